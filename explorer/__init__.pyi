@@ -106,7 +106,10 @@ from .statics.accuracy import (
     rms_error as rms_error,
     worst_error as worst_error,
 )
-from .statics.budget.allocation import Budget as Budget, tolerance_budget as tolerance_budget
+from .statics.budget.allocation import (
+    ToleranceBudget as ToleranceBudget,
+    tolerance_budget as tolerance_budget,
+)
 from .statics.budget.costs import (
     SourceCosts as SourceCosts,
     source_costs as source_costs,

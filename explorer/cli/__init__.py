@@ -24,6 +24,7 @@ COMMANDS: Mapping[str, str] = {
     "singularity": "Measure how near a pose is to a singularity, and to which.",
     "forces": "Compute the forces of actuators and struts under a load, and their limits.",
     "accuracy": "Compute the errors and the deflection of the tool in a pose.",
+    "budget": "Rank what tolerances cost in precision; find those of a wanted precision.",
     "interference": "Measure the clearances of the legs, in a pose or over a move.",
     "path": "Plan a path between two poses within limits, margins and clearances.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",

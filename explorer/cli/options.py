@@ -21,6 +21,7 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion
 from explorer.mechanism.tool_point import Point, offset_of, tool_offset, tool_position
+from explorer.mechanism.typical import typical_machine
 from explorer.numerics.arrays import FloatArray
 
 
@@ -71,6 +72,19 @@ class JsonOptions:
             write_json(as_json())
         else:
             write_lines(*as_lines())
+
+
+@dataclass(frozen=True, kw_only=True)
+class TypicalOptions:
+    """The option for typical values of precision and stiffness."""
+
+    typical: Flag = False
+    """Assume typical errors, stiffness, struts and tolerances where the design states none, and say
+    so."""
+
+    def with_typical(self, design: Design) -> tuple[Design, tuple[str, ...]]:
+        """Return the design with what is assumed of it, and in words what that is."""
+        return typical_machine(design) if self.typical else (design, ())
 
 
 @dataclass(frozen=True, kw_only=True)

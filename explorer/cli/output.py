@@ -150,6 +150,12 @@ def heading(design: Design) -> str:
     return f"{name} (1 unit = {design.unit_mm:g} mm, reach {design.reach:.6g})"
 
 
+def assumed_lines(assumed: Sequence[str]) -> Iterator[str]:
+    """Yield the line that says which typical values are assumed, if any are."""
+    if assumed:
+        yield f"assumed, since the design states none: {'; '.join(assumed)}"
+
+
 def pose_table(design: Design, pose: Pose, tool: Triple | None = None) -> str:
     """Return the position, the quaternion and the angles of a pose, and where its tool is."""
     angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()

@@ -17,10 +17,10 @@ from explorer import (
     PRESETS,
     SOURCES,
     Actuators,
-    Budget,
     Design,
     InputError,
     NoAnswerError,
+    ToleranceBudget,
     Tolerances,
     decode_design,
     encode_design,
@@ -341,7 +341,7 @@ def test_design_with_found_tolerances_keeps_what_is_wanted_after_its_file_is_rea
     assert costs.worst_displacement == found.costs.worst_displacement
     assert costs.worst_displacement <= 0.05
     assert costs.worst_turn <= 0.05
-    read: Budget = pickle.loads(pickle.dumps(found))
+    read: ToleranceBudget = pickle.loads(pickle.dumps(found))
     assert_allclose(read.tolerances, found.tolerances)
 
 

@@ -10,7 +10,8 @@ import msgspec
 import numpy as np
 
 from explorer.cli.load_options import LoadOptions, check_regular
-from explorer.cli.output import figure, figures, heading, pose_table, table
+from explorer.cli.options import TypicalOptions
+from explorer.cli.output import assumed_lines, figure, figures, heading, pose_table, table
 from explorer.cli.values import hint, numbers
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import DIMENSIONS, Six
@@ -24,6 +25,12 @@ from explorer.statics.compliance import (
     principal_compliances,
     stiffness_of,
 )
+from explorer.statics.error_sources import (
+    by_source,
+    largest_error,
+    rms_of_sources,
+    source_errors,
+)
 from explorer.statics.weights import carry, design_weights
 
 ORDER = "l1 d1 d2 d3 d4 l4"
@@ -35,6 +42,7 @@ class Answer:
     """What the command computes of a pose."""
 
     design: Design
+    assumed: tuple[str, ...]
     pose: Pose
     tool: Triple | None
     precision: Precision
@@ -42,10 +50,11 @@ class Answer:
     deflection: FloatArray
     shares: tuple[float, ...]
     geometry: ToolError
+    totals: dict[str, ToolError]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Accuracy(LoadOptions):
+class Accuracy(TypicalOptions, LoadOptions):
     """Compute the errors and the deflection of the tool in a pose.
 
     Errors, stiffness, struts and tolerances are those of the design; a design without them is
@@ -65,6 +74,7 @@ class Accuracy(LoadOptions):
     def run(self) -> None:
         """Write the errors, the compliance and the deflection."""
         design = self._with_actuators(self.read_loaded_design())
+        design, assumed = self.with_typical(design)
         pose, tool = self.pose(design), self.tool(design)
         given = design, pose.position, pose.rotation
         precision = pose_precision(*given, tool)
@@ -73,6 +83,7 @@ class Accuracy(LoadOptions):
         shares = compliance_shares(*given, wrench, *stiffness_of(design), tool)
         answer = Answer(
             design,
+            assumed,
             pose,
             tool,
             precision,
@@ -80,6 +91,7 @@ class Accuracy(LoadOptions):
             deflection(precision.compliance, wrench),
             tuple(float(share) for share in shares),
             geometry_error(design, precision.by_geometry),
+            _totals(design, precision),
         )
         self.write(lambda: _as_json(answer), lambda: _as_lines(answer))
 
@@ -95,6 +107,18 @@ class Accuracy(LoadOptions):
         if self.stiffness is not None:
             actuators = msgspec.structs.replace(actuators, stiffness_n_mm=self.stiffness)
         return msgspec.structs.replace(design, actuators=actuators)
+
+
+def _totals(design: Design, precision: Precision) -> dict[str, ToolError]:
+    """Return the worst and the RMS errors of the dimensions and of all sources together."""
+    influences, errors = by_source(precision), source_errors(design)
+    totals: dict[str, ToolError] = {}
+    for name, sources in (("dimensions", slice(len(JOINTS), None)), ("all", slice(None))):
+        given = influences[:, sources], errors[sources]
+        worst = largest_error(*given)
+        totals[f"worst_{{}}_of_{name}"] = ToolError(worst.displacement, worst.turn)
+        totals[f"rms_{{}}_of_{name}"] = rms_of_sources(*given)
+    return totals
 
 
 def _as_json(answer: Answer) -> dict[str, object]:
@@ -122,14 +146,25 @@ def _as_json(answer: Answer) -> dict[str, object]:
         "pose_error_by_geometry": precision.by_geometry,
         "displacement_by_geometry": answer.geometry.displacement,
         "turn_by_geometry": answer.geometry.turn,
+        **{
+            name.format(kind): float(getattr(error, kind))
+            for name, error in answer.totals.items()
+            for kind in ToolError._fields
+        },
+        "assumed": answer.assumed,
     }
 
 
 def _as_lines(answer: Answer) -> Iterator[str]:
     design, precision = answer.design, answer.precision
-    yield from (heading(design), pose_table(design, answer.pose, answer.tool), "")
+    yield from (heading(design), *assumed_lines(answer.assumed))
+    yield from (pose_table(design, answer.pose, answer.tool), "")
     rows = [("error from", "displacement, units", "mm", "turn")]
-    for name, error in (("all, worst", precision.worst), ("all, RMS", precision.rms)):
+    totals = [("actuators, worst", precision.worst), ("actuators, RMS", precision.rms)]
+    if any(answer.geometry.displacement) or any(answer.geometry.turn):
+        names = ("dimensions, worst", "dimensions, RMS", "all, worst", "all, RMS")
+        totals += zip(names, answer.totals.values(), strict=True)
+    for name, error in totals:
         rows.append((name, *_error(design, float(error.displacement), float(error.turn))))
     alone = precision.by_actuator
     for name, moved, turned in zip(JOINTS, *(each.tolist() for each in alone), strict=True):

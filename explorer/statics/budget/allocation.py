@@ -39,7 +39,7 @@ ROOM = 1e-9
 
 
 @dataclass(frozen=True)
-class Budget:
+class ToleranceBudget:
     """Tolerances that keep a wanted precision, with the least effort.
 
     Attributes:
@@ -73,7 +73,7 @@ def tolerance_budget(
     *,
     tool: ArrayLike | None = None,
     keep_actuators: bool = False,
-) -> Budget:
+) -> ToleranceBudget:
     """Return the tolerances of least effort that keep a wanted precision at all positions.
 
     The worst error within them is exact for the linear model, over all combinations of signs.
@@ -109,7 +109,7 @@ def tolerance_budget(
     tolerances = np.where(kept, stated, _rounded_down(found))
     efforts = 1.0 / (tolerances * lengths)
     costs = costs_of(design, points, influences, tolerances)
-    return Budget(tolerances, costs, float(efforts[~kept].sum()), least)
+    return ToleranceBudget(tolerances, costs, float(efforts[~kept].sum()), least)
 
 
 def _allocate(

@@ -1,0 +1,244 @@
+"""`explorer budget`: what tolerances cost in precision, and which ones keep a wanted precision."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+
+from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions, TypicalOptions
+from explorer.cli.output import (
+    assumed_lines,
+    attributes,
+    figure,
+    finite,
+    heading,
+    pose_table,
+    table,
+)
+from explorer.cli.usage import UsageError
+from explorer.cli.values import FILE, OPTIONAL, Flag, hint, numbers, positive
+from explorer.files.writing import check_writable, write_whole
+from explorer.measures.positions import PositionSet, positions_over
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import encode_design
+from explorer.mechanism.machine import Six
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.budget.allocation import ToleranceBudget, tolerance_budget
+from explorer.statics.budget.costs import (
+    IS_TILT,
+    PARTS,
+    SourceCosts,
+    source_costs,
+    stated_tolerances,
+    with_tolerances,
+)
+from explorer.statics.error_sources import SOURCES
+
+PROGRAM = "explorer budget"
+WORDS = {"box": "nodes of a grid over the box", "workspace": "nodes of a grid in the workspace"}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the command computes.
+
+    Attributes:
+        design: Design with what is assumed of it.
+        assumed: Words for what is assumed.
+        pose: Pose with the orientation, and with the position if there is only one.
+        tool: Tool point in the platform frame, in design units; None for b4.
+        over: Kind of the positions.
+        costs: Costs of the tolerances found, or else of those stated.
+        found: Tolerances that keep the wanted precision; None if none is wanted.
+        out: File of the design with these tolerances.
+    """
+
+    design: Design
+    assumed: tuple[str, ...]
+    pose: Pose
+    tool: Triple | None
+    over: PositionSet
+    costs: SourceCosts
+    found: ToleranceBudget | None
+    out: Path | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
+    """Rank what tolerances cost in precision; find those of a wanted precision.
+
+    The sources of errors are the six actuators and the 23 dimensions. The worst error is exact for
+    the linear model, over all combinations of signs, at the worst of the positions. The tolerances
+    that are found have the least sum of their reciprocals.
+    """
+
+    over: Annotated[
+        PositionSet | None, hint("default: box with --required-box, otherwise pose")
+    ] = None
+    """Positions, at one orientation: that of the pose, nodes of a grid over a box, or nodes of a
+    grid within the limits."""
+
+    required_box: Annotated[
+        Six | None,
+        numbers("--required-box", "x-low y-low z-low x-high y-high z-high"),
+        hint("default: the box of the design"),
+    ] = None
+    """Box of positions of b4 for `--over box`, in design units."""
+
+    wanted: Annotated[float | None, positive("--wanted"), OPTIONAL] = None
+    """Largest displacement of the tool that is wanted, in mm; tolerances that keep it are found."""
+
+    wanted_turn: Annotated[float | None, positive("--wanted-turn"), hint("default: any")] = None
+    """Largest turn of the tool that is wanted besides, in degrees."""
+
+    keep_actuators: Flag = False
+    """Keep the errors of the actuators as the design states them."""
+
+    out: Annotated[Path | None, FILE] = None
+    """File for the design with the tolerances that are found."""
+
+    def run(self) -> None:
+        """Write the costs of the tolerances, and the tolerances that are found.
+
+        Raises:
+            NoAnswerError: Errors are infinite at the positions, or those of the actuators alone
+                exceed what is wanted.
+        """
+        over, box = self._positions()
+        if self.wanted is None and (self.wanted_turn or self.keep_actuators or self.out):
+            raise UsageError(
+                "--wanted-turn, --keep-actuators and --out need a displacement with --wanted",
+                PROGRAM,
+            )
+        if self.out is not None:
+            check_writable(self.out)
+        design, assumed = self.with_typical(self.read_design())
+        pose, tool = self.pose(design), self.tool(design)
+        positions = positions_over(design, over, pose, box or design.limits.box)
+        given = design, positions, pose.rotation
+        found = None
+        if self.wanted is None:
+            costs = source_costs(*given, tool)
+        else:
+            found = tolerance_budget(
+                *given,
+                self.wanted,
+                self.wanted_turn,
+                tool=tool,
+                keep_actuators=self.keep_actuators,
+            )
+            costs = found.costs
+            if self.out is not None:
+                write_whole(self.out, encode_design(with_tolerances(design, found.tolerances)))
+        answer = Answer(design, assumed, pose, tool, over, costs, found, self.out)
+        self.write(lambda: _as_json(answer), lambda: self._as_lines(answer))
+
+    def _positions(self) -> tuple[PositionSet, tuple[Triple, Triple] | None]:
+        """Return the kind of the positions, and the given box.
+
+        Raises:
+            UsageError: Options contradict each other, or a low of the box exceeds its high.
+        """
+        given = self.required_box
+        over = self.over or ("pose" if given is None else "box")
+        if over != "box" and given is not None:
+            raise UsageError(f"--required-box needs --over box; got --over {over}", PROGRAM)
+        if over != "pose" and self.position is not None:
+            raise UsageError(f"--position is one position; leave out --over {over}", PROGRAM)
+        if given is None:
+            return over, None
+        lows, highs = given[:3], given[3:]
+        if any(low > high for low, high in zip(lows, highs, strict=True)):
+            raise UsageError("--required-box takes three lows, then highs above them", PROGRAM)
+        return over, (lows, highs)
+
+    def _as_lines(self, answer: Answer) -> Iterator[str]:
+        design, costs = answer.design, answer.costs
+        yield heading(design)
+        yield from assumed_lines(answer.assumed)
+        if answer.over == "pose":
+            yield pose_table(design, answer.pose, answer.tool)
+        else:
+            yield f"worst over {costs.count:,} {WORDS[answer.over]}, at one orientation"
+            if answer.over == "workspace" and not design.limits.margin:
+                yield "the limits demand no margin: nearer to singular poses errors are larger"
+        yield from ("", *_ranking(answer), "")
+        results = (
+            ("worst displacement", costs.worst_displacement, " mm", self.wanted),
+            ("worst turn", costs.worst_turn, "°", self.wanted_turn),
+            ("RMS displacement", costs.rms_displacement, " mm", None),
+            ("RMS turn", costs.rms_turn, "°", None),
+        )
+        rows = [
+            (
+                name,
+                f"{figure(value)}{unit}",
+                "" if wanted is None else f"of the wanted {wanted:g}{unit}",
+            )
+            for name, value, unit, wanted in results
+        ]
+        if answer.found is not None:
+            effort = f"{100.0 * answer.found.excess:.1f} % above the least, by rounding down"
+            rows.append(("sum of 1/tolerance", f"{figure(answer.found.effort)} /mm", effort))
+        yield table(rows, "<<<")
+        if answer.found is not None:
+            far = float(costs.lengths[IS_TILT].max() / np.radians(1.0))
+            yield f"a tilt counts as what it moves the guide by at {figure(far)} mm from a1"
+        if answer.out is not None:
+            yield str(answer.out)
+
+
+def _ranking(answer: Answer) -> Iterator[str]:
+    """Yield the table of the sources from the costliest."""
+    costs = answer.costs
+    stated = stated_tolerances(answer.design)
+    header = ("mm per mm or °", "° per mm or °", "stated", "found", "moves, mm", "turns", "share")
+    rows: list[tuple[str, ...]] = [("error of", "part", *header)]
+    rows += [
+        (
+            SOURCES[k],
+            PARTS[k],
+            figure(float(costs.displacement[k])),
+            figure(float(costs.turn[k])),
+            _tolerance(stated, k),
+            _tolerance(costs.tolerances, k),
+            figure(float(costs.displacement_within[k])),
+            f"{figure(float(costs.turn_within[k]))}°",
+            f"{100.0 * float(costs.shares[k]):.1f} %",
+        )
+        for k in costs.ranking.tolist()
+    ]
+    if answer.found is None:
+        rows = [(*row[:5], *row[6:]) for row in rows]
+    yield table(rows, "<<" + ">" * (len(rows[0]) - 2))
+
+
+def _tolerance(tolerances: FloatArray, k: int) -> str:
+    value = float(tolerances[k])
+    if not np.isfinite(value):
+        return "any"
+    return f"{value:g}{'°' if IS_TILT[k] else ' mm'}"
+
+
+def _as_json(answer: Answer) -> dict[str, object]:
+    costs, found = answer.costs, answer.found
+    names = "count position turn displacement displacement_within turn_within shares turn_shares"
+    return {
+        "over": answer.over,
+        "assumed": answer.assumed,
+        "sources": SOURCES,
+        "parts": PARTS,
+        "ranking": [SOURCES[k] for k in costs.ranking.tolist()],
+        **attributes(costs, names),
+        **attributes(costs, "worst_displacement worst_turn rms_displacement rms_turn"),
+        "stated": stated_tolerances(answer.design),
+        "tolerances": None if found is None else [*map(finite, found.tolerances.tolist())],
+        "effort": None if found is None else found.effort,
+        "least_effort": None if found is None else found.least_effort,
+        "out": answer.out,
+    }
