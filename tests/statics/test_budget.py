@@ -11,6 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 from refusals import refusal
 from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
 from statics_cases import random_poses
 
 from explorer import (
@@ -254,7 +255,7 @@ def test_tolerances_do_not_depend_on_the_design_unit(factor: float) -> None:
     found = tolerance_budget(design, factor * positions, HOME.rotation, 0.05, 0.05)
     expected = tolerance_budget(OPTIMAL, positions, HOME.rotation, 0.05, 0.05)
     assert_allclose(found.tolerances, expected.tolerances, rtol=0.1)
-    assert found.least_effort == pytest.approx(expected.least_effort, rel=1e-7)
+    assert found.least_effort == pytest.approx(expected.least_effort, rel=2e-6)
 
 
 @pytest.mark.parametrize("unit_mm", [1e-3, 1.0, 1e3])
@@ -266,13 +267,34 @@ def test_tolerances_of_large_and_small_machines_grow_with_what_is_wanted(unit_mm
     sizes = np.where(IS_TILT, 1.0, unit_mm / OPTIMAL.unit_mm)
     assert_allclose(found.tolerances, expected.tolerances * sizes, rtol=0.1)
     least = expected.least_effort * OPTIMAL.unit_mm / unit_mm
-    assert found.least_effort == pytest.approx(least, rel=1e-7)
+    assert found.least_effort == pytest.approx(least, rel=2e-6)
 
 
 @pytest.mark.parametrize("wanted", [1e-100, 1e-9, 1e9, 1e100])
 def test_wanted_precision_of_any_size_is_kept(wanted: float) -> None:
     found = tolerance_budget(OPTIMAL, box_positions(), HOME.rotation, wanted)
     assert 0.9 * wanted < found.costs.worst_displacement <= wanted
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_effort_is_near_its_lower_bound_for_any_design_in_any_pose(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** float(rng.uniform(-25.0, 25.0))
+    variables = size * rng.normal(size=6) * np.power(10.0, rng.uniform(-3.0, 0.0, 6))
+    unit_mm = 10.0 ** float(rng.uniform(-3.0, 3.0))
+    design = msgspec.structs.replace(
+        OPTIMAL.with_variables(variables.tolist()), unit_mm=unit_mm, home=None
+    )
+    rotation = Rotation.random(random_state=rng).as_matrix()
+    # Many of these are near a singular plane.
+    position = design.reach * rng.normal(size=(1, 3)) * np.power(10.0, rng.uniform(-8.0, 1.0, 3))
+    wanted = 10.0 ** float(rng.uniform(-20.0, 20.0))
+    turn = 10.0 ** float(rng.uniform(-10.0, 10.0)) if seed % 2 else None
+    found = tolerance_budget(design, position, rotation, wanted, turn)
+    assert found.costs.worst_displacement <= wanted
+    assert turn is None or found.costs.worst_turn <= turn
+    # Rounding down to two digits takes less than a tenth of each tolerance.
+    assert 0.0 < found.excess < 0.11
 
 
 def test_source_that_moves_nothing_takes_any_tolerance() -> None:

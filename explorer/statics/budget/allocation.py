@@ -32,8 +32,8 @@ from explorer.statics.error_sources import SOURCES, largest_error
 
 # Share of the largest influence up to which that of a source is rounding.
 NO_INFLUENCE = 1e-12
-# Largest excess of the effort over its lower bound, as a share, and the most cuts.
-GAP, MOST_ROUNDS = 1e-8, 100
+# Largest excess of the effort over its lower bound, as a share, and the most rounds.
+GAP, MOST_ROUNDS = 1e-6, 100
 # Room for the rounding of a sum of 29 errors, as a share of what is wanted.
 ROOM = 1e-9
 
@@ -154,6 +154,8 @@ def _allocate(
                 along = np.abs(vectors[place, half] @ halves[place, half]) / size
                 cuts.add(along[free] * scales, 1.0 - float(along @ held))
         x = cuts.solve()
+        if not np.isfinite(x).all():
+            break  # The solver has run out of precision; the best so far keeps what is wanted.
     return tolerances, cuts.least
 
 
