@@ -354,6 +354,13 @@ def test_unusable_wanted_precision_is_refused(wanted: float) -> None:
     )
 
 
+def test_costs_without_positions_are_refused() -> None:
+    none = np.empty((0, 3))
+    assert "at least one" in refusal(source_costs, OPTIMAL, none, HOME.rotation, kind=InputError)
+    largest = largest_error(pose_error_by_source(OPTIMAL, none, HOME.rotation), np.ones(29))
+    assert largest.vectors.shape == (0, 2, 3)
+
+
 def test_design_with_found_tolerances_keeps_what_is_wanted_after_its_file_is_read() -> None:
     found = tolerance_budget(STATED, box_positions(), HOME.rotation, 0.05, 0.05)
     written = encode_design(with_tolerances(STATED, found.tolerances))

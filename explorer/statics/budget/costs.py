@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import NoAnswerError
+from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import DIMENSIONS, Tolerances
 from explorer.mechanism.margins import INCIDENCES, margins
@@ -99,7 +99,7 @@ def source_costs(
         tool: Tool point in the platform frame, shape (3,), in design units; None for b4.
 
     Raises:
-        InputError: A position or the tool is not finite, or the rotation is not one.
+        InputError: There is no position, one or the tool is not finite, or the rotation is not one.
         NoAnswerError: A position is singular, or singular ones lie between them.
     """
     points = finite_array("positions", positions, (3,)).reshape(-1, 3)
@@ -145,9 +145,11 @@ def source_influences(
     """Return displacement (mm) and turn (degrees) of the tool per error, shape (n, 6, 29).
 
     Raises:
-        InputError: A position or the tool is not finite, or the rotation is not one.
+        InputError: There is no position, one or the tool is not finite, or the rotation is not one.
         NoAnswerError: A position is singular, or singular ones lie between them.
     """
+    if not len(positions):
+        raise InputError("costs of tolerances need at least one position; got none")
     signs = np.sign(margins(positions, rotation))
     crossed = np.flatnonzero(np.abs(signs.sum(axis=0)) < len(signs))
     by_source = pose_error_by_source(design, positions, rotation, tool)
