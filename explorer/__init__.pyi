@@ -8,6 +8,11 @@ from .errors import (
     MissingExtraError as MissingExtraError,
     NoAnswerError as NoAnswerError,
 )
+from .export.imperfect import (
+    ImperfectMachine as ImperfectMachine,
+    draw_deviations as draw_deviations,
+)
+from .export.simulation import simulation_mjcf as simulation_mjcf
 from .legs.clearance import (
     PAIRS as PAIRS,
     LegClearances as LegClearances,

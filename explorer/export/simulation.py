@@ -8,6 +8,10 @@ the six actuators.
 The swing limit of a universal joint is a cone; its two hinges have the box around it. Limits
 of the ball joints and of the pose (box, margins) have no counterpart in MJCF and are left out, as
 is the payload, whose weight would need servos of its own size.
+
+The model of an imperfect machine has its dimensions, and starts where its loops close. A joint has
+the value that its encoder reads, which is off by the zero of the encoder: commands, ranges and
+`qpos` are what a controller knows. Its servos have the stiffness of the design.
 """
 
 from __future__ import annotations
@@ -20,6 +24,7 @@ import numpy as np
 
 from explorer import __version__
 from explorer.errors import InputError
+from explorer.export.imperfect import UNITS, ImperfectMachine, drawing_values
 from explorer.mechanism.design import DOWN, JOINTS, Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import platform_points
@@ -37,6 +42,7 @@ from explorer.prototype.chains import (
 )
 from explorer.prototype.mass import Mass
 from explorer.prototype.sketch import BALL, ROD, leg_radii, sketch_masses
+from explorer.statics.error_sources import SOURCES
 from explorer.workspace.limits.constraints import demanded_order
 
 DENSITY = 1240.0
@@ -65,8 +71,14 @@ def simulation_joints(design: Design, position: FloatArray, rotation: FloatArray
     Raises:
         InputError: The position is not finite, or the rotation is not one.
     """
-    metres = 1e-3 * design.unit_mm
-    values = Chains.of(design).joints(position, rotation)
+    return _qpos(design, Chains.of(design).joints(position, rotation), position, rotation)
+
+
+def _qpos(
+    design: Design, joints: FloatArray, position: FloatArray, rotation: FloatArray
+) -> FloatArray:
+    """Return `qpos`, shape (..., 19), of chain joints (..., 12) in design units."""
+    metres, values = 1e-3 * design.unit_mm, joints
     values = np.where(np.isin(CHAIN_JOINTS, JOINTS), values * metres, values)
     platform_position = np.broadcast_to(position * metres, (*values.shape[:-1], 3))
     quaternion = np.broadcast_to(quaternion_from_rotation(rotation), (*values.shape[:-1], 4))
@@ -74,12 +86,15 @@ def simulation_joints(design: Design, position: FloatArray, rotation: FloatArray
 
 
 def simulation_mjcf(
-    design: Design, density: float = DENSITY, masses: Mapping[str, Mass] | None = None
+    design: Design | ImperfectMachine,
+    density: float = DENSITY,
+    masses: Mapping[str, Mass] | None = None,
 ) -> str:
     """Return the model as XML.
 
     Args:
-        design: The manipulator.
+        design: The manipulator, or an imperfect machine of it, such as
+            `explorer.ImperfectMachine.draw(design, seed)`.
         density: Density of the bodies, in kg/m³.
         masses: Masses of the bodies in their own frames, in metres and kilograms, such as
             `explorer.prototype.assembly.Prototype.masses`; those of bars with the legs' radii
@@ -88,6 +103,7 @@ def simulation_mjcf(
     Raises:
         InputError: The density is not positive, a leg has zero length in the home pose, or bodies
             are so light that MuJoCo treats them as massless.
+        NoAnswerError: The legs of the imperfect machine do not close near home.
     """
     if not (math.isfinite(density) and density > 0.0):
         raise InputError(f"the density must be positive; got {density:g}")
@@ -97,8 +113,14 @@ def simulation_mjcf(
 class _Model:
     """The elements of the model, from a design in its home pose."""
 
-    def __init__(self, design: Design, density: float, masses: Mapping[str, Mass] | None) -> None:
-        self.design = design
+    def __init__(
+        self,
+        given: Design | ImperfectMachine,
+        density: float,
+        masses: Mapping[str, Mass] | None,
+    ) -> None:
+        self.machine = given if isinstance(given, ImperfectMachine) else None
+        self.design = design = given.design if isinstance(given, ImperfectMachine) else given
         self.metres = 1e-3 * design.unit_mm
         self.home = home_pose(design)
         self.chains = Chains.of(design)
@@ -111,13 +133,33 @@ class _Model:
                     "there has no direction for it; choose another home"
                 )
         self.places: Places = self.chains.places(joints, position, rotation)
-        self.values = simulation_joints(design, position, rotation).tolist()
+        self.nominal = self.values = simulation_joints(design, position, rotation).tolist()
         self.masses = masses or {
             name: mass.scaled(self.metres, density * self.metres**3)
             for name, mass in sketch_masses(self.chains, joints, 1.0).items()
         }
         self._check_masses()
         self.radii = [radius * self.metres for radius in leg_radii(design)]
+        self.moving = sum(mass.mass for mass in self.masses.values())
+        self.points = platform_points(design)
+        self.stiffness: FloatArray | None = None
+        self.timestep = TIMESTEP
+        if self.machine is not None:
+            self._deviate(self.machine)
+
+    def _deviate(self, machine: ImperfectMachine) -> None:
+        """Replace what differs in an imperfect machine."""
+        position, rotation = np.array(machine.home.position), machine.home.rotation
+        joints = machine.chain_joints(position, rotation)
+        self.places = machine.places(joints, position, rotation)
+        joints[list(ACTUATED)] -= machine.zeros
+        self.values = _qpos(self.design, joints, position, rotation).tolist()
+        self.points = machine.points
+        self.stiffness = machine.stiffness
+        if self.stiffness is not None:
+            # Stiffer servos are faster: a step is the same share of their period.
+            fastest = math.sqrt(float(self.stiffness.max()) / self.moving)
+            self.timestep = min(TIMESTEP, float(f"{TIMESTEP * SERVO / fastest:.2g}"))
 
     def _check_masses(self) -> None:
         def inertia(mass: Mass) -> float:
@@ -143,11 +185,13 @@ class _Model:
                 f"one design unit is {self.design.unit_mm:g} mm "
             )
         )
+        if self.machine is not None:
+            root.append(ET.Comment(self._remarks(self.machine)))
         ET.SubElement(root, "compiler", angle="radian", autolimits="true")
         option = ET.SubElement(
             root,
             "option",
-            timestep=repr(TIMESTEP),
+            timestep=repr(self.timestep),
             integrator="implicitfast",
             solver="Newton",
             iterations="100",
@@ -158,7 +202,7 @@ class _Model:
         default = ET.SubElement(root, "default")
         # Bodies overlap in their joints, so contacts are off; the explorer checks collisions.
         ET.SubElement(default, "geom", contype="0", conaffinity="0")
-        stiff = {"solref": f"{2 * TIMESTEP!r} 1", "solimp": "0.9999 0.99999 1e-5"}
+        stiff = {"solref": f"{2 * self.timestep!r} 1", "solimp": "0.9999 0.99999 1e-5"}
         ET.SubElement(default, "equality", stiff)
         self._bodies(ET.SubElement(root, "worldbody"))
         equality = ET.SubElement(root, "equality")
@@ -169,7 +213,7 @@ class _Model:
         self._actuators(ET.SubElement(root, "actuator"))
         key = ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="home")
         key.set("qpos", _row(self.values))
-        key.set("ctrl", _row(self.values[index] for index in ACTUATED))
+        key.set("ctrl", _row(self.nominal[index] for index in ACTUATED))
         ET.indent(root)
         return ET.tostring(root, encoding="unicode") + "\n"
 
@@ -177,11 +221,11 @@ class _Model:
         design, metres = self.design, self.metres
         low, high = design.limits.guide or (0.0, design.a2x)
         thin = min(self.radii[1:3])
-        guide = _row([low * metres, 0.0, 0.0, high * metres, 0.0, 0.0])
         if high > low:
-            _geom(world, "capsule", thin, "guide", fromto=guide)
-        for name, (x, y) in (("a1", (0.0, 0.0)), ("a3", design.a3)):
-            _geom(world, "sphere", thin, name, pos=_row([x * metres, y * metres, 0.0]))
+            ends = [self._base_point(2, (x, 0.0)) for x in (low, high)]
+            _geom(world, "capsule", thin, "guide", fromto=_row(np.concatenate(ends)))
+        for name, leg, place in (("a1", 1, (0.0, 0.0)), ("a3", 4, design.a3)):
+            _geom(world, "sphere", thin, name, pos=_row(self._base_point(leg, place)))
         for leg in LEGS:
             radius = self.radii[leg - 1]
             names = BODIES[3 * leg - 2 : 3 * leg + 1]
@@ -195,7 +239,7 @@ class _Model:
             _geom(rod, "capsule", ROD * radius, fromto=_row([0, 0, -length, 0, 0, 0]))
             ET.SubElement(rod, "site", name=f"rod {leg} b{leg}", size=repr(radius))
         platform = self._body(world, "platform", "base")
-        points = platform_points(design) * metres
+        points = self.points * metres
         hub = points.mean(axis=0)
         for leg, radius, point in zip(LEGS, self.radii, points, strict=True):
             size, where = repr(radius), _row(point)
@@ -203,6 +247,13 @@ class _Model:
             _geom(platform, "sphere", BALL * radius, pos=where)
             if (point != hub).any():
                 _geom(platform, "capsule", radius, fromto=_row([*hub, *point]))
+
+    def _base_point(self, leg: int, place: tuple[float, float]) -> FloatArray:
+        """Return where a point (x, y) of the base at a leg lies, shape (3,), in metres."""
+        point = np.array([*place, 0.0])
+        if self.machine is not None:
+            point = self.machine.shifts[leg - 1] + self.machine.turns[leg - 1] @ point
+        return point * self.metres
 
     def _body(self, parent: ET.Element, name: str, within: str) -> ET.Element:
         """Add a body with its joint and its mass, placed as in the home pose."""
@@ -240,7 +291,7 @@ class _Model:
             axis=_row(axis),
             ref=repr(self.values[index]),
         )
-        limits = self._range(name, self.values[index])
+        limits = self._range(name, self.nominal[index])
         if limits is not None:
             joint.set("range", _row(limits))
 
@@ -265,7 +316,7 @@ class _Model:
         gap = self.design.limits.gap
         if gap <= 0.0 and not demanded_order(self.design):
             return
-        d1, d3 = (self.values[CHAIN_JOINTS.index(name)] for name in ("d1", "d3"))
+        d1, d3 = (self.nominal[CHAIN_JOINTS.index(name)] for name in ("d1", "d3"))
         order = 1 if d1 > d3 else -1
         limits = _row([gap * self.metres, 1e3 * self.design.reach * self.metres])
         tendon = ET.SubElement(ET.SubElement(root, "tendon"), "fixed", name="gap", range=limits)
@@ -273,19 +324,36 @@ class _Model:
             ET.SubElement(tendon, "joint", joint=joint, coef=str(sign))
 
     def _actuators(self, parent: ET.Element) -> None:
-        moving = sum(mass.mass for mass in self.masses.values())
-        for name in JOINTS:
+        for index, name in enumerate(JOINTS):
             limits = self._range(name, 0.0)
+            kp, kv = self.moving * SERVO**2, 2.0 * self.moving * SERVO
+            if self.stiffness is not None:
+                kp = float(self.stiffness[index])
+                kv = 2.0 * math.sqrt(kp * self.moving)
             servo = ET.SubElement(
-                parent,
-                "position",
-                name=name,
-                joint=name,
-                kp=repr(moving * SERVO**2),
-                kv=repr(2.0 * moving * SERVO),
+                parent, "position", name=name, joint=name, kp=repr(kp), kv=repr(kv)
             )
             if limits is not None:
                 servo.set("ctrlrange", _row(limits))
+
+    def _remarks(self, machine: ImperfectMachine) -> str:
+        """Return what differs from the perfect machine, as lines of a comment."""
+        seed = "" if machine.seed is None else f", drawn with seed {machine.seed}"
+        lines = [
+            f"An imperfect machine{seed}.",
+            "Values of the six actuated joints are what their encoders read: the true ones less",
+            "the deviation of the zero. The keyframe commands the joints of the perfect machine.",
+        ]
+        values = drawing_values(machine.design, machine.deviations)
+        rows = zip(SOURCES, values.tolist(), UNITS, strict=True)
+        lines += [f"{name}: {value:+.6g} {unit}" for name, value, unit in rows if value]
+        if self.stiffness is not None:
+            lines += [
+                "The servos have the stiffness of the actuators; those of d1 and d3 are in series",
+                "with struts 2 and 3 of the lengths at home. A servo of what the design leaves rigid",
+                "is ten times as stiff as the stiffest spring.",
+            ]
+        return "\n    ".join(["", *lines]) + "\n  "
 
 
 def _geom(parent: ET.Element, kind: str, radius: float, name: str = "", **where: str) -> None:

@@ -1,0 +1,259 @@
+"""A machine that deviates from its design: other dimensions, and encoders whose zeros are off.
+
+Nothing is linear here. Each leg is the one of the design, moved as a whole: legs 1 and 4 with a1
+and a3, legs 2 and 3 with the guide, whose tilt is the rotation by the vector (0, y, z) about a1.
+The ends b1 to b4 lie elsewhere on the platform.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from explorer.errors import InputError, NoAnswerError
+from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.kinematics import checked_joints, inverse, platform_points
+from explorer.mechanism.margins import margins, mode_of
+from explorer.mechanism.pose import Pose, checked_rotation
+from explorer.mechanism.tool_point import tool_offset
+from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.prototype.chains import ACTUATED, Chains, Places
+from explorer.statics.accuracy import A1_COLUMN, A3_COLUMN, B_COLUMN, GUIDE_COLUMN, TILT_COLUMN
+from explorer.statics.compliance import stiffness_of
+from explorer.statics.error_sources import SOURCES, pose_error_by_source, source_errors
+
+UNITS = tuple("degrees" if "tilt" in name else "mm" for name in SOURCES)
+"""Units of the deviations of the sources on a drawing."""
+
+# Largest error of the joints of a solved pose, as a share of the reach.
+CLOSED = 1e-12
+# Stiffness of what a design leaves rigid, over that of its stiffest spring.
+RIGID = 10.0
+
+
+def draw_deviations(design: Design, seed: int) -> FloatArray:
+    """Return random deviations of a design's 29 sources of errors, shape (29,).
+
+    Each is drawn uniformly within ± its largest error, by NumPy's `default_rng(seed)`. The order is
+    that of `explorer.statics.error_sources.SOURCES`: the zeros of the encoders of the six
+    actuators, then the 23 dimensions. Lengths are in design units, tilts in radians.
+
+    Args:
+        design: The manipulator, with the errors of its actuators and its tolerances.
+        seed: Seed of the drawing, not negative.
+
+    Raises:
+        InputError: The seed is negative, or the design states neither errors nor tolerances nor
+            any stiffness, so that no machine differs from it.
+    """
+    if seed < 0:
+        raise InputError(f"the seed must not be negative; got {seed}")
+    errors = source_errors(design)
+    if not errors.any() and all(np.isinf(each).all() for each in stiffness_of(design)):
+        raise InputError(
+            "the design states no errors, so that no machine differs from it: give its file "
+            "tolerances, actuators.error_mm, actuators.stiffness_n_mm or struts.outer_mm"
+        )
+    return errors * np.random.default_rng(seed).uniform(-1.0, 1.0, len(SOURCES))
+
+
+def drawing_values(design: Design, deviations: FloatArray) -> FloatArray:
+    """Return deviations of the sources or their bounds (29,) in the units of `UNITS`."""
+    is_tilt = np.array(UNITS) == "degrees"
+    return np.where(is_tilt, np.degrees(deviations), deviations * design.unit_mm)
+
+
+def servo_stiffness(design: Design) -> FloatArray | None:
+    """Return the stiffness of the servos at home, shape (6,), in N/m; None if all is rigid.
+
+    Those of d1 and d3 are in series with struts 2 and 3, cantilevers of the lengths that d2 and d4
+    have at home. An actuator that the design leaves rigid is ten times as stiff as the stiffest of
+    the others.
+    """
+    stiffness, bending = stiffness_of(design)
+    home = home_pose(design)
+    softness = 1.0 / stiffness
+    lengths = inverse(design, home.position, home.rotation)[[2, 4]]
+    softness[[1, 3]] += lengths**3 / (3.0 * bending)
+    gives = softness > 0.0
+    if not gives.any():
+        return None
+    softness[~gives] = softness[gives].min() / RIGID
+    return 1e3 / (softness * design.unit_mm)
+
+
+@dataclass(frozen=True, eq=False)
+class ImperfectMachine:
+    """A machine of a design, with its deviations.
+
+    Attributes:
+        design: The manipulator.
+        deviations: Deviations of the sources of errors, shape (29,), such as those of
+            `draw_deviations`, in design units and radians.
+        seed: Seed with which they were drawn; None if they were not.
+
+    Raises:
+        InputError: The deviations are not 29 finite numbers.
+    """
+
+    design: Design
+    deviations: FloatArray
+    seed: int | None = None
+
+    def __post_init__(self) -> None:
+        given = finite_array("deviations", self.deviations, (len(SOURCES),))
+        if given.ndim != 1:
+            raise InputError("a machine has one set of deviations, not a batch")
+
+    @staticmethod
+    def draw(design: Design, seed: int) -> ImperfectMachine:
+        """Return a random machine of a design, as `draw_deviations` does."""
+        return ImperfectMachine(design, draw_deviations(design, seed), seed)
+
+    @property
+    def zeros(self) -> FloatArray:
+        """True joint values less those that the encoders read, shape (6,), in design units."""
+        return self.deviations[:6]
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """True b1, b2, b3 and b4 in the platform frame, shape (4, 3), in design units."""
+        return platform_points(self.design) + self._dimensions[B_COLUMN:].reshape(4, 3)
+
+    @cached_property
+    def shifts(self) -> FloatArray:
+        """Displacements of the four legs' bases, shape (4, 3), in design units."""
+        starts = (A1_COLUMN, GUIDE_COLUMN, GUIDE_COLUMN, A3_COLUMN)
+        return np.stack([self._dimensions[start : start + 3] for start in starts])
+
+    @cached_property
+    def turns(self) -> FloatArray:
+        """Rotations of the four legs' bases about a1, shape (4, 3, 3)."""
+        tilt = [0.0, *self._dimensions[TILT_COLUMN : TILT_COLUMN + 2]]
+        guide = Rotation.from_rotvec(tilt).as_matrix()
+        return np.stack([np.eye(3), guide, guide, np.eye(3)])
+
+    @cached_property
+    def stiffness(self) -> FloatArray | None:
+        """Stiffness of the servos, as of `servo_stiffness`."""
+        return servo_stiffness(self.design)
+
+    @property
+    def _dimensions(self) -> FloatArray:
+        return self.deviations[6:]
+
+    @cached_property
+    def _chains(self) -> Chains:
+        return Chains.of(self.design)
+
+    def chain_joints(self, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+        """Return the true joint values of all chains in a pose, shape (12,), as `CHAIN_JOINTS`.
+
+        Args:
+            position: Position of the platform's frame in the base frame, shape (3,).
+            rotation: Platform to base, shape (3, 3).
+
+        Raises:
+            InputError: The position is not finite, or the rotation is not one.
+        """
+        p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
+        ends = p + self.points @ r.T
+        # Seen from its base, a leg is that of the design at another position of the platform.
+        seen = np.einsum("kji,kj->ki", self.turns, ends - self.shifts)
+        positions = seen - platform_points(self.design) @ r.T
+        values = self._chains.joints(positions, r).reshape(4, 4, 3)
+        return values[range(4), range(4)].ravel()
+
+    def places(self, joints: FloatArray, position: ArrayLike, rotation: ArrayLike) -> Places:
+        """Return the placements of all bodies in a pose with these true joint values (12,)."""
+        origin, turn = self._chains.places(joints, position, rotation)
+        legs = slice(1, 13)
+        turns, shifts = np.repeat(self.turns, 3, axis=0), np.repeat(self.shifts, 3, axis=0)
+        origin[legs] = shifts + np.einsum("kij,kj->ki", turns, origin[legs])
+        turn[legs] = turns @ turn[legs]
+        return Places(origin, turn)
+
+    def pose(self, joints: ArrayLike, near: Pose) -> Pose:
+        """Return the true pose in which the encoders read the joints.
+
+        Args:
+            joints: Values (l1, d1, d2, d3, d4, l4) that the encoders read, shape (6,), in design
+                units.
+            near: A pose close to it, such as the one in which the design has these joints.
+
+        Raises:
+            InputError: The joints are not usable.
+            NoAnswerError: There is no such pose in the assembly mode of the pose nearby.
+        """
+        from scipy.optimize import least_squares
+
+        true = checked_joints(self.design, joints) + self.zeros
+        size, position, rotation = self.design.reach, np.array(near.position), near.rotation
+
+        def moved(twist: FloatArray) -> tuple[FloatArray, FloatArray]:
+            turn = Rotation.from_rotvec(twist[3:]).as_matrix()
+            return position + size * twist[:3], turn @ rotation
+
+        def unmet(twist: FloatArray) -> FloatArray:
+            return (self.chain_joints(*moved(twist))[list(ACTUATED)] - true) / size
+
+        found = least_squares(unmet, np.zeros(6), method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        pose = Pose.of(*moved(found.x))
+        scale = max(1.0, float(np.abs(true).max()) / size)
+        modes = [mode_of(margins(each.position, each.rotation)) for each in (near, pose)]
+        if np.abs(unmet(found.x)).max() > CLOSED * scale or modes[0] != modes[1]:
+            raise NoAnswerError(
+                "the legs of the machine that deviates do not close near the pose of the design: "
+                "the errors are too large so close to singular poses; make them smaller, or "
+                "choose another home"
+            )
+        return pose
+
+    @cached_property
+    def home(self) -> Pose:
+        """True pose in which the encoders read the joints of the design's home pose.
+
+        Raises:
+            NoAnswerError: There is no such pose close to home.
+        """
+        home = home_pose(self.design)
+        if not self.deviations.any():
+            return home
+        return self.pose(inverse(self.design, home.position, home.rotation), home)
+
+    def tool_error(self) -> FloatArray:
+        """Return displacement and turn of the tool from its place at home, shape (6,).
+
+        They are exact, in design units and radians, along the axes of the base.
+
+        Raises:
+            NoAnswerError: The loops do not close near home.
+        """
+        meant, true = home_pose(self.design), self.home
+        tool = self.design.tool.position
+        moved = np.array(true.position) + tool_offset(true.rotation, tool)
+        moved -= np.array(meant.position) + tool_offset(meant.rotation, tool)
+        turn = Rotation.from_matrix(true.rotation @ meant.rotation.T)
+        return np.concatenate([moved, turn.as_rotvec()])
+
+    def linear_tool_error(self) -> FloatArray:
+        """Return what the linear model makes of `tool_error`, shape (6,).
+
+        Raises:
+            NoAnswerError: The home pose is singular.
+        """
+        if not self.deviations.any():
+            return np.zeros(6)
+        home = home_pose(self.design)
+        tool = self.design.tool.position
+        slopes = pose_error_by_source(self.design, home.position, home.rotation, tool)
+        if not np.isfinite(slopes).all():
+            raise NoAnswerError(
+                "the home pose is singular, so that errors have no bound there; choose another home"
+            )
+        return slopes @ self.deviations
