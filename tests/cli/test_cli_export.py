@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from explorer.cli import run
 from explorer.export.mesh import FORMATS
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Actuators, Payload
+from explorer.mechanism.typical import STIFFNESSES, typical_machine
 from explorer.workspace.held import held_workspace
 from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
@@ -149,6 +151,85 @@ def test_export_simulation_is_an_mjcf_model(cli: CommandLine, tmp_path: Path) ->
     assert out.read_text(encoding="utf-8") == simulation_mjcf(OPTIMAL, masses=masses)
 
 
+def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is(
+    cli: CommandLine, tmp_path: Path
+) -> None:
+    tolerances = explorer.Tolerances(a3=(0.1, 0.2, 0.0), guide_tilt_deg=(0.0, 0.3))
+    design = msgspec.structs.replace(
+        OPTIMAL,
+        tool=explorer.Tool((0.5, 1.0, -2.0)),
+        actuators=Actuators(error_mm=(0.05, 0, 0, 0, 0, 0), stiffness_n_mm=STIFFNESSES),
+        tolerances=tolerances,
+    )
+    file, out = tmp_path / "design.json", tmp_path / "model.xml"
+    file.write_bytes(encode_design(design))
+    words = ("simulation", "--design", file, "--out", out, "--errors", 7)
+    answer = cli.answer(*words)
+    machine = explorer.ImperfectMachine.draw(design, 7)
+    assert out.read_text(encoding="utf-8") == explorer.simulation_mjcf(machine)
+    assert (answer["seed"], len(answer["bodies"])) == (7, 13)
+    rows = {row["name"]: row for row in answer["deviations"]}
+    assert list(rows) == list(explorer.SOURCES)
+    assert {name for name, row in rows.items() if row["deviation"]} == {
+        *("l1", "a3x", "a3y", "guide tilt z")
+    }
+    for name, value, most, unit in (
+        ("l1", machine.deviations[0] * 10.0, 0.05, "mm"),
+        ("a3y", machine.deviations[10] * 10.0, 0.2, "mm"),
+        ("guide tilt z", math.degrees(machine.deviations[16]), 0.3, "degrees"),
+    ):
+        assert rows[name]["deviation"] == pytest.approx(value)
+        assert rows[name]["largest"] == pytest.approx(most)
+        assert rows[name]["unit"] == unit
+    for key, error in (
+        ("tool_error", machine.tool_error()),
+        ("linear_tool_error", machine.linear_tool_error()),
+    ):
+        assert answer[key]["displacement_mm"] == pytest.approx(error[:3] * 10.0)
+        assert answer[key]["turn_degrees"] == pytest.approx([math.degrees(v) for v in error[3:]])
+    assert answer["servo_stiffness_n_mm"] == pytest.approx([1000.0] * 6)
+    path, head, *lines = cli.text(*words).splitlines()
+    assert path == str(out)
+    assert head.split() == ["seed", "7", "deviation", "within", "±"]
+    assert [line.rsplit(maxsplit=3)[0].strip() for line in lines[:4]] == [
+        *("l1", "a3x", "a3y", "guide tilt z")
+    ]
+    assert lines[3].endswith("0.3  degrees")
+    assert lines[5].startswith("tool at home off by")
+    size = math.hypot(*answer["tool_error"]["displacement_mm"])
+    assert lines[6].split()[:2] == ["displacement", f"{size:.6g}"]
+    names = [line.split()[0] for line in lines[6:]]
+    assert names == ["displacement", "displacement,", "turn", "turn,"]
+
+
+def test_export_simulation_with_errors_assumes_typical_values_only_if_asked(
+    cli: CommandLine, tmp_path: Path
+) -> None:
+    out = tmp_path / "model.xml"
+    words = ("simulation", "--out", out, "--errors", 3)
+    assert "give its file tolerances" in cli.refusal(*words)
+    assert not out.exists()
+    answer = cli.answer(*words, "--typical")
+    typical, assumed = typical_machine(OPTIMAL)
+    assert answer["assumed"] == list(assumed)
+    machine = explorer.ImperfectMachine.draw(typical, 3)
+    assert out.read_text(encoding="utf-8") == explorer.simulation_mjcf(machine)
+    assert "assumed, since the design states none: errors" in cli.text(*words, "--typical")
+
+
+def test_export_simulation_of_springs_alone_says_that_nothing_deviates(
+    cli: CommandLine, tmp_path: Path
+) -> None:
+    file, out = tmp_path / "design.json", tmp_path / "model.xml"
+    springs = Actuators(stiffness_n_mm=STIFFNESSES)
+    file.write_bytes(encode_design(msgspec.structs.replace(OPTIMAL, actuators=springs)))
+    lines = cli.text("simulation", "--design", file, "--out", out, "--errors", 0).splitlines()
+    assert lines[1:] == [
+        "the design states neither errors nor tolerances: only its servos give way"
+    ]
+    assert 'kp="1000000.0"' in out.read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("name", "expected"), [("a.3mf", "3mf"), ("a.zip", "stl-zip"), ("a.step", "step")]
 )
@@ -242,6 +323,14 @@ def test_export_scene_is_one_page_with_its_title(cli: CommandLine, tmp_path: Pat
         ("simulation", "model.xml", ["--quaternion", "1", "0", "0", "0"], "--quaternion is not"),
         ("simulation", "model.xml", ["--density", "-1"], "--density must be a positive number"),
         ("simulation", "missing/model.xml", [], "no folder"),
+        ("simulation", "model.xml", ["--errors", "-1"], "--errors must lie within 0 to 2147483647"),
+        ("simulation", "model.xml", ["--errors", "x"], "--errors must be a whole number; got 'x'"),
+        ("simulation", "model.xml", ["--typical"], "give --errors SEED"),
+        ("mechanism", "parts.3mf", ["--errors", "1"], "--errors is not for mechanism"),
+        ("hull", "hull.stl", ["--errors", "1"], "--errors is not for hull"),
+        ("hull", "hull.stl", ["--typical"], "--typical is not for hull"),
+        ("workspace", "file.step", ["--errors", "1"], "--errors is not for workspace"),
+        ("scene", "out.html", ["--errors", "1"], "--errors is not for scene"),
         ("mechanism", "parts.stl", [], "there are 3mf, glb, stl-zip, step"),
         ("mechanism", "parts.3mf", ["--tolerance", "1"], "--tolerance is not for mechanism"),
         ("mechanism", "parts.3mf", ["--yaw-pitch-roll", "1", "2", "3"], "--yaw-pitch-roll is not"),

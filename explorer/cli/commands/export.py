@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from explorer.cli.load_options import held_by
-from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.values import OPTIONAL, hint, load_numbers, positive
+from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions, TypicalOptions
+from explorer.cli.values import OPTIONAL, hint, load_numbers, positive, whole_number
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Six
@@ -21,18 +21,21 @@ What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
 
 # Typical width of a browser window over its height.
 ASPECT = 1.6
+# Options of an imperfect machine, which the simulation alone has.
+ERRORS = ("errors", "typical")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export(JsonOptions, PoseOptions, DesignOptions):
+class Export(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
     """Write the workspace as a mesh, the mechanism as parts or simulation, or the scene.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
     specification requires. The mechanism consists of its parts, assembled in the home pose; in
     `stl-zip` a part is a file of its own. The simulation is an MJCF model in metres: every joint,
-    closed loops, six servos. The scene is one HTML file for any browser, in the home pose unless
-    a pose is given. With `--at tool` the workspace and the hull are those of the tool point, with
-    `--load` those of the positions that hold the load.
+    closed loops, six servos; with `--errors` the machine deviates from its design. The scene is one
+    HTML file for any browser, in the home pose unless a pose is given. With `--at tool` the
+    workspace and the hull are those of the tool point, with `--load` those of the positions that
+    hold the load.
     """
 
     what: Annotated[What, tyro.conf.Positional]
@@ -68,6 +71,14 @@ class Export(JsonOptions, PoseOptions, DesignOptions):
     masses: Annotated[Literal["bars", "parts"], hint("simulation; default: bars")] = "bars"
     """Masses of the bodies: of bars as thick as the legs, or of the parts of `export mechanism`."""
 
+    errors: Annotated[
+        int | None,
+        whole_number("--errors", 0, 2**31 - 1),
+        hint("simulation; default: a perfect machine", "SEED"),
+    ] = None
+    """Seed of a machine whose dimensions and encoders are off within the tolerances and errors of
+    the design, and whose actuators and struts give way as the design states."""
+
     def run(self) -> None:
         """Write the file, and its measures to standard output.
 
@@ -102,10 +113,14 @@ Facts = dict[str, Any]
 
 
 def _as_lines(facts: Facts) -> list[str]:
-    """Return remarks on the file: a mesh that is off, and strokes below the limits."""
+    """Return remarks on the file: a mesh that is off, deviations, strokes below the limits."""
     from explorer.cli.output import DISAGREES
 
     remarks: list[str] = []
+    if "deviations" in facts:
+        from explorer.cli.answers.imperfect import imperfect_lines
+
+        remarks += imperfect_lines(facts)
     if facts.get("agrees") is False:
         remarks.append(f"This differs from the workspace: {DISAGREES}.")
     return remarks + [
@@ -124,7 +139,7 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
     if command.what == "workspace" and file_format in ("step", "stp"):
         return _step(command)
-    command.refuse("density", "masses", "position")
+    command.refuse("density", "masses", *ERRORS, "position")
     check_format(file_format)
     design = command.read_design()
     from explorer.workspace.solids.solids import convex_hull, workspace_solid
@@ -165,7 +180,7 @@ def _step(command: Export) -> tuple[bytes, Facts]:
             "STEP takes exact faces, and the surface along which a part takes its limit consists "
             "of facets: write 3mf, stl, glb, obj or ply"
         )
-    command.refuse("tolerance", "density", "masses", "position")
+    command.refuse("tolerance", "density", "masses", *ERRORS, "position")
     check_extra()
     design = command.read_design()
     home = command.oriented_home(design)
@@ -185,8 +200,8 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.prototype.bill import bill_of_materials
 
     command.refuse(
-        *("tolerance", "masses", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion"),
-        *("at", "load"),
+        *("tolerance", "masses", *ERRORS, "position", "quaternion"),
+        *("yaw_pitch_roll", "tilt_torsion", "at", "load"),
     )
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     if file_format == "step":
@@ -234,13 +249,26 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
         from explorer.prototype.assembly import make_prototype
 
         masses = make_prototype(design).masses(density)
-    joints = [*CHAIN_JOINTS, "platform"]
-    data = simulation_mjcf(design, density, masses).encode()
-    return data, {"format": "mjcf", "bodies": BODIES[1:], "joints": joints}
+    facts: Facts = {
+        "format": "mjcf",
+        "bodies": BODIES[1:],
+        "joints": [*CHAIN_JOINTS, "platform"],
+    }
+    if command.errors is None:
+        if command.typical:
+            raise InputError("--typical is for the errors of a machine: give --errors SEED")
+        return simulation_mjcf(design, density, masses).encode(), facts
+    from explorer.cli.answers.imperfect import imperfect_json
+    from explorer.export.imperfect import ImperfectMachine
+
+    design, assumed = command.with_typical(design)
+    machine = ImperfectMachine.draw(design, command.errors)
+    data = simulation_mjcf(machine, density, masses).encode()
+    return data, {**facts, "assumed": assumed, **imperfect_json(machine)}
 
 
 def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    command.refuse("tolerance", "density", "masses", "load")
+    command.refuse("tolerance", "density", "masses", *ERRORS, "load")
     if file_format not in ("html", "htm"):
         raise InputError(f"no format {file_format!r} of the scene; there is html")
     design = command.read_design()
