@@ -132,12 +132,31 @@ KINDS = (
         gradient=lambda statics: statics.error_gradient,
     ),
     Kind(
+        "worst_turn",
+        "worst turn",
+        "The largest turn of the tool by the errors of the actuators",
+        lambda statics: statics.worst_turn,
+        ("has_errors",),
+        unit="°",
+        gradient=lambda statics: statics.turn_gradient,
+    ),
+    Kind(
         "softest_compliance",
         "softest compliance",
         "The largest displacement of the tool per force at it",
         lambda statics: statics.softest_compliance,
         ("is_elastic",),
         unit="mm/N",
+        gradient=lambda statics: statics.compliance_gradient,
+    ),
+    Kind(
+        "deflection",
+        "deflection",
+        "The largest displacement of the tool under the payload's weight and force",
+        lambda statics: statics.largest_deflection,
+        ("is_loaded", "is_elastic"),
+        power=1,
+        gradient=lambda statics: statics.deflection_gradient,
     ),
 )
 

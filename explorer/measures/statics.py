@@ -7,7 +7,8 @@ among its nodes. Where a margin changes its sign within the box, all of them are
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,10 +20,22 @@ from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.accuracy import actuator_errors, worst_error
-from explorer.statics.compliance import compliance, principal_compliances, stiffness_of
+from explorer.statics.accuracy import ToolError, actuator_errors, worst_error
+from explorer.statics.compliance import (
+    compliance,
+    largest_deflection,
+    principal_compliances,
+    stiffness_of,
+)
 from explorer.statics.forces import STRUT_ROWS
-from explorer.statics.load_slopes import BENDING, error_slopes, share_slopes
+from explorer.statics.load_slopes import (
+    BENDING,
+    TURN,
+    compliance_slopes,
+    deflection_slopes,
+    error_slopes,
+    share_slopes,
+)
 from explorer.statics.reactions import (
     Reactions,
     largest_payload,
@@ -30,8 +43,8 @@ from explorer.statics.reactions import (
     part_limits,
     reactions,
 )
-from explorer.statics.slopes import PARAMETERS, twist_slopes
-from explorer.statics.weights import design_weights
+from explorer.statics.slopes import PARAMETERS, TwistSlopes, twist_slopes
+from explorer.statics.weights import design_weights, payload_wrench
 
 
 @dataclass(frozen=True)
@@ -73,10 +86,27 @@ class BoxStatics:
         return inverse(self.design, self.positions, self.rotation)[:, STRUT_ROWS]
 
     @cached_property
-    def errors(self) -> FloatArray:
-        """The worst displacement of the tool at the nodes, shape (n,), in design units."""
+    def errors(self) -> ToolError:
+        """The worst errors of the tool at the nodes, each of shape (n,)."""
         errors, tool = actuator_errors(self.design), self.design.tool.position
-        return worst_error(self.design, self.positions, self.rotation, errors, tool).displacement
+        return worst_error(self.design, self.positions, self.rotation, errors, tool)
+
+    @cached_property
+    def compliances(self) -> FloatArray:
+        """The compliance at the nodes, shape (n, 6, 6)."""
+        stiffness, tool = stiffness_of(self.design), self.design.tool.position
+        return compliance(self.design, self.positions, self.rotation, *stiffness, tool)
+
+    @cached_property
+    def softest(self) -> FloatArray:
+        """The largest displacement of the tool per force at the nodes, (n,), in units/N."""
+        return principal_compliances(self.compliances).displacement[:, 0]
+
+    @cached_property
+    def deflections(self) -> FloatArray:
+        """The largest displacement under the load at the nodes, shape (n,), in design units."""
+        weight = payload_wrench(self.design, self.rotation)
+        return largest_deflection(self.compliances, weight, self.design.payload.force_n)[0]
 
     @cached_property
     def shares(self) -> FloatArray:
@@ -110,17 +140,22 @@ class BoxStatics:
     @property
     def worst_error(self) -> float:
         """The worst displacement of the tool by the actuators' errors, in design units."""
-        return float(self.errors.max()) if self.is_regular else np.inf
+        return float(self.errors.displacement.max()) if self.is_regular else np.inf
+
+    @property
+    def worst_turn(self) -> float:
+        """The worst turn of the tool by the actuators' errors, in degrees."""
+        return math.degrees(self.errors.turn.max()) if self.is_regular else np.inf
 
     @property
     def softest_compliance(self) -> float:
         """The largest displacement of the tool per force, in mm/N."""
-        if not self.is_regular:
-            return np.inf
-        stiffness, tool = stiffness_of(self.design), self.design.tool.position
-        found = compliance(self.design, self.positions, self.rotation, *stiffness, tool)
-        softest = principal_compliances(found).displacement.max()
-        return self.design.unit_mm * float(softest)
+        return self.design.unit_mm * float(self.softest.max()) if self.is_regular else np.inf
+
+    @property
+    def largest_deflection(self) -> float:
+        """The largest displacement of the tool under the load, in design units."""
+        return float(self.deflections.max()) if self.is_regular else np.inf
 
     @property
     def share_gradient(self) -> Mapping[str, float]:
@@ -137,11 +172,37 @@ class BoxStatics:
     @property
     def error_gradient(self) -> Mapping[str, float]:
         """Derivatives of the worst displacement, as those of the largest share."""
+        return self._slopes_at(self.errors.displacement, lambda at: error_slopes(self.design, at))
+
+    @property
+    def turn_gradient(self) -> Mapping[str, float]:
+        """Derivatives of the worst turn in degrees, as those of the largest share."""
+        found = self._slopes_at(self.errors.turn, lambda at: error_slopes(self.design, at, TURN))
+        return {name: math.degrees(slope) for name, slope in found.items()}
+
+    @property
+    def compliance_gradient(self) -> Mapping[str, float]:
+        """Derivatives of the softest compliance in mm/N, as those of the largest share."""
+        found = self._slopes_at(self.softest, lambda at: compliance_slopes(self.design, at))
+        return {name: self.design.unit_mm * slope for name, slope in found.items()}
+
+    @property
+    def deflection_gradient(self) -> Mapping[str, float]:
+        """Derivatives of the largest deflection, as those of the largest share."""
+        return self._slopes_at(
+            self.deflections, lambda at: deflection_slopes(self.design, self.rotation, at)
+        )
+
+    def _slopes_at(
+        self,
+        values: FloatArray,
+        slopes_of: Callable[[TwistSlopes], tuple[FloatArray, FloatArray]],
+    ) -> Mapping[str, float]:
+        """Return the derivatives at the node with the largest value; {} if it is infinite."""
         if not self.is_regular:
             return {}
-        worst = self.positions[[self.errors.argmax()]]
-        slopes = twist_slopes(self.design, worst, self.rotation)
-        return _by_name(error_slopes(self.design, slopes)[1][0])
+        slopes = twist_slopes(self.design, self.positions[[values.argmax()]], self.rotation)
+        return _by_name(slopes_of(slopes)[1][0])
 
     def _largest_slopes(self, limits: FloatArray) -> Mapping[str, float]:
         """Return the derivatives of the largest share of limits (2, 10); {} if it is infinite."""

@@ -19,6 +19,9 @@ from explorer.numerics.arrays import FloatArray, finite_array
 from explorer.numerics.compiled import helper, kernel
 from explorer.statics.equilibrium import B2, B3, Poses
 
+# Number of halvings, of the logarithm where it can be, that find the worst force to rounding.
+HALVINGS = 70
+
 
 class PrincipalCompliances(NamedTuple):
     """The principal values and directions of a compliance, from the softest to the stiffest.
@@ -166,6 +169,70 @@ def deflection(compliance: FloatArray, load: ArrayLike) -> FloatArray:
     finite = np.where(regular[..., None, None], compliance, 0.0)
     moved = np.einsum("...ij,...j->...i", finite, w)
     return np.where(regular[..., None], moved, np.inf)
+
+
+def largest_deflection(
+    compliance: FloatArray, load: ArrayLike, force: ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Return the largest displacement of the tool under a load and a force of any direction.
+
+    The force adds to the load at the tool. Its directions move the tool on an ellipsoid about the
+    displacement under the load; of this the farthest point from zero is the root of one equation,
+    as in a trust region. Both results are infinite in a singular pose.
+
+    Args:
+        compliance: C at the tool, shape (..., 6, 6).
+        load: (F; M) at the tool, shape (..., 6), in N and N × unit.
+        force: Size of the force of any direction, shape (...), in N, not negative.
+
+    Returns:
+        The displacement, shape (...), in design units, and the force that causes it, base axes,
+        shape (..., 3), in N.
+
+    Raises:
+        InputError: The load or the force is not finite, or the force is negative.
+    """
+    moved = deflection(compliance, load)[..., :3]
+    most = np.asarray(force, dtype=np.float64)
+    if not (np.isfinite(most) & (most >= 0.0)).all():
+        raise InputError(
+            f"the force of any direction must be finite and not negative; got {force!r}"
+        )
+    regular = np.isfinite(compliance[..., 0, 0]) & np.isfinite(moved[..., 0])
+    block = np.where(regular[..., None, None], compliance[..., :3, :3], 0.0)
+    soft, axes = np.linalg.eigh(block)
+    along = np.einsum("...ji,...j->...i", axes, np.where(regular[..., None], moved, 0.0))
+    held = _farthest_force(np.maximum(soft, 0.0), along, most)
+    length = np.sqrt(((soft * held + along) ** 2).sum(axis=-1))
+    pushed = np.einsum("...ij,...j->...i", axes, held)
+    return np.where(regular, length, np.inf), np.where(regular[..., None], pushed, np.inf)
+
+
+def _farthest_force(soft: FloatArray, along: FloatArray, most: FloatArray) -> FloatArray:
+    """Return f with |f| = F for which Σ (s_i f_i + g_i)² is largest, shape (..., 3).
+
+    The s_i ascend to s. For the largest sum s_i (s_i f_i + g_i) = (s² + m) f_i with m ≥ 0, so that
+    f_i = s_i g_i / (m + s² − s_i²). The length of f falls with m, which bounds m on both sides:
+    all s_i² count as s², or only the last part of f does.
+    """
+    pull = soft * along
+    gaps: FloatArray = soft[..., -1:] ** 2 - soft**2
+    sizes = np.sqrt((pull**2).sum(axis=-1))
+    size = np.where(most > 0.0, most, 1.0)
+    low, high = np.abs(pull[..., -1]) / size, sizes / size
+    for _ in range(HALVINGS):
+        middle: FloatArray = np.where(low > 0.0, np.sqrt(low * high), 0.5 * high)
+        is_long = (_over(pull, gaps + middle[..., None]) ** 2).sum(axis=-1) > most**2
+        low, high = np.where(is_long, middle, low), np.where(is_long, high, middle)
+    force = _over(pull, gaps + high[..., None])
+    # The softest direction takes what is left: all of it where nothing pulls along it.
+    rest = most**2 - (force[..., :-1] ** 2).sum(axis=-1)
+    force[..., -1] = np.sqrt(np.maximum(rest, 0.0)) * np.where(along[..., -1] < 0.0, -1.0, 1.0)
+    return np.where(most[..., None] > 0.0, force, 0.0)
+
+
+def _over(pull: FloatArray, divisor: FloatArray) -> FloatArray:
+    return np.divide(pull, divisor, out=np.zeros(divisor.shape), where=pull != 0.0)
 
 
 def principal_compliances(compliance: FloatArray) -> PrincipalCompliances:

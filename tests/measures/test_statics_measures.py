@@ -18,6 +18,7 @@ from explorer import (
     Pose,
     Struts,
     Tool,
+    deflection,
     home_pose,
     limit_shares,
     pose_precision,
@@ -27,14 +28,15 @@ from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import measure_design, reason_for_missing
 from explorer.mechanism.design import VARIABLES
-from explorer.statics.weights import design_weights
+from explorer.statics.weights import design_weights, payload_wrench
 
 OPTIMAL = PRESETS["paper-optimal"]
 BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
 NAMES = (
     *("load_share", "worst_actuator", "largest_payload"),
-    *("largest_bending", "worst_error", "softest_compliance"),
+    *("largest_bending", "worst_error", "worst_turn", "softest_compliance", "deflection"),
 )
+WITH_GRADIENT = tuple(name for name in NAMES if name not in ("worst_actuator", "largest_payload"))
 MACHINE = msgspec.structs.replace(
     OPTIMAL,
     tool=Tool(position=(0.5, 0.25, 1.0)),
@@ -64,12 +66,15 @@ def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
     held = reactions(*given, np.zeros(6), None, design_weights(MACHINE))
     shares = limit_shares(MACHINE, held)
     precision = pose_precision(*given, MACHINE.tool.position)
+    bent = deflection(precision.compliance, payload_wrench(MACHINE, rotation))
     sampled = {
         "load_share": shares.max(),
         "largest_bending": held.bending.max() * 1e-3 * MACHINE.unit_mm,
         "worst_error": precision.worst.displacement.max(),
         "softest_compliance": np.linalg.norm(precision.compliance[:, :3, :3], 2, axis=(1, 2)).max()
         * MACHINE.unit_mm,
+        "worst_turn": np.degrees(precision.worst.turn.max()),
+        "deflection": np.linalg.norm(bent[:, :3], axis=1).max(),
     }
     for name, value in sampled.items():
         # The largest values lie at the border of the box, most of them at a corner.
@@ -85,7 +90,7 @@ def test_measures_of_statics_need_a_box_and_the_parts_of_a_machine() -> None:
     parts = {
         "payload": ["largest_bending"],
         "struts": ["largest_payload", "softest_compliance"],
-        "actuators": ["largest_payload", "worst_error", "softest_compliance"],
+        "actuators": ["largest_payload", "worst_error", "worst_turn", "softest_compliance"],
     }
     for part, names in parts.items():
         design = msgspec.structs.replace(OPTIMAL, **{part: getattr(MACHINE, part)})
@@ -114,7 +119,7 @@ def test_measures_of_statics_are_of_the_given_orientation() -> None:
 
 def test_measures_of_statics_name_their_units() -> None:
     units = [CATALOGUE[name].unit_in("mm") for name in NAMES]
-    assert units == ["", "", "kg", "N m", "mm", "mm/N"]
+    assert units == ["", "", "kg", "N m", "mm", "°", "mm/N", "mm"]
 
 
 @pytest.mark.parametrize("prefix", ["home_", ""])
@@ -136,7 +141,7 @@ def test_gradients_of_statics_match_central_differences(seed: int, prefix: str) 
         at = msgspec.structs.replace(changed, home=Pose.of(home.position, r))
         return CATALOGUE[name].function(Case(at, box=BOX))
 
-    for kind in ("load_share", "largest_bending", "worst_error"):
+    for kind in WITH_GRADIENT:
         name = f"{prefix}{kind}"
         gradient = CATALOGUE[name].gradient
         assert gradient is not None
@@ -155,7 +160,7 @@ def test_gradients_of_statics_match_central_differences(seed: int, prefix: str) 
 
 def test_gradients_of_statics_of_a_singular_box_are_unknown() -> None:
     box = ((9.0, 4.0, -1.0), (11.0, 6.0, 1.0))
-    for name in ("load_share", "largest_bending", "worst_error"):
+    for name in WITH_GRADIENT:
         gradient = CATALOGUE[name].gradient
         assert gradient is not None
         assert gradient(Case(MACHINE, box=box)) == {}

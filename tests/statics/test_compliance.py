@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from refusals import refusal
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize_scalar
 from scipy.spatial.transform import Rotation
 from statics_cases import CASES, Loaded, random_poses
 
@@ -24,7 +26,8 @@ from explorer import (
     inverse,
     principal_compliances,
 )
-from explorer.statics.compliance import stiffness_of
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.compliance import largest_deflection, stiffness_of
 
 OPTIMAL = PRESETS["paper-optimal"]
 STIFFNESS = np.array([900.0, 1100.0, 700.0, 1300.0, 800.0, 1000.0])
@@ -71,6 +74,61 @@ def test_compliance_is_the_motion_of_soft_legs_under_a_small_load() -> None:
     twist = 1e-6 * solution.x
     found = deflection(compliance(OPTIMAL, position, rotation, STIFFNESS, BENDING, TOOL), load)
     assert_allclose(found, twist, rtol=1e-4, atol=1e-4 * np.abs(twist).max())
+
+
+def test_largest_deflection_is_caused_by_its_force_and_meets_the_bound_of_duality() -> None:
+    rng = np.random.default_rng(4)
+    positions, rotations = random_poses(OPTIMAL, 60)
+    found = compliance(OPTIMAL, positions, rotations, STIFFNESS, BENDING, TOOL)
+    loads = rng.normal(size=(60, 6)) * 10.0 ** rng.uniform(-3.0, 2.0, (60, 1))
+    forces = 10.0 ** rng.uniform(-3.0, 3.0, 60)
+    _, axes = np.linalg.eigh(found[:, :3, :3])
+    # Displacements across the softest direction are the hard case: the force has two worst ones.
+    stiff = np.linalg.solve(found[:20, :3, :3], axes[:20, :, :1] + axes[:20, :, 1:2])[..., 0]
+    loads[:20], loads[10:20, :3] = 0.0, stiff[10:]
+    largest, worst = largest_deflection(found, loads, forces)
+    assert_allclose(np.linalg.norm(worst, axis=1), forces, rtol=1e-12)
+    # The force that is found causes the displacement, so that none less is the largest.
+    with_force = loads.copy()
+    with_force[:, :3] += worst
+    caused = np.linalg.norm(deflection(found, with_force)[:, :3], axis=1)
+    assert_allclose(caused, largest, rtol=1e-9)
+    # For each m above the square of the largest principal compliance, |C f + d|² is at most
+    # m F² + m d · (m − C²)⁻¹ d, and for the best m it is that.
+    still = deflection(found, loads)[:, :3]
+    for matrix, moved, force, most in zip(found[:, :3, :3], still, forces, largest, strict=True):
+        softest = np.linalg.eigvalsh(matrix)[-1] ** 2
+
+        def bound(
+            log: float,
+            matrix: FloatArray = matrix,
+            moved: FloatArray = moved,
+            force: float = force,
+            softest: float = softest,
+        ) -> float:
+            m = softest * (1.0 + math.exp(log))
+            inner = np.asarray(np.linalg.solve(m * np.eye(3) - matrix @ matrix, moved))
+            return math.sqrt(m * force**2 + m * float(moved @ inner))
+
+        least = minimize_scalar(
+            bound, bounds=(-30.0, 30.0), method="bounded", options={"xatol": 1e-9}
+        )
+        assert most <= bound(float(least.x)) * (1.0 + 1e-9)
+        assert most == pytest.approx(bound(float(least.x)), rel=1e-6)
+
+
+def test_largest_deflection_without_force_or_load_is_that_of_the_other() -> None:
+    positions, rotations = random_poses(OPTIMAL, 30)
+    found = compliance(OPTIMAL, positions, rotations, STIFFNESS, BENDING, TOOL)
+    load = [3.0, -2.0, 4.0, 5.0, -6.0, 2.0]
+    still = np.linalg.norm(deflection(found, load)[:, :3], axis=1)
+    assert_allclose(largest_deflection(found, load, 0.0)[0], still, rtol=1e-12)
+    softest = principal_compliances(found).displacement[:, 0]
+    assert_allclose(largest_deflection(found, np.zeros(6), 7.0)[0], 7.0 * softest, rtol=1e-12)
+    assert not largest_deflection(np.zeros((6, 6)), load, 7.0)[0].any()
+    assert np.isinf(largest_deflection(np.full((6, 6), np.inf), load, 7.0)[0])
+    for force in (-1.0, np.nan, np.inf):
+        assert "not negative" in refusal(largest_deflection, found, load, force, kind=InputError)
 
 
 def test_principal_compliances_are_the_extremes_of_directions() -> None:

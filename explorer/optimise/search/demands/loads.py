@@ -123,7 +123,7 @@ class ErrorDemand:
     def measure(self, state: State) -> Measured:
         """Return what the largest displacements leave, see `spare_of`."""
         box = _statics_of(state)
-        worst = _worst_nodes(box, box.errors[:, None])[:, 0]
+        worst = _worst_nodes(box, box.errors.displacement[:, None])[:, 0]
         slopes = twist_slopes(state.design, box.positions[worst], state.rotation)
         largest, by = error_slopes(state.design, slopes)
         share = largest / self.most
@@ -138,7 +138,7 @@ def largest_share(state: State) -> float:
 
 def largest_error(state: State) -> float:
     """Return the worst displacement of the tool over the required box, in design units."""
-    return float(_statics_of(state).errors.max())
+    return float(_statics_of(state).errors.displacement.max())
 
 
 def _statics_of(state: State) -> BoxStatics:
