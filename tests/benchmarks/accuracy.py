@@ -11,49 +11,101 @@ import numpy as np
 from benchmarks.samples import DESIGN, around_home
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
-from explorer import Actuators, Struts, jacobian, pose_precision, principal_compliances
+from explorer import (
+    Actuators,
+    Struts,
+    Tolerances,
+    compliance_shares,
+    deflection,
+    inverse,
+    jacobian,
+    largest_error,
+    pose_precision,
+    principal_compliances,
+    source_errors,
+)
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
+from explorer.statics.accuracy import actuator_errors
+from explorer.statics.compliance import stiffness_of
+from explorer.statics.error_sources import by_source
+from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS
 
 POSES, ROUNDS = 10_000, 10
-ERRORS = (0.1, 0.2, 0.1, 0.2, 0.1, 0.1)
-STIFFNESS = (500.0, 600.0, 500.0, 600.0, 500.0, 400.0)
-ACTUATORS = Actuators(error_mm=ERRORS, stiffness_n_mm=STIFFNESS)
-STRUTS = Struts(outer_mm=6.0, inner_mm=4.0)
-MACHINE = msgspec.structs.replace(DESIGN, actuators=ACTUATORS, struts=STRUTS)
+TENTH = (0.1, 0.1, 0.1)
+MACHINE = msgspec.structs.replace(
+    DESIGN,
+    actuators=Actuators(
+        error_mm=(0.1, 0.2, 0.1, 0.2, 0.1, 0.1),
+        stiffness_n_mm=(500.0, 600.0, 500.0, 600.0, 500.0, 400.0),
+    ),
+    struts=Struts(outer_mm=6.0, inner_mm=4.0),
+    tolerances=Tolerances(TENTH, TENTH, TENTH, (0.1, 0.1), b1=TENTH, b2=TENTH, b3=TENTH, b4=TENTH),
+)
+LOAD = (3.0, -2.0, 4.0, 5.0, -6.0, 2.0)
+HALVES = (slice(0, 3), slice(3, 6))
 
 
 def run() -> Iterator[Row]:
     """Yield the rows."""
     positions, rotations, _ = around_home(POSES)
     warm()
+    errors, (stiffness, bending) = actuator_errors(MACHINE), stiffness_of(MACHINE)
 
     def all_of_it() -> object:
-        precision = pose_precision(MACHINE, positions, rotations)
-        return precision, principal_compliances(precision.compliance)
+        given = MACHINE, positions, rotations
+        precision = pose_precision(*given)
+        return (
+            precision,
+            _ellipsoids(precision.by_joint[:, :3] * errors),
+            principal_compliances(precision.compliance),
+            deflection(precision.compliance, LOAD),
+            compliance_shares(*given, LOAD, stiffness, bending),
+        )
 
-    ours = best_of(ROUNDS, all_of_it)
-    errors = np.array(ERRORS) / DESIGN.unit_mm
     corners = errors * np.array(list(itertools.product((-1.0, 1.0), repeat=6)))
-    softness = 1.0 / (np.array(STIFFNESS) * DESIGN.unit_mm)
 
     def plain() -> object:
-        joints = jacobian(DESIGN, positions, rotations)
-        twists = np.linalg.solve(joints, np.broadcast_to(np.eye(6), joints.shape))
-        compliance = (twists * softness) @ np.swapaxes(twists, -1, -2)
+        joints = jacobian(MACHINE, positions, rotations)
+        twists = np.linalg.inv(joints)
+        lengths = inverse(MACHINE, positions, rotations)[:, STRUT_ROWS]
+        soft, bent = np.tile(1.0 / stiffness, (POSES, 1)), lengths**3 / (3.0 * bending)
+        soft[:, GUIDE_ROWS] += bent
+        compliance = (twists * soft[:, None]) @ np.swapaxes(twists, -1, -2)
         moved = twists @ corners.T
-        worst = [
-            np.linalg.norm(moved[:, half], axis=1).max(axis=-1)
-            for half in (slice(0, 3), slice(3, 6))
-        ]
-        return compliance, worst, np.linalg.eigh(compliance[:, :3, :3])
+        alone = twists * errors
+        forces = np.swapaxes(twists, -1, -2) @ LOAD
+        work = forces**2 * soft
+        struts = (forces[:, GUIDE_ROWS] ** 2 * bent).sum(axis=1)
+        guide = work[:, GUIDE_ROWS].sum(axis=1) - struts
+        return (
+            [np.linalg.norm(moved[:, half], axis=1).max(axis=-1) for half in HALVES],
+            [np.linalg.norm(alone[:, half], axis=1) for half in HALVES],
+            [np.linalg.norm(alone[:, half], axis=(1, 2)) for half in HALVES],
+            _ellipsoids(alone[:, :3]),
+            [np.linalg.eigh(compliance[:, half, half]) for half in HALVES],
+            compliance @ LOAD,
+            np.stack([struts, guide]) / work.sum(axis=1),
+        )
 
-    theirs = best_of(3, plain)
+    ours, theirs = best_of(ROUNDS, all_of_it), best_of(3, plain)
     yield Row(
-        f"compliance, principal directions, worst and RMS errors, 23 dimensions in {POSES:,} "
-        "poses, one core",
+        "worst and RMS errors, by actuator and dimension, their ellipsoid, compliance, principal "
+        f"directions, deflection and shares in {POSES:,} poses, one core",
         seconds(ours),
         "60 ms",
         f"NumPy, without the dimensions: {seconds(theirs)}; {times(theirs / ours)}",
     )
     alone = best_of(100, lambda: pose_precision(MACHINE, positions[0], rotations[0]))
-    yield Row("all of the precision of one pose", seconds(alone))
+    yield Row("errors and compliance of one pose", seconds(alone))
+    sources, bounds = (
+        by_source(pose_precision(MACHINE, positions, rotations)),
+        source_errors(MACHINE),
+    )
+    worst = best_of(3, lambda: largest_error(sources, bounds))
+    yield Row(f"the exact largest errors by all 29 sources in {POSES:,} poses", seconds(worst))
+
+
+def _ellipsoids(moved: FloatArray) -> object:
+    """Return the squared semi-axes and the axes of errors, given those of each actuator."""
+    return np.linalg.eigh(moved @ np.swapaxes(moved, -1, -2))
