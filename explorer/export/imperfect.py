@@ -32,8 +32,6 @@ UNITS = tuple("degrees" if "tilt" in name else "mm" for name in SOURCES)
 
 # Largest error of the joints of a solved pose, as a share of the reach.
 CLOSED = 1e-12
-# Stiffness of what a design leaves rigid, over that of its stiffest spring.
-RIGID = 10.0
 
 
 def draw_deviations(design: Design, seed: int) -> FloatArray:
@@ -66,25 +64,6 @@ def drawing_values(design: Design, deviations: FloatArray) -> FloatArray:
     """Return deviations of the sources or their bounds (29,) in the units of `UNITS`."""
     is_tilt = np.array(UNITS) == "degrees"
     return np.where(is_tilt, np.degrees(deviations), deviations * design.unit_mm)
-
-
-def servo_stiffness(design: Design) -> FloatArray | None:
-    """Return the stiffness of the servos at home, shape (6,), in N/m; None if all is rigid.
-
-    Those of d1 and d3 are in series with struts 2 and 3, cantilevers of the lengths that d2 and d4
-    have at home. An actuator that the design leaves rigid is ten times as stiff as the stiffest of
-    the others.
-    """
-    stiffness, bending = stiffness_of(design)
-    home = home_pose(design)
-    softness = 1.0 / stiffness
-    lengths = inverse(design, home.position, home.rotation)[[2, 4]]
-    softness[[1, 3]] += lengths**3 / (3.0 * bending)
-    gives = softness > 0.0
-    if not gives.any():
-        return None
-    softness[~gives] = softness[gives].min() / RIGID
-    return 1e3 / (softness * design.unit_mm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +116,6 @@ class ImperfectMachine:
         tilt = [0.0, *self._dimensions[TILT_COLUMN : TILT_COLUMN + 2]]
         guide = Rotation.from_rotvec(tilt).as_matrix()
         return np.stack([np.eye(3), guide, guide, np.eye(3)])
-
-    @cached_property
-    def stiffness(self) -> FloatArray | None:
-        """Stiffness of the servos, as of `servo_stiffness`."""
-        return servo_stiffness(self.design)
 
     @property
     def _dimensions(self) -> FloatArray:

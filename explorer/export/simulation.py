@@ -25,6 +25,7 @@ import numpy as np
 from explorer import __version__
 from explorer.errors import InputError
 from explorer.export.imperfect import UNITS, ImperfectMachine, drawing_values
+from explorer.export.servos import Servos, spring_servos
 from explorer.mechanism.design import DOWN, JOINTS, Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import platform_points
@@ -103,7 +104,8 @@ def simulation_mjcf(
     Raises:
         InputError: The density is not positive, a leg has zero length in the home pose, or bodies
             are so light that MuJoCo treats them as massless.
-        NoAnswerError: The legs of the imperfect machine do not close near home.
+        NoAnswerError: The legs of the imperfect machine do not close near home, or its home is
+            singular.
     """
     if not (math.isfinite(density) and density > 0.0):
         raise InputError(f"the density must be positive; got {density:g}")
@@ -140,9 +142,8 @@ class _Model:
         }
         self._check_masses()
         self.radii = [radius * self.metres for radius in leg_radii(design)]
-        self.moving = sum(mass.mass for mass in self.masses.values())
         self.points = platform_points(design)
-        self.stiffness: FloatArray | None = None
+        self.servos: Servos | None = None
         self.timestep = TIMESTEP
         if self.machine is not None:
             self._deviate(self.machine)
@@ -155,11 +156,9 @@ class _Model:
         joints[list(ACTUATED)] -= machine.zeros
         self.values = _qpos(self.design, joints, position, rotation).tolist()
         self.points = machine.points
-        self.stiffness = machine.stiffness
-        if self.stiffness is not None:
-            # Stiffer servos are faster: a step is the same share of their period.
-            fastest = math.sqrt(float(self.stiffness.max()) / self.moving)
-            self.timestep = min(TIMESTEP, float(f"{TIMESTEP * SERVO / fastest:.2g}"))
+        self.servos = spring_servos(self.design, self.masses)
+        if self.servos is not None:
+            self.timestep = min(TIMESTEP, float(f"{self.servos.timestep:.2g}"))
 
     def _check_masses(self) -> None:
         def inertia(mass: Mass) -> float:
@@ -324,12 +323,12 @@ class _Model:
             ET.SubElement(tendon, "joint", joint=joint, coef=str(sign))
 
     def _actuators(self, parent: ET.Element) -> None:
+        moving = sum(mass.mass for mass in self.masses.values())
         for index, name in enumerate(JOINTS):
             limits = self._range(name, 0.0)
-            kp, kv = self.moving * SERVO**2, 2.0 * self.moving * SERVO
-            if self.stiffness is not None:
-                kp = float(self.stiffness[index])
-                kv = 2.0 * math.sqrt(kp * self.moving)
+            kp, kv = moving * SERVO**2, 2.0 * moving * SERVO
+            if self.servos is not None:
+                kp, kv = float(self.servos.stiffness[index]), float(self.servos.damping[index])
             servo = ET.SubElement(
                 parent, "position", name=name, joint=name, kp=repr(kp), kv=repr(kv)
             )
@@ -347,11 +346,11 @@ class _Model:
         values = drawing_values(machine.design, machine.deviations)
         rows = zip(SOURCES, values.tolist(), UNITS, strict=True)
         lines += [f"{name}: {value:+.6g} {unit}" for name, value, unit in rows if value]
-        if self.stiffness is not None:
+        if self.servos is not None:
             lines += [
                 "The servos have the stiffness of the actuators; those of d1 and d3 are in series",
-                "with struts 2 and 3 of the lengths at home. A servo of what the design leaves rigid",
-                "is ten times as stiff as the stiffest spring.",
+                "with struts 2 and 3 of the lengths at home. What the design leaves rigid has a",
+                "servo ten times as stiff as the stiffest spring.",
             ]
         return "\n    ".join(["", *lines]) + "\n  "
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from explorer.cli.output import assumed_lines, figure, figures, table
 from explorer.export.imperfect import UNITS, ImperfectMachine, drawing_values
+from explorer.export.servos import servo_stiffness
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.error_sources import SOURCES, source_errors
 
@@ -21,7 +22,7 @@ def imperfect_json(machine: ImperfectMachine) -> dict[str, Any]:
     )
     rows = zip(SOURCES, off.tolist(), most.tolist(), UNITS, strict=True)
     names = ("name", "deviation", "largest", "unit")
-    stiffness = machine.stiffness
+    stiffness = servo_stiffness(design)
     return {
         "seed": machine.seed,
         "deviations": [dict(zip(names, row, strict=True)) for row in rows],
