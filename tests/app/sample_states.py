@@ -40,7 +40,7 @@ from explorer.app.state.optimisation import PLACE, Comparison, OptimisationReque
 from explorer.app.state.state import Run, State, opened
 from explorer.app.state.studies import Studies
 from explorer.app.state.values import value_at, with_value
-from explorer.app.state.view import PrototypeView, SingularView, View, WorkspaceView
+from explorer.app.state.view import PrecisionView, PrototypeView, SingularView, View, WorkspaceView
 from explorer.errors import ExplorerError
 from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
@@ -92,6 +92,13 @@ def _view(_: State, i: int, share: float) -> Action:
             "prototype": PrototypeView(exploded=share),
             "drawn_as": ("schematic", "prototype", "6-4 twin")[i % 3],
             "singular": SingularView(ghost="δ2 = 0", strata=i > 2),
+            "precision": PrecisionView(
+                ellipsoid=i > 2,
+                deflected=i > 1,
+                times=None if i == 0 else 10.0,
+                over=("pose", "box", "workspace")[i % 3],
+                wanted=None if i == 0 else 0.1 + share,
+            ),
             "tetrahedra": (i > 1, i > 2, i > 3),
             "warn_below": None if i == 0 else 1.0 + share,
             "ghosts": i % 2 == 0,

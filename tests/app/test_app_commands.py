@@ -37,6 +37,7 @@ from explorer.app.features.paths.actions import (
     SetPathTime,
     TakePlan,
 )
+from explorer.app.features.precision.actions import SetTolerances
 from explorer.app.features.singularity.actions import Jog
 from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
 from explorer.app.features.view.camera_buttons import HINTS as CAMERA_HINTS
@@ -93,7 +94,10 @@ OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, GiveUp, Compar
 OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")}
 """Commands that change the camera or the panels of one browser, which there is none of."""
 
-WHERE_IT_IS_SHOWN = {StartThere: "Workspace › Go there"}
+WHERE_IT_IS_SHOWN = {
+    StartThere: "Workspace › Go there",
+    SetTolerances: "Precision › Set these tolerances",
+}
 """Actions of commands that do nothing unless something is shown."""
 
 CHOSEN_IN_THE_PANEL = {

@@ -447,7 +447,7 @@ def test_the_ellipsoids_hold_what_unit_actuators_do(services: Services, state: S
     for kind in ("speed", "force"):
         placed = Placed(Frame(viewed(state, ellipsoid=kind)))
         drawn = by_name(scene.updates(placed))
-        body, axes = drawn[f"/ellipsoid/{kind}"], drawn["/ellipsoid/axes"]["points"]
+        body, axes = drawn["/ellipsoid/body"], drawn["/ellipsoid/axes"]["points"]
         assert body["visible"] is True
         assert max(body["scale"]) <= LONGEST
         np.testing.assert_allclose(

@@ -21,7 +21,7 @@ from explorer.app.state.compared import Compared
 from explorer.app.state.state import Run, State, opened
 from explorer.app.state.studies import Studies
 from explorer.app.state.values import with_value
-from explorer.app.state.view import ForcesView, OrientationView
+from explorer.app.state.view import ForcesView, OrientationView, PrecisionView
 from explorer.app.storage.packing import present_view
 from explorer.app.storage.session_format import (
     MOST_BYTES,
@@ -291,6 +291,7 @@ def test_file_of_an_earlier_schema_opens_to_the_state_it_was_written_from(schema
             expected = with_value(expected, f"{view}.workspace.flipped", False)
             expected = with_value(expected, f"{view}.orientation", OrientationView())
             expected = with_value(expected, f"{view}.forces", ForcesView())
+            expected = with_value(expected, f"{view}.precision", PrecisionView())
             expected = with_value(expected, f"{view}.at", "b4")
             expected = with_value(expected, f"{view}.machine", True)
             # Twin and prototype were both switched on.

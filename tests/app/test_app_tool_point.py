@@ -304,7 +304,7 @@ def test_ellipsoid_and_gains_are_those_of_the_tool(services: Services) -> None:
     shown = Set("view.singular.ellipsoid", "speed").apply(state)
     drawn = by_name(EllipsoidScene(services).updates(Placed(Frame(shown))))
     expected = scene_scale(state) * tool_of(state)
-    np.testing.assert_allclose(drawn["/ellipsoid/speed"]["position"], expected, atol=1e-12)
+    np.testing.assert_allclose(drawn["/ellipsoid/body"]["position"], expected, atol=1e-12)
     assert "speed of b4" in performance_table(Frame(opened_at("b4")))
 
 

@@ -16,6 +16,7 @@ from explorer.app.features.mechanism.feature import MECHANISM
 from explorer.app.features.optimise.feature import OPTIMISE
 from explorer.app.features.orientation.feature import ORIENTATION
 from explorer.app.features.paths.feature import PATHS
+from explorer.app.features.precision.feature import PRECISION
 from explorer.app.features.prototype.feature import PROTOTYPE
 from explorer.app.features.sharing.feature import SHARING
 from explorer.app.features.singularity.feature import SINGULARITY
@@ -36,6 +37,7 @@ FEATURES: tuple[Feature, ...] = (
     ORIENTATION,
     LEGS,
     FORCES,
+    PRECISION,
     PROTOTYPE,
     OPTIMISE,
     STUDIES,

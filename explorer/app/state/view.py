@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from explorer.errors import InputError
+from explorer.measures.positions import PositionSet
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import Point
 from explorer.numerics.checks import LARGEST_NUMBER
@@ -142,6 +143,44 @@ class ForcesView:
             )
 
 
+@dataclass(frozen=True)
+class PrecisionView:
+    """How errors and the deflection are shown, and what is wanted of the tolerances.
+
+    Attributes:
+        ellipsoid: Whether the ellipsoid of the tool's RMS error is drawn.
+        deflected: Whether the mechanism is drawn as the load deflects it.
+        times: Magnification of the drawn deflection; None for one that suits it.
+        budget: Whether the budget of the tolerances is computed.
+        over: Positions of the budget: the present one, the required box, or the workspace.
+        wanted: Largest displacement of the tool that the tolerances may cause, in mm; None for a
+            ranking of the tolerances as they are.
+        wanted_turn: Largest turn of the tool likewise, in degrees; None for any.
+        keep_actuators: Whether the errors of the actuators stay as they are.
+
+    Raises:
+        InputError: a magnification or a wanted precision that is not positive.
+    """
+
+    ellipsoid: bool = False
+    deflected: bool = False
+    times: float | None = None
+    budget: bool = False
+    over: PositionSet = "pose"
+    wanted: float | None = None
+    wanted_turn: float | None = None
+    keep_actuators: bool = False
+
+    def __post_init__(self) -> None:
+        for name, value in (
+            ("magnification", self.times),
+            ("wanted displacement", self.wanted),
+            ("wanted turn", self.wanted_turn),
+        ):
+            if value is not None and not 0.0 < value <= LARGEST_NUMBER:
+                raise InputError(f"the {name} must be positive; got {format_number(value)}")
+
+
 DrawnAs = Literal["schematic", "prototype", "6-4 twin"]
 Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
 Arrows = Literal["one in use", "all six", "none"]
@@ -190,6 +229,7 @@ class View:
         orientation: What is drawn of the orientations over the workspace.
         singular: How singularities are shown.
         forces: The load besides the payload, and how forces are shown.
+        precision: How errors and the deflection are shown, and what is wanted of the tolerances.
 
     Raises:
         InputError: the warning length is not positive.
@@ -215,6 +255,7 @@ class View:
     orientation: OrientationView = field(default_factory=OrientationView)
     singular: SingularView = field(default_factory=SingularView)
     forces: ForcesView = field(default_factory=ForcesView)
+    precision: PrecisionView = field(default_factory=PrecisionView)
 
     @property
     def is_twin(self) -> bool:

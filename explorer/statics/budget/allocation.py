@@ -179,7 +179,7 @@ def _check_held(costs: SourceCosts, wanted: float, wanted_turn: float | None) ->
             raise NoAnswerError(
                 f"the errors of the actuators alone {moves} the tool by up to {worst:.4g}{unit}, "
                 f"which leaves nothing of the wanted {most:.4g}{unit} (it is {worst - most:.3g}"
-                f"{unit} more): want less, or let their errors change"
+                f"{unit} more): allow a larger error of the tool, or let their errors change"
             )
 
 

@@ -28,7 +28,7 @@ from explorer.statics.error_sources import (
 IS_TILT = np.array(["tilt" in name for name in SOURCES])
 """Whether each source is a tilt, shape (29,): its errors are in degrees, all others in mm."""
 
-PARTS = (
+PARTS: tuple[str, ...] = (
     *("cylinder 1, rod 1", "carriage 2", "cylinder 2, rod 2"),
     *("carriage 3", "cylinder 3, rod 3", "cylinder 4, rod 4"),
     *("platform" if name.startswith("b") else "base" for name in DIMENSIONS),

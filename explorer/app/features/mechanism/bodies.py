@@ -43,8 +43,13 @@ class Bodies(ScenePart):
         for body in (self._base, self._platform):
             yield body, "visible", state.view.bodies and placed.is_schematic
         # The browser does not draw a translucent body inside another one.
-        singular = state.view.singular
-        is_inside = state.view.workspace.solid or singular.ball or singular.ellipsoid != "none"
+        view = state.view
+        is_inside = (
+            view.workspace.solid
+            or view.singular.ball
+            or view.singular.ellipsoid != "none"
+            or view.precision.ellipsoid
+        )
         yield self._platform, "opacity", None if is_inside else PLATFORM_OPACITY
         for handle, (vertices, faces) in (
             (self._base, _base_plate(placed)),

@@ -9,19 +9,19 @@ import numpy as np
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.features.singularity.performance import gain_text
+from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent, sphere
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import FAR, GHOST, SINGULAR, Rgb, proximity_colour
-from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.nearest import NearestSingularity
 from explorer.singularity.strata import GENERIC
 
-GHOST_OPACITY, ELLIPSOID_OPACITY, BALL_OPACITY = 0.4, 0.3, 0.14
+GHOST_OPACITY, BALL_OPACITY = 0.4, 0.14
 # Semi-axes of an ellipsoid in scene units: for a gain of one, of speeds and of forces; and the
 # shortest and the longest that is drawn, so that a flat one is visible and a long one has an end.
 SPEED_UNIT, FORCE_UNIT = 1.0, 4.0
@@ -86,49 +86,20 @@ class EllipsoidScene(ScenePart):
     """The ellipsoid of velocities, or of forces, of unit actuators at b4 or at the tool point."""
 
     def __init__(self, services: Services) -> None:
-        scene = services.scene
-        self._bodies = {
-            name: add_translucent(
-                scene,
-                f"/ellipsoid/{name}",
-                sphere(),
-                ELLIPSOID_OPACITY,
-                colour=colour,
-                side="front",
-            )
-            for name, colour in (("speed", SPEED), ("force", FORCE))
-        }
-        self._axes = add_lines(scene, "/ellipsoid/axes", 3, FAR, 2.0)
-        self._label = add_label(scene, "/ellipsoid/label", "1", visible=False)
+        self._ellipsoid = Ellipsoid(services.scene, "/ellipsoid")
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the ellipsoid of this frame."""
         kind = placed.frame.state.view.singular.ellipsoid
-        for name, body in self._bodies.items():
-            yield body, "visible", name == kind
-        for handle in (self._axes, self._label):
-            yield handle, "visible", kind != "none"
+        yield from self._ellipsoid.show(kind != "none")
         if kind == "none":
             return
         gains = placed.frame.performance.translation
         gain = gains.velocity if kind == "speed" else gains.force
-        lengths = drawn_axes(gain, SPEED_UNIT if kind == "speed" else FORCE_UNIT)
-        centre = placed.point
-        body = self._bodies[kind]
-        yield body, "position", tuple(centre.tolist())
-        yield body, "wxyz", tuple(quaternion_from_rotation(gains.axes).tolist())
-        yield body, "scale", tuple(lengths.tolist())
-        semi_axes = (gains.axes * lengths).T
-        yield (
-            self._axes,
-            "points",
-            np.stack([centre - semi_axes, centre + semi_axes], axis=1).astype(np.float32),
-        )
-        longest = int(gain.argmax())
-        value = gain_text(float(gain[longest]))
-        yield self._label, "text", f"{kind} ≤ {value} per unit"
-        upward = semi_axes[longest] * (1.0 if semi_axes[longest, 2] >= 0.0 else -1.0)
-        yield self._label, "position", tuple((centre + upward).tolist())
+        colour, unit = (SPEED, SPEED_UNIT) if kind == "speed" else (FORCE, FORCE_UNIT)
+        words = f"{kind} ≤ {gain_text(float(gain.max()))} per unit"
+        lengths = drawn_axes(gain, unit)
+        yield from self._ellipsoid.draw(placed.point, gains.axes, lengths, colour, words)
 
 
 def drawn_axes(gain: FloatArray, unit: float) -> FloatArray:

@@ -1,0 +1,1 @@
+"""The precision of the tool: errors, compliance, deflection, and the budget of tolerances."""

@@ -1,0 +1,223 @@
+"""The budget of the tolerances: its feed, its file, and its part of the panel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import viser
+
+from explorer.app.features.feature import Services
+from explorer.app.features.optimise.problem import requested_box
+from explorer.app.features.precision.actions import SetTolerances
+from explorer.app.features.precision.figures import ACTUATOR, DIGITS, DIMENSION
+from explorer.app.features.precision.tasks import (
+    BudgetDrawing,
+    BudgetRequest,
+    budget_of,
+    budget_table,
+)
+from explorer.app.inputs.bindings import At
+from explorer.app.inputs.controls import Controls
+from explorer.app.session.feed import Feed
+from explorer.app.session.session import Who
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.markup import box, dim, meter, note, row, swatch, table
+from explorer.app.widgets.under_way import problem
+from explorer.measures.positions import PositionSet
+from explorer.mechanism.design import JOINTS
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import Pose
+from explorer.numerics.number_text import format_number
+from explorer.statics.budget.costs import IS_TILT, PARTS, SourceCosts
+from explorer.statics.error_sources import SOURCES
+
+OVER: dict[str, PositionSet] = {
+    "the present pose": "pose",
+    "the required box": "box",
+    "the workspace": "workspace",
+}
+OVER_HINT = (
+    "Positions at which the precision is wanted: the present one; the box of the tab Optimise, or "
+    "the workspace, at nodes of a grid in the orientation of home."
+)
+SET = "precision.set"
+SET_HINT = "Give the design these tolerances, and these errors of its actuators."
+
+
+class BudgetFeed(Feed[BudgetRequest, BudgetDrawing]):
+    """The budget, while it is shown."""
+
+    def __init__(self, services: Services) -> None:
+        super().__init__(services.worker, budget_of, _shown_budget, services.session.redraw)
+
+
+def _shown_budget(frame: Frame) -> BudgetRequest | None:
+    return budget_request(frame.state) if frame.state.view.precision.budget else None
+
+
+def budget_request(state: State) -> BudgetRequest:
+    """Return the request for the budget of a state."""
+    view, design = state.view.precision, state.design
+    pose: Pose = state.pose if view.over == "pose" else home_pose(design)
+    return BudgetRequest(
+        design,
+        view.over,
+        pose,
+        requested_box(state) if view.over == "box" else None,
+        view.wanted,
+        view.wanted_turn if view.wanted is not None else None,
+        view.keep_actuators and view.wanted is not None,
+    )
+
+
+class ToleranceFile:
+    """Sends the tolerances and their costs as a table."""
+
+    def __init__(self, services: Services) -> None:
+        self._session, self._downloads = services.session, services.downloads
+
+    def send(self, who: Who) -> None:
+        """Send the table of the budget, whether it is shown or not."""
+        state = self._session.settled()
+        name = f"{state.design.name}-tolerances.csv"
+        self._downloads.compute(who, name, budget_table, (budget_request(state),))
+
+
+class BudgetPart:
+    """The part of the panel with the budget."""
+
+    def __init__(self, services: Services) -> None:
+        gui, self._session = services.gui, services.session
+        self._feed = services.get(BudgetFeed)
+        self._controls = controls = Controls(gui, services.session)
+        controls.checkbox(
+            "What each tolerance costs",
+            "Rank the six actuators and the 23 dimensions by what their errors cost at the tool.",
+            "view.precision.budget",
+        )
+        controls.dropdown("Worst over", OVER_HINT, OVER, "view.precision.over")
+        controls.number(
+            "Wanted within ± (mm)",
+            "Largest displacement of the tool that is wanted: tolerances of the least total effort "
+            "that keep it are found. 0 ranks the tolerances as they are.",
+            At("view.precision.wanted", default=lambda _: 0.0, convert=lambda value: value or None),
+            least=0.0,
+            step=0.01,
+            small=True,
+            visible=lambda state: state.view.precision.budget,
+        )
+        controls.number(
+            "and turned within ± (°)",
+            "Largest turn of the tool that is wanted besides; 0 is any.",
+            At(
+                "view.precision.wanted_turn",
+                default=lambda _: 0.0,
+                convert=lambda value: value or None,
+            ),
+            least=0.0,
+            step=0.01,
+            small=True,
+            visible=_is_wanted,
+        )
+        controls.checkbox(
+            "Keep the actuators' errors",
+            "Find tolerances of the dimensions alone, with the errors of the actuators as they "
+            "are; off, errors of the actuators are found too.",
+            "view.precision.keep_actuators",
+            visible=_is_wanted,
+        )
+        self._result = gui.add_html("", visible=False)
+        services.buttons.on(SET, self._set)
+        services.buttons.offer(
+            "Precision › Set these tolerances",
+            SET_HINT,
+            SET,
+            is_ready=lambda: self._found is not None,
+        )
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the part show the frame."""
+        yield from self._controls.updates(frame)
+        yield self._result, "visible", self._feed.request is not None
+        yield self._result, "content", box(*self._parts())
+
+    @property
+    def _found(self) -> BudgetDrawing | None:
+        drawing = self._feed.drawing
+        is_found = drawing is not None and drawing.found is not None and self._feed.is_current
+        return drawing if is_found else None
+
+    def _parts(self) -> Iterator[str]:
+        feed = self._feed
+        if feed.problem is not None:
+            yield problem(feed, "There is no budget", "")
+        elif feed.drawing is None:
+            yield note("computing …")
+        else:
+            yield from budget_rows(feed.drawing)
+
+    def _set(self, _: str, client: viser.ClientHandle) -> None:
+        found = self._found
+        if found is not None:
+            tolerances = tuple(found.costs.tolerances.tolist())
+            self._session.do(SetTolerances(tolerances), who=client.client_id)
+
+
+def _is_wanted(state: State) -> bool:
+    return state.view.precision.budget and state.view.precision.wanted is not None
+
+
+def budget_rows(drawing: BudgetDrawing) -> Iterator[str]:
+    """Yield the errors that the tolerances allow, and a bar for each source of errors, as HTML."""
+    costs, found = drawing.costs, drawing.found
+    moved, turned = (
+        format_number(value, DIGITS) for value in (costs.worst_displacement, costs.worst_turn)
+    )
+    where = "" if costs.count == 1 else f" at the worst of {costs.count:,} positions"
+    if not costs.tolerances[np.isfinite(costs.tolerances)].any():
+        yield note(
+            "The design states no tolerances; the bars show what an error of 1 mm, and of a tilt "
+            "that moves the guide's end by 1 mm, costs."
+        )
+    else:
+        yield f'<div class="ex-status">±{moved} mm, ±{turned}°{dim(where)}</div>'
+        rms = format_number(costs.rms_displacement, DIGITS)
+        yield f"<div>{dim('RMS displacement')} {rms} mm</div>"
+    if found is not None:
+        above = format_number(100.0 * found.excess, 2)
+        button = press_button(SET, "", "Set these tolerances", hint=SET_HINT, class_name="ex-link")
+        words = dim(f"Least effort, but for {above} % by rounding down.")
+        yield f'<div class="ex-line">{words} {button}</div>'
+    yield (
+        f'<div class="ex-flow ex-after">{swatch(ACTUATOR)} {dim("actuators")} '
+        f"{swatch(DIMENSION)} {dim('dimensions')}</div>"
+    )
+    yield f'<div class="ex-budget">{table(_rows(costs))}</div>'
+
+
+def _rows(costs: SourceCosts) -> Iterator[str]:
+    """Yield a row for each source of errors, the costliest first."""
+    moved = costs.displacement_within
+    if not moved.any():
+        moved = costs.displacement / costs.lengths
+    most = float(moved.max()) or 1.0
+    ranking: list[int] = costs.ranking.tolist()
+    for k in ranking:
+        unit = "°" if IS_TILT[k] else " mm"
+        tolerance, cost = float(costs.tolerances[k]), float(moved[k])
+        given = f"± {format_number(tolerance, 2)}{unit}" if np.isfinite(tolerance) else "any"
+        colour = ACTUATOR if k < len(JOINTS) else DIMENSION
+        per = format_number(float(costs.displacement[k]), DIGITS)
+        turns = format_number(float(costs.turn[k]), DIGITS)
+        hint = f"{SOURCES[k]} of {PARTS[k]}: {per} mm and {turns}° at the tool per{unit}"
+        yield row(
+            f"{SOURCES[k]} {dim(PARTS[k])}",
+            given,
+            meter(100.0 * cost / most, colour),
+            f"{format_number(cost, 2)} mm",
+            hint=hint,
+        )

@@ -1,0 +1,166 @@
+"""The ellipsoid of the tool's error, and the mechanism as the load deflects it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from explorer.app.features.feature import Services
+from explorer.app.features.forces.scene import tool_point
+from explorer.app.features.mechanism.bodies import platform_plate
+from explorer.app.features.precision.figures import degrees, millimetres
+from explorer.app.features.precision.pose import PosePrecision, has_errors, is_elastic
+from explorer.app.scene.ellipsoid import Ellipsoid
+from explorer.app.scene.labels import add_label
+from explorer.app.scene.part import ScenePart
+from explorer.app.scene.placing import Placed, round_step
+from explorer.app.scene.shapes import (
+    NO_MESH,
+    Balls,
+    Rods,
+    add_lines,
+    add_translucent,
+    linear_colour,
+)
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import Rgb
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
+from explorer.statics.tool_precision import ToolPrecision
+
+ERROR: Rgb = (176, 60, 120)
+DEFLECTED: Rgb = (222, 110, 20)
+PLATE_OPACITY = 0.7
+# Sizes over the reach that an automatic magnification gives the longest semi-axis and the largest
+# displacement; the largest semi-axis over the shortest one that is drawn.
+ELLIPSOID_SIZE, DEFLECTION_SIZE, THINNEST = 0.18, 0.25, 0.01
+# Pieces of a drawn strut, and its radius in scene units.
+PIECES, RADIUS = 12, 0.1
+# Largest magnification and largest drawn displacement over the reach.
+LARGEST_TIMES, FARTHEST = 1e12, 5.0
+
+
+class ErrorEllipsoidScene(ScenePart):
+    """The ellipsoid of the tool's RMS displacement by all sources of errors."""
+
+    def __init__(self, services: Services) -> None:
+        self._poses = services.get(PosePrecision)
+        self._ellipsoid = Ellipsoid(services.scene, "/precision/ellipsoid")
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the ellipsoid of this frame."""
+        precision = self._poses.of(placed.frame)
+        shown = (
+            placed.frame.state.view.precision.ellipsoid
+            and has_errors(precision)
+            and precision.is_regular
+        )
+        longest = float(precision.ellipsoid.semi_axes[0]) if shown else 0.0
+        yield from self._ellipsoid.show(longest > 0.0)
+        if not longest > 0.0:
+            return
+        ellipsoid, design = precision.ellipsoid, placed.frame.state.design
+        times = fitting_times(longest / (ELLIPSOID_SIZE * design.reach))
+        lengths = times * placed.scale * np.maximum(ellipsoid.semi_axes, THINNEST * longest)
+        axes = ellipsoid.directions.T * np.linalg.det(ellipsoid.directions)
+        error = design.unit_mm * float(precision.rms().displacement)
+        words = f"RMS error {millimetres(error)}, drawn × {format_number(times)}"
+        yield from self._ellipsoid.draw(tool_point(placed), axes, lengths, ERROR, words)
+
+
+class DeflectedScene(ScenePart):
+    """Platform and legs where the load deflects them to, magnified."""
+
+    def __init__(self, services: Services) -> None:
+        scene, self._poses = services.scene, services.get(PosePrecision)
+        self._plate = add_translucent(
+            scene, "/precision/platform", NO_MESH, PLATE_OPACITY, colour=DEFLECTED
+        )
+        self._legs = Rods(scene, "/precision/legs", [linear_colour(DEFLECTED)] * (2 + 2 * PIECES))
+        self._balls = Balls(scene, "/precision/balls", [linear_colour(DEFLECTED)] * 5)
+        self._way = add_lines(scene, "/precision/way", 1, DEFLECTED, 2.5)
+        self._label = add_label(scene, "/precision/label", "0 mm", visible=False)
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the deflection of this frame."""
+        precision = self._poses.of(placed.frame)
+        view = placed.frame.state.view
+        shown = (
+            view.precision.deflected
+            and not (view.is_twin or placed.is_apart)
+            and is_elastic(precision.loaded.design)
+            and precision.is_regular
+        )
+        for handle in (self._plate, self._way, self._label):
+            yield handle, "visible", shown
+        yield from self._legs.show(shown)
+        yield from self._balls.show(shown)
+        if not shown:
+            return
+        tool, names = tool_point(placed), list(placed.platform_points)
+        tips = np.array([placed.points[name] for name in names])
+        times = drawn_times(placed, precision)
+        field = times * placed.scale * _displacements(precision, placed, np.array([*tips, tool]))
+        moved = np.array([*tips, tool]) + field
+        yield from self._draw_legs(placed, precision, moved[:4], times)
+        yield from self._balls.at(moved, np.full(5, 1.6 * RADIUS * placed.thickness))
+        vertices, faces = platform_plate(placed)
+        plate = placed.points["b4"] + vertices @ placed.frame.snapshot.rotation.T
+        plate = plate + times * placed.scale * _displacements(precision, placed, plate)
+        yield self._plate, "vertices", plate.astype(np.float32)
+        yield self._plate, "faces", faces.astype(np.uint32)
+        yield self._way, "points", np.stack([tool, moved[4]])[None].astype(np.float32)
+        design, deflection = precision.loaded.design, precision.deflection
+        total = millimetres(design.unit_mm * float(np.linalg.norm(deflection[:3])))
+        turn = degrees(float(np.linalg.norm(deflection[3:])))
+        yield self._label, "text", f"{total}, {turn}, drawn × {format_number(times)}"
+        yield self._label, "position", tuple(moved[4].tolist())
+
+    def _draw_legs(
+        self, placed: Placed, precision: ToolPrecision, tips: FloatArray, times: float
+    ) -> Iterator[Update]:
+        """Yield the updates that draw legs 1 and 4 straight, and the struts of 2 and 3 bent."""
+        feet = placed.struts[0]
+        starts, ends = [feet[0], feet[3]], [tips[0], tips[3]]
+        lines = [np.stack([np.array(starts), np.array(ends)], axis=1)]
+        for index, leg in enumerate((2, 3)):
+            foot = feet[leg - 1].copy()
+            foot[0] += times * placed.scale * precision.along_guide.carriages[index]
+            u = np.linspace(0.0, 1.0, PIECES + 1)
+            points = foot + u[:, None] * (tips[leg - 1] - foot)
+            # A cantilever with a force at its tip: (3 u² − u³) / 2 of the tip's displacement.
+            points[:, 0] = foot[0] + 0.5 * (3.0 * u**2 - u**3) * (tips[leg - 1, 0] - foot[0])
+            lines.append(np.stack([points[:-1], points[1:]], axis=1))
+        pieces = np.concatenate(lines)
+        radii = np.full(len(pieces), RADIUS * placed.thickness)
+        yield from self._legs.between(pieces[:, 0], pieces[:, 1], radii)
+
+
+def _displacements(precision: ToolPrecision, placed: Placed, points: FloatArray) -> FloatArray:
+    """Return the displacements of points fixed to the platform, in design units.
+
+    Args:
+        precision: The deflection, as a displacement of the tool and a turn about it.
+        placed: The frame.
+        points: Points in scene units, shape (n, 3).
+    """
+    arms = (points - tool_point(placed)) / placed.scale
+    return precision.deflection[:3] + np.cross(precision.deflection[3:], arms)
+
+
+def drawn_times(placed: Placed, precision: ToolPrecision) -> float:
+    """Return the magnification of the drawn deflection."""
+    reach = placed.frame.state.design.reach
+    points = np.array([*placed.points.values(), tool_point(placed)])
+    largest = float(np.linalg.norm(_displacements(precision, placed, points), axis=1).max())
+    chosen = placed.frame.state.view.precision.times
+    if chosen is None:
+        return fitting_times(largest / (DEFLECTION_SIZE * reach))
+    # Beyond this the drawing would leave the scene.
+    return min(chosen, FARTHEST * reach / largest) if largest > 0.0 else chosen
+
+
+def fitting_times(share: float) -> float:
+    """Return the magnification, 1, 2 or 5 times a power of ten, that makes a share about 1."""
+    return round_step(1.0 / max(share, 1.0 / LARGEST_TIMES))

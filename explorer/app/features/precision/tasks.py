@@ -1,0 +1,81 @@
+"""The worker's tasks for the budget: costs of tolerances, and those of a wanted precision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from explorer.export.tolerance_table import tolerance_csv
+from explorer.measures.positions import PositionSet, positions_over
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose, Triple
+from explorer.statics.budget.allocation import ToleranceBudget, tolerance_budget
+from explorer.statics.budget.costs import SourceCosts, source_costs
+
+
+@dataclass(frozen=True)
+class BudgetRequest:
+    """A request for a budget.
+
+    Attributes:
+        design: The manipulator.
+        over: Kind of the positions.
+        pose: Pose with the orientation, and with the position if there is only one.
+        box: Box of positions, if they are those of a box.
+        wanted: Largest displacement of the tool, in mm; None for the costs alone.
+        wanted_turn: Largest turn of the tool, in degrees; None for any.
+        keep_actuators: Whether the errors of the actuators stay.
+    """
+
+    design: Design
+    over: PositionSet
+    pose: Pose
+    box: tuple[Triple, Triple] | None
+    wanted: float | None
+    wanted_turn: float | None
+    keep_actuators: bool
+
+
+@dataclass(frozen=True)
+class BudgetDrawing:
+    """A budget.
+
+    Attributes:
+        request: The request.
+        costs: Costs of the tolerances that were found, or else of those stated.
+        found: Tolerances that keep the wanted precision; None if none is wanted.
+    """
+
+    request: BudgetRequest
+    costs: SourceCosts
+    found: ToleranceBudget | None
+
+
+def budget_of(request: BudgetRequest) -> BudgetDrawing:
+    """Return a budget.
+
+    Raises:
+        ExplorerError: errors are infinite at the positions, no position is within the limits, or
+            the errors of the actuators alone exceed what is wanted.
+    """
+    design, tool = request.design, request.design.tool.position
+    positions = positions_over(design, request.over, request.pose, request.box)
+    given = design, positions, request.pose.rotation
+    if request.wanted is None:
+        return BudgetDrawing(request, source_costs(*given, tool), None)
+    found = tolerance_budget(
+        *given,
+        request.wanted,
+        request.wanted_turn,
+        tool=tool,
+        keep_actuators=request.keep_actuators,
+    )
+    return BudgetDrawing(request, found.costs, found)
+
+
+def budget_table(request: BudgetRequest) -> bytes:
+    """Return the tolerances of a budget as CSV.
+
+    Raises:
+        ExplorerError: as for `budget_of`.
+    """
+    return tolerance_csv(budget_of(request).costs).encode()

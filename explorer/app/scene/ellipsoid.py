@@ -1,0 +1,60 @@
+"""A translucent ellipsoid with its axes and a label at the end of the longest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import viser
+
+from explorer.app.scene.labels import add_label
+from explorer.app.scene.shapes import add_lines, add_translucent, sphere
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import FAR, Rgb
+from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.numerics.arrays import FloatArray
+
+OPACITY = 0.3
+
+
+class Ellipsoid:
+    """An ellipsoid in the scene.
+
+    Args:
+        scene: Where it is added.
+        name: Its node.
+    """
+
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        self._body = add_translucent(scene, f"{name}/body", sphere(), OPACITY, side="front")
+        self._axes = add_lines(scene, f"{name}/axes", 3, FAR, 2.0)
+        self._label = add_label(scene, f"{name}/label", "1", visible=False)
+
+    def show(self, visible: bool) -> Iterator[Update]:
+        """Yield the updates that show or hide it."""
+        for handle in (self._body, self._axes, self._label):
+            yield handle, "visible", visible
+
+    def draw(
+        self, centre: FloatArray, axes: FloatArray, lengths: FloatArray, colour: Rgb, words: str
+    ) -> Iterator[Update]:
+        """Yield the updates that draw it.
+
+        Args:
+            centre: Its centre in scene units, shape (3,).
+            axes: Rotation whose columns are the directions of the semi-axes, shape (3, 3).
+            lengths: Lengths of the semi-axes in scene units, shape (3,).
+            colour: Its colour.
+            words: Text of the label.
+        """
+        yield self._body, "position", tuple(centre.tolist())
+        yield self._body, "wxyz", tuple(quaternion_from_rotation(axes).tolist())
+        yield self._body, "scale", tuple(lengths.tolist())
+        yield self._body, "color", colour
+        semi_axes = (axes * lengths).T
+        ends = np.stack([centre - semi_axes, centre + semi_axes], axis=1)
+        yield self._axes, "points", ends.astype(np.float32)
+        yield self._label, "text", words
+        longest = semi_axes[int(lengths.argmax())]
+        upward = longest if longest[2] >= 0.0 else -longest
+        yield self._label, "position", tuple((centre + upward).tolist())

@@ -1,0 +1,157 @@
+"""The precision of a design in one pose under a load: errors, compliance and deflection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.kinematics import inverse
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.accuracy import Precision, ToolError, pose_precision
+from explorer.statics.compliance import (
+    ComplianceShares,
+    PrincipalCompliances,
+    compliance_shares,
+    deflection,
+    principal_compliances,
+    stiffness_of,
+)
+from explorer.statics.error_sources import (
+    LargestError,
+    by_source,
+    largest_error,
+    rms_of_sources,
+    source_errors,
+)
+from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, actuator_forces
+from explorer.statics.loaded import LoadedPose
+from explorer.statics.weights import carry
+
+BY_ACTUATORS, BY_DIMENSIONS, BY_ALL = slice(0, 6), slice(6, 29), slice(0, 29)
+"""The sources of errors that are actuators, those that are dimensions, and all of them."""
+
+
+class ErrorEllipsoid(NamedTuple):
+    """The ellipsoid of the tool's displacements one standard deviation from its place.
+
+    Attributes:
+        semi_axes: Semi-axes, from the longest to the shortest, shape (3,), in design units.
+        directions: Unit vectors of the semi-axes, base axes, as rows, shape (3, 3).
+    """
+
+    semi_axes: FloatArray
+    directions: FloatArray
+
+
+class CarriageDeflections(NamedTuple):
+    """What the load moves legs 2 and 3 along the guide.
+
+    Attributes:
+        carriages: Displacements of the carriages, by the actuators d1 and d3, shape (2,), in
+            design units.
+        bending: Displacements of the struts' tips against their carriages, shape (2,), likewise.
+    """
+
+    carriages: FloatArray
+    bending: FloatArray
+
+
+@dataclass(frozen=True)
+class ToolPrecision:
+    """Errors, compliance and deflection at the tool of a design in one pose under a load.
+
+    Values are infinite in a singular pose.
+
+    Attributes:
+        loaded: The pose under its load, its payload and other weights.
+    """
+
+    loaded: LoadedPose
+
+    @cached_property
+    def precision(self) -> Precision:
+        """The compliance and the errors per error of each source."""
+        return pose_precision(*self._given, self.loaded.tool)
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether the pose is not singular."""
+        return bool(np.isfinite(self.precision.compliance).all())
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """Largest errors of the sources, shape (29,), in design units and radians."""
+        return source_errors(self.loaded.design)
+
+    @cached_property
+    def by_source(self) -> FloatArray:
+        """The tool's error per error of each source, shape (6, 29)."""
+        return by_source(self.precision)
+
+    def worst(self, sources: slice = BY_ALL) -> LargestError:
+        """Return the largest errors by some of the sources."""
+        return largest_error(self.by_source[:, sources], self.bounds[sources])
+
+    def rms(self, sources: slice = BY_ALL) -> ToolError:
+        """Return the root-mean-square errors by some of the sources."""
+        return rms_of_sources(self.by_source[:, sources], self.bounds[sources])
+
+    @cached_property
+    def alone(self) -> ToolError:
+        """The errors that each source alone causes, each of shape (29,)."""
+        moved = np.where(self.bounds > 0.0, self.by_source, 0.0) * self.bounds
+        halves = (moved[:3], moved[3:])
+        return ToolError(*(np.sqrt((half**2).sum(axis=0)) for half in halves))
+
+    @cached_property
+    def ellipsoid(self) -> ErrorEllipsoid:
+        """The ellipsoid of the tool's RMS displacement by all sources, in a regular pose."""
+        values, vectors = np.linalg.eigh(self._covariance)
+        return ErrorEllipsoid(np.sqrt(np.maximum(values[::-1], 0.0)), vectors[:, ::-1].T)
+
+    @property
+    def _covariance(self) -> FloatArray:
+        moved = self.by_source[:3] * self.bounds
+        return moved @ moved.T
+
+    @cached_property
+    def wrench(self) -> FloatArray:
+        """The load and the weights as (F; M) at the tool, shape (6,), in N and N × unit."""
+        carried = carry(*self._given, self.loaded.weights, self.loaded.tool)
+        return self.loaded.load + carried.wrench
+
+    @cached_property
+    def deflection(self) -> FloatArray:
+        """Displacement and turn of the tool under the wrench, shape (6,)."""
+        return deflection(self.precision.compliance, self.wrench)
+
+    @cached_property
+    def principal(self) -> PrincipalCompliances:
+        """The six principal directions of the compliance."""
+        return principal_compliances(self.precision.compliance)
+
+    @cached_property
+    def shares(self) -> ComplianceShares:
+        """Shares of guide, struts and actuators in the deflection's work."""
+        stiffness = stiffness_of(self.loaded.design)
+        return compliance_shares(*self._given, self.wrench, *stiffness, self.loaded.tool)
+
+    @cached_property
+    def along_guide(self) -> CarriageDeflections:
+        """What the wrench moves legs 2 and 3 along the guide, in a regular pose."""
+        stiffness, bending = stiffness_of(self.loaded.design)
+        guide, struts = list(GUIDE_ROWS), list(STRUT_ROWS)
+        forces = actuator_forces(*self._given, self.wrench, self.loaded.tool)[guide]
+        lengths = inverse(*self._given)[struts]
+        return CarriageDeflections(
+            -forces / stiffness[guide], -forces * lengths**3 / (3.0 * bending)
+        )
+
+    @property
+    def _given(self) -> tuple[Design, tuple[float, ...], FloatArray]:
+        pose = self.loaded.pose
+        return self.loaded.design, pose.position, pose.rotation

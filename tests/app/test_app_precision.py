@@ -1,0 +1,273 @@
+"""Precision on the page: the figures, the ellipsoid, the deflected shape and the budget."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from desk import Desk, by_name
+from services import StubWorker, services_for
+
+from explorer import Actuators, Payload, Struts, Tolerances, Tool
+from explorer.app.features.feature import Services
+from explorer.app.features.precision.actions import SetTolerances
+from explorer.app.features.precision.budget import (
+    SET,
+    BudgetFeed,
+    BudgetPart,
+    budget_request,
+    budget_rows,
+)
+from explorer.app.features.precision.panel import TYPICAL, PrecisionPanel
+from explorer.app.features.precision.pose import PosePrecision
+from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene, drawn_times
+from explorer.app.features.precision.tasks import budget_of, budget_table
+from explorer.app.scene.placing import Placed
+from explorer.app.state.actions import Set
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.state.view import ForcesView, PrecisionView
+from explorer.app.widgets.buttons import Buttons
+from explorer.errors import InputError, NoAnswerError
+from explorer.export.tolerance_table import COLUMNS
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
+from explorer.mechanism.typical import typical_machine
+from explorer.statics.budget.costs import stated_tolerances
+from explorer.statics.error_sources import SOURCES
+
+OPTIMAL = PRESETS["paper-optimal"]
+TYPICAL_DESIGN = msgspec.structs.replace(
+    typical_machine(OPTIMAL)[0], tool=Tool((1.0, -0.5, 2.0)), payload=Payload(0.5, (1.0, 0.0, 1.0))
+)
+SINGULAR = Pose((3.0, 4.0, 5.0), (1.0, 0.0, 0.0, 0.0))
+
+
+def shown(design: Design = TYPICAL_DESIGN, **precision: Any) -> State:
+    """Return a design at home under a force, with what is drawn of its precision."""
+    state = opened(design)
+    forces = ForcesView(force=(3.0, -4.0, -10.0), moment=(0.05, 0.0, -0.02))
+    view = replace(state.view, forces=forces, precision=PrecisionView(**precision))
+    return Set("view", view).apply(state)
+
+
+def markup(panel: Any, state: State) -> str:
+    """Return the markup of a panel."""
+    return " ".join(str(v) for _, name, v in panel.updates(Frame(state)) if name == "content")
+
+
+def words(html: str) -> str:
+    return re.sub("<[^>]+>", " ", html)
+
+
+@pytest.fixture
+def services(server: viser.ViserServer) -> Services:
+    return at_desk(server, Desk(opened(OPTIMAL)))
+
+
+def at_desk(server: viser.ViserServer, desk: Desk) -> Services:
+    """Return services whose worker answers at once."""
+    worker = StubWorker(at_once=True)
+    return services_for(server, desk.session, worker, buttons=Buttons(server))
+
+
+# Figures
+
+
+def test_figures_are_those_of_the_pose(services: Services) -> None:
+    state = shown()
+    precision = services.get(PosePrecision).of(Frame(state))
+    worst, rms = precision.worst(), precision.rms()
+    text = words(markup(PrecisionPanel(services), state))
+    for value in (10.0 * worst.displacement, 10.0 * rms.displacement):
+        assert f"{float(value):.3g} mm" in text
+    assert f"{math.degrees(float(worst.turn)):.3g}°" in text
+    moved = 10.0 * float(np.linalg.norm(precision.deflection[:3]))
+    assert f"{moved:.3g} mm" in text
+    softest = 10.0 * float(precision.principal.displacement[0])
+    assert f"{softest:.3g} mm/N" in text
+    percents = [int(each) for each in re.findall(r"(?:guide|struts|actuators) (\d+)&nbsp;%", text)]
+    assert len(percents) == 3
+    assert sum(percents) == pytest.approx(100, abs=1)
+
+
+def test_ideal_design_is_offered_typical_values(server: viser.ViserServer) -> None:
+    desk = Desk(opened(OPTIMAL))
+    services = at_desk(server, desk)
+    panel = PrecisionPanel(services)
+    text = markup(panel, desk.state)
+    assert "No errors are given" in text
+    assert "Rigid" in text
+    assert "0.05 mm" in text
+    desk.press(services.buttons, TYPICAL)
+    assert desk.state.design == typical_machine(OPTIMAL)[0]
+    assert "Assume" not in markup(panel, desk.state)
+    # What the design states stays.
+    stated = msgspec.structs.replace(
+        OPTIMAL,
+        actuators=Actuators(error_mm=(0.0, 0.0, 0.01, 0.0, 0.0, 0.0)),
+        struts=Struts(outer_mm=20.0),
+        tolerances=Tolerances(b4=(0.0, 0.0, 0.2)),
+    )
+    filled, assumed = typical_machine(stated)
+    assert len(assumed) == 1
+    assert filled == msgspec.structs.replace(
+        stated, actuators=msgspec.structs.replace(stated.actuators, stiffness_n_mm=(1000.0,) * 6)
+    )
+    desk.session.stop()
+
+
+def test_singular_pose_is_told_and_nothing_is_drawn(services: Services) -> None:
+    state = replace(shown(ellipsoid=True, deflected=True), pose=SINGULAR)
+    text = markup(PrecisionPanel(services), state)
+    assert text.count("singular") == 2
+    assert "nan" not in text
+    for scene in (ErrorEllipsoidScene(services), DeflectedScene(services)):
+        drawn = by_name(scene.updates(Placed(Frame(state))))
+        assert not any(each["visible"] for each in drawn.values())
+
+
+# The scene
+
+
+def test_ellipsoid_is_that_of_the_covariance(services: Services) -> None:
+    placed = Placed(Frame(shown(ellipsoid=True)))
+    precision = services.get(PosePrecision).of(placed.frame)
+    drawn = by_name(ErrorEllipsoidScene(services).updates(placed))
+    body, label = drawn["/precision/ellipsoid/body"], drawn["/precision/ellipsoid/label"]["text"]
+    times = float(re.search(r"× ([\d.,]+)$", label)[1].replace(",", ""))  # type: ignore[index]
+    moved = precision.by_source[:3] * precision.bounds
+    sizes = np.sqrt(np.linalg.eigvalsh(moved @ moved.T))[::-1]
+    np.testing.assert_allclose(np.array(body["scale"]) / (times * placed.scale), sizes, rtol=1e-9)
+    # The RMS displacement is that of its three semi-axes.
+    assert np.linalg.norm(sizes) == pytest.approx(float(precision.rms().displacement))
+    np.testing.assert_allclose(
+        body["position"], placed.on_platform(placed.frame.state.design.tool.position)
+    )
+
+
+@pytest.mark.parametrize("times", [None, 20.0])
+def test_deflected_shape_is_the_linear_motion_magnified(
+    services: Services, times: float | None
+) -> None:
+    state = shown(deflected=True, times=times)
+    placed = Placed(Frame(state))
+    precision = services.get(PosePrecision).of(placed.frame)
+    drawn = by_name(DeflectedScene(services).updates(placed))
+    magnified = drawn_times(placed, precision)
+    assert times in (None, magnified)
+    v, w = precision.deflection[:3], precision.deflection[3:]
+    tool = placed.on_platform(state.design.tool.position)
+    names = list(placed.platform_points)
+    tips = np.array([*(placed.points[name] for name in names), tool])
+    moved = tips + magnified * (placed.scale * v + np.cross(w, tips - tool))
+    balls = drawn["/precision/balls"]["batched_positions"]
+    np.testing.assert_allclose(balls, moved, atol=1e-5)
+    # The last piece of each strut ends at its displaced point, and its foot stays on the guide.
+    legs = drawn["/precision/legs"]
+    starts, pieces = legs["batched_positions"], len(legs["batched_positions"])
+    per_strut = (pieces - 2) // 2
+    for index, name in enumerate(("b2", "b3")):
+        foot = starts[2 + index * per_strut]
+        assert np.abs(foot[1:]).max() < 1e-6
+        slid = magnified * placed.scale * precision.along_guide.carriages[index]
+        assert foot[0] == pytest.approx(placed.points[name][0] + slid, abs=1e-5)
+        # What the carriage and the bending do adds up to the motion of the tip.
+        along = precision.along_guide
+        total = placed.scale * (along.carriages[index] + along.bending[index])
+        tip = (moved[names.index(name)] - placed.points[name])[0] / magnified
+        assert tip == pytest.approx(total, rel=1e-9)
+
+
+def test_magnification_that_leaves_the_scene_is_limited(services: Services) -> None:
+    placed = Placed(Frame(shown(deflected=True, times=1e30)))
+    drawn = by_name(DeflectedScene(services).updates(placed))
+    assert np.abs(drawn["/precision/balls"]["batched_positions"]).max() < 200.0
+
+
+@pytest.mark.parametrize("values", [{"times": 0.0}, {"wanted": -1.0}, {"wanted_turn": math.inf}])
+def test_impossible_wishes_are_refused(values: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="must be positive"):
+        PrecisionView(**values)
+
+
+# The budget
+
+
+@pytest.mark.parametrize("over", ["pose", "box", "workspace"])
+def test_budget_keeps_what_is_wanted_and_is_set_in_one_step(
+    server: viser.ViserServer, over: Any
+) -> None:
+    desk = Desk(shown(budget=True, over=over, wanted=0.5))
+    services = at_desk(server, desk)
+    part = BudgetPart(services)
+    before = desk.state.design
+    services.get(BudgetFeed).follow(Frame(desk.state))
+    text = markup(part, desk.state)
+    drawing = budget_of(budget_request(desk.state))
+    assert drawing.found is not None
+    assert drawing.costs.worst_displacement <= 0.5
+    assert len(re.findall("<tr", text)) == len(SOURCES)
+    desk.press(services.buttons, SET)
+    design = desk.state.design
+    assert design != before
+    known = np.isfinite(drawing.costs.tolerances)
+    np.testing.assert_array_equal(stated_tolerances(design)[known], drawing.costs.tolerances[known])
+    # The costs of what is set are those that were told.
+    again = budget_of(budget_request(Set("view.precision.wanted", None).apply(desk.state)))
+    if known.all():
+        assert again.costs.worst_displacement == pytest.approx(drawing.costs.worst_displacement)
+    desk.session.stop()
+
+
+def test_budget_without_tolerances_ranks_by_unit_errors() -> None:
+    drawing = budget_of(budget_request(shown(OPTIMAL, budget=True)))
+    text = "".join(budget_rows(drawing))
+    assert "states no tolerances" in text
+    bars = [float(each) for each in re.findall(r"--share:([\d.]+)%", text)]
+    assert bars == sorted(bars, reverse=True)
+    assert bars[0] == 100.0
+
+
+def test_budget_that_cannot_be_kept_is_told_in_one_line(server: viser.ViserServer) -> None:
+    desk = Desk(shown(budget=True, wanted=0.01, keep_actuators=True))
+    worker = StubWorker()
+    services = services_for(server, desk.session, worker, buttons=Buttons(server))
+    part = BudgetPart(services)
+    services.get(BudgetFeed).follow(Frame(desk.state))
+    with pytest.raises(NoAnswerError) as error:
+        worker.work()
+    worker.orders[-1].failed(str(error.value))
+    text = words(markup(part, desk.state))
+    assert "There is no budget" in text
+    assert "actuators" in text
+    desk.press(services.buttons, SET)
+    assert desk.session.history.at == 0
+    desk.session.stop()
+
+
+def test_table_has_every_source_with_its_part() -> None:
+    rows = list(csv.reader(io.StringIO(budget_table(budget_request(shown())).decode())))
+    assert rows[0] == list(COLUMNS)
+    assert sorted(row[1] for row in rows[1:]) == sorted(SOURCES)
+    by_name = {row[1]: row for row in rows[1:]}
+    assert by_name["b2y"][0] == "platform"
+    assert by_name["guide tilt y"][2:4] == ["degree", "0.1"]
+    assert sum(float(row[8]) for row in rows[1:]) == pytest.approx(1.0)
+
+
+def test_tolerances_that_may_be_any_stay() -> None:
+    state = shown()
+    found = list(stated_tolerances(state.design))
+    found[0], found[6] = math.inf, math.inf
+    after = SetTolerances(tuple(found)).apply(state)
+    assert after.design == state.design
