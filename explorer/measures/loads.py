@@ -139,6 +139,7 @@ KINDS = (
         ("has_errors",),
         unit="°",
         gradient=lambda statics: statics.turn_gradient,
+        in_report=False,
     ),
     Kind(
         "softest_compliance",

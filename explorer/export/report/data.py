@@ -11,6 +11,7 @@ from typing import TypeVar
 
 from explorer.errors import ExplorerError
 from explorer.export.report.loads import ReportLoads, loads_of
+from explorer.export.report.precision import precision_of
 from explorer.export.simulation import DENSITY
 from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
@@ -29,6 +30,7 @@ from explorer.singularity.ellipsoids import (
     performance,
     singularity_free_ball,
 )
+from explorer.statics.tool_precision import ToolPrecision
 from explorer.workspace.accessible.workspace import ReachableWorkspace, reachable_workspace
 from explorer.workspace.held import HeldWorkspace
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
@@ -70,6 +72,7 @@ class ReportData:
             pose is singular.
         loads: The pose under the payload; None without a tool, a payload and limits of forces.
         held: Part of the workspace that holds the payload; None without a payload or limits.
+        precision: Errors and deflection in the pose; None of a design that is exact and rigid.
         bill: Bill of the prototype's parts.
         record: Record of the search that found the design; None without one.
     """
@@ -88,6 +91,7 @@ class ReportData:
     certified: float
     loads: ReportLoads | None
     held: HeldWorkspace | Missing | None
+    precision: ToolPrecision | None
     bill: Bill | Missing
     record: Record | None
 
@@ -151,6 +155,7 @@ def gather_report_data(
         certified=certified_radius(design, at),
         loads=loads_of(case),
         held=held,
+        precision=precision_of(case),
         bill=_compute(lambda: bill_of_materials(make_prototype(design), DENSITY)),
         record=record,
     )

@@ -26,6 +26,7 @@ from explorer.export.report.sections.legs import legs_section
 from explorer.export.report.sections.loads import loads_section
 from explorer.export.report.sections.mechanism import mechanism_section
 from explorer.export.report.sections.parts import parts_section
+from explorer.export.report.sections.precision import precision_section
 from explorer.export.report.sections.search import search_section
 from explorer.export.report.sections.singularity import singularity_section
 from explorer.export.report.sections.workspace import workspace_section
@@ -33,6 +34,7 @@ from explorer.files.packaged import packaged_file
 from explorer.files.versions import versions
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design_file import PRESETS, encode_design
+from explorer.mechanism.tool_point import tool_position
 from explorer.numerics.number_text import format_number
 from explorer.workspace.accessible.workspace import ReachableWorkspace
 
@@ -160,6 +162,9 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
     pose = data.snapshot.pose
     turned = "" if data.is_home else f" --quaternion {_words(pose.quaternion)}"
     at = "" if data.is_home else f" --position {_words(pose.position)}{turned}"
+    # With --at tool a position is that of the tool.
+    tool = tool_position(pose, data.design.tool.position)
+    at_tool = "" if data.is_home else f" --position {_words(tool)}{turned}"
     legs = " --interference" if isinstance(data.reachable, ReachableWorkspace) else ""
     record = "" if data.record is None else " --record record.json"
     yield f"explorer report --design {source}{at}{record} --out report.html"
@@ -167,7 +172,9 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
     yield f"explorer singularity --design {source}{at}"
     yield f"explorer interference --design {source}{at}"
     if data.case.is_loaded or data.case.is_limited:
-        yield f"explorer forces --design {source}{at} --at tool"
+        yield f"explorer forces --design {source}{at_tool} --at tool"
+    if data.precision is not None:
+        yield f"explorer accuracy --design {source}{at_tool} --at tool"
     if data.held is not None:
         yield f"explorer workspace --design {source}{turned} --load 0 0 0"
     if not isinstance(data.bill, Missing):
@@ -186,6 +193,7 @@ _SECTIONS: tuple[Callable[[ReportData], Iterable[Element]], ...] = (
     singularity_section,
     legs_section,
     loads_section,
+    precision_section,
     parts_section,
     search_section,
     claims_section,

@@ -98,6 +98,20 @@ def ends(low: float, high: float) -> Cell:
     return number(low), " to ", number(high)
 
 
+def range_of(values: Sequence[float], unit: str, digits: int = 4) -> Cell:
+    """Return one number that all values are, or the least and the largest, with their unit."""
+    low, high = min(values), max(values)
+    if low == high:
+        return number(low, digits), f" {unit}"
+    return number(low, digits), " to ", number(high, digits), f" {unit}"
+
+
+def vector(values: Sequence[float], digits: int = 3) -> tuple[Piece, ...]:
+    """Return the pieces of three numbers with commas between them."""
+    x, y, z = (number(value, digits) for value in values)
+    return x, ", ", y, ", ", z
+
+
 def whole(value: int) -> Element:
     """Return an element with a whole number, its digits in groups of three."""
     return element("data", f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}"), value=str(value))

@@ -15,7 +15,6 @@ from explorer.export.report.drawings.slices import Slices
 from explorer.export.report.loads import ReportLoads
 from explorer.export.report.markup import (
     Cell,
-    Piece,
     Row,
     element,
     illustration,
@@ -23,7 +22,9 @@ from explorer.export.report.markup import (
     numbers,
     paragraph,
     percentage,
+    range_of,
     table,
+    vector,
 )
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Tool
@@ -35,8 +36,8 @@ from explorer.workspace.held import HeldWorkspace
 from explorer.workspace.position_bands import position_bands
 from explorer.workspace.solids.solid import Solid
 
-# Digits of forces and moments, and of directions.
-_MANY, _FEW = 4, 3
+# Digits of forces and moments.
+_MANY = 4
 
 
 def loads_section(data: ReportData) -> Iterator[Element]:
@@ -73,7 +74,7 @@ def _carried(data: ReportData) -> Element:
     if payload.mass_kg:
         rows += _point("payload’s centre", payload.centre, unit)
     rows.append(("force at the tool, any direction", _amount(payload.force_n, "N"), ""))
-    rows.append(("gravity, along x, y, z of the base", _vector(design.gravity), ""))
+    rows.append(("gravity, along x, y, z of the base", vector(design.gravity), ""))
     return table(
         ("", "units", "mm"),
         rows,
@@ -92,20 +93,14 @@ def _point(name: str, point: Triple, unit_mm: float) -> list[Row]:
 def _limits(data: ReportData) -> Element:
     actuators, struts, guide = data.design.actuators, data.design.struts, data.design.guide
     rows: list[Row] = []
-    for name, six, unit in (
-        ("push of an actuator, at most", actuators.push_n, "N"),
-        ("pull of an actuator, at most", actuators.pull_n or actuators.push_n, "N"),
-        ("error of an actuator, ±", actuators.error_mm if data.case.has_errors else None, "mm"),
-        ("stiffness of an actuator", actuators.stiffness_n_mm, "N/mm"),
+    for name, six in (
+        ("push of an actuator, at most", actuators.push_n),
+        ("pull of an actuator, at most", actuators.pull_n or actuators.push_n),
     ):
-        if six is not None:
-            rows.append((name, _range(six, unit)))
-        elif unit == "N":
-            rows.append((name, "no limit"))
+        rows.append((name, "no limit" if six is None else range_of(six, "N")))
     if struts.outer_mm is not None:
         rows.append(("outer diameter of the struts", _amount(struts.outer_mm, "mm")))
         rows.append(("inner diameter of the struts", _amount(struts.inner_mm, "mm")))
-        rows.append(("Young’s modulus of the struts", _amount(struts.modulus_gpa, "GPa")))
     if struts.stress_mpa is not None:
         rows.append(("stress of the struts, at most", _amount(struts.stress_mpa, "MPa")))
     rows.append(("bending of a strut, at most", _limit(struts.largest_moment, "N m")))
@@ -215,12 +210,12 @@ def _most(data: ReportData, loads: ReportLoads) -> Element:
         ),
     ]
     if newton.share and np.isfinite(newton.direction).all():
-        direction = _vector(newton.direction.tolist())
+        direction = vector(newton.direction.tolist())
         remark = f"where {PART_NAMES[newton.part]} gives way first"
         rows.append(("its worst direction", direction, remark))
     worst = loads.worst_payload_force
     if force and np.isfinite(worst.direction).all():
-        direction = _vector(worst.direction.tolist())
+        direction = vector(worst.direction.tolist())
         remark = f"with the weight; {PART_NAMES[worst.part]} needs ", percentage(worst.share)
         rows.append(
             ("worst direction of the payload’s force", direction, (*remark, " of its limit"))
@@ -263,7 +258,7 @@ def _volumes(data: ReportData, held: HeldWorkspace) -> Element:
 
 def _best(position: FloatArray, factor: float) -> Element:
     """Return the words for the position of an empty solid that holds most of the payload."""
-    at = ("(", *_vector(position.tolist()), ")")
+    at = ("(", *vector(position.tolist()), ")")
     if factor > 1.0:
         words = "The positions that hold the payload are too few for a solid. The best is "
         return paragraph(words, *at, ".", class_="note")
@@ -298,15 +293,3 @@ def _limit(value: float | None, unit: str) -> Cell:
 
 def _figure(value: float) -> Element:
     return number(value, _MANY)
-
-
-def _range(six: Sequence[float], unit: str) -> Cell:
-    """Return one number that all six are, or the least and the largest."""
-    if min(six) == max(six):
-        return _figure(six[0]), f" {unit}"
-    return _figure(min(six)), " to ", _figure(max(six)), f" {unit}"
-
-
-def _vector(vector: Sequence[float]) -> tuple[Piece, ...]:
-    x, y, z = (number(value, _FEW) for value in vector)
-    return x, ", ", y, ", ", z
