@@ -105,7 +105,6 @@ from .statics.accuracy import (
     Precision as Precision,
     ToolError as ToolError,
     error_by_actuator as error_by_actuator,
-    geometry_error as geometry_error,
     pose_error_by_geometry as pose_error_by_geometry,
     pose_precision as pose_precision,
     rms_error as rms_error,
@@ -129,6 +128,7 @@ from .statics.compliance import (
 from .statics.error_sources import (
     SOURCES as SOURCES,
     LargestError as LargestError,
+    errors_alone as errors_alone,
     largest_error as largest_error,
     pose_error_by_source as pose_error_by_source,
     rms_of_sources as rms_of_sources,

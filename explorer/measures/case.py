@@ -16,6 +16,7 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.statics.compliance import is_elastic
 from explorer.statics.reactions import has_limits
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
@@ -185,8 +186,7 @@ class Case:
     @property
     def is_elastic(self) -> bool:
         """Whether the design's actuators or struts give way."""
-        design = self.design
-        return design.actuators.stiffness_n_mm is not None or design.struts.outer_mm is not None
+        return is_elastic(self.design)
 
     def has(self, need: str) -> bool:
         """Return whether the case has what a measure needs, an attribute."""

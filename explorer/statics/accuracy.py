@@ -300,23 +300,6 @@ def actuator_errors(design: Design) -> FloatArray:
     return np.array(design.actuators.error_mm) / design.unit_mm
 
 
-def geometry_error(design: Design, by_geometry: FloatArray) -> ToolError:
-    """Return the largest error per dimension within the design's tolerances, shapes (..., 23).
-
-    Args:
-        design: The manipulator, with its tolerances.
-        by_geometry: Tool errors per error of each dimension, shape (..., 6, 23).
-    """
-    tolerances = design.tolerances.values(design.unit_mm)
-    sizes = [
-        np.sqrt(np.einsum("...ij,...ij->...j", half, half))
-        for half in (by_geometry[..., :3, :], by_geometry[..., 3:, :])
-    ]
-    infinite = np.isinf(sizes[0]) & (tolerances == 0.0)
-    moved, turned = (np.where(infinite, 0.0, size) * tolerances for size in sizes)
-    return ToolError(moved, turned)
-
-
 def _by_geometry(poses: Poses, twists: FloatArray) -> FloatArray:
     out = np.empty((poses.count, 6, len(DIMENSIONS)))
     geometry_rows(poses.count, poses.variables, poses.positions, poses.rotations, twists, out)

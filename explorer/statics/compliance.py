@@ -152,6 +152,11 @@ def stiffness_of(design: Design) -> tuple[FloatArray, FloatArray]:
     return stiffness, np.full(2, design.struts.bending_stiffness / design.unit_mm**2)
 
 
+def is_elastic(design: Design) -> bool:
+    """Return whether a design states the stiffness of its actuators or the tubes of its struts."""
+    return design.actuators.stiffness_n_mm is not None or design.struts.outer_mm is not None
+
+
 def deflection(compliance: FloatArray, load: ArrayLike) -> FloatArray:
     """Return the displacement and the turn (v; ω) of the tool under a load, shape (..., 6).
 

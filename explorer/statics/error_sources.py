@@ -220,6 +220,25 @@ def largest_error(by_source: FloatArray, bounds: ArrayLike) -> LargestError:
     return LargestError(size[..., 0], size[..., 1], vectors, signs)
 
 
+def errors_alone(by_source: FloatArray, bounds: ArrayLike) -> ToolError:
+    """Return the largest errors of the tool by each source alone, each of shape (..., n).
+
+    Args:
+        by_source: Errors of the tool per error of each source, shape (..., 6, n).
+        bounds: Bounds of the sources' errors, shape (..., n), not negative.
+
+    Raises:
+        InputError: A bound is negative or not finite.
+    """
+    limits = _checked(bounds)[..., None, :]
+    # A source without an error moves nothing, also in a singular pose.
+    with np.errstate(over="ignore", invalid="ignore"):
+        moved = np.where(limits > 0.0, by_source * limits, 0.0)
+        halves = moved.reshape(*moved.shape[:-2], 2, 3, moved.shape[-1])
+        sizes = np.sqrt(np.einsum("...ij,...ij->...j", halves, halves))
+    return ToolError(sizes[..., 0, :], sizes[..., 1, :])
+
+
 def rms_of_sources(by_source: FloatArray, deviations: ArrayLike) -> ToolError:
     """Return the root-mean-square errors of the tool for independent errors of the sources.
 

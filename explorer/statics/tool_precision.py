@@ -23,6 +23,7 @@ from explorer.statics.compliance import (
 from explorer.statics.error_sources import (
     LargestError,
     by_source,
+    errors_alone,
     largest_error,
     rms_of_sources,
     source_errors,
@@ -103,9 +104,7 @@ class ToolPrecision:
     @cached_property
     def alone(self) -> ToolError:
         """The errors that each source alone causes, each of shape (29,)."""
-        moved = np.where(self.bounds > 0.0, self.by_source, 0.0) * self.bounds
-        halves = (moved[:3], moved[3:])
-        return ToolError(*(np.sqrt((half**2).sum(axis=0)) for half in halves))
+        return errors_alone(self.by_source, self.bounds)
 
     @cached_property
     def ellipsoid(self) -> ErrorEllipsoid:

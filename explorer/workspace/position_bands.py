@@ -32,7 +32,7 @@ from explorer.singularity.colours import (
 )
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.accuracy import actuator_errors, worst_error
-from explorer.statics.compliance import compliance, deflection, stiffness_of
+from explorer.statics.compliance import compliance, deflection, is_elastic, stiffness_of
 from explorer.statics.held import held_load, largest_shares
 from explorer.statics.reactions import has_limits
 from explorer.statics.weights import payload_wrench
@@ -163,7 +163,7 @@ def is_unstated(design: Design, measure: PositionMeasure) -> bool:
         case "error":
             return not any(design.actuators.error_mm)
         case "deflection":
-            return design.actuators.stiffness_n_mm is None and design.struts.outer_mm is None
+            return not is_elastic(design)
         case _:
             return False
 

@@ -21,14 +21,15 @@ from explorer import (
     Tolerances,
     compliance,
     error_by_actuator,
+    errors_alone,
     forward,
-    geometry_error,
     home_pose,
     inverse,
     margins,
     pose_error_by_geometry,
     pose_precision,
     rms_error,
+    source_errors,
     worst_error,
 )
 from explorer.mechanism.machine import DIMENSIONS
@@ -36,6 +37,7 @@ from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.compliance import stiffness_of
 from explorer.statics.equilibrium import twists_of_actuators
+from explorer.statics.error_sources import by_source
 
 OPTIMAL = PRESETS["paper-optimal"]
 ERRORS = np.array([0.01, 0.02, 0.015, 0.005, 0.02, 0.01])
@@ -190,9 +192,10 @@ def test_precision_of_poses_is_that_of_the_single_functions() -> None:
         assert_allclose(each, function(*given, errors, TOOL))
     assert_allclose(found.by_geometry, pose_error_by_geometry(*given, TOOL))
     assert_allclose(found.compliance, compliance(*given, *stiffness_of(design), TOOL))
-    moved = geometry_error(design, found.by_geometry)
-    assert moved.displacement.shape == (500, 23)
-    used = np.flatnonzero(moved.displacement.any(axis=0))
+    alone = errors_alone(by_source(found), source_errors(design))
+    assert_allclose(alone.displacement[:, :6], found.by_actuator.displacement)
+    assert_allclose(alone.turn[:, :6], found.by_actuator.turn)
+    used = np.flatnonzero(alone.displacement[:, 6:].any(axis=0))
     assert [DIMENSIONS[index] for index in used] == ["a3x", "a3y", "guide tilt y"]
 
 

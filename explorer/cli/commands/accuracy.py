@@ -13,44 +13,33 @@ from explorer.cli.load_options import LoadOptions, check_regular
 from explorer.cli.options import TypicalOptions
 from explorer.cli.output import assumed_lines, figure, figures, heading, pose_table, table
 from explorer.cli.values import hint, numbers
-from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.design import Design
 from explorer.mechanism.machine import DIMENSIONS, Six
-from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray
-from explorer.statics.accuracy import Precision, ToolError, geometry_error, pose_precision
-from explorer.statics.compliance import (
-    PrincipalCompliances,
-    compliance_shares,
-    deflection,
-    principal_compliances,
-    stiffness_of,
-)
-from explorer.statics.error_sources import (
-    by_source,
-    largest_error,
-    rms_of_sources,
-    source_errors,
-)
-from explorer.statics.weights import carry, design_weights
+from explorer.mechanism.pose import Triple
+from explorer.statics.compliance import is_elastic
+from explorer.statics.error_sources import SOURCES
+from explorer.statics.loaded import LoadedPose
+from explorer.statics.tool_precision import BY_ACTUATORS, BY_ALL, BY_DIMENSIONS, ToolPrecision
 
+B4: Triple = (0.0, 0.0, 0.0)
+GROUPS = {"actuators": BY_ACTUATORS, "dimensions": BY_DIMENSIONS, "all": BY_ALL}
 ORDER = "l1 d1 d2 d3 d4 l4"
 PARTS = ("guide", "struts", "actuators")
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What the command computes of a pose."""
+    """What the command computes of a pose.
 
-    design: Design
+    Attributes:
+        assumed: Words for what is assumed of the design.
+        tool: Tool point in the platform frame, in design units; None for b4.
+        precision: Errors, compliance and deflection at this point.
+    """
+
     assumed: tuple[str, ...]
-    pose: Pose
     tool: Triple | None
-    precision: Precision
-    principal: PrincipalCompliances
-    deflection: FloatArray
-    shares: tuple[float, ...]
-    geometry: ToolError
-    totals: dict[str, ToolError]
+    precision: ToolPrecision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,23 +65,10 @@ class Accuracy(TypicalOptions, LoadOptions):
         design = self._with_actuators(self.read_loaded_design())
         design, assumed = self.with_typical(design)
         pose, tool = self.pose(design), self.tool(design)
-        given = design, pose.position, pose.rotation
-        precision = pose_precision(*given, tool)
-        check_regular(pose, precision.by_geometry)
-        wrench = carry(*given, design_weights(design), tool).wrench + self.load
-        shares = compliance_shares(*given, wrench, *stiffness_of(design), tool)
-        answer = Answer(
-            design,
-            assumed,
-            pose,
-            tool,
-            precision,
-            principal_compliances(precision.compliance),
-            deflection(precision.compliance, wrench),
-            tuple(float(share) for share in shares),
-            geometry_error(design, precision.by_geometry),
-            _totals(design, precision),
-        )
+        loaded = LoadedPose(design, pose, self.load, point=tool or B4)
+        precision = ToolPrecision(loaded)
+        check_regular(pose, precision.by_source)
+        answer = Answer(assumed, tool, precision)
         self.write(lambda: _as_json(answer), lambda: _as_lines(answer))
 
     def _with_actuators(self, design: Design) -> Design:
@@ -109,26 +85,34 @@ class Accuracy(TypicalOptions, LoadOptions):
         return msgspec.structs.replace(design, actuators=actuators)
 
 
-def _totals(design: Design, precision: Precision) -> dict[str, ToolError]:
-    """Return the worst and the RMS errors of the dimensions and of all sources together."""
-    influences, errors = by_source(precision), source_errors(design)
-    totals: dict[str, ToolError] = {}
-    for name, sources in (("dimensions", slice(len(JOINTS), None)), ("all", slice(None))):
-        given = influences[:, sources], errors[sources]
-        worst = largest_error(*given)
-        totals[f"worst_{{}}_of_{name}"] = ToolError(worst.displacement, worst.turn)
-        totals[f"rms_{{}}_of_{name}"] = rms_of_sources(*given)
-    return totals
+def _totals(precision: ToolPrecision) -> dict[str, tuple[float, float]]:
+    """Return the worst and the RMS errors of actuators, dimensions and all, by their words."""
+    return {
+        f"{name}, {kind}": (float(error.displacement), float(error.turn))
+        for name, sources in GROUPS.items()
+        for kind, error in (
+            ("worst", precision.worst(sources)),
+            ("RMS", precision.rms(sources)),
+        )
+    }
 
 
 def _as_json(answer: Answer) -> dict[str, object]:
-    precision, principal = answer.precision, answer.principal
+    precision = answer.precision
+    principal, alone = precision.principal, precision.alone
     shares = {
-        name: None if np.isnan(v) else v for name, v in zip(PARTS, answer.shares, strict=True)
+        name: None if np.isnan(share) else float(share)
+        for name, share in zip(PARTS, precision.shares, strict=True)
     }
+    totals: dict[str, float] = {}
+    for words, (moved, turned) in _totals(precision).items():
+        name, kind = words.lower().split(", ")
+        suffix = "" if name == "actuators" else f"_of_{name}"
+        totals[f"{kind}_displacement{suffix}"] = moved
+        totals[f"{kind}_turn{suffix}"] = turned
     return {
-        "compliance": precision.compliance,
-        "deflection": answer.deflection,
+        "compliance": precision.precision.compliance,
+        "deflection": precision.deflection,
         "deflection_shares": shares,
         "principal_compliances": {
             "displacement": principal.displacement,
@@ -136,48 +120,39 @@ def _as_json(answer: Answer) -> dict[str, object]:
             "turn": principal.turn,
             "moment_directions": principal.moment_directions,
         },
-        "worst_displacement": float(precision.worst.displacement),
-        "worst_turn": float(precision.worst.turn),
-        "rms_displacement": float(precision.rms.displacement),
-        "rms_turn": float(precision.rms.turn),
-        "displacement_by_actuator": precision.by_actuator.displacement,
-        "turn_by_actuator": precision.by_actuator.turn,
+        **totals,
+        "displacement_by_actuator": alone.displacement[BY_ACTUATORS],
+        "turn_by_actuator": alone.turn[BY_ACTUATORS],
         "dimensions": list(DIMENSIONS),
-        "pose_error_by_geometry": precision.by_geometry,
-        "displacement_by_geometry": answer.geometry.displacement,
-        "turn_by_geometry": answer.geometry.turn,
-        **{
-            name.format(kind): float(getattr(error, kind))
-            for name, error in answer.totals.items()
-            for kind in ToolError._fields
-        },
+        "pose_error_by_geometry": precision.precision.by_geometry,
+        "displacement_by_geometry": alone.displacement[BY_DIMENSIONS],
+        "turn_by_geometry": alone.turn[BY_DIMENSIONS],
         "assumed": answer.assumed,
     }
 
 
 def _as_lines(answer: Answer) -> Iterator[str]:
-    design, precision = answer.design, answer.precision
+    precision = answer.precision
+    loaded = precision.loaded
+    design = loaded.design
     yield from (heading(design), *assumed_lines(answer.assumed))
-    yield from (pose_table(design, answer.pose, answer.tool), "")
+    yield from (pose_table(design, loaded.pose, answer.tool), "")
     rows = [("error from", "displacement, units", "mm", "turn")]
-    totals = [("actuators, worst", precision.worst), ("actuators, RMS", precision.rms)]
-    if any(answer.geometry.displacement) or any(answer.geometry.turn):
-        names = ("dimensions, worst", "dimensions, RMS", "all, worst", "all, RMS")
-        totals += zip(names, answer.totals.values(), strict=True)
-    for name, error in totals:
-        rows.append((name, *_error(design, float(error.displacement), float(error.turn))))
-    alone = precision.by_actuator
-    for name, moved, turned in zip(JOINTS, *(each.tolist() for each in alone), strict=True):
-        rows.append((name, *_error(design, moved, turned)))
-    by_geometry = zip(DIMENSIONS, *(each.tolist() for each in answer.geometry), strict=True)
-    ranked = sorted(by_geometry, key=lambda row: -row[1])
-    rows += [(name, *_error(design, *error)) for name, *error in ranked if any(error)]
+    moved, turned = (each.tolist() for each in precision.alone)
+    has_tolerances = any(moved[BY_DIMENSIONS]) or any(turned[BY_DIMENSIONS])
+    for words, error in _totals(precision).items():
+        if has_tolerances or words.startswith("actuators"):
+            rows.append((words, *_error(design, *error)))
+    by_source = [*zip(SOURCES, moved, turned, strict=True)]
+    dimensions = sorted(by_source[BY_DIMENSIONS], key=lambda row: -row[1])
+    for name, *error in (*by_source[BY_ACTUATORS], *(each for each in dimensions if any(each[1:]))):
+        rows.append((name, *_error(design, *error)))
     yield from (table(rows, "<>>>"), "")
-    if not precision.compliance.any():
+    if not is_elastic(design):
         yield "rigid: the design states no stiffness of its actuators and no struts"
         return
     rows = [("softest first", "mm/N", "direction")]
-    principal = answer.principal
+    principal = precision.principal
     for value, axis in zip(
         principal.displacement.tolist(), principal.force_directions.tolist(), strict=True
     ):
@@ -189,13 +164,13 @@ def _as_lines(answer: Answer) -> Iterator[str]:
     ):
         rows.append(("moment", figure(value * scale), "  ".join(figures(axis))))
     yield from (table(rows, "<><"), "")
-    moved, turned = answer.deflection[:3], answer.deflection[3:]
+    moved, turned = precision.deflection[:3], precision.deflection[3:]
     rows = [
         ("deflection", f"{'  '.join(figures((moved * design.unit_mm).tolist()))} mm"),
         ("turn", f"{'  '.join(figures(np.degrees(turned).tolist()))} °"),
     ]
-    if not np.isnan(answer.shares[0]):
-        parts = zip(PARTS, answer.shares, strict=True)
+    if not np.isnan(precision.shares.guide):
+        parts = zip(PARTS, precision.shares, strict=True)
         rows.append(("of it", ", ".join(f"{name} {100.0 * part:.1f} %" for name, part in parts)))
     yield table(rows, "<<")
 

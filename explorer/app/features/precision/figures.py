@@ -6,13 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from explorer.app.features.precision.pose import has_errors, is_elastic
+from explorer.app.features.precision.pose import has_errors
 from explorer.app.widgets.charts import BLUE, ORANGE, TEAL
 from explorer.app.widgets.colours import Rgb, css
 from explorer.app.widgets.markup import caption, dim, meter, row, swatch, table
 from explorer.mechanism.design import JOINTS
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_column, format_decimals, format_number
+from explorer.statics.compliance import is_elastic
 from explorer.statics.error_sources import SOURCES
 from explorer.statics.tool_precision import BY_ACTUATORS, BY_ALL, BY_DIMENSIONS, ToolPrecision
 

@@ -10,7 +10,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.precision.actions import AssumeTypical
 from explorer.app.features.precision.budget import BudgetPart
 from explorer.app.features.precision.figures import deflections, errors, headline
-from explorer.app.features.precision.pose import PosePrecision, has_errors, is_elastic
+from explorer.app.features.precision.pose import PosePrecision, has_errors
 from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
@@ -19,6 +19,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import box, dim
 from explorer.mechanism.typical import typical_machine
+from explorer.statics.compliance import is_elastic
 
 TYPICAL = "precision.typical"
 TYPICAL_HINT = (

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import Loads
 from explorer.app.state.frame import Frame
-from explorer.mechanism.design import Design
 from explorer.statics.tool_precision import ToolPrecision
 
 
@@ -29,10 +26,3 @@ class PosePrecision:
 def has_errors(precision: ToolPrecision) -> bool:
     """Return whether an actuator has an error or a dimension a tolerance."""
     return bool(precision.bounds.any())
-
-
-def is_elastic(design: Design) -> bool:
-    """Return whether actuators or struts give way."""
-    return design.actuators.stiffness_n_mm is not None or np.isfinite(
-        design.struts.bending_stiffness
-    )

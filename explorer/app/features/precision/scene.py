@@ -10,7 +10,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.scene import tool_point
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.features.precision.figures import degrees, millimetres
-from explorer.app.features.precision.pose import PosePrecision, has_errors, is_elastic
+from explorer.app.features.precision.pose import PosePrecision, has_errors
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
@@ -27,6 +27,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.statics.compliance import is_elastic
 from explorer.statics.tool_precision import ToolPrecision
 
 ERROR: Rgb = (176, 60, 120)
