@@ -37,6 +37,7 @@ from explorer.app.state.studies import Brush, within
 from explorer.app.state.view import (
     ForcesView,
     OrientationView,
+    PrecisionView,
     PrototypeView,
     SingularView,
     View,
@@ -46,6 +47,7 @@ from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
+from explorer.mechanism.typical import typical_machine
 from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.sweep.results import load_results
 from explorer.sweep.run import run_study
@@ -181,6 +183,25 @@ SCENES = {
         ),
         panels=True,
         tab="Forces",
+    ),
+    "precision": Scene(
+        actions=(
+            Open(typical_machine(PRESS)[0]),
+            SetPosition(2, 7.0),
+            Set(
+                "view",
+                replace(
+                    BARE,
+                    flags=False,
+                    grid=False,
+                    forces=ForcesView(force=(40.0, 10.0, -20.0)),
+                    precision=PrecisionView(deflected=True, ellipsoid=True),
+                ),
+            ),
+        ),
+        panels=True,
+        tab="Precision",
+        size=(1280, 900),
     ),
     # Shares grow beyond all bounds towards the base plane.
     "load-share": Scene(
