@@ -23,6 +23,7 @@ GOALS: Mapping[ObjectiveName, str] = MappingProxyType(
         "largest-margin": "box_margin",
         "smallest-load": "load_share",
         "smallest-error": "worst_error",
+        "smallest-deflection": "deflection",
     }
 )
 """The name in the catalogue of the measure that each objective improves."""

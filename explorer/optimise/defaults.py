@@ -9,12 +9,11 @@ from explorer.errors import InputError
 from explorer.measures.clearance import MARGIN_OF_CLEARANCE
 from explorer.measures.size import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
+from explorer.optimise.demands import Box, Demands
 from explorer.optimise.problem import (
     DISTANCES,
     REACH,
     SHIFTS,
-    Box,
-    Demands,
     ObjectiveName,
     Problem,
     Variable,
@@ -44,6 +43,7 @@ def make_problem(
     required_box: Box | None = None,
     held: bool = False,
     error: float | None = None,
+    deflection: float | None = None,
     tilt: float | None = None,
     free: Iterable[str] = (),
     bounds: Iterable[Variable] = (),
@@ -63,6 +63,7 @@ def make_problem(
         required_box: See `Demands`.
         held: See `Demands`.
         error: See `Demands`.
+        deflection: See `Demands`.
         tilt: See `Demands`.
         free: Variables of `OPTIONAL` that may change besides the six design variables.
         bounds: Variables with other bounds than the default ones.
@@ -96,6 +97,7 @@ def make_problem(
             required_box=required_box,
             held=held,
             error=error,
+            deflection=deflection,
             tilt=tilt,
         ),
     )

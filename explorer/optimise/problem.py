@@ -6,7 +6,6 @@ from a design, whose own limits (the box among them) bound its workspace as alwa
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from typing import Literal, get_args
 
@@ -17,8 +16,10 @@ from explorer.errors import InputError
 from explorer.measures.size import longest_leg
 from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Limits, Swing
 from explorer.mechanism.home import home_pose
-from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
-from explorer.numerics.checks import not_negative, number, numbers, ordered, positive, two
+from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
+from explorer.numerics.checks import number
+from explorer.optimise.demands import MOST_TILT, Box, Demands
+from explorer.statics.compliance import is_elastic
 from explorer.statics.reactions import part_limits
 
 ObjectiveName = Literal[
@@ -28,14 +29,23 @@ ObjectiveName = Literal[
     "largest-margin",
     "smallest-load",
     "smallest-error",
+    "smallest-deflection",
 ]
 
 OBJECTIVES: tuple[ObjectiveName, ...] = get_args(ObjectiveName)
 """Objectives: to match the demanded volume (the paper's F = |1 − V/V′|), the shortest longest leg
 for it, the largest volume, the largest worst margin over the required box, and over that box the
-smallest largest share of a limit under the design's load, and the smallest worst error."""
+smallest largest share of a limit under the design's load, the smallest worst error, and the
+smallest deflection under that load."""
 
-OVER_BOX: tuple[ObjectiveName, ...] = ("largest-margin", "smallest-load", "smallest-error")
+OF_THE_MACHINE: tuple[ObjectiveName, ...] = (
+    "smallest-load",
+    "smallest-error",
+    "smallest-deflection",
+)
+"""Objectives that are about the machine around the mechanism."""
+
+OVER_BOX: tuple[ObjectiveName, ...] = ("largest-margin", *OF_THE_MACHINE)
 """Objectives that are the worst of several values over the required box."""
 
 YAW = "yaw"
@@ -44,13 +54,6 @@ SHIFTS = ("shift-x", "shift-y", "shift-z")
 OPTIONAL = (YAW, REACH, *SHIFTS)
 """Variables besides the six of a design: the yaw of home in degrees, one maximum for all four
 lengths, and the shift of the required box along each axis."""
-
-Box = tuple[Triple, Triple]
-
-AZIMUTHS = 12
-"""Number of azimuths, at equal distances from the yaw of home, in which a tilt is demanded."""
-
-MOST_TILT = 90.0
 
 # Least value of the reach as a variable, as a share of the start's.
 LEAST_REACH = 1e-3
@@ -72,71 +75,6 @@ class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         for field in ("low", "high"):
             value = number(f"the {field} bound of {self.name}", getattr(self, field))
             msgspec.structs.force_setattr(self, field, value)
-
-
-class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Demands besides the design's own limits; None is no demand.
-
-    Attributes:
-        volume: Exact volume of the workspace to match, or the least one, in cubed design units.
-        reach: Longest leg allowed, in design units.
-        clearance: Smallest clearance of each pair of legs, radii taken off, wherever in the
-            workspace every margin is at least `clearance_margin`. Nearer to a singularity
-            legs may have to meet: with a level platform all four lie in the base at δ3 = 0.
-        clearance_margin: Least margin at which clearance is demanded, in design units.
-        least: Smallest |a3y|, |b1y| and |b3 − b2|, at zero of which a design is degenerate.
-        stroke_ratio: Longest over shortest of each actuator: raises its minimum length to
-            its maximum over this ratio, so that the workspace is what such strokes reach.
-        required_box: (lows, highs) of positions that must lie in the workspace.
-        held: Whether the design's load must be held over the required box, within the limits of
-            its actuators, struts and guide.
-        tilt: Tilt from the orientation of home that the required box must allow in every azimuth,
-            in degrees. It is demanded in `AZIMUTHS` of them; between these the box may allow
-            some hundredths less.
-        error: Worst displacement of the tool by the actuators' errors over the required box, in
-            design units.
-    """
-
-    volume: float | None = None
-    reach: float | None = None
-    clearance: float | None = None
-    clearance_margin: float = 0.0
-    least: float = 0.0
-    stroke_ratio: float | None = None
-    required_box: Box | None = None
-    held: bool = False
-    error: float | None = None
-    tilt: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.volume is not None:
-            # The volume of a huge design exceeds the bound of other numbers.
-            if not 0.0 < self.volume < math.inf:
-                raise InputError(
-                    f"the volume demanded must be a positive, finite number; got {self.volume:g}"
-                )
-            msgspec.structs.force_setattr(self, "volume", float(self.volume))
-        for field in ("reach", "clearance", "stroke_ratio", "error", "tilt"):
-            value = getattr(self, field)
-            if value is not None:
-                label = f"the {field.replace('_', ' ')} demanded"
-                msgspec.structs.force_setattr(self, field, positive(label, value))
-        for field in ("clearance_margin", "least"):
-            value = not_negative(f"the {field.replace('_', ' ')}", getattr(self, field))
-            msgspec.structs.force_setattr(self, field, value)
-        if self.required_box is not None:
-            lows, highs = two("the required box", self.required_box)
-            pairs = [
-                ordered(f"the required box {axis}", low, high)
-                for axis, low, high in zip(
-                    "xyz",
-                    numbers("the required box's lows", lows, 3),
-                    numbers("the required box's highs", highs, 3),
-                    strict=True,
-                )
-            ]
-            box = tuple(low for low, _ in pairs), tuple(high for _, high in pairs)
-            msgspec.structs.force_setattr(self, "required_box", box)
 
 
 class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -354,14 +292,16 @@ def _check_statics(problem: Problem) -> None:
     demands, design = problem.demands, problem.start
     needs_load = demands.held or problem.objective == "smallest-load"
     needs_error = demands.error is not None or problem.objective == "smallest-error"
-    needs_box = needs_load or needs_error or demands.tilt is not None
+    bends = demands.deflection is not None or problem.objective == "smallest-deflection"
+    needs_box = needs_load or needs_error or bends or demands.tilt is not None
     if needs_box and demands.required_box is None:
         raise InputError(
-            "loads, errors and tilts are demanded over a required box, and none is given"
+            "loads, errors, deflections and tilts are demanded over a required box, and none is "
+            "given"
         )
     if demands.tilt is not None and not demands.tilt < MOST_TILT:
         raise InputError(f"the tilt demanded must be below {MOST_TILT:g}°; got {demands.tilt:g}°")
-    if needs_load and not (design.payload.mass_kg or design.payload.force_n):
+    if (needs_load or bends) and not (design.payload.mass_kg or design.payload.force_n):
         raise InputError(
             "the design has no load: give its payload a mass, or a force of any direction"
         )
@@ -372,6 +312,10 @@ def _check_statics(problem: Problem) -> None:
         )
     if needs_error and not any(design.actuators.error_mm):
         raise InputError("the actuators of the design have no errors: give them")
+    if bends and not is_elastic(design):
+        raise InputError(
+            "the design is rigid: give its actuators a stiffness, or its struts a diameter"
+        )
 
 
 def _check_objective(problem: Problem) -> None:
@@ -387,7 +331,7 @@ def _check_objective(problem: Problem) -> None:
                     "the design fixes maximum lengths: tie them to the reach |a3|, or let the "
                     "reach change as a variable of its own"
                 )
-        case "largest-volume" | "smallest-load" | "smallest-error":
+        case "largest-volume" | "smallest-load" | "smallest-error" | "smallest-deflection":
             pass
         case "largest-margin":
             if demands.required_box is None:

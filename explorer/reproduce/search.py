@@ -10,6 +10,7 @@ from explorer.measures.catalogue import measures_in
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
+from explorer.optimise.demands import Box
 from explorer.optimise.paper import (
     CLEARANCE,
     PAPER_VOLUME,
@@ -17,7 +18,6 @@ from explorer.optimise.paper import (
     paper_start,
     reach_problem,
 )
-from explorer.optimise.problem import Box
 from explorer.optimise.solver import optimise_design
 from explorer.reproduce.claim import Measurement, Values, below
 

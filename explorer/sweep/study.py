@@ -24,11 +24,11 @@ from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.numerics.checks import instance, number, positive, two
+from explorer.optimise.demands import Demands
 from explorer.optimise.problem import (
     OBJECTIVES,
     REACH,
     YAW,
-    Demands,
     ObjectiveName,
     longest_minimum,
 )

@@ -259,9 +259,10 @@ def rich_state() -> State:
         "volume": 1e4 / 3,
         "free": (VARIABLES[4], YAW, PLACE),
         "box": ((0.0, 0.0, 0.0), (4 / 3, 2.0, 1 / 3)),
-        # The design has no load and no errors to search with.
+        # The design has no load, no errors and no stiffness to search with.
         "held": False,
         "error": 0.0,
+        "deflection": 0.0,
         "tilt": 0.0,
     }
     actions: list[Action | Callable[[State], Action]] = [
@@ -284,7 +285,10 @@ def rich_state() -> State:
         Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
         Change("", {"set_tool_angles": (1 / 3, 90.0, -50.0)}),
         BrushAxis("volume", ((1 / 3, 10.0),)),
-        Change("optimisation.request", {"held": True, "error": 1 / 3, "tilt": 10 / 3}),
+        Change(
+            "optimisation.request",
+            {"held": True, "error": 1 / 3, "deflection": 2 / 3, "tilt": 10 / 3},
+        ),
         SetJoint(0, 99.1),
     ]
     for action in actions:

@@ -20,7 +20,7 @@ from desk import number, rows_of
 from limited_designs import limited
 from services import services_for
 
-from explorer import Actuators, Payload
+from explorer import Actuators, Payload, Struts
 from explorer.app.features.optimise import runner as optimiser
 from explorer.app.features.optimise.actions import (
     Accept,
@@ -794,8 +794,13 @@ def test_tilt_is_demanded_over_the_required_box() -> None:
     [
         ({"objective": "smallest-load"}, "no load: give its payload a mass.* in the tab Machine"),
         ({"held": True}, "no load: give its payload a mass.* in the tab Machine"),
-        ({"objective": "smallest-error"}, "no errors: give them.* errors .* in the design file"),
-        ({"error": 0.1}, "no errors: give them.* errors of the actuators in the design file"),
+        ({"objective": "smallest-error"}, "no errors: give them.* errors .* in the tab Machine"),
+        (
+            {"objective": "smallest-deflection"},
+            "no load: give its payload a mass.* in the tab Machine",
+        ),
+        ({"deflection": 0.1}, "no load: give its payload a mass.* in the tab Machine"),
+        ({"error": 0.1}, "no errors: give them.* errors of the actuators in the tab Machine"),
     ],
 )
 def test_a_machine_that_is_lacking_is_told_with_where_to_give_it(
@@ -810,15 +815,25 @@ def test_a_machine_that_is_lacking_is_told_with_where_to_give_it(
     assert "tab Design" not in text
 
 
+def test_deflection_of_a_rigid_machine_is_refused_with_where_to_give_its_stiffness() -> None:
+    design = msgspec.structs.replace(OPTIMAL, payload=Payload(force_n=1.0))
+    request = OptimisationRequest(deflection=0.1)
+    state = SetRequest("optimisation.request", request).apply(opened(design))
+    text = re.sub("<.*?>", " ", refused_words(refuted(state), liftable(state)))
+    assert re.search("The design is rigid: .* in the tab Machine", text), text
+
+
 def test_the_chart_of_a_load_or_an_error_has_its_unit() -> None:
     design = msgspec.structs.replace(
         OPTIMAL,
         payload=Payload(force_n=1.0),
         actuators=Actuators((50.0, 50.0, 50.0, 50.0, 50.0, 50.0), error_mm=(0.01,) * 6),  # pyright: ignore[reportArgumentType]
+        struts=Struts(outer_mm=12.0),
     )
     captions: tuple[tuple[ObjectiveName, str], ...] = (
         ("smallest-load", "Load share over the box: 0.4"),
         ("smallest-error", "Worst error over the box (units): 0.4"),
+        ("smallest-deflection", "Deflection over the box (units): 0.4"),
         ("largest-margin", "Margin over the box (units): 0.4"),
     )
     for objective, caption in captions:
@@ -842,6 +857,7 @@ def test_demands_by_default_can_be_kept_by_every_preset(name: str, objective: An
             push_n=(50.0, 50.0, 50.0, 50.0, 50.0, 50.0),
             error_mm=(0.01, 0.01, 0.01, 0.01, 0.01, 0.01),
         ),
+        struts=Struts(outer_mm=12.0),
     )
     request = OptimisationRequest(objective=objective)
     state = SetRequest("optimisation.request", request).apply(opened(design))

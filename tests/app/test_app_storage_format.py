@@ -300,6 +300,7 @@ def test_file_of_an_earlier_schema_opens_to_the_state_it_was_written_from(schema
         for request in ("optimisation.request", "optimisation.run.own.optimisation.request"):
             expected = with_value(expected, f"{request}.held", False)
             expected = with_value(expected, f"{request}.error", 0.0)
+            expected = with_value(expected, f"{request}.deflection", 0.0)
             expected = with_value(expected, f"{request}.tilt", 0.0)
         # There were no kinds of paths, and titles named the signs of modes.
         paths = state.paths

@@ -35,8 +35,9 @@ from explorer.measures.case import Case
 from explorer.measures.size import corners_of, longest_leg
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.optimise.demands import AZIMUTHS
 from explorer.optimise.paper import paper_problem, paper_start, reach_problem
-from explorer.optimise.problem import AZIMUTHS, DISTANCES, ObjectiveName, distance_of
+from explorer.optimise.problem import DISTANCES, ObjectiveName, distance_of
 from explorer.optimise.record import (
     Settings,
     decode_record,
@@ -627,24 +628,48 @@ def test_demand_of_a_load_is_kept_by_the_design_found() -> None:
     assert BoxStatics(outcome.design, box, ROTATION).largest_share <= 1.0 + 1e-6
 
 
-def test_demand_of_an_error_is_kept_by_the_design_found() -> None:
-    actuators = Actuators(error_mm=(0.1, 0.1, 0.1, 0.1, 0.1, 0.1))
-    start = msgspec.structs.replace(PRESETS["paper-optimal"], actuators=actuators)
+@pytest.mark.parametrize(
+    ("demand", "objective", "measure", "free"),
+    [
+        ("error", "smallest-error", "worst_error", ()),
+        ("deflection", "smallest-deflection", "largest_deflection", ("yaw",)),
+    ],
+)
+def test_demand_of_a_displacement_is_kept_by_the_design_found(
+    demand: str, objective: ObjectiveName, measure: str, free: tuple[str, ...]
+) -> None:
+    start = msgspec.structs.replace(
+        PRESETS["paper-optimal"],
+        actuators=Actuators(
+            error_mm=(0.1, 0.1, 0.1, 0.1, 0.1, 0.1),
+            stiffness_n_mm=(900.0, 800.0, 1000.0, 800.0, 1000.0, 900.0),
+        ),
+        struts=Struts(outer_mm=12.0, inner_mm=10.0),
+        payload=Payload(0.5, (0.0, 0.0, 1.0), 5.0),
+    )
     box = ((8.0, 3.0, 7.0), (12.0, 7.0, 11.0))
-    problem = make_problem(start, "smallest-error", volume=7053.0, reach=20.5, required_box=box)
+    problem = make_problem(start, objective, volume=7053.0, reach=20.5, required_box=box, free=free)
     outcome = optimise_design(problem)
     assert outcome.converged
-    before, after = (
-        BoxStatics(design, box, ROTATION).worst_error for design in (start, outcome.design)
-    )
+
+    def measured(design: Design) -> float:
+        return getattr(BoxStatics(design, box, home_pose(design).rotation), measure)
+
+    before, after = measured(start), measured(outcome.design)
     assert outcome.best.objective == pytest.approx(after, rel=1e-9)
     assert after < before
+    middle = 0.5 * (before + after)
     least = make_problem(
-        start, "smallest-reach", volume=7053.0, required_box=box, error=0.5 * (before + after)
+        start,
+        "smallest-reach",
+        volume=7053.0,
+        required_box=box,
+        free=free,
+        **{demand: middle},  # pyright: ignore[reportArgumentType]
     )
     found = optimise_design(least)
     assert found.converged
-    assert BoxStatics(found.design, box, ROTATION).worst_error <= 0.5 * (before + after) + 1e-9
+    assert measured(found.design) <= middle + 1e-9
 
 
 def test_demand_of_a_tilt_is_kept_in_its_azimuths() -> None:
@@ -669,6 +694,9 @@ def test_demand_of_a_tilt_is_kept_in_its_azimuths() -> None:
         ({"payload": Payload()}, {"held": True}, "the design has no load"),
         ({"struts": Struts()}, {"held": True}, "limits neither its actuators nor its struts"),
         ({}, {"error": 0.1}, "the actuators of the design have no errors"),
+        ({"payload": Payload()}, {"deflection": 0.1}, "the design has no load"),
+        ({"struts": Struts()}, {"deflection": 0.1}, "the design is rigid: give its actuators"),
+        ({}, {"deflection": 0.0}, "the deflection demanded must be positive"),
         ({}, {"tilt": 95.0}, "the tilt demanded must be below 90°; got 95°"),
         ({}, {"held": True, "required_box": None}, "over a required box, and none is given"),
     ],

@@ -38,7 +38,8 @@ from explorer import (
 from explorer.measures.size import corners_of
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import SHIFTS, Box
+from explorer.optimise.demands import Box
+from explorer.optimise.problem import SHIFTS
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.joint_cones import angle_between, legs
 from explorer.workspace.orientations.share import orientations_within

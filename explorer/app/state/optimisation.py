@@ -13,14 +13,12 @@ from explorer.errors import InputError
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
 from explorer.numerics.number_text import format_number
+from explorer.optimise.demands import Box, Demands
 from explorer.optimise.outcome import Iterate, Outcome, Status
-from explorer.optimise.problem import OVER_BOX, YAW, Box, Demands, ObjectiveName, Problem
+from explorer.optimise.problem import OF_THE_MACHINE, OVER_BOX, YAW, ObjectiveName, Problem
 from explorer.optimise.record import Record, Settings, record_of
 from explorer.optimise.search.starts import check_starts
 from explorer.optimise.search.trail import Trail
-
-OF_THE_MACHINE: tuple[ObjectiveName, ...] = ("smallest-load", "smallest-error")
-"""Objectives that keep at least the present volume with legs of at most the present length."""
 
 PLACE = "place"
 """Name in `OptimisationRequest.free` for the three shifts of the required box."""
@@ -41,6 +39,7 @@ class OptimisationRequest:
         box: The required box; None for one that suits the design.
         held: Whether the design's load must be held over the required box.
         error: Worst error of the tool over the required box; 0 for no demand.
+        deflection: Largest deflection under the load over the required box; 0 for no demand.
         tilt: Tilt in every azimuth that the required box must allow, in degrees; 0 for no demand.
 
     Raises:
@@ -58,6 +57,7 @@ class OptimisationRequest:
     box: Box | None = None
     held: bool = False
     error: float = 0.0
+    deflection: float = 0.0
     tilt: float = 0.0
 
     def __post_init__(self) -> None:
@@ -70,12 +70,13 @@ class OptimisationRequest:
             reach=self.reach,
             clearance=self.clearance or None,
             error=self.error or None,
+            deflection=self.deflection or None,
             tilt=self.tilt or None,
         )
 
     @property
     def needs_volume(self) -> bool:
-        """Whether the objective takes a volume."""
+        """Whether the objective takes a volume, by default the present one."""
         return self.objective in ("match-volume", "smallest-reach", *OF_THE_MACHINE)
 
     @property
@@ -86,7 +87,7 @@ class OptimisationRequest:
     @property
     def needs_box(self) -> bool:
         """Whether a box is required."""
-        demands = self.held or self.error > 0.0 or self.tilt > 0.0
+        demands = self.held or max(self.error, self.deflection, self.tilt) > 0.0
         return self.with_box or demands or self.objective in OVER_BOX
 
 

@@ -37,8 +37,9 @@ from explorer.mechanism.machine import Six
 from explorer.optimise.curves import CALLED
 
 if TYPE_CHECKING:
+    from explorer.optimise.demands import Box
     from explorer.optimise.outcome import Outcome
-    from explorer.optimise.problem import Box, Problem, Variable
+    from explorer.optimise.problem import Problem, Variable
     from explorer.optimise.record import Settings
 
 _CORNERS = "x-low y-low z-low x-high y-high z-high"
@@ -60,9 +61,11 @@ class Optimise(JsonOptions, DesignOptions):
         "largest-margin",
         "smallest-load",
         "smallest-error",
+        "smallest-deflection",
     ] = "match-volume"
     """Objective: F = |1 − V/V′| of the exact volume, the longest leg, the volume, or over the
-    required box the worst margin, the largest share of a limit of forces, or the worst error."""
+    required box the worst margin, the largest share of a limit of forces, the worst error, or the
+    largest deflection under the load."""
 
     target_volume: Annotated[float | None, positive("--target-volume"), OPTIONAL] = None
     """Volume to match, or least volume; for the shortest leg by default that of the design."""
@@ -112,6 +115,10 @@ class Optimise(JsonOptions, DesignOptions):
 
     error: Annotated[float | None, positive("--error"), OPTIONAL] = None
     """Worst displacement of the tool by the actuators' errors over the required box, in design
+    units."""
+
+    deflection: Annotated[float | None, positive("--deflection"), OPTIONAL] = None
+    """Largest displacement of the tool under payload and force over the required box, in design
     units."""
 
     tilt: Annotated[float | None, positive("--tilt"), OPTIONAL] = None
@@ -204,6 +211,7 @@ class Optimise(JsonOptions, DesignOptions):
             required_box=None if self.required_box is None else _as_box(self.required_box),
             held=self.held,
             error=self.error,
+            deflection=self.deflection,
             tilt=self.tilt,
             free=self.free,
             bounds=[_as_variable(word) for word in self.bounds],

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import Box
+from explorer.optimise.demands import Box
 
 # Tolerance of corners that lie on a plane, as a share of the edges of the box.
 SLACK = 1e-9

@@ -18,7 +18,8 @@ from explorer.mechanism.design import LENGTHS, Pair
 from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.optimise.problem import REACH, Box
+from explorer.optimise.demands import Box
+from explorer.optimise.problem import REACH
 from explorer.optimise.refutation.cut_box import cut_volume
 from explorer.optimise.refutation.ranges import Ranges, product, smallest
 from explorer.singularity.ellipsoids import planes_of_singularity

@@ -17,7 +17,8 @@ from explorer.mechanism.design import Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.numerics.number_text import format_number
-from explorer.optimise.problem import SHIFTS, Box, Problem
+from explorer.optimise.demands import Box
+from explorer.optimise.problem import SHIFTS, Problem
 from explorer.optimise.refutation.lifting import BOX_LIMIT
 from explorer.optimise.refutation.most_volume import (
     LONGEST_LEG,

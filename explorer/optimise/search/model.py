@@ -14,7 +14,7 @@ import numpy as np
 
 from explorer.errors import DesignError
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.optimise.problem import OVER_BOX, Problem
+from explorer.optimise.problem import OF_THE_MACHINE, OVER_BOX, Problem
 from explorer.optimise.search.demands.clearances import ClearanceDemand
 from explorer.optimise.search.demands.geometry import (
     MET,
@@ -28,9 +28,10 @@ from explorer.optimise.search.demands.geometry import (
     box_margins,
 )
 from explorer.optimise.search.demands.loads import (
-    ErrorDemand,
+    CAUSES,
+    DisplacementDemand,
     LoadDemand,
-    largest_error,
+    largest_displacement,
     largest_share,
 )
 from explorer.optimise.search.demands.tilts import tilt_demands
@@ -187,7 +188,7 @@ class Model:
                 root = (state.volume / self._volume) ** (1.0 / 3.0)
                 slope = root / (3.0 * state.volume) if state.volume > 0.0 else 0.0
                 return -root, -slope * state.volume_gradient
-            case "largest-margin" | "smallest-load" | "smallest-error":
+            case "largest-margin" | "smallest-load" | "smallest-error" | "smallest-deflection":
                 slope = np.zeros(len(u))
                 slope[-1] = -1.0
                 return -float(u[-1]), slope
@@ -232,8 +233,8 @@ def reported_objective(problem: Problem, state: State) -> float:
             return float(box_margins(state)[0].min())
         case "smallest-load":
             return largest_share(state)
-        case "smallest-error":
-            return largest_error(state)
+        case "smallest-error" | "smallest-deflection" as objective:
+            return largest_displacement(state, CAUSES[objective])
 
 
 def _demands(problem: Problem, start: State) -> list[Demand]:
@@ -252,20 +253,23 @@ def _demands(problem: Problem, start: State) -> list[Demand]:
         listed.append(BoxDemand(start))
     if demands.tilt is not None:
         listed += tilt_demands(start, demands.tilt)
-    is_load = problem.objective == "smallest-load"
-    is_error = problem.objective == "smallest-error"
-    if demands.held and not is_load:
-        listed.append(LoadDemand(start))
-    if demands.error is not None and not is_error:
-        listed.append(ErrorDemand(demands.error))
-    if demands.held or demands.error is not None or is_load or is_error:
+    machine: list[Demand] = []
+    if demands.held and problem.objective != "smallest-load":
+        machine.append(LoadDemand(start))
+    if demands.error is not None and problem.objective != "smallest-error":
+        machine.append(DisplacementDemand("error", demands.error))
+    if demands.deflection is not None and problem.objective != "smallest-deflection":
+        machine.append(DisplacementDemand("deflection", demands.deflection))
+    listed += machine
+    if machine or problem.objective in OF_THE_MACHINE:
         # On the way to a singular pose loads and errors grow, and beyond it they fall again.
         listed.append(MarginDemand())
     # What an objective raises comes last.
     if problem.objective == "largest-margin":
         listed.append(MarginDemand())
-    elif is_load:
+    elif problem.objective == "smallest-load":
         listed.append(LoadDemand(start))
-    elif is_error:
-        listed.append(ErrorDemand(largest_error(start)))
+    elif problem.objective in CAUSES:
+        cause = CAUSES[problem.objective]
+        listed.append(DisplacementDemand(cause, largest_displacement(start, cause)))
     return listed

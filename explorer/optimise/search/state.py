@@ -20,7 +20,8 @@ from explorer.mechanism.pose import (
     yaw_pitch_roll_from_rotation,
 )
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import REACH, YAW, Box, Problem
+from explorer.optimise.demands import Box
+from explorer.optimise.problem import REACH, YAW, Problem
 from explorer.workspace.limits.constraints import (
     YAW as YAW_PARAMETER,
     BallOrCylinder,

@@ -28,6 +28,7 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.pose import Triple
 from explorer.optimise.problem import OVER_BOX, YAW, ObjectiveName
+from explorer.statics.compliance import is_elastic
 
 OBJECTIVES: dict[str, ObjectiveName] = {
     "match a volume": "match-volume",
@@ -36,6 +37,7 @@ OBJECTIVES: dict[str, ObjectiveName] = {
     "largest worst margin over a box": "largest-margin",
     "smallest load over a box": "smallest-load",
     "smallest error over a box": "smallest-error",
+    "smallest deflection over a box": "smallest-deflection",
 }
 FREE = {
     **{name: f"Let {name} change." for name in VARIABLES},
@@ -137,6 +139,17 @@ class OptimisePanel:
             # A demand that another design left behind can be taken back.
             visible=lambda state: (
                 any(state.design.actuators.error_mm) or state.optimisation.request.error > 0.0
+            ),
+        )
+        controls.number(
+            _label("deflection"),
+            "The largest displacement of the tool under the payload's weight and force allowed in "
+            "the required box, in units; 0 for no demand.",
+            At("optimisation.request.deflection", action=SetRequest),
+            least=0.0,
+            step=STEP,
+            visible=lambda state: (
+                is_elastic(state.design) or state.optimisation.request.deflection > 0.0
             ),
         )
         controls.number(

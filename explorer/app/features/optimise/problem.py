@@ -16,10 +16,10 @@ from explorer.measures.size import longest_leg
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Swing
 from explorer.mechanism.home import home_pose
 from explorer.optimise.defaults import make_problem
+from explorer.optimise.demands import Box
 from explorer.optimise.problem import (
     SHIFTS,
     YAW,
-    Box,
     Problem,
 )
 from explorer.optimise.refutation.lifting import BOX_LIMIT, MAXIMA, SWING_LIMIT, lift
@@ -27,7 +27,7 @@ from explorer.optimise.refutation.refutation import Refutation, paper_box, refut
 from explorer.workspace.limits.constraints import Never, constraints
 from explorer.workspace.slices.volume import workspace_volume
 
-NO_LOAD, NO_ERRORS = "no load", "no errors"
+NO_LOAD, NO_ERRORS, RIGID = "no load", "no errors", "rigid"
 """What a design may lack for the demands; they stand for the limit of a refusal."""
 
 # Default volume to match, as a multiple of the present volume.
@@ -90,6 +90,7 @@ def _problem(design: Design, base: Design, request: OptimisationRequest) -> Prob
         required_box=_requested_box(base, request) if request.needs_box else None,
         held=request.held,
         error=request.error or None,
+        deflection=request.deflection or None,
         tilt=request.tilt or None,
         free=[name for name in free if name not in VARIABLES],
     )
@@ -119,6 +120,11 @@ def _limit_against_problem(design: Design, request: OptimisationRequest) -> str:
         return NO_LOAD
     if (request.error or request.objective == "smallest-error") and not case.has_errors:
         return NO_ERRORS
+    bends = request.deflection > 0.0 or request.objective == "smallest-deflection"
+    if bends and not case.is_loaded:
+        return NO_LOAD
+    if bends and not case.is_elastic:
+        return RIGID
     if limits.swing != Swing():
         return SWING_LIMIT
     has_fixed = any(getattr(limits, name)[1] is not None for name in LENGTHS)

@@ -17,7 +17,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import JOINT
 from explorer.measures.size import corners_of
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import Box
+from explorer.optimise.demands import Box
 
 # The twelve edges of a cube by its corners, whose bits are the axes.
 EDGES = tuple((a, a | 1 << axis) for a in range(8) for axis in range(3) if not a >> axis & 1)

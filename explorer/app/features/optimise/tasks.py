@@ -8,8 +8,9 @@ from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
+from explorer.optimise.demands import Box
 from explorer.optimise.outcome import Outcome
-from explorer.optimise.problem import Box, Problem
+from explorer.optimise.problem import Problem
 from explorer.optimise.solver import optimise_design
 
 

@@ -24,6 +24,7 @@ from explorer.app.features.optimise.limits import limits_table
 from explorer.app.features.optimise.problem import (
     NO_ERRORS,
     NO_LOAD,
+    RIGID,
     box_on_offer,
     liftable,
     refuted,
@@ -65,7 +66,8 @@ TITLES = {
 # What a design lacks for a problem, and where to change it.
 LACKING = {
     NO_LOAD: "payload and limits in the tab Machine",
-    NO_ERRORS: "the errors of the actuators in the design file",
+    NO_ERRORS: "the errors of the actuators in the tab Machine",
+    RIGID: "the stiffness of the actuators or the tubes of the struts in the tab Machine",
 }
 # Limits of refusals without a problem that could be searched.
 NO_PROBLEM = ("", SWING_LIMIT, MAXIMA, *LACKING)

@@ -15,7 +15,8 @@ from explorer.measures.size import corners_of
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import SHIFTS, Box
+from explorer.optimise.demands import Box
+from explorer.optimise.problem import SHIFTS
 from explorer.optimise.search.state import State
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.limits.constraints import GAP, YAW, BallOrCylinder, Constraint, HalfSpace

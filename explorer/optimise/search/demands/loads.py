@@ -1,4 +1,4 @@
-"""Loads and errors of the tool over the required box, as demands with exact gradients.
+"""Loads, errors and deflections of the tool over the required box, as demands with exact gradients.
 
 They are evaluated at the nodes of a grid over the box, see `explorer.measures.statics`. Of the
 nodes of each eighth of the box the worst one counts, so that only a few values have gradients and
@@ -7,16 +7,25 @@ most of them stay smooth from step to step.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Literal
+
 import numpy as np
 
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import JOINTS, VARIABLES
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.optimise.problem import SHIFTS
+from explorer.optimise.problem import SHIFTS, ObjectiveName
 from explorer.optimise.search.demands.geometry import Measured
 from explorer.optimise.search.state import State
 from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.load_slopes import ACTUATOR_OF, BENDING, error_slopes, share_slopes
+from explorer.statics.load_slopes import (
+    ACTUATOR_OF,
+    BENDING,
+    deflection_slopes,
+    error_slopes,
+    share_slopes,
+)
 from explorer.statics.reactions import part_limits
 from explorer.statics.slopes import twist_slopes
 from explorer.statics.weights import payload_wrench
@@ -29,6 +38,15 @@ PARTS = (*JOINTS, "bending 2", "bending 3", "guide force 2", "guide force 3")
 """The loaded parts; the moment on the guide is the bending of the strut."""
 
 EIGHTHS = 8
+
+Cause = Literal["error", "deflection"]
+"""What displaces the tool: the actuators' errors, or the design's load."""
+
+CAUSES: Mapping[ObjectiveName, Cause] = {
+    "smallest-error": "error",
+    "smallest-deflection": "deflection",
+}
+"""The causes of the displacements that objectives are about."""
 
 
 def spare_of(share: FloatArray) -> FloatArray:
@@ -106,26 +124,31 @@ class LoadDemand:
         return np.asarray(np.maximum(up, down))
 
 
-class ErrorDemand:
-    """The worst displacement of the tool by the actuators' errors, over the required box.
+class DisplacementDemand:
+    """The largest displacement of the tool by a cause, over the required box.
 
     Args:
+        cause: Cause: the errors of the actuators, or the deflection under the design's load.
         most: Largest displacement allowed, in design units.
     """
 
     is_equality = False
     is_limit = False
-    names = ("error over the required box",) * EIGHTHS
 
-    def __init__(self, most: float) -> None:
+    def __init__(self, cause: Cause, most: float) -> None:
+        self.cause: Cause = cause
         self.most = most
+        self.names = (f"{cause} over the required box",) * EIGHTHS
 
     def measure(self, state: State) -> Measured:
         """Return what the largest displacements leave, see `spare_of`."""
-        box = _statics_of(state)
-        worst = _worst_nodes(box, box.errors.displacement[:, None])[:, 0]
-        slopes = twist_slopes(state.design, box.positions[worst], state.rotation)
-        largest, by = error_slopes(state.design, slopes)
+        box, design = _statics_of(state), state.design
+        worst = _worst_nodes(box, _displacements(box, self.cause)[:, None])[:, 0]
+        slopes = twist_slopes(design, box.positions[worst], state.rotation)
+        if self.cause == "error":
+            largest, by = error_slopes(design, slopes)
+        else:
+            largest, by = deflection_slopes(design, state.rotation, slopes)
         share = largest / self.most
         gradient = by @ state.rows(CHAIN) / self.most
         return Measured(spare_of(share), _spare_slope(share)[:, None] * gradient)
@@ -136,9 +159,13 @@ def largest_share(state: State) -> float:
     return LoadDemand(state).largest_share(state)
 
 
-def largest_error(state: State) -> float:
-    """Return the worst displacement of the tool over the required box, in design units."""
-    return float(_statics_of(state).errors.displacement.max())
+def largest_displacement(state: State, cause: Cause) -> float:
+    """Return the largest displacement of the tool over the required box, in design units."""
+    return float(_displacements(_statics_of(state), cause).max())
+
+
+def _displacements(box: BoxStatics, cause: Cause) -> FloatArray:
+    return box.errors.displacement if cause == "error" else box.deflections
 
 
 def _statics_of(state: State) -> BoxStatics:

@@ -10,7 +10,7 @@ import numpy as np
 
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import AZIMUTHS
+from explorer.optimise.demands import AZIMUTHS
 from explorer.optimise.search.demands.geometry import BoxDemand, GapDemand, Measured
 from explorer.optimise.search.state import State
 
