@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case, reference_case, scaled_design, troubled_case
 
-from explorer import Actuators, Payload
+from explorer import Actuators, Payload, Struts
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
@@ -254,6 +254,7 @@ def test_objective_of_a_search_is_the_measure_that_it_is_named_after(
                 push_n=(9.0, 9.0, 9.0, 9.0, 9.0, 9.0),
                 error_mm=(0.01, 0.01, 0.01, 0.01, 0.01, 0.01),
             ),
+            struts=Struts(outer_mm=12.0),
         )
     middle = np.array(home_pose(design).position)
     box = (tuple((middle - 1e-3).tolist()), tuple((middle + 1e-3).tolist()))
