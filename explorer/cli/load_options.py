@@ -84,17 +84,20 @@ def check_limited(design: Design) -> None:
         )
 
 
-def check_regular(pose: Pose, values: FloatArray) -> None:
+def check_regular(pose: Pose, values: FloatArray, infinite: str) -> None:
     """Check that results of a pose are finite.
 
+    Args:
+        pose: The pose.
+        values: The results.
+        infinite: What is infinite in a singular pose, such as "the forces that hold a load".
+
     Raises:
-        NoAnswerError: The pose is singular, so that no forces hold a load.
+        NoAnswerError: The pose is singular.
     """
     if np.isfinite(values).all():
         return
     least = SINGULAR * float(np.linalg.norm(pose.position))
     margin = np.abs(margins(pose.position, pose.rotation))
     zero = [f"δ{k + 1} = 0: {INCIDENCES[k]}" for k in np.flatnonzero(margin <= least)]
-    raise NoAnswerError(
-        f"the pose is singular ({'; '.join(zero)}): the forces that hold a load are infinite"
-    )
+    raise NoAnswerError(f"the pose is singular ({'; '.join(zero)}): {infinite} are infinite")

@@ -1,4 +1,4 @@
-"""A machine that deviates from its design: other dimensions, and encoders whose zeros are off.
+"""A machine that deviates from its design: other dimensions, and encoders with offsets.
 
 Nothing is linear here. Each leg is the one of the design, moved as a whole: legs 1 and 4 with a1
 and a3, legs 2 and 3 with the guide, whose tilt is the rotation by the vector (0, y, z) about a1.
@@ -24,11 +24,8 @@ from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray, finite_array
 from explorer.prototype.chains import ACTUATED, Chains, Places
 from explorer.statics.accuracy import A1_COLUMN, A3_COLUMN, B_COLUMN, GUIDE_COLUMN, TILT_COLUMN
-from explorer.statics.compliance import stiffness_of
+from explorer.statics.compliance import is_elastic
 from explorer.statics.error_sources import SOURCES, pose_error_by_source, source_errors
-
-UNITS = tuple("degrees" if "tilt" in name else "mm" for name in SOURCES)
-"""Units of the deviations of the sources on a drawing."""
 
 # Largest error of the joints of a solved pose, as a share of the reach.
 CLOSED = 1e-12
@@ -38,7 +35,7 @@ def draw_deviations(design: Design, seed: int) -> FloatArray:
     """Return random deviations of a design's 29 sources of errors, shape (29,).
 
     Each is drawn uniformly within ± its largest error, by NumPy's `default_rng(seed)`. The order is
-    that of `explorer.statics.error_sources.SOURCES`: the zeros of the encoders of the six
+    that of `explorer.statics.error_sources.SOURCES`: the offsets of the encoders of the six
     actuators, then the 23 dimensions. Lengths are in design units, tilts in radians.
 
     Args:
@@ -52,18 +49,12 @@ def draw_deviations(design: Design, seed: int) -> FloatArray:
     if seed < 0:
         raise InputError(f"the seed must not be negative; got {seed}")
     errors = source_errors(design)
-    if not errors.any() and all(np.isinf(each).all() for each in stiffness_of(design)):
+    if not (errors.any() or is_elastic(design)):
         raise InputError(
             "the design states no errors, so that no machine differs from it: give its file "
             "tolerances, actuators.error_mm, actuators.stiffness_n_mm or struts.outer_mm"
         )
     return errors * np.random.default_rng(seed).uniform(-1.0, 1.0, len(SOURCES))
-
-
-def drawing_values(design: Design, deviations: FloatArray) -> FloatArray:
-    """Return deviations of the sources or their bounds (29,) in the units of `UNITS`."""
-    is_tilt = np.array(UNITS) == "degrees"
-    return np.where(is_tilt, np.degrees(deviations), deviations * design.unit_mm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +86,7 @@ class ImperfectMachine:
         return ImperfectMachine(design, draw_deviations(design, seed), seed)
 
     @property
-    def zeros(self) -> FloatArray:
+    def encoder_offsets(self) -> FloatArray:
         """True joint values less those that the encoders read, shape (6,), in design units."""
         return self.deviations[:6]
 
@@ -166,7 +157,7 @@ class ImperfectMachine:
         """
         from scipy.optimize import least_squares
 
-        true = checked_joints(self.design, joints) + self.zeros
+        true = checked_joints(self.design, joints) + self.encoder_offsets
         size, position, rotation = self.design.reach, np.array(near.position), near.rotation
 
         def moved(twist: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -24,7 +24,7 @@ import numpy as np
 
 from explorer import __version__
 from explorer.errors import InputError
-from explorer.export.imperfect import UNITS, ImperfectMachine, drawing_values
+from explorer.export.imperfect import ImperfectMachine
 from explorer.export.servos import Servos, spring_servos
 from explorer.mechanism.design import DOWN, JOINTS, Design
 from explorer.mechanism.home import home_pose
@@ -43,7 +43,7 @@ from explorer.prototype.chains import (
 )
 from explorer.prototype.mass import Mass
 from explorer.prototype.sketch import BALL, ROD, leg_radii, sketch_masses
-from explorer.statics.error_sources import SOURCES
+from explorer.statics.error_sources import SOURCES, UNITS, drawing_values
 from explorer.workspace.limits.constraints import demanded_order
 
 DENSITY = 1240.0
@@ -153,7 +153,7 @@ class _Model:
         position, rotation = np.array(machine.home.position), machine.home.rotation
         joints = machine.chain_joints(position, rotation)
         self.places = machine.places(joints, position, rotation)
-        joints[list(ACTUATED)] -= machine.zeros
+        joints[list(ACTUATED)] -= machine.encoder_offsets
         self.values = _qpos(self.design, joints, position, rotation).tolist()
         self.points = machine.points
         self.servos = spring_servos(self.design, self.masses)

@@ -7,8 +7,8 @@ import io
 
 import numpy as np
 
-from explorer.statics.budget.costs import IS_TILT, PARTS, SourceCosts
-from explorer.statics.error_sources import SOURCES
+from explorer.statics.budget.costs import PARTS, SourceCosts
+from explorer.statics.error_sources import IS_TILT, SOURCES
 
 COLUMNS = (
     *("part", "error of", "unit", "tolerance"),

@@ -1,7 +1,7 @@
 """Typical values of precision and stiffness, for a design that does not state its own.
 
-They are those of a small machine with ball screws and milled parts. They serve to begin with, and
-whoever uses them is told so.
+They are those of a small machine with ball screws and milled parts. A design without values of its
+own starts with them, and the page and the commands say so.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ STIFFNESSES: Six = (STIFFNESS, STIFFNESS, STIFFNESS, STIFFNESS, STIFFNESS, STIFF
 
 
 def typical_machine(design: Design) -> tuple[Design, tuple[str, ...]]:
-    """Return a design with typical values where it states none, and in words what they are.
+    """Return a design with typical values in place of those that it leaves out, and words for each.
 
-    The words are empty for a design that states all of them.
+    Errors of the actuators count as left out if all six are zero, tolerances if all 23 are. There
+    are no words for a design that states everything.
     """
     assumed: list[str] = []
     actuators, struts, tolerances = design.actuators, design.struts, design.tolerances
@@ -37,7 +38,7 @@ def typical_machine(design: Design) -> tuple[Design, tuple[str, ...]]:
         assumed.append(f"errors of the actuators {ERROR:g} mm")
     if actuators.stiffness_n_mm is None:
         actuators = msgspec.structs.replace(actuators, stiffness_n_mm=STIFFNESSES)
-        assumed.append(f"their stiffness {STIFFNESS:g} N/mm")
+        assumed.append(f"stiffness of the actuators {STIFFNESS:g} N/mm")
     if struts.outer_mm is None:
         struts = msgspec.structs.replace(struts, outer_mm=OUTER, inner_mm=INNER)
         assumed.append(f"struts of tube {OUTER:g} × {INNER:g} mm, {struts.modulus_gpa:g} GPa")

@@ -40,10 +40,10 @@ class ToolError(NamedTuple):
 
 
 class Precision(NamedTuple):
-    """All of the precision of poses, from one inversion of J; infinite in singular poses.
+    """Compliance and errors of the tool in poses, by one inversion of J; infinite in singular ones.
 
     Attributes:
-        compliance: C at the tool, shape (..., 6, 6), as of `explorer.compliance`.
+        compliance: C at the tool, shape (..., 6, 6), see `explorer.compliance`.
         worst: Largest errors for actuator errors within their bounds.
         rms: Root-mean-square errors, with the bounds as standard deviations.
         by_actuator: Errors of each actuator alone, with axes of six in the order of `JOINTS`.

@@ -24,6 +24,12 @@ from explorer.statics.equilibrium import along
 SOURCES = (*JOINTS, *DIMENSIONS)
 """The 29 sources of errors, in the order of every array axis of 29."""
 
+IS_TILT = np.array(["tilt" in name for name in SOURCES])
+"""Whether each source is a tilt of the guide, shape (29,)."""
+
+UNITS = tuple("degrees" if is_tilt else "mm" for is_tilt in IS_TILT.tolist())
+"""Units of the errors of the sources on a drawing."""
+
 # Sine of the angle up to which vectors count as parallel or in one plane. In the farthest sum S
 # each vector w has w · S ≥ |w|², so that the wrong sign of one within this angle of the plane
 # across S changes |S| by less than this share squared, which is rounding.
@@ -162,6 +168,16 @@ def source_errors(design: Design) -> FloatArray:
     dimensions. Lengths are in design units, tilts of the guide in radians.
     """
     return np.concatenate([actuator_errors(design), design.tolerances.values(design.unit_mm)])
+
+
+def drawing_values(design: Design, errors: FloatArray) -> FloatArray:
+    """Return errors of the sources, shape (29,), in the units of `UNITS`.
+
+    Args:
+        design: The manipulator.
+        errors: Errors in design units and radians, shape (29,).
+    """
+    return np.where(IS_TILT, np.degrees(errors), errors * design.unit_mm)
 
 
 def pose_error_by_source(

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import inverse
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.accuracy import Precision, ToolError, pose_precision
 from explorer.statics.compliance import (
@@ -17,6 +16,7 @@ from explorer.statics.compliance import (
     PrincipalCompliances,
     compliance_shares,
     deflection,
+    largest_deflection,
     principal_compliances,
     stiffness_of,
 )
@@ -28,12 +28,15 @@ from explorer.statics.error_sources import (
     rms_of_sources,
     source_errors,
 )
-from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, actuator_forces
+from explorer.statics.forces import GUIDE_ROWS
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.weights import carry
 
 BY_ACTUATORS, BY_DIMENSIONS, BY_ALL = slice(0, 6), slice(6, 29), slice(0, 29)
 """The sources of errors that are actuators, those that are dimensions, and all of them."""
+
+GROUPS = {"actuators": BY_ACTUATORS, "dimensions": BY_DIMENSIONS, "all": BY_ALL}
+"""The groups of sources by their names."""
 
 
 class ErrorEllipsoid(NamedTuple):
@@ -46,19 +49,6 @@ class ErrorEllipsoid(NamedTuple):
 
     semi_axes: FloatArray
     directions: FloatArray
-
-
-class CarriageDeflections(NamedTuple):
-    """What the load moves legs 2 and 3 along the guide.
-
-    Attributes:
-        carriages: Displacements of the carriages, by the actuators d1 and d3, shape (2,), in
-            design units.
-        bending: Displacements of the struts' tips against their carriages, shape (2,), likewise.
-    """
-
-    carriages: FloatArray
-    bending: FloatArray
 
 
 @dataclass(frozen=True)
@@ -82,6 +72,11 @@ class ToolPrecision:
     def is_regular(self) -> bool:
         """Whether the pose is not singular."""
         return bool(np.isfinite(self.precision.compliance).all())
+
+    @property
+    def has_errors(self) -> bool:
+        """Whether an actuator has an error or a dimension a tolerance."""
+        return bool(self.bounds.any())
 
     @cached_property
     def bounds(self) -> FloatArray:
@@ -140,15 +135,17 @@ class ToolPrecision:
         return compliance_shares(*self._given, self.wrench, *stiffness, self.loaded.tool)
 
     @cached_property
-    def along_guide(self) -> CarriageDeflections:
-        """What the wrench moves legs 2 and 3 along the guide, in a regular pose."""
-        stiffness, bending = stiffness_of(self.loaded.design)
-        guide, struts = list(GUIDE_ROWS), list(STRUT_ROWS)
-        forces = actuator_forces(*self._given, self.wrench, self.loaded.tool)[guide]
-        lengths = inverse(*self._given)[struts]
-        return CarriageDeflections(
-            -forces / stiffness[guide], -forces * lengths**3 / (3.0 * bending)
-        )
+    def largest_displacement(self) -> float:
+        """Largest displacement of the tool with the payload's force besides, in design units."""
+        force = self.loaded.design.payload.force_n
+        return float(largest_deflection(self.precision.compliance, self.wrench, force)[0])
+
+    @cached_property
+    def carriages(self) -> FloatArray:
+        """Displacements of the carriages along the guide, shape (2,), in a regular pose."""
+        guide = list(GUIDE_ROWS)
+        forces = -self.precision.by_joint[:, guide].T @ self.wrench
+        return -forces / stiffness_of(self.loaded.design)[0][guide]
 
     @property
     def _given(self) -> tuple[Design, tuple[float, ...], FloatArray]:

@@ -16,7 +16,7 @@ import viser
 from desk import Desk, by_name
 from services import StubWorker, services_for
 
-from explorer import Actuators, Payload, Struts, Tolerances, Tool
+from explorer import Actuators, Payload, Struts, Tolerances, Tool, actuator_forces, inverse
 from explorer.app.features.feature import Services
 from explorer.app.features.precision.actions import SetTolerances
 from explorer.app.features.precision.budget import (
@@ -43,6 +43,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.typical import typical_machine
 from explorer.statics.budget.costs import stated_tolerances
+from explorer.statics.compliance import stiffness_of
 from explorer.statics.error_sources import SOURCES
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -80,9 +81,6 @@ def at_desk(server: viser.ViserServer, desk: Desk) -> Services:
     return services_for(server, desk.session, worker, buttons=Buttons(server))
 
 
-# Figures
-
-
 def test_figures_are_those_of_the_pose(services: Services) -> None:
     state = shown()
     precision = services.get(PosePrecision).of(Frame(state))
@@ -105,7 +103,7 @@ def test_ideal_design_is_offered_typical_values(server: viser.ViserServer) -> No
     services = at_desk(server, desk)
     panel = PrecisionPanel(services)
     text = markup(panel, desk.state)
-    assert "No errors are given" in text
+    assert "states no errors" in text
     assert "Rigid" in text
     assert "0.05 mm" in text
     desk.press(services.buttons, TYPICAL)
@@ -119,11 +117,29 @@ def test_ideal_design_is_offered_typical_values(server: viser.ViserServer) -> No
         tolerances=Tolerances(b4=(0.0, 0.0, 0.2)),
     )
     filled, assumed = typical_machine(stated)
-    assert len(assumed) == 1
+    assert assumed == ("stiffness of the actuators 1000 N/mm",)
     assert filled == msgspec.structs.replace(
         stated, actuators=msgspec.structs.replace(stated.actuators, stiffness_n_mm=(1000.0,) * 6)
     )
     desk.session.stop()
+
+
+def test_source_that_only_turns_the_tool_is_listed(services: Services) -> None:
+    errors = Actuators(error_mm=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0))
+    state = shown(msgspec.structs.replace(OPTIMAL, actuators=errors))
+    text = words(markup(PrecisionPanel(services), state))
+    assert re.search(r"By source\s+l1\s+0(\.0+)? mm", text)
+    rows = "".join(budget_rows(budget_of(budget_request(state))))
+    assert "states no tolerances" not in rows
+    assert set(re.findall(r"--share:([\d.]+)%", rows)) == {"0.00"}
+
+
+def test_deflection_too_large_to_be_drawn_is_told(services: Services) -> None:
+    struts = Struts(outer_mm=1e-40, inner_mm=0.0)
+    state = shown(msgspec.structs.replace(OPTIMAL, struts=struts), deflected=True)
+    assert "mm/N" in words(markup(PrecisionPanel(services), state))
+    drawn = by_name(DeflectedScene(services).updates(Placed(Frame(state))))
+    assert not any(each["visible"] for each in drawn.values())
 
 
 def test_singular_pose_is_told_and_nothing_is_drawn(services: Services) -> None:
@@ -134,9 +150,6 @@ def test_singular_pose_is_told_and_nothing_is_drawn(services: Services) -> None:
     for scene in (ErrorEllipsoidScene(services), DeflectedScene(services)):
         drawn = by_name(scene.updates(Placed(Frame(state))))
         assert not any(each["visible"] for each in drawn.values())
-
-
-# The scene
 
 
 def test_ellipsoid_is_that_of_the_covariance(services: Services) -> None:
@@ -179,12 +192,15 @@ def test_deflected_shape_is_the_linear_motion_magnified(
     for index, name in enumerate(("b2", "b3")):
         foot = starts[2 + index * per_strut]
         assert np.abs(foot[1:]).max() < 1e-6
-        slid = magnified * placed.scale * precision.along_guide.carriages[index]
+        slid = magnified * placed.scale * precision.carriages[index]
         assert foot[0] == pytest.approx(placed.points[name][0] + slid, abs=1e-5)
         # What the carriage and the bending do adds up to the motion of the tip.
-        along = precision.along_guide
-        total = placed.scale * (along.carriages[index] + along.bending[index])
+        given = state.design, state.pose.position, state.pose.rotation
+        row, length = 1 + 2 * index, inverse(*given)[2 + 2 * index]
+        force = actuator_forces(*given, precision.wrench, state.design.tool.position)[row]
+        bending = -force * length**3 / (3.0 * stiffness_of(state.design)[1][index])
         tip = (moved[names.index(name)] - placed.points[name])[0] / magnified
+        total = placed.scale * (precision.carriages[index] + bending)
         assert tip == pytest.approx(total, rel=1e-9)
 
 
@@ -194,13 +210,12 @@ def test_magnification_that_leaves_the_scene_is_limited(services: Services) -> N
     assert np.abs(drawn["/precision/balls"]["batched_positions"]).max() < 200.0
 
 
-@pytest.mark.parametrize("values", [{"times": 0.0}, {"wanted": -1.0}, {"wanted_turn": math.inf}])
-def test_impossible_wishes_are_refused(values: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    "values", [{"times": 0.0}, {"wanted": -1.0}, {"wanted": 1e-300}, {"wanted_turn": math.inf}]
+)
+def test_precision_of_the_view_that_is_not_positive_is_refused(values: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="must be positive"):
         PrecisionView(**values)
-
-
-# The budget
 
 
 @pytest.mark.parametrize("over", ["pose", "box", "workspace"])
@@ -224,8 +239,8 @@ def test_budget_keeps_what_is_wanted_and_is_set_in_one_step(
     np.testing.assert_array_equal(stated_tolerances(design)[known], drawing.costs.tolerances[known])
     # The costs of what is set are those that were told.
     again = budget_of(budget_request(Set("view.precision.wanted", None).apply(desk.state)))
-    if known.all():
-        assert again.costs.worst_displacement == pytest.approx(drawing.costs.worst_displacement)
+    assert known.all()
+    assert again.costs.worst_displacement == pytest.approx(drawing.costs.worst_displacement)
     desk.session.stop()
 
 

@@ -64,7 +64,7 @@ def test_report_precision_tells_the_errors_of_the_pose_and_ranks_their_sources()
     for name, part in (
         ("actuators", slice(6)),
         ("dimensions", slice(6, 29)),
-        ("all together", slice(29)),
+        ("all", slice(29)),
     ):
         worst = explorer.largest_error(by[:, part], bounds[part])
         rms = explorer.rms_of_sources(by[:, part], bounds[part])

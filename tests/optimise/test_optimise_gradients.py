@@ -67,8 +67,9 @@ def loaded(design: Design) -> Design:
             push_n=(60.0, 50.0, 40.0, 50.0, 45.0, 70.0),
             pull_n=(30.0, 40.0, 50.0, 60.0, 70.0, 80.0),
             error_mm=(0.01, 0.02, 0.01, 0.02, 0.03, 0.02),
+            stiffness_n_mm=(900.0, 1100.0, 700.0, 1300.0, 800.0, 1000.0),
         ),
-        struts=Struts(moment_nm=2.0),
+        struts=Struts(outer_mm=10.0, moment_nm=2.0),
         guide=Guide(force_n=70.0, moment_nm=1.9),
     )
 

@@ -270,7 +270,7 @@ def test_tolerances_of_large_and_small_machines_grow_with_what_is_wanted(unit_mm
     assert found.least_effort == pytest.approx(least, rel=2e-6)
 
 
-@pytest.mark.parametrize("wanted", [1e-100, 1e-9, 1e9, 1e100])
+@pytest.mark.parametrize("wanted", [1e-40, 1e-9, 1e9, 1e40])
 def test_wanted_precision_of_any_size_is_kept(wanted: float) -> None:
     found = tolerance_budget(OPTIMAL, box_positions(), HOME.rotation, wanted)
     assert 0.9 * wanted < found.costs.worst_displacement <= wanted
@@ -328,6 +328,15 @@ def test_errors_of_actuators_that_exceed_what_is_wanted_are_told() -> None:
     assert (found.tolerances > 0.0).all()
 
 
+def test_exact_actuators_that_are_kept_cost_nothing() -> None:
+    exact = msgspec.structs.replace(STATED, actuators=Actuators())
+    given = exact, box_positions(), HOME.rotation, 0.05
+    kept = tolerance_budget(*given, keep_actuators=True)
+    assert not kept.tolerances[:6].any()
+    assert kept.costs.worst_displacement <= 0.05
+    assert kept.effort < tolerance_budget(*given).effort
+
+
 def test_positions_about_a_singularity_have_no_budget() -> None:
     for z in (0.0, -1.0):
         positions = [[10.0, 5.0, 9.0], [10.0, 5.0, z]]
@@ -343,7 +352,7 @@ def test_positions_about_a_singularity_have_no_budget() -> None:
     assert found.costs.worst_displacement <= 0.05
 
 
-@pytest.mark.parametrize("wanted", [0.0, -1.0, np.nan, np.inf])
+@pytest.mark.parametrize("wanted", [0.0, -1.0, np.nan, np.inf, 1e-300, 1e308])
 def test_unusable_wanted_precision_is_refused(wanted: float) -> None:
     given = OPTIMAL, [HOME.position], HOME.rotation
     assert "displacement must be positive" in refusal(

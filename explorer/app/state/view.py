@@ -10,7 +10,7 @@ from explorer.errors import InputError
 from explorer.measures.positions import PositionSet
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import Point
-from explorer.numerics.checks import LARGEST_NUMBER
+from explorer.numerics.checks import LARGEST_NUMBER, SMALLEST_POSITIVE
 from explorer.numerics.number_text import format_number
 
 ALUMINIUM = 2700.0
@@ -177,7 +177,7 @@ class PrecisionView:
             ("wanted displacement", self.wanted),
             ("wanted turn", self.wanted_turn),
         ):
-            if value is not None and not 0.0 < value <= LARGEST_NUMBER:
+            if value is not None and not SMALLEST_POSITIVE <= value <= LARGEST_NUMBER:
                 raise InputError(f"the {name} must be positive; got {format_number(value)}")
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from explorer.cli.output import assumed_lines, figure, figures, table
-from explorer.export.imperfect import UNITS, ImperfectMachine, drawing_values
+from explorer.export.imperfect import ImperfectMachine
 from explorer.export.servos import servo_stiffness
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.error_sources import SOURCES, source_errors
+from explorer.statics.error_sources import SOURCES, UNITS, drawing_values, source_errors
 
 
 def imperfect_json(machine: ImperfectMachine) -> dict[str, Any]:

@@ -19,10 +19,9 @@ from explorer.mechanism.pose import Triple
 from explorer.statics.compliance import is_elastic
 from explorer.statics.error_sources import SOURCES
 from explorer.statics.loaded import LoadedPose
-from explorer.statics.tool_precision import BY_ACTUATORS, BY_ALL, BY_DIMENSIONS, ToolPrecision
+from explorer.statics.tool_precision import BY_ACTUATORS, BY_DIMENSIONS, GROUPS, ToolPrecision
 
 B4: Triple = (0.0, 0.0, 0.0)
-GROUPS = {"actuators": BY_ACTUATORS, "dimensions": BY_DIMENSIONS, "all": BY_ALL}
 ORDER = "l1 d1 d2 d3 d4 l4"
 PARTS = ("guide", "struts", "actuators")
 
@@ -67,7 +66,7 @@ class Accuracy(TypicalOptions, LoadOptions):
         pose, tool = self.pose(design), self.tool(design)
         loaded = LoadedPose(design, pose, self.load, point=tool or B4)
         precision = ToolPrecision(loaded)
-        check_regular(pose, precision.by_source)
+        check_regular(pose, precision.by_source, "errors and compliance")
         answer = Answer(assumed, tool, precision)
         self.write(lambda: _as_json(answer), lambda: _as_lines(answer))
 
@@ -85,16 +84,11 @@ class Accuracy(TypicalOptions, LoadOptions):
         return msgspec.structs.replace(design, actuators=actuators)
 
 
-def _totals(precision: ToolPrecision) -> dict[str, tuple[float, float]]:
-    """Return the worst and the RMS errors of actuators, dimensions and all, by their words."""
-    return {
-        f"{name}, {kind}": (float(error.displacement), float(error.turn))
-        for name, sources in GROUPS.items()
-        for kind, error in (
-            ("worst", precision.worst(sources)),
-            ("RMS", precision.rms(sources)),
-        )
-    }
+def _totals(precision: ToolPrecision) -> Iterator[tuple[str, str, tuple[float, float]]]:
+    """Yield each group of sources, "worst" or "RMS", and its displacement and turn."""
+    for group, sources in GROUPS.items():
+        for kind, error in (("worst", precision.worst(sources)), ("RMS", precision.rms(sources))):
+            yield group, kind, (float(error.displacement), float(error.turn))
 
 
 def _as_json(answer: Answer) -> dict[str, object]:
@@ -105,11 +99,10 @@ def _as_json(answer: Answer) -> dict[str, object]:
         for name, share in zip(PARTS, precision.shares, strict=True)
     }
     totals: dict[str, float] = {}
-    for words, (moved, turned) in _totals(precision).items():
-        name, kind = words.lower().split(", ")
-        suffix = "" if name == "actuators" else f"_of_{name}"
-        totals[f"{kind}_displacement{suffix}"] = moved
-        totals[f"{kind}_turn{suffix}"] = turned
+    for group, kind, (moved, turned) in _totals(precision):
+        suffix = "" if group == "actuators" else f"_of_{group}"
+        totals[f"{kind.lower()}_displacement{suffix}"] = moved
+        totals[f"{kind.lower()}_turn{suffix}"] = turned
     return {
         "compliance": precision.precision.compliance,
         "deflection": precision.deflection,
@@ -140,9 +133,9 @@ def _as_lines(answer: Answer) -> Iterator[str]:
     rows = [("error from", "displacement, units", "mm", "turn")]
     moved, turned = (each.tolist() for each in precision.alone)
     has_tolerances = any(moved[BY_DIMENSIONS]) or any(turned[BY_DIMENSIONS])
-    for words, error in _totals(precision).items():
-        if has_tolerances or words.startswith("actuators"):
-            rows.append((words, *_error(design, *error)))
+    for group, kind, error in _totals(precision):
+        if has_tolerances or group == "actuators":
+            rows.append((f"{group}, {kind}", *_error(design, *error)))
     by_source = [*zip(SOURCES, moved, turned, strict=True)]
     dimensions = sorted(by_source[BY_DIMENSIONS], key=lambda row: -row[1])
     for name, *error in (*by_source[BY_ACTUATORS], *(each for each in dimensions if any(each[1:]))):

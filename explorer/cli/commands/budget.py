@@ -30,14 +30,13 @@ from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.budget.allocation import ToleranceBudget, tolerance_budget
 from explorer.statics.budget.costs import (
-    IS_TILT,
     PARTS,
     SourceCosts,
     source_costs,
     stated_tolerances,
     with_tolerances,
 )
-from explorer.statics.error_sources import SOURCES
+from explorer.statics.error_sources import IS_TILT, SOURCES
 
 PROGRAM = "explorer budget"
 WORDS = {"box": "nodes of a grid over the box", "workspace": "nodes of a grid in the workspace"}
@@ -183,7 +182,7 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
             for name, value, unit, wanted in results
         ]
         if answer.found is not None:
-            effort = f"{100.0 * answer.found.excess:.1f} % above the least, by rounding down"
+            effort = f"{100.0 * answer.found.excess:.1f} % above the least"
             rows.append(("sum of 1/tolerance", f"{figure(answer.found.effort)} /mm", effort))
         yield table(rows, "<<<")
         if answer.found is not None:

@@ -81,7 +81,7 @@ class Forces(LoadOptions):
         design = self.read_loaded_design()
         pose, tool = self.pose(design), self.tool(design)
         given = design, pose.position, pose.rotation
-        check_regular(pose, twists_of_actuators(*given))
+        check_regular(pose, twists_of_actuators(*given), "the forces that hold a load")
         point = tool or (0.0, 0.0, 0.0)
         loaded = LoadedPose(design, pose, self.load, self._own_weights(design), point=point)
         most = np.minimum(*design.actuators.limits) if self.most is None else self.most

@@ -8,7 +8,6 @@ import numpy as np
 
 from explorer.measures.case import Case
 from explorer.statics.compliance import largest_deflection
-from explorer.statics.error_sources import source_errors
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.tool_precision import ToolPrecision
 
@@ -18,9 +17,9 @@ def precision_of(case: Case) -> ToolPrecision | None:
 
     The load is the payload's weight, and its force in the direction that moves the tool the most.
     """
-    if not (source_errors(case.design).any() or case.is_elastic):
-        return None
     weighed = ToolPrecision(LoadedPose(case.design, case.at))
+    if not (weighed.has_errors or case.is_elastic):
+        return None
     force = case.design.payload.force_n
     _, worst = largest_deflection(weighed.precision.compliance, weighed.wrench, force)
     if not np.isfinite(worst).all():

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import BoolArray, FloatArray, finite_array
+from explorer.numerics.checks import LARGEST_NUMBER, SMALLEST_POSITIVE
 from explorer.numerics.number_text import format_number
 from explorer.statics.budget.costs import (
     SourceCosts,
@@ -60,7 +61,7 @@ class ToleranceBudget:
 
     @property
     def excess(self) -> float:
-        """Effort above its lower bound, which rounding causes, as a share of that bound."""
+        """Effort above its lower bound, mostly by rounding, as a share of that bound."""
         return self.effort / self.least_effort - 1.0 if self.least_effort else 0.0
 
 
@@ -88,14 +89,17 @@ def tolerance_budget(
         keep_actuators: Whether the errors of the actuators stay as the design states them.
 
     Raises:
-        InputError: What is wanted is not positive, a position or the tool is not finite, or the
-            rotation is not one.
+        InputError: What is wanted is not positive or beyond 1e±40, a position or the tool is not
+            finite, or the rotation is not one.
         NoAnswerError: A position is singular, or singular ones lie between them, or the errors of
             the actuators alone exceed what is wanted.
     """
     for name, value in (("displacement", wanted), ("turn", wanted_turn)):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"the wanted {name} must be positive; got {format_number(value)}")
+        if value is not None and not SMALLEST_POSITIVE <= value <= LARGEST_NUMBER:
+            raise InputError(
+                f"the wanted {name} must be positive, from {SMALLEST_POSITIVE:g} to "
+                f"{LARGEST_NUMBER:g}; got {format_number(value)}"
+            )
     points = finite_array("positions", positions, (3,)).reshape(-1, 3)
     influences = source_influences(design, points, rotation, tool)
     stated = stated_tolerances(design)
@@ -107,9 +111,9 @@ def tolerance_budget(
     lengths = error_lengths(design)
     found, least = _allocate(shares, lengths, held, ~kept)
     tolerances = np.where(kept, stated, _rounded_down(found))
-    efforts = 1.0 / (tolerances * lengths)
+    efforts = 1.0 / (tolerances * lengths)[~kept]
     costs = costs_of(design, points, influences, tolerances)
-    return ToleranceBudget(tolerances, costs, float(efforts[~kept].sum()), least)
+    return ToleranceBudget(tolerances, costs, float(efforts.sum()), least)
 
 
 def _allocate(

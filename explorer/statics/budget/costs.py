@@ -19,14 +19,12 @@ from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray, finite_array
 from explorer.statics.error_sources import (
+    IS_TILT,
     SOURCES,
     largest_error,
     pose_error_by_source,
     rms_of_sources,
 )
-
-IS_TILT = np.array(["tilt" in name for name in SOURCES])
-"""Whether each source is a tilt, shape (29,): its errors are in degrees, all others in mm."""
 
 PARTS: tuple[str, ...] = (
     *("cylinder 1, rod 1", "carriage 2", "cylinder 2, rod 2"),
@@ -214,5 +212,5 @@ def with_tolerances(design: Design, tolerances: FloatArray) -> Design:
 
 
 def _finite(tolerances: FloatArray) -> FloatArray:
-    """Return tolerances with 0 in place of any, which is that of a source that moves nothing."""
+    """Return tolerances with 0 in place of infinite ones, whose sources move nothing."""
     return np.where(np.isfinite(tolerances), tolerances, 0.0)

@@ -13,7 +13,7 @@ from explorer.app.state.state import State
 from explorer.mechanism.machine import Tolerances
 from explorer.numerics.number_text import format_number
 
-# Fields of lengths, with what each is of and the axes that it has.
+# Fields of lengths, each with the words for its hint.
 LENGTHS = {
     "a1": "the base joint of leg 1, along the axes of the base",
     "a3": "the base joint of leg 4, along the axes of the base",

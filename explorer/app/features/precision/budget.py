@@ -32,8 +32,8 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import format_number
-from explorer.statics.budget.costs import IS_TILT, PARTS, SourceCosts
-from explorer.statics.error_sources import SOURCES
+from explorer.statics.budget.costs import PARTS, SourceCosts
+from explorer.statics.error_sources import IS_TILT, SOURCES
 
 OVER: dict[str, PositionSet] = {
     "the present pose": "pose",
@@ -178,7 +178,8 @@ def budget_rows(drawing: BudgetDrawing) -> Iterator[str]:
         format_number(value, DIGITS) for value in (costs.worst_displacement, costs.worst_turn)
     )
     where = "" if costs.count == 1 else f" at the worst of {costs.count:,} positions"
-    if not costs.tolerances[np.isfinite(costs.tolerances)].any():
+    has_tolerances = bool(costs.tolerances[np.isfinite(costs.tolerances)].any())
+    if not has_tolerances:
         yield note(
             "The design states no tolerances; the bars show what an error of 1 mm, and of a tilt "
             "that moves the guide's end by 1 mm, costs."
@@ -190,26 +191,29 @@ def budget_rows(drawing: BudgetDrawing) -> Iterator[str]:
     if found is not None:
         above = format_number(100.0 * found.excess, 2)
         button = press_button(SET, "", "Set these tolerances", hint=SET_HINT, class_name="ex-link")
-        words = dim(f"Least effort, but for {above} % by rounding down.")
+        words = dim(f"At most {above} % above the least effort.")
         yield f'<div class="ex-line">{words} {button}</div>'
     yield (
         f'<div class="ex-flow ex-after">{swatch(ACTUATOR)} {dim("actuators")} '
         f"{swatch(DIMENSION)} {dim('dimensions')}</div>"
     )
-    yield f'<div class="ex-budget">{table(_rows(costs))}</div>'
+    yield f'<div class="ex-budget">{table(_rows(costs, per_unit=not has_tolerances))}</div>'
 
 
-def _rows(costs: SourceCosts) -> Iterator[str]:
-    """Yield a row for each source of errors, the costliest first."""
-    moved = costs.displacement_within
-    if not moved.any():
-        moved = costs.displacement / costs.lengths
+def _rows(costs: SourceCosts, *, per_unit: bool) -> Iterator[str]:
+    """Yield a row for each source of errors, the costliest first.
+
+    Args:
+        costs: Costs of the tolerances.
+        per_unit: Whether the bars show what unit errors cost, in place of the tolerances.
+    """
+    moved = costs.displacement / costs.lengths if per_unit else costs.displacement_within
     most = float(moved.max()) or 1.0
     ranking: list[int] = costs.ranking.tolist()
     for k in ranking:
         unit = "°" if IS_TILT[k] else " mm"
         tolerance, cost = float(costs.tolerances[k]), float(moved[k])
-        given = f"± {format_number(tolerance, 2)}{unit}" if np.isfinite(tolerance) else "any"
+        given = f"± {format_number(tolerance, 6)}{unit}" if np.isfinite(tolerance) else "any"
         colour = ACTUATOR if k < len(JOINTS) else DIMENSION
         per = format_number(float(costs.displacement[k]), DIGITS)
         turns = format_number(float(costs.turn[k]), DIGITS)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
-from explorer.app.features.precision.pose import has_errors
 from explorer.app.widgets.charts import BLUE, ORANGE, TEAL
 from explorer.app.widgets.colours import Rgb, css
 from explorer.app.widgets.markup import caption, dim, meter, row, swatch, table
@@ -15,7 +15,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_column, format_decimals, format_number
 from explorer.statics.compliance import is_elastic
 from explorer.statics.error_sources import SOURCES
-from explorer.statics.tool_precision import BY_ACTUATORS, BY_ALL, BY_DIMENSIONS, ToolPrecision
+from explorer.statics.tool_precision import GROUPS, ToolPrecision
 
 DIGITS = 3
 # Number of sources of errors that are listed by themselves.
@@ -23,6 +23,10 @@ LISTED = 8
 ACTUATOR, DIMENSION = BLUE, ORANGE
 # Parts in the order of `ComplianceShares`.
 PARTS: tuple[tuple[str, Rgb], ...] = (("guide", TEAL), ("struts", ORANGE), ("actuators", BLUE))
+KINDS = {
+    "worst": "The largest for all combinations of signs of the errors, each at its largest",
+    "RMS": "Root mean square, with the largest errors as standard deviations",
+}
 SHARES_HINT = (
     "Parts of the work that the load does: on the actuators d1 and d3 along the guide, on the "
     "bending struts of legs 2 and 3, and on the actuators l1, d2, d4 and l4."
@@ -41,8 +45,8 @@ def degrees(radians: float) -> str:
 
 def headline(precision: ToolPrecision) -> Iterator[str]:
     """Yield the worst error of the tool in large words, or why there is none."""
-    if not has_errors(precision):
-        yield '<div class="ex-status">No errors are given</div>'
+    if not precision.has_errors:
+        yield '<div class="ex-status">The design states no errors</div>'
         return
     if not precision.is_regular:
         yield '<div class="ex-status ex-beyond">Errors are infinite here</div>'
@@ -57,27 +61,16 @@ def errors(precision: ToolPrecision) -> Iterator[str]:
     """Yield the worst and the RMS errors, and the sources of the largest."""
     unit = precision.loaded.design.unit_mm
     bounds = precision.bounds
-    groups = (
-        ("actuators", BY_ACTUATORS, "The six actuators at their largest errors"),
-        ("dimensions", BY_DIMENSIONS, "The 23 dimensions at their tolerances"),
-        ("all", BY_ALL, "All 29 at once, in the worst combination of their signs"),
-    )
-    stated = [group for group in groups if bounds[group[1]].any()]
+    stated = [name for name, sources in GROUPS.items() if bounds[sources].any()]
     if len(stated) == 2:
         # One of the two is all.
         stated = stated[:1]
     rows: list[str] = []
-    for name, sources, hint in stated:
-        worst, rms = precision.worst(sources), precision.rms(sources)
-        rows += [
-            row(dim(f"{name}, {kind}"), millimetres(unit * float(moved)), degrees(float(turned)),
-                hint=more)
-            for kind, moved, turned, more in (
-                ("worst", worst.displacement, worst.turn, hint),
-                ("RMS", rms.displacement, rms.turn,
-                 "Root mean square, with the largest errors as standard deviations"),
-            )
-        ]  # fmt: skip
+    for name in stated:
+        worst, rms = precision.worst(GROUPS[name]), precision.rms(GROUPS[name])
+        for kind, error in (("worst", worst), ("RMS", rms)):
+            figures = millimetres(unit * float(error.displacement)), degrees(float(error.turn))
+            rows.append(row(dim(f"{name}, {kind}"), *figures, hint=KINDS[kind]))
     yield caption("Error of the tool", "Displacement of the tool point, and turn of the tool.")
     yield table(rows)
     moved, turned = unit * precision.alone.displacement, np.degrees(precision.alone.turn)
@@ -95,10 +88,10 @@ def source_rows(moved: FloatArray, turned: FloatArray) -> Iterator[str]:
         moved: Displacement of the tool by each source, shape (29,), in mm.
         turned: Turn of the tool, shape (29,), in degrees.
     """
-    order: list[int] = np.argsort(-moved, kind="stable").tolist()
-    ranked = [index for index in order if moved[index] > 0.0]
+    order: list[int] = np.lexsort([-turned, -moved]).tolist()
+    ranked = [index for index in order if moved[index] > 0.0 or turned[index] > 0.0]
     listed = ranked[:LISTED]
-    most = float(moved.max(initial=0.0))
+    most = float(moved.max()) or 1.0
     lengths = format_column(moved[listed].tolist(), DIGITS)
     angles = format_column(turned[listed].tolist(), DIGITS)
     for index, length, angle in zip(listed, lengths, angles, strict=True):
@@ -115,7 +108,9 @@ def deflections(precision: ToolPrecision) -> Iterator[str]:
     design = precision.loaded.design
     if not is_elastic(design):
         yield caption("Deflection")
-        yield dim("Rigid: the design states no stiffness of its actuators and no tubes as struts.")
+        yield dim(
+            "Rigid: the design states no stiffness of its actuators and no tubes for its struts."
+        )
         return
     yield caption(
         "Deflection under the load",
@@ -125,7 +120,7 @@ def deflections(precision: ToolPrecision) -> Iterator[str]:
         yield '<div class="ex-beyond">It is infinite: the pose is singular.</div>'
         return
     unit, moved = design.unit_mm, precision.deflection
-    total, turn = unit * float(np.linalg.norm(moved[:3])), float(np.linalg.norm(moved[3:]))
+    total, turn = unit * math.hypot(*moved[:3].tolist()), math.hypot(*moved[3:].tolist())
     along = ", ".join(format_column((unit * moved[:3]).tolist(), DIGITS))
     about = ", ".join(format_column(np.degrees(moved[3:]).tolist(), DIGITS))
     rows = [
@@ -134,9 +129,9 @@ def deflections(precision: ToolPrecision) -> Iterator[str]:
     ]
     force = design.payload.force_n
     if force > 0.0:
-        more = unit * force * float(precision.principal.displacement[0])
-        hint = "The payload's force acts besides, in any direction."
-        rows.append(row(dim("force in any direction"), f"± {millimetres(more)}", "", hint=hint))
+        most = unit * precision.largest_displacement
+        hint = "The payload's force acts besides, in the direction that deflects the tool most."
+        rows.append(row(dim("with the process force"), f"≤ {millimetres(most)}", "", hint=hint))
     yield table(rows)
     shares = [float(share) for share in precision.shares]
     if not np.isnan(shares).any():

@@ -10,7 +10,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.precision.actions import AssumeTypical
 from explorer.app.features.precision.budget import BudgetPart
 from explorer.app.features.precision.figures import deflections, errors, headline
-from explorer.app.features.precision.pose import PosePrecision, has_errors
+from explorer.app.features.precision.pose import PosePrecision
 from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
@@ -69,9 +69,9 @@ class PrecisionPanel:
         """Yield the updates that make the panel show the frame."""
         precision = self._poses.of(frame)
         parts = [*headline(precision)]
-        if has_errors(precision) and precision.is_regular:
+        if precision.has_errors and precision.is_regular:
             parts += errors(precision)
-        if not (has_errors(precision) and is_elastic(frame.state.design)):
+        if not (precision.has_errors and is_elastic(frame.state.design)):
             parts += _offer(frame.state)
         yield self._top, "content", box(*parts)
         yield self._deflection, "content", box(*deflections(precision))
@@ -92,7 +92,7 @@ def _offer(state: State) -> Iterator[str]:
     """Yield what typical values can be assumed, with the button that does."""
     assumed = _assumed(state)
     if assumed:
-        words = dim(f"The tab Machine takes errors, stiffness and tolerances. Typical ones are: "
-                    f"{'; '.join(assumed)}.")  # fmt: skip
+        values = "; ".join(assumed)
+        words = dim(f"State them in the tab Machine, or assume typical values: {values}.")
         button = press_button(TYPICAL, "", "Assume these", hint=TYPICAL_HINT, class_name="ex-link")
         yield f'<div class="ex-after">{words} {button}</div>'

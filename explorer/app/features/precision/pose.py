@@ -21,8 +21,3 @@ class PosePrecision:
         if self._kept is None or self._kept.loaded is not loaded:
             self._kept = ToolPrecision(loaded)
         return self._kept
-
-
-def has_errors(precision: ToolPrecision) -> bool:
-    """Return whether an actuator has an error or a dimension a tolerance."""
-    return bool(precision.bounds.any())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,7 +11,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.scene import tool_point
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.features.precision.figures import degrees, millimetres
-from explorer.app.features.precision.pose import PosePrecision, has_errors
+from explorer.app.features.precision.pose import PosePrecision
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
@@ -34,12 +35,13 @@ ERROR: Rgb = (176, 60, 120)
 DEFLECTED: Rgb = (222, 110, 20)
 PLATE_OPACITY = 0.7
 # Sizes over the reach that an automatic magnification gives the longest semi-axis and the largest
-# displacement; the largest semi-axis over the shortest one that is drawn.
+# displacement, and the shortest semi-axis that is drawn as a share of the longest.
 ELLIPSOID_SIZE, DEFLECTION_SIZE, THINNEST = 0.18, 0.25, 0.01
 # Pieces of a drawn strut, and its radius in scene units.
 PIECES, RADIUS = 12, 0.1
-# Largest magnification and largest drawn displacement over the reach.
-LARGEST_TIMES, FARTHEST = 1e12, 5.0
+# Largest automatic magnification, largest drawn displacement over the reach, and the deflection
+# from which none is drawn.
+LARGEST_TIMES, FARTHEST, LARGEST_DEFLECTION = 1e12, 5.0, 1e100
 
 
 class ErrorEllipsoidScene(ScenePart):
@@ -54,7 +56,8 @@ class ErrorEllipsoidScene(ScenePart):
         precision = self._poses.of(placed.frame)
         shown = (
             placed.frame.state.view.precision.ellipsoid
-            and has_errors(precision)
+            and not placed.is_apart
+            and precision.has_errors
             and precision.is_regular
         )
         longest = float(precision.ellipsoid.semi_axes[0]) if shown else 0.0
@@ -92,6 +95,8 @@ class DeflectedScene(ScenePart):
             and not (view.is_twin or placed.is_apart)
             and is_elastic(precision.loaded.design)
             and precision.is_regular
+            # The square of a larger one would overflow.
+            and float(np.abs(precision.deflection).max()) < LARGEST_DEFLECTION
         )
         for handle in (self._plate, self._way, self._label):
             yield handle, "visible", shown
@@ -113,8 +118,8 @@ class DeflectedScene(ScenePart):
         yield self._plate, "faces", faces.astype(np.uint32)
         yield self._way, "points", np.stack([tool, moved[4]])[None].astype(np.float32)
         design, deflection = precision.loaded.design, precision.deflection
-        total = millimetres(design.unit_mm * float(np.linalg.norm(deflection[:3])))
-        turn = degrees(float(np.linalg.norm(deflection[3:])))
+        total = millimetres(design.unit_mm * math.hypot(*deflection[:3].tolist()))
+        turn = degrees(math.hypot(*deflection[3:].tolist()))
         yield self._label, "text", f"{total}, {turn}, drawn × {format_number(times)}"
         yield self._label, "position", tuple(moved[4].tolist())
 
@@ -127,7 +132,7 @@ class DeflectedScene(ScenePart):
         lines = [np.stack([np.array(starts), np.array(ends)], axis=1)]
         for index, leg in enumerate((2, 3)):
             foot = feet[leg - 1].copy()
-            foot[0] += times * placed.scale * precision.along_guide.carriages[index]
+            foot[0] += times * placed.scale * precision.carriages[index]
             u = np.linspace(0.0, 1.0, PIECES + 1)
             points = foot + u[:, None] * (tips[leg - 1] - foot)
             # A cantilever with a force at its tip: (3 u² − u³) / 2 of the tip's displacement.

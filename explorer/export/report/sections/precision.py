@@ -22,13 +22,8 @@ from explorer.export.report.markup import (
     vector,
 )
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.error_sources import SOURCES
-from explorer.statics.tool_precision import (
-    BY_ACTUATORS,
-    BY_ALL,
-    BY_DIMENSIONS,
-    ToolPrecision,
-)
+from explorer.statics.error_sources import IS_TILT, SOURCES
+from explorer.statics.tool_precision import GROUPS, ToolPrecision
 
 RANKED = 10
 """Number of sources of errors that are listed, from the largest."""
@@ -58,10 +53,10 @@ def precision_section(data: ReportData) -> Iterator[Element]:
 
 
 def _errors(data: ReportData, precision: ToolPrecision) -> Element:
-    kinds = {"actuators": BY_ACTUATORS, "dimensions": BY_DIMENSIONS}
-    stated = {name: part for name, part in kinds.items() if precision.bounds[part].any()}
-    if len(stated) > 1:
-        stated["all together"] = BY_ALL
+    stated = {name: part for name, part in GROUPS.items() if precision.bounds[part].any()}
+    if len(stated) == 2:
+        # One of the two is all.
+        del stated["all"]
     errors = [(precision.worst(part), precision.rms(part)) for part in stated.values()]
     moved = [data.unit_mm * float(each.displacement) for pair in errors for each in pair]
     turned = [math.degrees(each.turn) for pair in errors for each in pair]
@@ -101,7 +96,7 @@ def _sources(data: ReportData, precision: ToolPrecision) -> Element:
 
 def _bound(data: ReportData, bounds: FloatArray, source: int) -> Cell:
     value = float(bounds[source])
-    if SOURCES[source].startswith("guide tilt"):
+    if IS_TILT[source]:
         return "± ", number(math.degrees(value), 4), "°"
     return "± ", number(data.unit_mm * value, 4), " mm"
 
