@@ -28,7 +28,9 @@ from explorer.app.scene.placing import scene_scale
 from explorer.app.server import Running
 from explorer.app.state.actions import Open, Set
 from explorer.app.state.state import State
+from explorer.app.state.view import PrecisionView
 from explorer.app.widgets.assigning import Assigner, Update
+from explorer.mechanism.typical import typical_machine
 
 ROUNDS, EVENTS, WARM_UP_EVENTS = 3, 100, 20
 
@@ -43,6 +45,7 @@ class Kind:
         sent: The value in a message of it.
         arrived: The same value in a state.
         is_loaded: Whether the machine has limits, and forces are drawn.
+        is_precise: Whether the machine has errors and stiffness, which are drawn.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Kind:
     sent: Callable[[Any], float]
     arrived: Callable[[State], float]
     is_loaded: bool = False
+    is_precise: bool = False
 
 
 def _value(message: Any) -> float:
@@ -90,6 +94,7 @@ KINDS = (
     ),
     DRAG,
     replace(DRAG, name="drag handle, forces drawn", is_loaded=True),
+    replace(DRAG, name="drag handle, precision drawn", is_precise=True),
 )
 
 
@@ -188,8 +193,11 @@ def measure() -> dict[str, list[Stopwatch]]:
         # The kinds take turns, so that no disturbance falls on one alone.
         for events in (WARM_UP_EVENTS, *[EVENTS] * ROUNDS):
             for kind in KINDS:
-                session.do(Open(PRESS if kind.is_loaded else DESIGN))
+                design = PRESS if kind.is_loaded else DESIGN
+                session.do(Open(typical_machine(design)[0] if kind.is_precise else design))
                 session.do(Set("view.forces.shown", kind.is_loaded))
+                drawn = PrecisionView(ellipsoid=kind.is_precise, deflected=kind.is_precise)
+                session.do(Set("view.precision", drawn))
                 session.wait_until_idle()
                 stopwatch = Stopwatch(kind)
                 with timed(running, stopwatch):
