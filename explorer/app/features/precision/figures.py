@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from explorer.app.widgets.charts import BLUE, ORANGE, TEAL
+from explorer.app.widgets.charts import BLUE, ORANGE, TEAL, VIOLET
 from explorer.app.widgets.colours import Rgb, css
 from explorer.app.widgets.markup import caption, dim, meter, row, swatch, table
 from explorer.mechanism.design import JOINTS
@@ -22,7 +22,7 @@ DIGITS = 3
 LISTED = 8
 ACTUATOR, DIMENSION = BLUE, ORANGE
 # Parts in the order of `ComplianceShares`.
-PARTS: tuple[tuple[str, Rgb], ...] = (("guide", TEAL), ("struts", ORANGE), ("actuators", BLUE))
+PARTS: tuple[tuple[str, Rgb], ...] = (("guide", TEAL), ("struts", VIOLET), ("actuators", BLUE))
 KINDS = {
     "worst": "The largest for all combinations of signs of the errors, each at its largest",
     "RMS": "Root mean square, with the largest errors as standard deviations",
