@@ -28,11 +28,10 @@ from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.budget.allocation import ToleranceBudget, tolerance_budget
+from explorer.statics.budget.allocation import ToleranceBudget, costs_or_budget
 from explorer.statics.budget.costs import (
     PARTS,
     SourceCosts,
-    source_costs,
     stated_tolerances,
     with_tolerances,
 )
@@ -119,21 +118,17 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
         design, assumed = self.with_typical(self.read_design())
         pose, tool = self.pose(design), self.tool(design)
         positions = positions_over(design, over, pose, box or design.limits.box)
-        given = design, positions, pose.rotation
-        found = None
-        if self.wanted is None:
-            costs = source_costs(*given, tool)
-        else:
-            found = tolerance_budget(
-                *given,
-                self.wanted,
-                self.wanted_turn,
-                tool=tool,
-                keep_actuators=self.keep_actuators,
-            )
-            costs = found.costs
-            if self.out is not None:
-                write_whole(self.out, encode_design(with_tolerances(design, found.tolerances)))
+        costs, found = costs_or_budget(
+            design,
+            positions,
+            pose.rotation,
+            self.wanted,
+            self.wanted_turn,
+            tool=tool,
+            keep_actuators=self.keep_actuators,
+        )
+        if found is not None and self.out is not None:
+            write_whole(self.out, encode_design(with_tolerances(design, found.tolerances)))
         answer = Answer(design, assumed, pose, tool, over, costs, found, self.out)
         self.write(lambda: _as_json(answer), lambda: self._as_lines(answer))
 

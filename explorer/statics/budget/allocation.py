@@ -25,6 +25,7 @@ from explorer.statics.budget.costs import (
     SourceCosts,
     costs_of,
     error_lengths,
+    source_costs,
     source_influences,
     stated_tolerances,
 )
@@ -114,6 +115,38 @@ def tolerance_budget(
     efforts = 1.0 / (tolerances * lengths)[~kept]
     costs = costs_of(design, points, influences, tolerances)
     return ToleranceBudget(tolerances, costs, float(efforts.sum()), least)
+
+
+def costs_or_budget(
+    design: Design,
+    positions: ArrayLike,
+    rotation: ArrayLike,
+    wanted: float | None,
+    wanted_turn: float | None = None,
+    *,
+    tool: ArrayLike | None = None,
+    keep_actuators: bool = False,
+) -> tuple[SourceCosts, ToleranceBudget | None]:
+    """Return the costs of the tolerances of a wanted precision with these, or of those stated.
+
+    Args:
+        design: As in `tolerance_budget`, and so are all others but one.
+        positions: Positions of b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (3, 3).
+        wanted: Largest displacement of the tool, in mm; None for the tolerances as stated.
+        wanted_turn: Largest turn of the tool, in degrees; None for any.
+        tool: Tool point in the platform frame, shape (3,), in design units; None for b4.
+        keep_actuators: Whether the errors of the actuators stay as the design states them.
+
+    Raises:
+        InputError: As in `tolerance_budget`.
+        NoAnswerError: As in `tolerance_budget`.
+    """
+    given = design, positions, rotation
+    if wanted is None:
+        return source_costs(*given, tool), None
+    found = tolerance_budget(*given, wanted, wanted_turn, tool=tool, keep_actuators=keep_actuators)
+    return found.costs, found
 
 
 def _allocate(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import viser
 
@@ -18,6 +19,7 @@ from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import box, dim
+from explorer.mechanism.design import Design
 from explorer.mechanism.typical import typical_machine
 from explorer.statics.compliance import is_elastic
 
@@ -85,7 +87,13 @@ class PrecisionPanel:
 
 def _assumed(state: State) -> tuple[str, ...]:
     """Return what typical values the design would get."""
-    return typical_machine(state.design)[1]
+    return _assumed_of(state.design)
+
+
+@lru_cache(maxsize=1)
+def _assumed_of(design: Design) -> tuple[str, ...]:
+    # A design stays while the mechanism moves.
+    return typical_machine(design)[1]
 
 
 def _offer(state: State) -> Iterator[str]:

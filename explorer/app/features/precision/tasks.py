@@ -8,8 +8,8 @@ from explorer.export.tolerance_table import tolerance_csv
 from explorer.measures.positions import PositionSet, positions_over
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
-from explorer.statics.budget.allocation import ToleranceBudget, tolerance_budget
-from explorer.statics.budget.costs import SourceCosts, source_costs
+from explorer.statics.budget.allocation import ToleranceBudget, costs_or_budget
+from explorer.statics.budget.costs import SourceCosts
 
 
 @dataclass(frozen=True)
@@ -59,17 +59,16 @@ def budget_of(request: BudgetRequest) -> BudgetDrawing:
     """
     design, tool = request.design, request.design.tool.position
     positions = positions_over(design, request.over, request.pose, request.box)
-    given = design, positions, request.pose.rotation
-    if request.wanted is None:
-        return BudgetDrawing(request, source_costs(*given, tool), None)
-    found = tolerance_budget(
-        *given,
+    costs, found = costs_or_budget(
+        design,
+        positions,
+        request.pose.rotation,
         request.wanted,
         request.wanted_turn,
         tool=tool,
         keep_actuators=request.keep_actuators,
     )
-    return BudgetDrawing(request, found.costs, found)
+    return BudgetDrawing(request, costs, found)
 
 
 def budget_table(request: BudgetRequest) -> bytes:
