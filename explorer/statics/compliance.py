@@ -21,6 +21,8 @@ from explorer.statics.equilibrium import B2, B3, Poses
 
 # Number of halvings, of the logarithm where it can be, that find the worst force to rounding.
 HALVINGS = 70
+# Largest share of all forces and displacements that is counted as none.
+NO_PULL = 1e-150
 
 
 class PrincipalCompliances(NamedTuple):
@@ -207,33 +209,45 @@ def largest_deflection(
     block = np.where(regular[..., None, None], compliance[..., :3, :3], 0.0)
     soft, axes = np.linalg.eigh(block)
     along = np.einsum("...ji,...j->...i", axes, np.where(regular[..., None], moved, 0.0))
-    held = _farthest_force(np.maximum(soft, 0.0), along, most)
-    length = np.sqrt(((soft * held + along) ** 2).sum(axis=-1))
-    pushed = np.einsum("...ij,...j->...i", axes, held)
+    soft = np.maximum(soft, 0.0)
+    direction = _farthest_direction(soft, along, most)
+    # Squares of very small and of very large displacements are beyond the range of numbers.
+    reached = soft * (most[..., None] * direction) + along
+    scale = np.abs(reached).max(axis=-1)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    length = scale * np.linalg.norm(reached / scale[..., None], axis=-1)
+    pushed = most[..., None] * np.einsum("...ij,...j->...i", axes, direction)
     return np.where(regular, length, np.inf), np.where(regular[..., None], pushed, np.inf)
 
 
-def _farthest_force(soft: FloatArray, along: FloatArray, most: FloatArray) -> FloatArray:
-    """Return f with |f| = F for which Σ (s_i f_i + g_i)² is largest, shape (..., 3).
+def _farthest_direction(soft: FloatArray, along: FloatArray, most: FloatArray) -> FloatArray:
+    """Return the unit u for which Σ (s_i F u_i + g_i)² is largest, shape (..., 3).
 
-    The s_i ascend to s. For the largest sum s_i (s_i f_i + g_i) = (s² + m) f_i with m ≥ 0, so that
-    f_i = s_i g_i / (m + s² − s_i²). The length of f falls with m, which bounds m on both sides:
-    all s_i² count as s², or only the last part of f does.
+    The s_i ascend to s = 1 and the largest of |g_i| and F is 1, after both are divided by a size
+    each. For the largest sum s_i (s_i F u_i + g_i) = (F s² + n) u_i with n ≥ 0, so that
+    u_i = s_i g_i / (F (s² − s_i²) + n). The length of u falls with n, which bounds n on both
+    sides: all s_i² count as s², or only the last part of u does.
     """
-    pull = soft * along
-    gaps: FloatArray = soft[..., -1:] ** 2 - soft**2
-    sizes = np.sqrt((pull**2).sum(axis=-1))
-    size = np.where(most > 0.0, most, 1.0)
-    low, high = np.abs(pull[..., -1]) / size, sizes / size
+    softest = np.where(soft[..., -1:] > 0.0, soft[..., -1:], 1.0)
+    s = soft / softest
+    size = np.maximum(np.abs(along).max(axis=-1, keepdims=True), softest * most[..., None])
+    size = np.where(size > 0.0, size, 1.0)
+    g, force = along / size, softest * most[..., None] / size
+    pull = s * g
+    # Its square would be zero, and the lower bound with it.
+    pull[np.abs(pull) < NO_PULL] = 0.0
+    gaps = force * (1.0 - s**2)
+    low: FloatArray = np.abs(pull[..., -1])
+    high: FloatArray = np.linalg.norm(pull, axis=-1)
     for _ in range(HALVINGS):
-        middle: FloatArray = np.where(low > 0.0, np.sqrt(low * high), 0.5 * high)
-        is_long = (_over(pull, gaps + middle[..., None]) ** 2).sum(axis=-1) > most**2
+        middle: FloatArray = np.where(low > 0.0, np.sqrt(low) * np.sqrt(high), 0.5 * high)
+        is_long = (_over(pull, gaps + middle[..., None]) ** 2).sum(axis=-1) > 1.0
         low, high = np.where(is_long, middle, low), np.where(is_long, high, middle)
-    force = _over(pull, gaps + high[..., None])
+    direction = _over(pull, gaps + high[..., None])
     # The softest direction takes what is left: all of it where nothing pulls along it.
-    rest = most**2 - (force[..., :-1] ** 2).sum(axis=-1)
-    force[..., -1] = np.sqrt(np.maximum(rest, 0.0)) * np.where(along[..., -1] < 0.0, -1.0, 1.0)
-    return np.where(most[..., None] > 0.0, force, 0.0)
+    rest = 1.0 - (direction[..., :-1] ** 2).sum(axis=-1)
+    direction[..., -1] = np.sqrt(np.maximum(rest, 0.0)) * np.where(along[..., -1] < 0.0, -1.0, 1.0)
+    return direction
 
 
 def _over(pull: FloatArray, divisor: FloatArray) -> FloatArray:

@@ -131,6 +131,30 @@ def test_largest_deflection_without_force_or_load_is_that_of_the_other() -> None
         assert "not negative" in refusal(largest_deflection, found, load, force, kind=InputError)
 
 
+@pytest.mark.parametrize("scale", [1e-300, 1e-170, 1e-100, 1e100, 1e170])
+def test_largest_deflection_scales_with_compliance_and_with_loads_of_any_size(scale: float) -> None:
+    rng = np.random.default_rng(5)
+    positions, rotations = random_poses(OPTIMAL, 30)
+    found = compliance(OPTIMAL, positions, rotations, STIFFNESS, BENDING, TOOL)
+    found[:10, 3:, :3] = found[:10, :3, 3:] = 0.0
+    loads, forces = rng.normal(size=(30, 6)), rng.uniform(0.5, 2.0, 30)
+    largest, worst = largest_deflection(found, loads, forces)
+    softer, same = largest_deflection(scale * found, loads, forces)
+    assert_allclose(softer, scale * largest, rtol=1e-9)
+    assert_allclose(same, worst, rtol=1e-6, atol=1e-6)
+    assert_allclose(largest_deflection(found, scale * loads, scale * forces)[0], scale * largest)
+    # One of the two far beyond the other.
+    still, alone = (largest_deflection(found, *of)[0] for of in ((loads, 0.0), (0.0 * loads, 1.0)))
+    one, other = (
+        largest_deflection(found, loads, scale),
+        largest_deflection(found, scale * loads, 1),
+    )
+    first, second = (still, scale * alone), (scale * still, alone)
+    for of, parts in ((one, first), (other, second)):
+        assert (of[0] <= (parts[0] + parts[1]) * (1.0 + 1e-12)).all()
+        assert (of[0] >= np.maximum(*parts) * (1.0 - 1e-12)).all()
+
+
 def test_principal_compliances_are_the_extremes_of_directions() -> None:
     positions, rotations = random_poses(OPTIMAL, 20)
     found = compliance(OPTIMAL, positions, rotations, STIFFNESS, BENDING, TOOL)

@@ -8,7 +8,14 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace
-from explorer.workspace.solids.facets import Box, Facets, facing_part, frame_about, sphere_part
+from explorer.workspace.solids.facets import (
+    BEYOND,
+    Box,
+    Facets,
+    facing_part,
+    frame_about,
+    sphere_part,
+)
 
 # Largest angle between the normals at two ends of an edge, in radians.
 WIDEST = 0.06
@@ -16,6 +23,8 @@ WIDEST = 0.06
 CHORD, LONGEST = 1.0 / 4000.0, 1.0 / 40.0
 # Directions around a cone at the least, and rows along it at the most.
 FEWEST, MOST_ROWS = 24, 48
+# Largest angle in radians at which a box is seen as a small one.
+NARROW = 0.25
 NONE: Facets = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
 
 
@@ -34,7 +43,7 @@ def pattern(limit: BallOrCylinder | HalfSpace | Cone, box: Box) -> Facets:
     if not nearest <= limit.radius <= farthest:
         return NONE
     edge = _edge(limit.radius, box)
-    towards, angle = facing_part(centre, limit.radius, box, 0.0)
+    towards, angle = _part_near(centre, limit.radius, box)
     if limit.is_ball:
         points, faces = sphere_part(angle, edge / limit.radius)
         return limit.centre + limit.radius * (points @ frame_about(towards)), faces
@@ -46,6 +55,26 @@ def pattern(limit: BallOrCylinder | HalfSpace | Cone, box: Box) -> Facets:
     points[..., 1] = (centre[0] + limit.radius * np.cos(turns))[:, None]
     points[..., 2] = (centre[1] + limit.radius * np.sin(turns))[:, None]
     return points.reshape(-1, 3), _grid_faces(len(turns), len(rows))
+
+
+def _part_near(centre: FloatArray, radius: float, box: Box) -> tuple[FloatArray, float]:
+    """Return the unit direction from a centre to a box, and the angle about it that holds the box.
+
+    The base that closes the part of a solid passes below a box, which takes an angle as large as
+    the square root of the box's size. A surface needs no base, so that around a small box the
+    angle at which the box is seen will do.
+    """
+    to_middle = box.middle[3 - len(centre) :] - centre
+    seen = _seen(float(np.linalg.norm(to_middle)), box)
+    if seen > NARROW:
+        return facing_part(centre, radius, box, 0.0)
+    return to_middle / np.linalg.norm(to_middle), seen
+
+
+def _seen(distance: float, box: Box) -> float:
+    """Return the half-angle at which a box is seen, and a little more; π from inside."""
+    half = (0.5 + BEYOND) * box.size
+    return math.asin(half / distance) if half < distance else math.pi
 
 
 def _edge(radius: float, box: Box) -> float:
@@ -90,19 +119,23 @@ def _cone(limit: Cone, box: Box) -> Facets:
     near, far = box.distances(limit.apex)
     radius = far * math.sin(limit.half_angle)
     edge = _edge(radius, box)
-    count = max(FEWEST, math.ceil(2.0 * math.pi * radius / edge))
-    turns = np.linspace(0.0, 2.0 * math.pi, count + 1)
+    frame = frame_about(limit.axis)
+    across = frame[:2] @ (box.middle - limit.apex)
+    seen = _seen(float(np.linalg.norm(across)), box)
+    count = max(FEWEST, math.ceil(2.0 * seen * radius / edge))
+    turns = math.atan2(across[1], across[0]) + np.linspace(-seen, seen, count + 1)
     rows = np.linspace(
         0.999 * near, 1.001 * far, min(MOST_ROWS, math.ceil((far - near) / edge) + 2)
     )
     sine, cosine = math.sin(limit.half_angle), math.cos(limit.half_angle)
     rim = [sine * np.cos(turns), sine * np.sin(turns), np.full(count + 1, cosine)]
-    unit = np.column_stack(rim)
-    # The last direction is the first.
-    points = limit.apex + rows[:, None, None] * (unit[:-1] @ frame_about(limit.axis))
+    points = limit.apex + rows[:, None, None] * (np.column_stack(rim) @ frame)
     faces = _grid_faces(len(rows), count + 1)
+    if seen < math.pi:
+        return points.reshape(-1, 3), faces
+    # The last direction is the first.
     row, column = faces // (count + 1), faces % (count + 1) % count
-    return points.reshape(-1, 3), row * count + column
+    return points.reshape(-1, 3), row * (count + 1) + column
 
 
 def _wedge(limit: Cone, box: Box) -> Facets:
