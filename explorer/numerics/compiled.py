@@ -13,6 +13,8 @@ import threading
 from collections.abc import Callable
 from typing import Any, Generic, ParamSpec, TypeVar
 
+import numpy as np
+
 from explorer.numerics.kernel_cache import Entry, await_cached
 from explorer.numerics.object_code import compile_object, load_object, with_compiled_helpers
 
@@ -51,7 +53,12 @@ class Kernel(Generic[Arguments]):
         """Run over `rows` rows: compiled if they are many or the compiled form is loaded."""
         if self._compiled is None and rows >= MANY_ROWS:
             self.compile()
-        (self._compiled or self._function)(*args, **kwargs)
+        if self._compiled is not None:
+            self._compiled(*args, **kwargs)
+            return
+        # As the compiled form, which overflows to infinity without a warning.
+        with np.errstate(all="ignore"):
+            self._function(*args, **kwargs)
 
     @functools.cached_property
     def entry(self) -> Entry:

@@ -12,6 +12,7 @@ from explorer import PRESETS, Actuators, Payload, Struts
 from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import all_kernels, warm
+from explorer.statics.forces import actuator_forces
 from explorer.statics.held import held_load, held_values, settle_on_limit
 from explorer.statics.slopes import twist_slopes
 from explorer.workspace.orientations.share import orientation_share
@@ -63,12 +64,19 @@ def dips() -> FloatArray:
     return greatest_tilts(design, POSITION, [-180.0, -75.0, 0.0, 83.0, 103.0], azimuths=5)
 
 
+def forces_beyond_all_numbers() -> FloatArray:
+    loads = np.random.default_rng(4).uniform(-1.0, 1.0, (12, 6))
+    scales = 10.0 ** np.linspace(290.0, 308.0, 12)
+    return actuator_forces(OPTIMAL, positions(), ROTATION, scales[:, None] * loads)
+
+
 CASES: dict[str, Callable[[], FloatArray]] = {
     "tilts": tilts,
     "greatest tilts": lambda: greatest_tilts(OPTIMAL, positions()[:2], azimuths=5),
     "dips of tilts": dips,
     "share": lambda: np.array([orientation_share(OPTIMAL, POSITION, 200).share]),
     "regions": regions,
+    "forces": forces_beyond_all_numbers,
     "slopes": lambda: twist_slopes(LOADED, positions(), ROTATION).by,
 }
 
