@@ -205,11 +205,14 @@ def largest_deflection(
         raise InputError(
             f"the force of any direction must be finite and not negative; got {force!r}"
         )
-    regular = np.isfinite(compliance[..., 0, 0]) & np.isfinite(moved[..., 0])
+    regular = np.isfinite(compliance[..., 0, 0]) & np.isfinite(moved).all(axis=-1)
     block = np.where(regular[..., None, None], compliance[..., :3, :3], 0.0)
     soft, axes = np.linalg.eigh(block)
     along = np.einsum("...ji,...j->...i", axes, np.where(regular[..., None], moved, 0.0))
     soft = np.maximum(soft, 0.0)
+    with np.errstate(over="ignore"):
+        regular &= np.isfinite(soft[..., -1] * most)
+    soft = np.where(regular[..., None], soft, 0.0)
     direction = _farthest_direction(soft, along, most)
     # Squares of very small and of very large displacements are beyond the range of numbers.
     reached = soft * (most[..., None] * direction) + along
@@ -287,7 +290,8 @@ def compliance_shares(
 ) -> ComplianceShares:
     """Return which parts of the deflection's work guide, struts and actuators take.
 
-    The shares add up to 1; they are NaN where nothing gives way and in singular poses.
+    The shares add up to 1; they are NaN where nothing gives way, in singular poses, and where
+    struts are so soft that the compliance overflows.
 
     Args:
         design: The manipulator.
@@ -310,13 +314,19 @@ def compliance_shares(
     forces = np.einsum(
         "nji,nj->ni", np.where(regular[:, None, None], twists, 0.0), poses.rows(w, 1)
     )
+    # Shares do not change with the size of the load; squares of large forces would overflow.
+    largest = np.abs(forces).max(axis=1, keepdims=True)
+    forces = np.divide(forces, largest, out=np.zeros_like(forces), where=largest > 0.0)
     lengths = _strut_lengths(poses)
     work = forces**2 * poses.rows(c, 1)
-    bent = (forces[:, [1, 3]] ** 2 * poses.rows(b, 1) * lengths**3).sum(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        bent = (forces[:, [1, 3]] ** 2 * poses.rows(b, 1) * lengths**3).sum(axis=1)
     guide, actuators = work[:, [1, 3]].sum(axis=1), work[:, [0, 2, 4, 5]].sum(axis=1)
     total: FloatArray = guide + actuators + bent
     parts = [
-        np.divide(part, total, out=np.full(total.shape, np.nan), where=total > 0.0)
+        np.divide(
+            part, total, out=np.full(total.shape, np.nan), where=(total > 0.0) & (total < np.inf)
+        )
         for part in (guide, bent, actuators)
     ]
     return ComplianceShares(*(part.reshape(poses.batch) for part in parts))
