@@ -178,7 +178,7 @@ def bound_share(
         angle: Angle of the turn over the move, in radians.
         half: Half of the interval, as a share of the move.
     """
-    if is_singular(p, r):
+    if is_singular(row, p, r):
         return math.inf, math.inf
     turn = three(axis, 0)
     u = turning(column(r, 0), turn, angle, half)

@@ -24,6 +24,8 @@ from explorer.numerics.compiled import helper, kernel
 
 # Share of |p| up to which a margin is zero but for rounding.
 SINGULAR = 1e-13
+# |p| over the reach up to which b4 is at a1, where all margins vanish.
+AT_A1 = 1e-26
 
 # Columns of the row of design variables, `Design.variables`.
 A3X, A3Y, B1X, B1Y, B2, B3 = range(6)
@@ -44,11 +46,14 @@ def along(a: Vector, share: float, b: Vector) -> Vector:
 
 
 @helper
-def is_singular(p: FloatArray, r: FloatArray) -> bool:
+def is_singular(x: FloatArray, p: FloatArray, r: FloatArray) -> bool:
     """Return whether a margin of the pose vanishes to rounding."""
-    least = SINGULAR * math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+    square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2]
+    least = SINGULAR * math.sqrt(square)
     delta1 = r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2]
     delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
+    if square <= AT_A1 * AT_A1 * (x[A3X] * x[A3X] + x[A3Y] * x[A3Y]):
+        return True
     return abs(delta1) <= least or abs(delta2) <= least or abs(p[2]) <= least
 
 
@@ -120,7 +125,7 @@ def force_rows(
     """
     for k in range(position.shape[0]):
         p, r = position[k], rotation[k]
-        if is_singular(p, r):
+        if is_singular(x, p, r):
             for i in range(6):
                 out[k, i] = math.inf
             continue
@@ -151,7 +156,7 @@ def inverse_rows(
     """
     for k in range(position.shape[0]):
         p, r = position[k], rotation[k]
-        if is_singular(p, r):
+        if is_singular(x, p, r):
             for row in range(6):
                 for i in range(6):
                     out[k, row, i] = math.inf

@@ -64,7 +64,7 @@ def held_load(
 def share_at(held: FloatArray, r: FloatArray, p: FloatArray) -> tuple[float, int]:
     """Return the largest share of a limit at a position, infinite if singular, and its part."""
     x = held[:TOOL]
-    if is_singular(p, r):
+    if is_singular(x, p, r):
         return math.inf, 0
     t, w = held[TOOL:WRENCH], held[WRENCH:FORCE]
     force, limits = held[FORCE], held[LIMITS:SIGNS]

@@ -290,6 +290,12 @@ def _square_range(
     """Return the least and the largest m with |start + m slope| ≤ limit, of vectors (..., 2)."""
     if np.isinf(limit).all():
         return np.full(start.shape[:-1], -np.inf), np.full(start.shape[:-1], np.inf)
+    # Squares of large forces would overflow; so slopes are scaled by a size, and forces by one.
+    steepest = np.abs(slope).max(axis=-1)
+    steepest = np.where(steepest > 0.0, steepest, 1.0)
+    size = np.maximum(np.abs(start).max(axis=-1), np.where(np.isinf(limit), 0.0, np.abs(limit)))
+    size = np.where(size > 0.0, size, 1.0)
+    slope, start, limit = slope / steepest[..., None], start / size[..., None], limit / size
     a, b, c = dot(slope, slope), dot(start, slope), limit**2 - dot(start, start)
     every = (c >= 0.0) & (limit >= 0.0)
     least, most = np.where(every, -np.inf, np.inf), np.where(every, np.inf, -np.inf)
@@ -299,4 +305,4 @@ def _square_range(
     with np.errstate(over="ignore"):
         np.divide(-b - root, a, out=least, where=crosses)
         np.divide(root - b, a, out=most, where=crosses)
-    return least, most
+        return least * (size / steepest), most * (size / steepest)
