@@ -15,7 +15,14 @@ from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, LENGTHS, Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.trilateration import solve_rows
-from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
+from explorer.numerics.arrays import (
+    BoolArray,
+    FloatArray,
+    batch_shape,
+    finite_array,
+    for_kernel,
+    lengths_of,
+)
 
 # Largest joint over the design's size; beyond it double precision cannot tell its points apart.
 LARGEST_RATIO = 1e15
@@ -98,12 +105,12 @@ def inverse(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatAr
     points = attachment_points(design, position, rotation)
     return np.stack(
         [
-            _length(points.b1),
+            lengths_of(points.b1),
             points.b2[..., 0],
             np.hypot(points.b2[..., 1], points.b2[..., 2]),
             points.b3[..., 0],
             np.hypot(points.b3[..., 1], points.b3[..., 2]),
-            _length(points.b4 - points.a3),
+            lengths_of(points.b4 - points.a3),
         ],
         axis=-1,
     )
@@ -179,7 +186,3 @@ def _solve(
         feasible.reshape(batch),
         squares.reshape(*batch, 3),
     )
-
-
-def _length(vector: FloatArray) -> FloatArray:
-    return np.hypot(np.hypot(vector[..., 0], vector[..., 1]), vector[..., 2])

@@ -75,6 +75,11 @@ def dot(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("...i,...i->...", a, b), dtype=np.float64)
 
 
+def lengths_of(vectors: FloatArray) -> FloatArray:
+    """Return the lengths of vectors (..., 3), also of those whose squares are no numbers."""
+    return np.hypot(np.hypot(vectors[..., 0], vectors[..., 1]), vectors[..., 2])
+
+
 def rotate(rotation: FloatArray, vector: FloatArray) -> FloatArray:
     """Return `rotation @ vector` over batches, shapes (..., 3, 3) and (..., 3)."""
     return np.asarray(np.einsum("...ij,...j->...i", rotation, vector), dtype=np.float64)

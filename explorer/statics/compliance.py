@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.numerics.arrays import FloatArray, finite_array, lengths_of
 from explorer.numerics.compiled import helper, kernel
 from explorer.statics.equilibrium import B2, B3, Poses
 
@@ -214,13 +214,9 @@ def largest_deflection(
         regular &= np.isfinite(soft[..., -1] * most)
     soft = np.where(regular[..., None], soft, 0.0)
     direction = _farthest_direction(soft, along, most)
-    # Squares of very small and of very large displacements are beyond the range of numbers.
-    reached = soft * (most[..., None] * direction) + along
-    scale = np.abs(reached).max(axis=-1)
-    scale = np.where(scale > 0.0, scale, 1.0)
-    length = scale * np.linalg.norm(reached / scale[..., None], axis=-1)
+    farthest = lengths_of(soft * (most[..., None] * direction) + along)
     pushed = most[..., None] * np.einsum("...ij,...j->...i", axes, direction)
-    return np.where(regular, length, np.inf), np.where(regular[..., None], pushed, np.inf)
+    return np.where(regular, farthest, np.inf), np.where(regular[..., None], pushed, np.inf)
 
 
 def _farthest_direction(soft: FloatArray, along: FloatArray, most: FloatArray) -> FloatArray:

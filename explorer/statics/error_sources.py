@@ -16,7 +16,7 @@ from explorer.errors import InputError
 from explorer.legs.segments import Vector, cross3, dot3
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import DIMENSIONS
-from explorer.numerics.arrays import FloatArray, for_kernel
+from explorer.numerics.arrays import FloatArray, for_kernel, lengths_of
 from explorer.numerics.compiled import helper, kernel
 from explorer.statics.accuracy import Precision, ToolError, actuator_errors, pose_precision
 from explorer.statics.equilibrium import along
@@ -229,7 +229,7 @@ def largest_error(by_source: FloatArray, bounds: ArrayLike) -> LargestError:
             count, halves.reshape(count, *halves.shape[-2:]), signs.reshape(count, signs.shape[-1])
         )
         vectors = np.einsum("...ij,...j->...i", halves, signs)
-        size = np.hypot(np.hypot(vectors[..., 0], vectors[..., 1]), vectors[..., 2])
+        size = lengths_of(vectors)
     finite = np.isfinite(size)
     size = np.where(finite, size, np.inf)
     vectors = np.where(finite[..., None], vectors, np.nan)

@@ -124,8 +124,8 @@ def _cone(limit: Cone, box: Box) -> Facets:
     seen = _seen(float(np.linalg.norm(across)), box)
     count = max(FEWEST, math.ceil(2.0 * seen * radius / edge))
     turns = math.atan2(across[1], across[0]) + np.linspace(-seen, seen, count + 1)
-    more, count_rows = 1e-3 * (far - near), math.ceil((far - near) / edge) + 2
-    rows = np.linspace(max(near - more, 0.0), far + more, min(MOST_ROWS, count_rows))
+    spacing = max(edge, (far - near) / (MOST_ROWS - 1))
+    rows = np.maximum(_rows(near, far, spacing), 0.0)
     sine, cosine = math.sin(limit.half_angle), math.cos(limit.half_angle)
     rim = [sine * np.cos(turns), sine * np.sin(turns), np.full(count + 1, cosine)]
     points = limit.apex + rows[:, None, None] * (np.column_stack(rim) @ frame)
