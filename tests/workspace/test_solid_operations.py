@@ -66,6 +66,16 @@ def test_cut_beside_a_solid_returns_all_of_it_or_nothing() -> None:
     assert cut_solid(nothing, HalfSpace("cut", up, 1.0)).is_empty
 
 
+def test_hull_of_one_solid_is_the_same_each_time() -> None:
+    # Of a fine mesh the threads of manifold3d share the work.
+    solid = workspace_solid(OPTIMAL, home_rotation(OPTIMAL), 2e-4 * OPTIMAL.reach)
+    first, *others = (convex_hull(solid) for _ in range(10))
+    assert len(first.faces) > 5000
+    for other in others:
+        np.testing.assert_array_equal(other.vertices, first.vertices)
+        np.testing.assert_array_equal(other.faces, first.faces)
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_hull_is_convex_and_contains_the_solid(seed: int) -> None:
     design, rotation = ordinary_case(seed)

@@ -241,7 +241,18 @@ def convex_hull(solid: Solid) -> Solid:
     untyped: Any = Manifold
     vertices, faces, _ = mesh_of(untyped.hull_points(frame.to_frame(solid.vertices)))
     limit_of_face, points = np.zeros(len(faces), dtype=np.int64), frame.to_design(vertices)
+    faces = _in_order(faces)
     return Solid(points, faces, limit_of_face, (HULL,), solid.tolerance, agrees=solid.agrees)
+
+
+def _in_order(faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return faces by their corners, the first of each face first.
+
+    The threads of manifold3d leave those of a hull in any order, and each with any corner first.
+    """
+    turns = faces.argmin(axis=1)[:, None] + np.arange(3)
+    turned = np.take_along_axis(faces, turns % 3, axis=1)
+    return turned[np.lexsort(turned.T[::-1])]
 
 
 def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
