@@ -11,8 +11,8 @@ limits (comments, groups), and its PLY has single precision.
 
 from __future__ import annotations
 
-import json
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
@@ -21,7 +21,15 @@ import numpy as np
 
 from explorer.errors import ExplorerError, InputError, NoAnswerError
 from explorer.export.glb import METRES_PER_MILLIMETRE, Y_UP, Body, Material, glb_bytes
-from explorer.export.metadata import APPLICATION, Rgb, design_json
+from explorer.export.metadata import (
+    APPLICATION,
+    Rgb,
+    ascii_name,
+    comments,
+    design_json,
+    json_line,
+    printable_name,
+)
 from explorer.export.three_mf import Model, check_size, refusals_of_lib3mf
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
@@ -67,8 +75,7 @@ def mesh_bytes(solid: Solid, file_format: str, design: Design, name: str) -> byt
         raise NoAnswerError(f"there is nothing to export, the workspace is empty{reason}")
     if not solid.is_watertight:
         raise ExplorerError("the mesh is not watertight, so that it encloses no volume to export")
-    plain = " ".join("".join(c if c.isprintable() else " " for c in name).split())
-    return FORMATS[file_format](solid, design, plain or "workspace")
+    return FORMATS[file_format](solid, design, printable_name(name))
 
 
 def check_format(file_format: str) -> None:
@@ -130,8 +137,8 @@ def _stl(solid: Solid, design: Design, name: str) -> bytes:
     data: bytes = mesh.export(file_type="stl")
     # trimesh leaves the header empty. It must not start with "solid", by which readers tell text
     # from binary.
-    text = f"binary STL in millimetres, {APPLICATION}: {name}"
-    return text.encode("ascii", "replace")[:80].ljust(80) + data[80:]
+    text = f"binary STL in millimetres, {APPLICATION}: {ascii_name(name)}"
+    return text.encode()[:80].ljust(80) + data[80:]
 
 
 def _ply(solid: Solid, design: Design, name: str) -> bytes:
@@ -139,10 +146,13 @@ def _ply(solid: Solid, design: Design, name: str) -> bytes:
         "ply",
         "format binary_little_endian 1.0",
         f"comment {APPLICATION}",
-        f"comment name {json.dumps(name)[1:-1]}",
+        *comments("comment name", json_line(name)[1:-1]),
         "comment unit millimetre",
-        *(f"comment colour {_spaced(colour_of(limit))} {_ascii(limit)}" for limit in solid.limits),
-        f"comment design {design_json(design)}",
+        *(
+            f"comment colour {_spaced(colour_of(limit))} {ascii_name(limit)}"
+            for limit in solid.limits
+        ),
+        *comments("comment design", design_json(design)),
         f"element vertex {len(solid.vertices)}",
         *(f"property double {axis}" for axis in "xyz"),
         f"element face {len(solid.faces)}",
@@ -162,14 +172,14 @@ def _obj(solid: Solid, design: Design, name: str) -> bytes:
     lines = [
         f"# {APPLICATION}",
         "# unit millimetre",
-        f"# design {design_json(design)}",
-        f"o {_ascii(name).replace(' ', '_')}",
+        *comments("# design", design_json(design)),
+        f"o {_word(name)}",
         *(f"v {_spaced(point)}" for point in _millimetres(solid, design).tolist()),
     ]
     for index, limit in enumerate(solid.limits):
         faces = solid.faces[solid.limit_of_face == index] + 1
         if len(faces):
-            lines.append(f"g {_ascii(limit).replace(' ', '_')}")
+            lines.append(f"g {_word(limit)}")
             lines.extend(f"f {_spaced(face)}" for face in faces.tolist())
     return ("\n".join(lines) + "\n").encode("ascii")
 
@@ -197,8 +207,9 @@ def _3mf(solid: Solid, design: Design, name: str) -> bytes:
         return model.encode(mesh, decimals)
 
 
-def _ascii(text: str) -> str:
-    return text.encode("ascii", "replace").decode()
+def _word(name: str) -> str:
+    """Return a name of OBJ: without blanks, and without what ends or continues a line."""
+    return re.sub(r"[ #\\]", "_", ascii_name(name))
 
 
 def _spaced(values: Iterable[float]) -> str:

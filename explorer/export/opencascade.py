@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,12 +18,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import ExplorerError, MissingExtraError
-from explorer.export.metadata import Rgb, linear
+from explorer.export.metadata import Rgb, linear, printable_name
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.kernel import Circle
 
 SCHEMA = "AP242DIS"
+
+# A string of a STEP file, which OpenCASCADE breaks into lines, even between two apostrophes.
+_STRING = re.compile(rb"'(?:[^']|'\n?')*'")
 
 # The directions in which the outline of a hull is sampled, to order its circles.
 _DIRECTIONS = 3600
@@ -211,8 +215,8 @@ class Document:
         self.colours = tools.ColorTool_s(self._document.Main())
 
     def set_name(self, label: Any, name: str) -> None:
-        """Set the name of a label."""
-        occ("TDataStd_Name").Set_s(label, _text(name))
+        """Set the name of a label, any text."""
+        occ("TDataStd_Name").Set_s(label, _text(step_text(printable_name(name))))
 
     def set_colour(self, label: Any, rgb: Rgb) -> None:
         """Set the surface colour of a label."""
@@ -242,7 +246,22 @@ class Document:
             path = Path(folder) / "document.step"
             if not writer.Transfer(self._document, mode) or int(writer.Write(str(path))) != 1:
                 raise ExplorerError("OpenCASCADE cannot write the STEP file")
-            return path.read_bytes()
+            return _STRING.sub(lambda match: match[0].replace(b"\n", b""), path.read_bytes())
+
+
+def step_text(text: str) -> str:
+    """Return a printable text as a string of ISO 10303-21 holds it, except for its apostrophes.
+
+    OpenCASCADE doubles apostrophes, but writes other letters than those of ASCII as UTF-8, and
+    takes a backslash for the start of a directive.
+    """
+    return re.sub(r"[^ -\[\]-~]+", _directive, text)
+
+
+def _directive(match: re.Match[str]) -> str:
+    letters = match[0]
+    plane, digits = ("X4", 8) if max(letters) > "\uffff" else ("X2", 4)
+    return f"\\{plane}\\{''.join(f'{ord(each):0{digits}X}' for each in letters)}\\X0\\"
 
 
 def _text(text: str) -> Any:

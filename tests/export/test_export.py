@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import struct
 from dataclasses import replace
 from typing import Any
@@ -113,13 +114,97 @@ def test_ply_and_obj_hold_double_precision_and_design(file_format: str) -> None:
     shape = read(data, file_format)
     assert shape.is_watertight
     assert shape.volume == pytest.approx(cubic_mm(SOLID, OPTIMAL), rel=1e-12)
-    comments = [
-        line.partition("design ")[2]
-        for line in data.decode("latin-1").splitlines()
-        if "design " in line and line.startswith(("#", "comment"))
-    ]
-    assert decode_design(comments[0].encode(), file_format) == OPTIMAL
-    assert b"unit millimetre" in data
+    assert decode_design(comment(data, "design").encode(), file_format) == OPTIMAL
+    assert comment(data, "unit") == "millimetre"
+
+
+def text_lines(data: bytes) -> list[str]:
+    """Return the lines of an OBJ file or of the header of a PLY file, as strict readers want them.
+
+    They take ASCII in lines of at most 200 characters, and trim blanks; a backslash at the end of
+    a line of OBJ appends the next one.
+    """
+    head = data.partition(b"end_header\n")[0]
+    assert head.endswith(b"\n")
+    lines = head.decode("ascii").split("\n")[:-1]
+    assert all(line.isprintable() and len(line) <= 200 for line in lines)
+    assert not any(line.endswith((" ", "\\")) for line in lines)
+    return lines
+
+
+def comment(data: bytes, word: str) -> str:
+    """Return what all comments that begin with a word say, joined."""
+    marks = f"comment {word} ", f"# {word} "
+    lines = [line for line in text_lines(data) if line.startswith(marks)]
+    return "".join(line.partition(f"{word} ")[2] for line in lines)
+
+
+NAMES = [
+    *(
+        "",
+        "κ",
+        "\n\t\0",
+        "Räume 设计 😀",
+        "a\nv 0 0 0\nend_header\nf 1 2 3",
+        'o\' "quoted" <&> ]]>',
+    ),
+    *(
+        "back\\",
+        "\\" * 99,
+        "# comment",
+        "x  y" * 25,
+        "😀" * 99,
+        "long " * 2000,
+        "\ud800",
+        "solid é" * 9,
+    ),
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_ply_and_obj_of_any_name_have_short_lines_in_ascii(name: str) -> None:
+    kept = " ".join("".join(c if c.isprintable() else " " for c in name).split()) or "workspace"
+    printable = "".join(c if c.isprintable() else "x" for c in name[:100])
+    design = msgspec.structs.replace(OPTIMAL, name=printable)
+    for file_format in ("ply", "obj"):
+        data = mesh_bytes(SOLID, file_format, design, name)
+        assert decode_design(comment(data, "design").encode(), file_format) == design
+        shape = read(data, file_format)
+        assert len(shape.vertices) == len(SOLID.vertices)
+        assert len(shape.faces) == len(SOLID.faces)
+        if file_format == "ply":
+            assert json.loads(f'"{comment(data, "name")}"') == kept[:160].rstrip()
+        else:
+            (own,) = (line for line in text_lines(data) if line.startswith("o"))
+            assert re.fullmatch(r"o [!-~]+", own)
+            assert "?" not in own
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_binary_formats_take_any_name(name: str) -> None:
+    stl = mesh_bytes(SOLID, "stl", OPTIMAL, name)
+    assert stl[:80].decode("ascii").isprintable()
+    assert b"?" not in stl[:80]
+    assert not stl.lower().startswith(b"solid")
+    kept = " ".join("".join(c if c.isprintable() else " " for c in name).split()) or "workspace"
+    kept = kept[:160].rstrip()
+    assert glb_json(mesh_bytes(SOLID, "glb", OPTIMAL, name))["nodes"][0]["name"] == kept
+    assert only_mesh(read_3mf(mesh_bytes(SOLID, "3mf", OPTIMAL, name)))[0].GetName() == kept
+
+
+def test_names_of_margins_are_words_of_ascii() -> None:
+    limits = msgspec.structs.replace(OPTIMAL.limits, margin=0.8)
+    design = msgspec.structs.replace(OPTIMAL, limits=limits)
+    solid = workspace_solid(design)
+    used = {limit for limit in limits_of_faces(solid) if limit.startswith("margin")}
+    assert used
+    obj = text_lines(mesh_bytes(solid, "obj", design, NAME))
+    groups = [line for line in obj if line.startswith("g ")]
+    assert {f"g margin_{limit[-1]}" for limit in used} <= set(groups)
+    assert len(set(groups)) == len(set(limits_of_faces(solid)))
+    ply = text_lines(mesh_bytes(solid, "ply", design, NAME))
+    named = [line.split(" ", 5)[-1] for line in ply if line.startswith("comment colour ")]
+    assert [name.replace("margin ", "margin δ") for name in named] == list(solid.limits)
 
 
 def test_ply_reads_back_corners_and_face_colours() -> None:

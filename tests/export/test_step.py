@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from explorer.export.step_assembly import assembly_step, exact_parts
 from explorer.mechanism.design import Swing
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
+SOLID = exact_workspace(OPTIMAL)
 
 
 def cubic_mm(design: Design, volume: float) -> float:
@@ -114,6 +116,58 @@ def test_step_file_reads_back_names_colours_and_volume(tmp_path: Path) -> None:
         if "COLOUR_RGB('',0." in line
     }
     assert reds <= written | {0, 255}
+
+
+def strings(data: bytes) -> list[str]:
+    """Return the strings of a STEP file, decoded as ISO 10303-21 says, each of one line."""
+    text = data.decode("ascii")
+
+    def letters(match: re.Match[str]) -> str:
+        digits = 4 if match[1] == "X2" else 8
+        return "".join(chr(int(each, 16)) for each in re.findall(f".{{{digits}}}", match[2]))
+
+    found: list[str] = []
+    for literal in re.findall(r"'((?:[^']|'')*)'", text):
+        assert literal.isprintable(), literal
+        plain = re.sub(r"\\(X2|X4)\\([0-9A-F]+)\\X0\\", "", literal)
+        assert "\\" not in plain, literal
+        found.append(re.sub(r"\\(X2|X4)\\([0-9A-F]+)\\X0\\", letters, literal.replace("''", "'")))
+    return found
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("Räume κ", "it's a 'name'", "back \\ slash", "\\X2\\03B4\\X0\\", "δ😀δ", "设计" * 60),
+        *("'" * 99, "a'" * 70, "\\" * 99, "😀" * 99, "a\nb\tc\0", "; ENDSEC; /* ", "x" * 10_000),
+    ],
+)
+def test_step_any_name_is_written_as_the_standard_says(name: str, tmp_path: Path) -> None:
+    kept = " ".join("".join(c if c.isprintable() else " " for c in name).split())[:160].rstrip()
+    data = step_bytes(SOLID, name)
+    assert strings(data).count(kept) >= 2
+    path = tmp_path / "a.step"
+    path.write_bytes(data)
+    reader = occ("STEPControl_Reader")()
+    assert int(reader.ReadFile(str(path))) == 1
+    model = reader.WS().Model()
+    entities = [model.Value(i) for i in range(1, model.NbEntities() + 1)]
+    products = [each for each in entities if isinstance(each, occ("StepBasic_Product"))]
+    assert [each.Name().ToCString() for each in products] == [kept]
+
+
+def test_step_margins_have_the_letter_delta() -> None:
+    limits = msgspec.structs.replace(OPTIMAL.limits, margin=0.8)
+    solid = exact_workspace(msgspec.structs.replace(OPTIMAL, limits=limits))
+    of_margins = {limit for limit in solid.limit_of_face if limit.startswith("margin δ")}
+    assert of_margins
+    assert of_margins <= set(strings(step_bytes(solid, "workspace")))
+
+
+def test_step_assembly_of_any_name_reads_back() -> None:
+    name = "d'où \\ 😀"
+    design = msgspec.structs.replace(OPTIMAL, name=name)
+    assert f"mechanism of {name}" in strings(assembly_step(make_prototype(design).sizes))
 
 
 def test_step_workspace_shifted_to_the_tool_keeps_faces_and_volume() -> None:
