@@ -40,6 +40,7 @@ class Trajectory:
         position: b4 in the base frame, in design units, shape (n, 3).
         quaternion: (w, x, y, z), without changes of sign between samples, shape (n, 4).
         at: Place on the path: number of the move plus the share of it, shape (n,).
+        unit_mm: Millimetres in one design unit.
         tool_position: Tool point in the base frame, in design units, shape (n, 3); None if b4
             moves straight.
     """
@@ -49,6 +50,7 @@ class Trajectory:
     position: FloatArray
     quaternion: FloatArray
     at: FloatArray
+    unit_mm: float
     tool_position: FloatArray | None = None
 
     @property
@@ -116,4 +118,5 @@ def trajectory(
     signs = np.cumprod(np.where(np.concatenate([[False], flips]), -1.0, 1.0))
     joints = inverse(design, position, rotation)
     of_tool = None if tool is None else position + tool_offset(rotation, tool)
-    return Trajectory(sampled, joints, position, quaternion * signs[:, None], at, of_tool)
+    quaternion *= signs[:, None]
+    return Trajectory(sampled, joints, position, quaternion, at, design.unit_mm, of_tool)

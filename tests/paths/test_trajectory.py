@@ -7,6 +7,7 @@ import itertools
 import math
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -23,7 +24,7 @@ from explorer import (
     poses_between,
     rotation_from_quaternion as rotation_of,
 )
-from explorer.export.trajectory import COLUMNS, trajectory_csv, write_trajectory
+from explorer.export.trajectory import trajectory_csv, write_trajectory
 from explorer.paths.trajectory import trajectory
 
 DESIGN = PRESETS["paper-optimal"]
@@ -115,8 +116,9 @@ def test_trajectory_csv_reads_back_to_the_last_bit(tmp_path: Path) -> None:
     text = file.read_text(encoding="utf-8")
     assert text == trajectory_csv(found)
     head, *rows = csv.reader(text.splitlines())
-    assert tuple(head) == COLUMNS
-    assert head[:7] == ["time_s", "l1", "d1", "d2", "d3", "d4", "l4"]
+    joints = [f"{name} [unit = 10 mm]" for name in ("l1", "d1", "d2", "d3", "d4", "l4")]
+    position = [f"{name} [unit = 10 mm]" for name in "xyz"]
+    assert head == ["time_s", *joints, *position, "qw", "qx", "qy", "qz"]
     values = np.array([[float(word) for word in row] for row in rows])
     expected = (found.time[:, None], found.joints, found.position, found.quaternion)
     assert (values == np.concatenate(expected, axis=1)).all()
@@ -127,9 +129,17 @@ def test_trajectory_csv_reads_back_to_the_last_bit(tmp_path: Path) -> None:
 def test_trajectory_csv_of_the_tool_has_its_positions_last() -> None:
     found = trajectory(DESIGN, random_path(2, 3), samples=9, tool=(0.0, 1.0, 2.0))
     head, *rows = csv.reader(trajectory_csv(found).splitlines())
-    assert tuple(head) == (*COLUMNS, "tool_x", "tool_y", "tool_z")
+    assert head[-4:] == ["qz", *(f"tool_{axis} [unit = 10 mm]" for axis in "xyz")]
     assert found.tool_position is not None
     assert [[float(word) for word in row[-3:]] for row in rows] == found.tool_position.tolist()
+
+
+@pytest.mark.parametrize("unit", [1e-30, 0.1, 1.0 / 3.0, 25.4, 1000.0, 1e30])
+def test_trajectory_csv_header_has_the_exact_unit(unit: float) -> None:
+    found = trajectory(msgspec.structs.replace(DESIGN, unit_mm=unit), [HOME, HOME], samples=2)
+    head = trajectory_csv(found).partition("\n")[0].split(",")
+    units = {name.partition(" [unit = ")[2].removesuffix(" mm]") for name in head if "[" in name}
+    assert [float(each) for each in units] == [unit]
 
 
 def test_trajectory_bad_input_is_refused() -> None:
