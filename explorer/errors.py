@@ -23,8 +23,8 @@ class DesignError(InputError):
     """A design, or a design file, that describes no usable manipulator.
 
     Attributes:
-        field: Name of the design file's field with which the message begins, such as
-            `limits.gap`; empty if it begins with none.
+        field: Name of the design file's field that is at fault, such as `limits.gap`, with which
+            the message begins if it can; empty if there is none.
     """
 
     def __init__(self, message: str, field: str = "") -> None:

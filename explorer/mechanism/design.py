@@ -254,7 +254,8 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
                 raise DesignError(
                     f"degenerate design: {name} = {value:g}, so {zero} and every pose is "
                     f"singular; it must exceed {DEGENERATE_RATIO:g} of the largest "
-                    f"variable ({size:g}) in magnitude"
+                    f"variable ({size:g}) in magnitude",
+                    name[:2],
                 )
         self._check_machine()
 

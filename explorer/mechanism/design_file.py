@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from explorer.errors import DesignError
-from explorer.files.json_text import check_unique_fields, one_line_errors
+from explorer.files.json_text import check_unique_fields, located_errors
 from explorer.files.packaged import packaged_files
 from explorer.mechanism.design import Design
 
@@ -35,7 +35,7 @@ def _from_first_schema(fields: dict[str, Any]) -> dict[str, Any]:
     """
     for name in _OF_SECOND_SCHEMA:
         if name in fields:
-            raise DesignError(f'unknown field `{name}` of schema 1; it needs "schema": 2')
+            raise DesignError(f'unknown field `{name}` of schema 1; it needs "schema": 2', name)
     return fields
 
 
@@ -53,7 +53,7 @@ def decode_design(data: bytes, source: str) -> Design:
     """Return the design in a JSON text.
 
     Args:
-        data: The text, UTF-8.
+        data: The text, UTF-8 or UTF-16.
         source: Name of the text in an error message.
 
     Raises:
@@ -64,18 +64,18 @@ def decode_design(data: bytes, source: str) -> Design:
         raise DesignError(
             f"{source}: {len(data)} bytes is no design file; they stay below {LARGEST_FILE}"
         )
-    with one_line_errors(source, DesignError):
-        schema = msgspec.json.decode(data, type=_Versioned).schema
+    with located_errors(data, Design, source, DesignError) as text:
+        schema = msgspec.json.decode(text, type=_Versioned).schema
         if schema > SCHEMA:
             raise DesignError(
                 f"schema {schema} was made by a newer explorer; this one reads up to {SCHEMA}"
             )
         if schema in MIGRATIONS:
-            fields = msgspec.json.decode(data, type=dict[str, Any])
+            fields = msgspec.json.decode(text, type=dict[str, Any])
             design = msgspec.convert(migrate(fields), Design)
         else:
-            design = msgspec.json.decode(data, type=Design)
-        check_unique_fields(data)
+            design = msgspec.json.decode(text, type=Design)
+        check_unique_fields(text)
         return design
 
 

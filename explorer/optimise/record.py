@@ -118,7 +118,7 @@ def decode_record(data: bytes, source: str) -> Record:
     """Return the record in a JSON text.
 
     Args:
-        data: The text, UTF-8.
+        data: The text, UTF-8 or UTF-16.
         source: Name of the text in an error message.
 
     Raises:

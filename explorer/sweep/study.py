@@ -89,7 +89,7 @@ class Sampling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
                     "one for each variable"
                 )
             for name, count in self.count.items():
-                _check_within(f"sampling.count of {name}", count, 1, MOST_DESIGNS)
+                _check_within(f"sampling.count.{name}", count, 1, MOST_DESIGNS)
         else:
             _check_within("sampling.count", self.count, 1, MOST_DESIGNS)
 
@@ -277,7 +277,7 @@ def decode_study(data: bytes, source: str) -> Study:
     """Return the study in a JSON text.
 
     Args:
-        data: The text, UTF-8.
+        data: The text, UTF-8 or UTF-16.
         source: Name of the text in an error message.
 
     Raises:

@@ -137,7 +137,6 @@ def test_limit_that_is_not_finite_is_refused(odd: float) -> None:
         *(json.dumps(PLAIN | {"b2": odd}).encode() for odd in (math.nan, math.inf)),
         *(PLAIN_TEXT.replace(b"8", digits) for digits in (b"1e999", b"9" * 400, b"9" * 9000)),
         json.dumps(PLAIN | {"name": "ÿ"}, ensure_ascii=False).encode("latin-1"),
-        *(json.dumps(PLAIN).encode(code) for code in ("utf-16", "utf-8-sig")),
         b'{"name": "\\ud800"}',
         *(PLAIN_TEXT + more for more in (b"x", PLAIN_TEXT, b"\0")),
         *(b"[" * 100_000, b'{"limits":' * 50_000, b'{"a":' * 50_000 + b"1" + b"}" * 50_000),
