@@ -34,6 +34,7 @@ from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.compiling import CompilingNotice
+from explorer.app.widgets.markup import sentence
 from explorer.app.widgets.palette import Command, Palette
 from explorer.app.widgets.theme import Theme
 from explorer.numerics.arrays import FloatArray
@@ -56,6 +57,9 @@ SCRIPTS = (
 REFUSAL = "That is not possible"
 # Seconds for which a notice is shown, and not repeated.
 NOTICE_SECONDS = 6.0
+NOTICE_COLOUR = "orange"
+# Largest number of notices that wait for a browser; the newest are kept.
+MOST_UNTOLD = 10
 # Seconds between two updates of all panels, while events come faster than frames.
 PANELS_SECONDS = 0.1
 # Seconds without a frame after which cameras follow what was drawn.
@@ -93,6 +97,9 @@ class Page:
     ) -> None:
         self._server = server
         self._notified: dict[str, float] = {}
+        # Notices for the next browser, since none was there; held while one is told.
+        self._untold: list[tuple[str, str]] = []
+        self._untold_lock = threading.Lock()
         self._panels_updated = 0.0
         self._redraw_timer: threading.Timer | None = None
         # Looks after the cameras once nothing has been drawn for a while.
@@ -124,6 +131,9 @@ class Page:
         for script in SCRIPTS:
             run_script(server, read_script(script))
         self.panels = Panels(gui)
+        self.autosaver = (
+            None if user_data is None else Autosaver(user_data.store, self._show_saving)
+        )
         self.services = Services(
             server,
             self.session,
@@ -137,10 +147,10 @@ class Page:
             user_data,
             studies,
             preferences,
+            self.autosaver,
             lambda: self.palette.commands,
         )
         self.services.at_end(self.services.downloads.stop)
-        self.autosaver = None if user_data is None else Autosaver(user_data.store, self._announce)
         server.scene.set_up_direction("+z")
         self._features = tuple(each for each in FEATURES if each.is_offered(self.services))
         self.services.exports = tuple(each for one in self._features for each in one.exports)
@@ -159,6 +169,9 @@ class Page:
         self._panels = self._add_panels() if panels else []
         layout = Layout(server, theme, self.services.cameras, self.panels if panels else None)
         self.palette = self._add_palette(layout)
+        for message in () if user_data is None else user_data.messages:
+            self._announce(sentence(message))
+        server.on_client_connect(self._tell_untold)
         server.on_client_connect(self.services.cameras.connected)
         server.on_client_disconnect(self.services.cameras.disconnected)
         server.on_client_connect(lambda client: listen(client, presses))
@@ -320,6 +333,12 @@ class Page:
         """Notify all browsers of what no request caused."""
         self._notify("Please note", message, None)
 
+    def _show_saving(self, message: str) -> None:
+        # The bar shows whether saving fails, also to browsers that come later.
+        if self._server.get_clients():
+            self._announce(message)
+        self.session.redraw()
+
     def _report(self, error: Exception) -> None:
         traceback.print_exception(error, file=sys.stderr)
         self._notify("Something went wrong", f"In the explorer itself: {error}", None)
@@ -330,8 +349,19 @@ class Page:
             return
         self._notified = {m: t for m, t in self._notified.items() if now - t < NOTICE_SECONDS}
         self._notified[message] = now
-        for client_id, client in self._server.get_clients().items():
+        with self._untold_lock:
+            clients = self._server.get_clients()
+            if who is None and not clients:
+                self._untold = [*self._untold, (title, message)][-MOST_UNTOLD:]
+        for client_id, client in clients.items():
             if who is None or client_id == who:
                 client.add_notification(
-                    title, message, auto_close_seconds=NOTICE_SECONDS, color="orange"
+                    title, message, auto_close_seconds=NOTICE_SECONDS, color=NOTICE_COLOUR
                 )
+
+    def _tell_untold(self, client: viser.ClientHandle) -> None:
+        """Show a new browser the notices that came while there was none, until it closes them."""
+        with self._untold_lock:
+            untold, self._untold = self._untold, []
+        for title, message in untold:
+            client.add_notification(title, message, color=NOTICE_COLOUR)

@@ -22,6 +22,7 @@ from explorer.app.session.session import Session, Who
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.storage.autosaver import Autosaver
 from explorer.app.storage.preferences import PreferenceFile
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import UserData
@@ -54,6 +55,7 @@ class Services:
         user_data: The user's designs and session; None to save nothing.
         studies: Folders of design studies; None to offer none.
         preferences: File that remembers theme and tour; None to remember nothing.
+        autosaver: Saver of the session; None to save nothing.
         commands: Function that returns the commands of the palette.
         exports: The files that the features of the page offer.
         tab: Tab whose panels are being made.
@@ -71,6 +73,7 @@ class Services:
     user_data: UserData | None
     studies: StudyFolders | None
     preferences: PreferenceFile | None
+    autosaver: Autosaver | None = None
     commands: Callable[[], tuple[Command, ...]] = tuple
     exports: tuple[Export, ...] = ()
     tab: viser.GuiTabHandle | None = None

@@ -61,11 +61,17 @@ class Autosaver:
         self._waiting: History | None = None
         # Times by the monotonic clock: when it is saved if nothing changes, and at the latest.
         self._due, self._latest = 0.0, math.inf
-        self._is_busy = self._is_failing = self._is_stopped = False
+        self._is_busy = self._is_stopped = False
+        self._problem: str | None = None
         # Number of attempts so far, and the number up to which they are made at once.
         self._attempts = self._urgent = 0
         self._thread = threading.Thread(target=self._run, name="autosave", daemon=True)
         self._thread.start()
+
+    @property
+    def problem(self) -> str | None:
+        """A line for people on why the last save failed; None if it did not."""
+        return self._problem
 
     def follow(self, state: State, history: History) -> None:
         """Post a history that has changed.
@@ -132,22 +138,24 @@ class Autosaver:
         return max(0.0, self._due - time.monotonic())
 
     def _save(self, history: History) -> None:
-        problem = None
+        reason = None
         try:
             self._store.save(history)
         except ExplorerError as error:
-            problem = str(error)
+            reason = str(error)
         except Exception as error:  # noqa: BLE001 - a fault here must not end the saving
-            problem = f"{type(error).__name__}: {error}"
-        was_failing = self._is_failing
+            reason = f"{type(error).__name__}: {error}"
+        before = self._problem
         with self._condition:
             self._attempts += 1
-            self._is_failing = problem is not None
-            if problem is not None and self._waiting is None:
-                self._waiting = history
-                self._due, self._latest = time.monotonic() + self._retry, math.inf
-        if problem is not None and not was_failing:
-            line = " ".join(problem.split())
-            self._notify(f"The session is not saved: {line}. The explorer keeps trying.")
-        elif problem is None and was_failing:
+            self._problem = None
+            if reason is not None:
+                line = " ".join(reason.split())
+                self._problem = f"The session is not saved: {line}. The explorer keeps trying."
+                if self._waiting is None:
+                    self._waiting = history
+                    self._due, self._latest = time.monotonic() + self._retry, math.inf
+        if self._problem is not None and before is None:
+            self._notify(self._problem)
+        elif self._problem is None and before is not None:
             self._notify("The session is saved again.")

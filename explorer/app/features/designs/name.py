@@ -1,22 +1,29 @@
-"""The name of the live design in the bar, and whether it is saved."""
+"""The name of the live design in the bar, whether it is saved, and whether the session is."""
 
 from __future__ import annotations
 
 from html import escape
 
+import viser
+
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.buttons import open_button
+from explorer.app.widgets.buttons import open_button, press_button
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 
+# Name of the button that tells why the session is not saved, and the words on it.
+UNSAVED, SIGN = "session.unsaved", "Session not saved"
+
 
 class DesignName:
-    """The name, a button that opens the dialog Designs where designs are saved."""
+    """The name, a button that opens the dialog Designs, and a sign while saving fails."""
 
     def __init__(self, services: Services) -> None:
         self._saved = None if services.user_data is None else services.get(SavedDesigns)
+        self._autosaver = services.autosaver
+        services.buttons.on(UNSAVED, lambda _, client: self._tell_problem(client))
 
     def __call__(self, frame: Frame) -> str:
         """Return the name for a frame, as HTML."""
@@ -27,7 +34,24 @@ class DesignName:
         mark, words = saved_words(live, self._saved.find(live.name))
         content = f'{name}<span class="ex-dim">{mark}</span>'
         hint = f"{words} Save, rename, open or upload designs."
-        return open_button("Designs", content, hint=hint, class_name="ex-name")
+        return open_button("Designs", content, hint=hint, class_name="ex-name") + self._sign()
+
+    def _sign(self) -> str:
+        """Return the sign that the session is not saved, as HTML; "" while it is saved."""
+        problem = self._problem
+        if problem is None:
+            return ""
+        look = "ex-tool ex-outlined ex-beyond"
+        return press_button(UNSAVED, "", SIGN, hint=problem, class_name=look)
+
+    def _tell_problem(self, client: viser.ClientHandle) -> None:
+        problem = self._problem
+        if problem is not None:
+            client.add_notification(SIGN, problem, color="orange")
+
+    @property
+    def _problem(self) -> str | None:
+        return None if self._autosaver is None else self._autosaver.problem
 
 
 def saved_words(live: Design, saved: Design | None) -> tuple[str, str]:
