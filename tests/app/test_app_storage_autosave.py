@@ -9,17 +9,18 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
 from desk import Desk
 
 from explorer.app.features.optimise.actions import StartRun
+from explorer.app.server import start
 from explorer.app.session.history import History, start_history
 from explorer.app.session.session import REDO, UNDO, Session
 from explorer.app.state.actions import SetName, SetPosition
-from explorer.app.state.state import opened
+from explorer.app.state.state import joints_of, opened
 from explorer.app.storage.autosaver import Autosaver
 from explorer.app.storage.folder import data_folder, lock_folder, try_lock
 from explorer.app.storage.session_file import MOST_ORPHANS, SessionFile
@@ -27,6 +28,7 @@ from explorer.app.storage.session_format import decode_header, encode_session
 from explorer.app.storage.user_data import open_user_data
 from explorer.errors import StorageError
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
 
 HERE = Path(__file__).parent
 NEVER = 1e6
@@ -221,6 +223,26 @@ def test_damaged_file_is_renamed_and_the_session_before_is_resumed(
     assert resume(tmp_path) == 1
 
 
+def test_session_that_no_page_shows_is_set_aside_and_the_explorer_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
+    store = SessionFile()
+    state = opened(PRESETS["paper-optimal"])
+    far = Pose((1e39, 0.0, 0.0), state.pose.quaternion)
+    store.save(start_history(replace(state, pose=far, joints=joints_of(state.design, far))))
+    assert store.path is not None
+    store.close()
+    data = open_user_data(resume=True)
+    assert data.history is None
+    running = start(PRESETS["paper-optimal"], port=0, user_data=data)
+    running.stop()
+    (message,) = data.messages
+    assert "too far to be drawn" in message
+    assert store.path is None
+    assert [path.suffix for path in (tmp_path / "sessions").glob("*.broken")] == [".broken"]
+
+
 def test_file_of_a_newer_explorer_is_left_alone_and_new_saves_are_newer(tmp_path: Path) -> None:
     leave(tmp_path, 1)
     newer = tmp_path / "newer.json"
@@ -345,10 +367,11 @@ FULL = """
 import json, resource, sys
 from pathlib import Path
 from explorer.app.session.history import History, Step
-from explorer.app.state.state import opened
+from explorer.app.state.state import joints_of, opened
 from explorer.app.storage.autosaver import Autosaver
 from explorer.app.storage.session_file import SessionFile
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
 
 folder, messages, seen = Path(sys.argv[1]), [], []
 state = opened(PRESETS["paper-optimal"])

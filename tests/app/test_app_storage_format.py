@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
 import msgspec
 import pytest
+from desk import thick
 from hypothesis import example, given, strategies as st
 from sample_states import OPTIMAL, Sample, iterates_of, rich_state, samples, states_of
 
@@ -18,7 +19,7 @@ from explorer.app.features.optimise.actions import Advance, StartRun
 from explorer.app.session.history import History, Step, start_history
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.compared import Compared
-from explorer.app.state.state import Run, State, opened
+from explorer.app.state.state import Run, State, joints_of, opened
 from explorer.app.state.studies import Studies
 from explorer.app.state.values import with_value
 from explorer.app.state.view import ForcesView, OrientationView, PrecisionView
@@ -35,9 +36,10 @@ from explorer.app.storage.session_format import (
 )
 from explorer.errors import StorageError
 from explorer.mechanism.design_file import MIGRATIONS
+from explorer.mechanism.pose import Pose
 
 DATA = Path(__file__).parents[1] / "data"
-RICH = rich_state()
+RICH, OPENED = rich_state(), opened(OPTIMAL)
 WHOLE = encode_session(History((Step(7, "Open", opened(OPTIMAL)), Step(8, "All", RICH)), 1), 3)
 
 
@@ -264,6 +266,48 @@ def test_value_of_another_kind_is_refused_or_read_as_any_other(
     except StorageError as error:
         problem = str(error)
     assert "\n" not in problem
+
+
+Change = Callable[[State], State]
+FAR = Pose((1e39, 5.0, 9.0), OPENED.pose.quaternion)
+NONSENSE: dict[str, Change] = {
+    "a huge length": lambda state: replace(state, joints=(*state.joints[:5], 1e300)),
+    "a negative length": lambda state: replace(state, joints=(-5.0, *state.joints[1:])),
+    "joints of another pose": lambda state: replace(state, joints=(*state.joints[::-1],)),
+    "a pose far away": lambda state: replace(
+        state, pose=FAR, joints=joints_of(state.design, FAR)
+    ),
+    "a pose with other joints": lambda state: replace(
+        state, pose=Pose((5.0, 5.0, 5.0), state.pose.quaternion)
+    ),
+    "a huge radius": lambda state: thick(state, 1e30),
+    "another design": lambda state: replace(
+        state, design=msgspec.structs.replace(state.design, b1=(1.0, 1.0))
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("nonsense", NONSENSE)
+@pytest.mark.parametrize("place", ["shown", "undone", "before a run"])
+def test_state_that_no_page_shows_is_refused_wherever_it_is(nonsense: str, place: str) -> None:
+    bad = NONSENSE[nonsense](OPENED)
+    if place == "before a run":
+        run = RICH.optimisation.run
+        assert run is not None
+        optimisation = replace(RICH.optimisation, run=replace(run, own=bad))
+        bad = replace(RICH, optimisation=optimisation)
+    states = [bad, OPENED] if place == "undone" else [OPENED, bad]
+    with pytest.raises(StorageError, match="file cannot be used") as refusal:
+        decode_session(encode_session(history_of(states), 1), "file")
+    assert str(refusal.value).isprintable()
+
+
+@pytest.mark.parametrize("words", [[], ["Open"], ["Open"] * 3])
+def test_words_for_more_or_fewer_steps_are_refused(words: list[str]) -> None:
+    body = body_of(WHOLE)
+    body["words"] = words
+    with pytest.raises(StorageError, match="file cannot be used"):
+        decode_session(signed(msgspec.json.encode(body)), "file")
 
 
 def without_diagram(state: State) -> State:

@@ -14,14 +14,20 @@ from functools import cache
 from typing import Any, cast, get_args, get_type_hints
 
 import msgspec
+import numpy as np
 
+from explorer.app.session.drawable import check_drawable
 from explorer.app.state.actions import SetJoint
 from explorer.app.state.parts import saved_fields
-from explorer.app.state.state import State
+from explorer.app.state.state import State, joints_of
 from explorer.errors import InputError, StorageError
 from explorer.mechanism.design_file import MIGRATIONS as MIGRATIONS_OF_DESIGNS, migrate
 
 REFERENCE = "#"
+
+# Largest difference of saved joints and those of the pose, over the reach: the joints are as the
+# user typed them, the pose is computed from them.
+JOINT_TOLERANCE = 1e-4
 
 # Fields that a design of any schema has.
 _DESIGN_FIELDS = frozenset({"schema", "unit_mm"})
@@ -117,7 +123,7 @@ class Unpacker:
                 read = {n: self._read(v, types[n], f"{where}.{n}") for n, v in fields.items()}
                 value = cast("Callable[..., Any]", part)(**read)
                 if isinstance(value, State):
-                    value = _with_unclosed(value)
+                    value = _checked(value)
             self._values[key] = value, fields
         return self._values[key][0]
 
@@ -189,12 +195,20 @@ def present_view(fields: dict[str, Any]) -> dict[str, Any]:
     return present | {"prototype": prototype, "drawn_as": drawn_as}
 
 
-def _with_unclosed(state: State) -> State:
-    """Return a state with the reason why its joints do not close computed again."""
-    if state.unclosed is None:
-        return state
-    joint = state.unclosed.joint
-    return SetJoint(joint, state.joints[joint]).apply(state)
+def _checked(state: State) -> State:
+    """Return a state with the reason why its joints do not close computed again.
+
+    Raises:
+        InputError: no page draws it, or its joints are not those of its pose.
+    """
+    check_drawable(state)
+    if state.unclosed is not None:
+        joint = state.unclosed.joint
+        return SetJoint(joint, state.joints[joint]).apply(state)
+    off = np.subtract(state.joints, joints_of(state.design, state.pose))
+    if np.abs(off).max() > JOINT_TOLERANCE * state.design.reach:
+        raise InputError("its joints are not those of its pose")
+    return state
 
 
 @cache

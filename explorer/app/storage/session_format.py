@@ -111,7 +111,8 @@ def decode_session(data: bytes, source: str) -> History:
 
     Raises:
         SchemaError: a newer explorer wrote it.
-        StorageError: it is damaged, or not the file of a session.
+        StorageError: it is damaged, not the file of a session, or holds a state that no page
+            shows.
     """
     header = decode_header(data, source)
     if header.schema > SCHEMA:
@@ -128,7 +129,8 @@ def decode_session(data: bytes, source: str) -> History:
     except (
         ExplorerError,
         msgspec.MsgspecError,
-        UnicodeDecodeError,
+        ValueError,
+        ArithmeticError,
         RecursionError,
         LookupError,
         TypeError,
