@@ -6,11 +6,16 @@ without Greek letters causes no traceback.
 
 from __future__ import annotations
 
+import codecs
 import os
 import sys
+import unicodedata
 from io import TextIOWrapper
 
 from explorer.errors import ExplorerError
+
+# Characters of ASCII in place of those that a terminal cannot show.
+_PLAIN = str.maketrans({"−": "-", "–": "-", "×": "x", "≤": "<=", "≥": ">=", "“": '"', "”": '"'})
 
 
 class OutputError(ExplorerError):
@@ -18,14 +23,28 @@ class OutputError(ExplorerError):
 
 
 def prepare() -> None:
-    """Make both streams accept any text: replace closed ones, write ? for missing characters."""
+    """Make both streams accept any text: replace closed ones, and characters that they lack."""
+    codecs.register_error("explorer.plain", _write_plainly)
     # A stream that was closed when the process started is None.
     if sys.stdout is None or sys.stderr is None:
         nowhere = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
         sys.stdout, sys.stderr = sys.stdout or nowhere, sys.stderr or nowhere
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="replace")
+            stream.reconfigure(errors="explorer.plain")
+
+
+def _write_plainly(error: UnicodeError) -> tuple[str | bytes, int]:
+    """Return ASCII in place of what cannot be encoded, and where to go on.
+
+    A minus sign becomes a hyphen, ä becomes a, ² becomes 2, and what has no like becomes ?.
+    """
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end].translate(_PLAIN)
+    letters = (each for each in unicodedata.normalize("NFKD", text))
+    plain = (each if each.isascii() else "?" for each in letters if not unicodedata.combining(each))
+    return "".join(plain), error.end
 
 
 def write(text: str) -> None:

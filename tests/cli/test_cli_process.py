@@ -157,3 +157,32 @@ def test_ascii_terminal_gets_text_with_replacements() -> None:
     done = process("singularity", env={"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"})
     assert (done.returncode, done.stderr) == (0, "")
     assert "?1" in done.stdout
+
+
+LIKE = {"−": "-", "–": "-", "×": "x", "≤": "<=", "≥": ">=", "²": "2", "“": '"', "”": '"', "ö": "o",
+        "ß": "?", "漢": "?", "δ": "?"}  # fmt: skip
+
+
+def encodes(letter: str, encoding: str) -> bool:
+    try:
+        return bool(letter.encode(encoding))
+    except UnicodeEncodeError:
+        return False
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "cp437", "latin-1", "shift-jis", "utf-8"])
+def test_terminal_gets_the_characters_most_like_those_that_it_lacks(encoding: str) -> None:
+    text = "−1.5 – 2×3 ≤ 4² ≥ “Größe” 漢δ"
+    code = (
+        "from explorer.cli import streams; streams.prepare(); "
+        f"streams.write({text!r}); streams.write_error({text!r})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"},
+        check=True,
+    )
+    shown = "".join(each if encodes(each, encoding) else LIKE[each] for each in text)
+    assert done.stdout.decode(encoding) == shown
+    assert done.stderr.decode(encoding).rstrip() == shown
