@@ -154,9 +154,9 @@ from .sweep.study import Study as Study, load_study as load_study
 from .sweep.workers import LocalWorkers as LocalWorkers
 from .workspace.accessible.radii import RadiusCurve as RadiusCurve, radius_curve as radius_curve
 from .workspace.accessible.workspace import (
+    AccessibleWorkspace as AccessibleWorkspace,
     PairCost as PairCost,
-    ReachableWorkspace as ReachableWorkspace,
-    reachable_workspace as reachable_workspace,
+    accessible_workspace as accessible_workspace,
 )
 from .workspace.least_clearance import (
     LeastClearances as LeastClearances,
@@ -193,8 +193,8 @@ from .workspace.slices.volume import (
 from .workspace.solids.solid import Solid as Solid
 from .workspace.solids.solids import (
     convex_hull as convex_hull,
-    dexterous_solid as dexterous_solid,
-    reachable_solid as reachable_solid,
+    inclusive_solid as inclusive_solid,
+    total_solid as total_solid,
     workspace_solid as workspace_solid,
 )
 

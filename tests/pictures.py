@@ -161,10 +161,10 @@ SCENES = {
         size=(1280, 900),
     ),
     # Where legs 2 and 4 collide, low on both sides, shows through the solid.
-    "reachable": Scene(
+    "accessible": Scene(
         actions=(
             Set("design.limits", with_radius(DESIGN, 0.2).limits),
-            Set("view", replace(BARE, workspace=WorkspaceView(solid=True, region="reachable"))),
+            Set("view", replace(BARE, workspace=WorkspaceView(solid=True, region="accessible"))),
         ),
     ),
     "forces": Scene(

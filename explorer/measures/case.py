@@ -145,10 +145,10 @@ class Case:
         """The volume that a collision-free move from home leads to; else NaN and the reason."""
         # Both load the kernel of solids.
         from explorer.workspace.accessible.start import StartError
-        from explorer.workspace.accessible.workspace import reachable_workspace
+        from explorer.workspace.accessible.workspace import accessible_workspace
 
         try:
-            return reachable_workspace(self.design, self.rotation).reachable_volume, ""
+            return accessible_workspace(self.design, self.rotation).accessible_volume, ""
         except StartError as error:
             return math.nan, str(error)
 

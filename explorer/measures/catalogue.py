@@ -269,7 +269,7 @@ def _clearances() -> Iterable[Measure]:
         places=COMPARE | STUDIES,
     )
     yield Measure(
-        "reachable_volume",
+        "accessible_volume",
         "accessible volume",
         "Volume that a collision-free move from the home pose leads to",
         lambda case: case.accessible_volume[0],
@@ -378,6 +378,9 @@ CATALOGUE: Mapping[str, Measure] = {
     for measure in group
 }
 """All measures by name, in the order in which every list has them."""
+
+FORMER_NAMES: Mapping[str, str] = {"reachable_volume": "accessible_volume"}
+"""Present names of measures by those in files of older explorers."""
 
 
 def measures_in(place: Place) -> dict[str, Measure]:

@@ -12,12 +12,13 @@ import importlib
 import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from explorer.errors import InputError, MissingExtraError
 from explorer.files.writing import storage_error, write_whole
+from explorer.measures.catalogue import FORMER_NAMES
 from explorer.sweep.rows import Kind, Rows, columns_of, one_line
 from explorer.sweep.study import Study, decode_study, encode_study, study_hash
 
@@ -142,7 +143,10 @@ def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, A
         file = parquet.ParquetFile(path, page_checksum_verification=True)
         with file:
             part = _checked_metadata(file.schema_arrow.metadata or {}, file.metadata.metadata or {})
-            return part, file.read(columns=None if columns is None else list(columns))
+            table = file.read(columns=None if columns is None else list(columns))
+            names = [FORMER_NAMES.get(name, name) for name in table.column_names]
+            table = table.rename_columns(names).replace_schema_metadata(table.schema.metadata)
+            return _with_present_names(part, str(path)), table
     except (arrow.ArrowException, OSError, ValueError, KeyError) as error:
         raise BadPartError(f"{path} is no part of a study: {one_line(error)}") from None
 
@@ -168,6 +172,14 @@ def _checked_metadata(metadata: Mapping[bytes, bytes], copy: Mapping[bytes, byte
     ):
         raise ValueError("its metadata is damaged")
     return part
+
+
+def _with_present_names(part: Part, source: str) -> Part:
+    """Return the metadata of a part with the present names of its measures."""
+    if not any(name.encode() in part.study for name in FORMER_NAMES):
+        return part
+    study = decode_study(part.study, source)
+    return replace(part, study=encode_study(study), study_hash=study_hash(study))
 
 
 def sound_parts(

@@ -271,7 +271,7 @@ def load_kernels(study: Study) -> None:
     """Import all kernels that the rows of a study may need."""
     if study.polish is not None:
         importlib.import_module("explorer.optimise.solver")
-    if "reachable_volume" in study.measures:
+    if "accessible_volume" in study.measures:
         importlib.import_module("explorer.workspace.accessible.workspace")
     if "held_volume" in study.measures:
         importlib.import_module("explorer.workspace.held")

@@ -19,7 +19,7 @@ from explorer.errors import InputError
 from explorer.files.json_text import decode_strictly
 from explorer.files.packaged import packaged_files
 from explorer.files.writing import read_at_most
-from explorer.measures.catalogue import measures_in
+from explorer.measures.catalogue import FORMER_NAMES, measures_in
 from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
@@ -135,6 +135,9 @@ class Objective(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     measure: str
     sense: Sense
 
+    def __post_init__(self) -> None:
+        _set(self, "measure", FORMER_NAMES.get(self.measure, self.measure))
+
 
 class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A study of many designs.
@@ -177,6 +180,8 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             raise InputError(f"name must be one printable line of 1 to {LONGEST_NAME} characters")
         _set(self, "design", _complete(self.design))
         _set(self, "variables", _ranges("variables", self.variables, NAMES))
+        present = (FORMER_NAMES.get(name, name) for name in self.measures)
+        _set(self, "measures", tuple(present))
         self._check_ranges()
         self._check_sampling()
         self._check_measures()

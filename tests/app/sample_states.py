@@ -84,7 +84,7 @@ def _view(_: State, i: int, share: float) -> Action:
         {
             "workspace": WorkspaceView(
                 solid=i > 2,
-                region=("limits", "reachable", "held")[i % 3],
+                region=("limits", "accessible", "held")[i % 3],
                 colour=("share", "force", "plain")[i % 3],
                 cut=("x", "y", None)[i % 3],
                 level=share,

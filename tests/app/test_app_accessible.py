@@ -54,7 +54,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
 from explorer.workspace.accessible.start import StartError, check_start
-from explorer.workspace.accessible.workspace import reachable_workspace
+from explorer.workspace.accessible.workspace import accessible_workspace
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks
 
@@ -74,7 +74,7 @@ def desk() -> Generator[Desk]:
 
 def shown(state: State, **changes: Any) -> State:
     """Return the state with the accessible workspace shown."""
-    asked = {"solid": True, "region": "reachable", **changes}
+    asked = {"solid": True, "region": "accessible", **changes}
     workspace = replace(state.view.workspace, **asked)
     return Set("view", replace(state.view, workspace=workspace)).apply(state)
 
@@ -143,17 +143,17 @@ THICK = shown(thick(opened(OPTIMAL), RADIUS))
 
 def test_the_drawing_holds_what_the_library_finds() -> None:
     drawing = drawing_of(THICK)
-    expected = reachable_workspace(THICK.design, tolerance=REACHED_TOLERANCE * OPTIMAL.reach)
+    expected = accessible_workspace(THICK.design, tolerance=REACHED_TOLERANCE * OPTIMAL.reach)
     assert drawing.reached is not None
     assert drawing.trouble is None
     assert drawing.volume == expected.volume
-    assert drawing.reached.volume == expected.reachable_volume
-    assert drawing.reached.node_count == expected.reachable_node_count
+    assert drawing.reached.volume == expected.accessible_volume
+    assert drawing.reached.node_count == expected.accessible_node_count
     assert drawing.reached.pairs == expected.pairs
     assert drawing.reached.harmless_radius == expected.harmless_radius
     assert drawing.nodes is not None
     assert drawing.nodes.count == expected.node_count
-    assert drawing.mesh_volume == pytest.approx(expected.reachable_volume, rel=1e-3)
+    assert drawing.mesh_volume == pytest.approx(expected.accessible_volume, rel=1e-3)
 
 
 def test_faces_where_legs_begin_to_collide_have_a_colour_of_their_own() -> None:
@@ -182,7 +182,7 @@ def test_the_measures_colour_the_same_surface(colour: str) -> None:
 
 def test_a_hull_holds_what_is_reached_and_no_more_than_that_of_all() -> None:
     drawing, whole = (
-        drawing_of(shown(THICK, hull=True, region=region)) for region in ("reachable", "limits")
+        drawing_of(shown(THICK, hull=True, region=region)) for region in ("accessible", "limits")
     )
     assert drawing.hull_volume is not None
     assert whole.hull_volume is not None
@@ -265,9 +265,9 @@ def test_cutting_and_colouring_reach_for_nothing_anew(monkeypatch: pytest.Monkey
 
     def counted(*args: Any, **kwargs: Any) -> Any:
         calls.append(0.0)
-        return reachable_workspace(*args, **kwargs)
+        return accessible_workspace(*args, **kwargs)
 
-    monkeypatch.setattr(reached, "reachable_workspace", counted)
+    monkeypatch.setattr(reached, "accessible_workspace", counted)
     state = shown(thick(opened(OPTIMAL), 0.15))
     for changes in (
         {},
@@ -473,7 +473,7 @@ def test_what_is_reached_is_exported(what: str) -> None:
     drawing = drawing_of(shown(THICK, hull=True))
     rows = drawing.request.rotation
     tolerance = REACHED_TOLERANCE * OPTIMAL.reach
-    data = export_mesh(THICK.design, rows, tolerance, "reachable", None, UNLOADED, what, "stl")
+    data = export_mesh(THICK.design, rows, tolerance, "accessible", None, UNLOADED, what, "stl")
     import trimesh
 
     untyped: Any = trimesh
@@ -481,7 +481,7 @@ def test_what_is_reached_is_exported(what: str) -> None:
     expected = drawing.mesh_volume if what == "workspace" else drawing.hull_volume
     assert expected is not None
     assert float(mesh.volume) == pytest.approx(expected * OPTIMAL.unit_mm**3, rel=1e-4)
-    assert exported_name("reachable", what) == f"accessible {what}"
+    assert exported_name("accessible", what) == f"accessible {what}"
     assert exported_name("limits", what) == what
 
 
@@ -489,7 +489,7 @@ def test_where_nothing_is_reached_nothing_is_exported() -> None:
     state = shown(beyond_its_limits())
     rows = drawing_of(state).request.rotation
     with pytest.raises(InputError, match="no position is accessible from"):
-        export_mesh(state.design, rows, 0.1, "reachable", None, UNLOADED, "workspace", "stl")
+        export_mesh(state.design, rows, 0.1, "accessible", None, UNLOADED, "workspace", "stl")
 
 
 def test_step_of_the_workspace_has_its_exact_volume_and_its_faces() -> None:
@@ -506,10 +506,10 @@ def test_step_of_the_workspace_has_its_exact_volume_and_its_faces() -> None:
 
 @pytest.mark.parametrize(
     ("region", "what", "reason"),
-    [("limits", "hull", "a convex hull"), ("reachable", "workspace", "begin to collide")],
+    [("limits", "hull", "a convex hull"), ("accessible", "workspace", "begin to collide")],
 )
 def test_step_of_what_has_facets_is_refused_with_what_would_work(
-    region: Literal["limits", "reachable"], what: str, reason: str
+    region: Literal["limits", "accessible"], what: str, reason: str
 ) -> None:
     rows = drawing_of(shown(THICK, region="limits")).request.rotation
     with pytest.raises(InputError, match=reason) as refusal:

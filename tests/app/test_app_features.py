@@ -228,7 +228,7 @@ def test_without_panels_the_scene_has_the_feeds_that_it_draws_of() -> None:
     running = start(OPTIMAL, port=0, panels=False)
     try:
         page = running.page
-        page.session.do(Set("view.orientation", OrientationView(tilts=True, over="reachable")))
+        page.session.do(Set("view.orientation", OrientationView(tilts=True, over="inclusive")))
         page.session.do(Set("view.forces.weighed", "payload and legs"))
         page.session.wait_until_idle()
         feeds: list[Feed[Any, Any]] = [

@@ -213,7 +213,7 @@ def test_load_that_is_not_shown_changes_no_request() -> None:
     unloaded: tuple[dict[str, Any], ...] = (
         {"colour": "plain"},
         {"colour": "margin", "cut": "x"},
-        {"region": "reachable"},
+        {"region": "accessible"},
         {"colour": "error"},
     )
     for changes in unloaded:

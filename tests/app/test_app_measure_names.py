@@ -81,7 +81,9 @@ def test_a_name_has_one_value_after_an_optimum_and_after_a_turn() -> None:
         for turn in (0.0, 35.0):
             session.do(SetAngle(0, session.state.yaw_pitch_roll[0] + turn))
             session.do(SetPosition(0, 9.0))
-            for orientation, region in itertools.product(("home", "pose"), ("limits", "reachable")):
+            for orientation, region in itertools.product(
+                ("home", "pose"), ("limits", "accessible")
+            ):
                 session.do(Set("view.workspace.orientation", orientation))
                 session.do(Set("view.workspace.region", region))
                 assert page.wait_until_drawn(PATIENCE_SECONDS)

@@ -87,7 +87,7 @@ def test_numbers_of_computed_drawings_are_written_alike(running: Running) -> Non
     for design in PRESETS.values():
         do(running, Open(design))
         do(running, Set("view.workspace.solid", True))
-        do(running, Set("view.workspace.region", "reachable"))
+        do(running, Set("view.workspace.region", "accessible"))
         do(running, Set("view.workspace.cut", "y"))
         do(running, Set("view.radius_curve", True))
         do(running, Set("view.drawn_as", "prototype"))

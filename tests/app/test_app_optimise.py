@@ -671,7 +671,7 @@ def test_a_design_changed_since_is_told_of() -> None:
     assert "by hand" in verdict_words(changed, now, now.verdict)
 
 
-def test_an_unreachable_volume_is_told_with_the_largest_found(bench: Bench) -> None:
+def test_an_unaccessible_volume_is_told_with_the_largest_found(bench: Bench) -> None:
     run = bench.find(replace(SMALL, volume=1400.0, free=("b2", "b3")))
     assert run.verdict is not None
     assert run.verdict.status == "infeasible"

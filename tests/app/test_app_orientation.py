@@ -69,7 +69,7 @@ from explorer.workspace.orientations.share import OrientationShare, orientation_
 from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap, greatest_tilt, tilt_map
 from explorer.workspace.orientations.torsions import tilt_by_torsion
 from explorer.workspace.orientations.turns import limit_names
-from explorer.workspace.solids.solids import dexterous_solid, reachable_solid
+from explorer.workspace.solids.solids import inclusive_solid, total_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -189,28 +189,28 @@ def test_feeds_compute_what_is_shown_and_nothing_else() -> None:
     assert drawing.share == orientation_share(OPTIMAL, state.pose.position)
     best = tilt_by_torsion(OPTIMAL, state.pose.position).best
     assert drawing.by_torsion.best == best
-    follow(shown(state, tilts=True, over="dexterous", range=15.0))
+    follow(shown(state, tilts=True, over="total", range=15.0))
     tilts = services.get(TiltsFeed).drawing
     assert tilts is not None
     for index in np.random.default_rng(0).integers(len(tilts.tilts), size=20):
         expected = greatest_tilt(OPTIMAL, tilts.positions[index], tilts.request.torsion).tilt
         assert tilts.tilts[index] == pytest.approx(expected, abs=1e-6)
     volumes: dict[str, float] = {}
-    for over, make in (("dexterous", dexterous_solid), ("reachable", reachable_solid)):
+    for over, make in (("total", total_solid), ("inclusive", inclusive_solid)):
         follow(shown(state, over=over, range=15.0))
         ranged = services.get(RangeFeed).drawing
         assert ranged is not None
         rotations = cone_of_directions(home_pose(OPTIMAL).rotation, 15.0, ORIENTATIONS)
         volumes[over] = ranged.solid.volume
         assert volumes[over] == pytest.approx(make(OPTIMAL, rotations).volume, rel=1e-3)
-    assert volumes["dexterous"] < volumes["reachable"]
+    assert volumes["total"] < volumes["inclusive"]
 
 
 def test_range_turns_the_tilted_orientations_either_way() -> None:
     home = home_pose(OPTIMAL)
-    tilted = orientations_over(RangeRequest(OPTIMAL, home, 15.0, 0.0, "dexterous"))
+    tilted = orientations_over(RangeRequest(OPTIMAL, home, 15.0, 0.0, "total"))
     np.testing.assert_array_equal(tilted, cone_of_directions(home.rotation, 15.0, ORIENTATIONS))
-    turned = orientations_over(RangeRequest(OPTIMAL, home, 15.0, 10.0, "dexterous"))
+    turned = orientations_over(RangeRequest(OPTIMAL, home, 15.0, 10.0, "total"))
     angles = tilt_torsion_from_rotation(home.rotation.T @ turned)
     assert angles[:, 1].max() == pytest.approx(15.0, abs=1e-9)
     torsions, counts = np.unique(angles[:, 2].round(6), return_counts=True)
@@ -340,7 +340,7 @@ def test_failure_of_the_share_is_shown() -> None:
     assert "…" not in shown_text
 
 
-@pytest.mark.parametrize(("over", "bound"), [("reachable", "at least"), ("dexterous", "at most")])
+@pytest.mark.parametrize(("over", "bound"), [("inclusive", "at least"), ("total", "at most")])
 def test_volume_over_sampled_orientations_is_a_bound(over: str, bound: str) -> None:
     services, state = services_for(), shown(opened(OPTIMAL), over=over, range=15.0)
     worker = services.worker

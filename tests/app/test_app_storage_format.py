@@ -20,7 +20,7 @@ from explorer.app.session.history import History, Step, start_history
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.compared import Compared
 from explorer.app.state.state import Run, State, joints_of, opened
-from explorer.app.state.studies import Studies
+from explorer.app.state.studies import Brush, Studies, StudyPlan
 from explorer.app.state.values import with_value
 from explorer.app.state.view import ForcesView, OrientationView, PrecisionView
 from explorer.app.storage.packing import present_view
@@ -382,6 +382,29 @@ def test_forms_that_were_switched_apart_are_one_choice_now() -> None:
     ):
         former = {"twin": twin, "prototype": {"shown": shown, "exploded": 0.5}}
         assert present_view(former) == {"drawn_as": form, "prototype": {"exploded": 0.5}}
+
+
+def test_former_words_for_workspaces_and_their_measure_are_read_as_the_present_ones() -> None:
+    plan = StudyPlan(
+        measures=("volume", "accessible_volume"), objectives=(("accessible_volume", "max"),)
+    )
+    axis = "accessible_volume"
+    studies = Studies("reachable", (Brush(axis, ((0.0, 1.0),)),), axis, axis, axis, plan=plan)
+    for over, former in (("inclusive", "reachable"), ("total", "dexterous")):
+        state = with_value(opened(OPTIMAL), "studies", studies)
+        state = with_value(state, "view.workspace.region", "accessible")
+        state = with_value(state, "view.orientation.over", over)
+        # A name that a user gave stays.
+        state = with_value(state, "design", msgspec.structs.replace(OPTIMAL, name="reachable"))
+        body = encode_session(start_history(state), 1).partition(b"\n")[2]
+        for present, word in (
+            (b'"accessible"', b'"reachable"'),
+            (b'"accessible_volume"', b'"reachable_volume"'),
+            (f'"over":"{over}"'.encode(), f'"over":"{former}"'.encode()),
+        ):
+            assert present in body
+            body = body.replace(present, word)
+        assert decode_session(signed(body), "file").step.state == state
 
 
 def test_paths_between_modes_or_stored_poses_have_the_same_ends_now() -> None:

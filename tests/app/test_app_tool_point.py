@@ -650,7 +650,7 @@ def test_broken_limit_is_marked_from_the_tool_on(services: Services, orientation
 
 
 def test_paths_start_where_the_tool_is() -> None:
-    state = in_workspace(opened_at(), solid=True, region="reachable", start="pose")
+    state = in_workspace(opened_at(), solid=True, region="accessible", start="pose")
     assert workspace_start(Frame(state)) == state.pose.position
     at_home = in_workspace(state, orientation="home")
     start = workspace_start(Frame(at_home))
@@ -674,7 +674,7 @@ def test_file_holds_the_positions_of_the_tool(what: str) -> None:
         read.append(np.array(mesh.bounds) / design.unit_mm)
     np.testing.assert_allclose(read[1], read[0] + offset, atol=1e-4)
     assert exported_name("limits", what, (x, y, z)) == f"{what} of the tool"
-    assert exported_name("reachable", what, (x, y, z)) == f"accessible {what} of the tool"
+    assert exported_name("accessible", what, (x, y, z)) == f"accessible {what} of the tool"
 
 
 def test_step_file_holds_the_positions_of_the_tool() -> None:
@@ -747,9 +747,9 @@ def test_nodes_of_tilts_are_where_the_tool_is_at_tilt_zero(services: Services) -
     assert len(below) + len(above) == len(tools)
 
 
-@pytest.mark.parametrize("over", ["reachable", "dexterous"])
+@pytest.mark.parametrize("over", ["inclusive", "total"])
 def test_solid_over_tilts_is_of_the_positions_of_the_tool(
-    services: Services, over: Literal["reachable", "dexterous"]
+    services: Services, over: Literal["inclusive", "total"]
 ) -> None:
     state = opened_at(orientation=OrientationView(over=over, range=12.0))
     feed = services.get(RangeFeed)
@@ -760,7 +760,7 @@ def test_solid_over_tilts_is_of_the_positions_of_the_tool(
     solid, turned = feed.drawing.solid, orientations_over(feed.drawing.request)
     triangles = np.asarray(solid.vertices)[solid.faces]
     poses = [Pose.of((0.0, 0.0, 0.0), rotation) for rotation in turned]
-    has = any if over == "reachable" else all
+    has = any if over == "inclusive" else all
     lows, highs = solid.vertices.min(axis=0) - 1.0, solid.vertices.max(axis=0) + 1.0
     seen: list[bool] = []
     for point in np.random.default_rng(9).uniform(lows, highs, (25, 3)):

@@ -44,11 +44,11 @@ def rows_of(design: Design) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in home_pose(design).rotation.tolist())
 
 
-def reachable_request(design: Design, **changes: Any) -> WorkspaceRequest:
+def accessible_request(design: Design, **changes: Any) -> WorkspaceRequest:
     request = WorkspaceRequest(
         design=design,
         rotation=rows_of(design),
-        region="reachable",
+        region="accessible",
         start=None,
         colour="plain",
         cut=None,
@@ -76,9 +76,9 @@ class Watched:
             self.surfaces.append(value)
 
 
-def test_a_reachable_workspace_tells_each_pair_of_legs_that_it_carves() -> None:
+def test_an_accessible_workspace_tells_each_pair_of_legs_that_it_carves() -> None:
     watched = Watched()
-    drawing = draw_workspace(reachable_request(THICK, level=1.0), watched.line)
+    drawing = draw_workspace(accessible_request(THICK, level=1.0), watched.line)
     assert drawing.reached is not None
     blocking = [pair.legs for pair in drawing.reached.pairs if pair.blocked_volume > 0.0]
     assert len(blocking) > 1
@@ -94,7 +94,7 @@ def test_a_reachable_workspace_tells_each_pair_of_legs_that_it_carves() -> None:
 @pytest.mark.parametrize("last", [0, 2, 3])
 def test_a_cancelled_drawing_ends_at_the_next_stage_and_keeps_nothing_of_it(last: int) -> None:
     # A tolerance that no other test asks for, so that nothing is kept yet.
-    request = reachable_request(THICK, tolerance=0.51)
+    request = accessible_request(THICK, tolerance=0.51)
     watched = Watched(last)
     with pytest.raises(CancelledError):
         draw_workspace(request, watched.line)
@@ -108,17 +108,17 @@ def test_a_cancelled_drawing_ends_at_the_next_stage_and_keeps_nothing_of_it(last
 def test_a_grid_too_fine_to_look_at_each_step_leaves_the_rest_of_the_drawing() -> None:
     design = msgspec.structs.replace(PRESETS["paper-optimal"], node_step=0.25)
     assert workspace_nodes(design).count > MOST_LIVE_NODES
-    drawing = draw_workspace(reachable_request(design))
+    drawing = draw_workspace(accessible_request(design))
     assert drawing.trouble is None
     assert drawing.reached is not None
     assert drawing.reached.node_count is None
-    same = draw_workspace(reachable_request(PRESETS["paper-optimal"])).reached
+    same = draw_workspace(accessible_request(PRESETS["paper-optimal"])).reached
     assert same is not None
     assert same.node_count is not None
     assert drawing.reached.volume == same.volume
 
 
-def test_only_the_newest_reachable_workspaces_are_kept() -> None:
+def test_only_the_newest_accessible_workspaces_are_kept() -> None:
     asked: list[str] = []
 
     def reach(tolerance: float) -> None:
@@ -170,9 +170,9 @@ def worker() -> Iterator[Worker]:
     made.stop()
 
 
-def reachable_state() -> State:
+def accessible_state() -> State:
     state = Set("design.limits", THICK.limits).apply(opened(PRESETS["paper-optimal"]))
-    workspace = replace(state.view.workspace, solid=True, region="reachable")
+    workspace = replace(state.view.workspace, solid=True, region="accessible")
     return Set("view", replace(state.view, workspace=workspace)).apply(state)
 
 
@@ -180,7 +180,7 @@ def test_a_drawing_shows_its_stage_and_can_be_cancelled_and_asked_for_again(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_feed, "LONG_SECONDS", 0.0)
-    frame, followed = Frame(reachable_state()), Followed(worker)
+    frame, followed = Frame(accessible_state()), Followed(worker)
     feed = followed.feed
     feed.follow(frame)
     followed.wait_for(lambda: feed.stage is not None)
@@ -205,7 +205,7 @@ def test_what_is_shown_no_more_is_not_computed_to_its_end(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_feed, "LONG_SECONDS", 0.0)
-    state, followed = reachable_state(), Followed(worker)
+    state, followed = accessible_state(), Followed(worker)
     feed = followed.feed
     feed.follow(Frame(state))
     followed.wait_for(lambda: feed.stage is not None)

@@ -166,8 +166,8 @@ def test_region_holds_the_start_of_the_paths(services: Services, desk: Desk) -> 
         if getattr(handle, "label", "") == "Region"
     )
     for words, expected in (
-        ("accessible from the present position", ("reachable", "pose")),
-        ("accessible from home", ("reachable", "home")),
+        ("accessible from the present position", ("accessible", "pose")),
+        ("accessible from home", ("accessible", "home")),
         ("within the limits", ("limits", "home")),
     ):
         desk.use(chosen, words)
@@ -466,7 +466,7 @@ def test_legend_names_what_only_the_map_shows() -> None:
     within = drawing_of(shown(radii, solid=True, cut="x"))
     assert "legs collide" in legend("plain", 1.0, within)
     assert "not accessible" not in legend("plain", 1.0, within)
-    accessible = drawing_of(shown(radii, solid=True, cut="x", region="reachable"))
+    accessible = drawing_of(shown(radii, solid=True, cut="x", region="accessible"))
     assert "not accessible" in legend("plain", 1.0, accessible)
     assert "1 / cond J" in legend("condition", 1.0, None)
 
@@ -480,8 +480,8 @@ def test_files_are_sent_in_the_format_that_is_asked_for(services: Services, desk
     for what, file_format in itertools.product(("workspace", "hull"), FORMATS):
         files.send(what, file_format, CLIENT.client_id)
         assert downloads.sent[-1] == (CLIENT.client_id, f"paper-optimal-{what}.{file_format}")
-    desk.session.do(Set("view.workspace.region", "reachable"))
-    assert desk.state.view.workspace.region == "reachable"
+    desk.session.do(Set("view.workspace.region", "accessible"))
+    assert desk.state.view.workspace.region == "accessible"
     files.send("hull", "stl", CLIENT.client_id)
     assert downloads.sent[-1][1] == "paper-optimal-accessible-hull.stl"
     files.send_hull_at_home("3mf", CLIENT.client_id)

@@ -16,7 +16,7 @@ BENCHMARKS: Mapping[str, str] = {
     "solid": "the solid of the workspace",
     "solid_page": "from a design slider to the updated solid",
     "interference": "overlap of tetrahedra, clearances of the legs, whole moves",
-    "reachable": "the workspace that can be reached without collisions, against the radius",
+    "accessible": "the workspace that a move leads to without collisions, against the radius",
     "nearest": "nearest singular pose of all three incidences",
     "validity": "whether poses and moves keep limits, margins and clearances",
     "forces": "forces of the actuators in many poses",

@@ -92,7 +92,7 @@ def test_positions_are_coloured_and_ranges_have_volumes(tab: Tab) -> None:
     tab.switch("Greatest tilts", on=True)
     tab.wait_for(lambda: services.get(TiltsFeed).drawing is not None, "tilts at nodes")
     expect(tab.page.get_by_text("nodes, 0.", exact=False)).to_be_visible()
-    tab.choose("Solid over tilts", "dexterous")
+    tab.choose("Solid over tilts", "total")
     tab.wait_for(lambda: services.get(RangeFeed).drawing is not None, "the solid")
     expect(tab.page.get_by_text("Dexterous volume", exact=True)).to_be_visible()
     tab.switch("Greatest tilts", on=False)

@@ -211,7 +211,7 @@ def test_what_hands_do_in_the_plots(tab: Tab, home: Path) -> None:
 
 def test_a_small_study_is_started_and_cancelled(tab: Tab, home: Path) -> None:
     # So many, of something so slow, that even a slow browser can cancel it on the way.
-    plan = StudyPlan(MOST, 20.0, ("a3x", "b2"), ("volume", "reachable_volume"), ())
+    plan = StudyPlan(MOST, 20.0, ("a3x", "b2"), ("volume", "accessible_volume"), ())
     tab.running.page.session.do(Set("studies.plan", plan))
     looked_at(tab)
     count = tab.slider("Number of designs")

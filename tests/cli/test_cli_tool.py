@@ -219,7 +219,7 @@ def test_workspace_of_the_tool_is_moved_as_a_whole(cli: CommandLine, tooled: lis
     found, b4 = (cli.answer("workspace", *options, *more) for more in (tooled, tooled[:2]))
     for key, value in b4.items():
         if key != "extent":
-            if key in ("mesh", "reachable_solid"):
+            if key in ("mesh", "accessible_solid"):
                 assert found[key]["volume"] == pytest.approx(value["volume"], rel=1e-9)
             elif key == "hull_volume":
                 assert found[key] == pytest.approx(value, rel=1e-9)
@@ -246,13 +246,13 @@ def test_workspaces_over_orientations_are_those_of_the_tool(
     box = float(np.prod(high - low))
     for tool, answer in ((TOOL, found), ((0.0, 0.0, 0.0), b4)):
         within = explorer.poses_are_valid(TOOLED, points[:, None] - rotations @ tool, rotations)
-        for key, holds in (("reachable", within.any(axis=1)), ("dexterous", within.all(axis=1))):
+        for key, holds in (("inclusive", within.any(axis=1)), ("total", within.all(axis=1))):
             share = float(holds.mean())
             error = 5.0 * box * (share * (1.0 - share) / len(points)) ** 0.5
             volume = answer[f"{key}_mesh"]["volume"]
             assert volume == pytest.approx(box * share, abs=error + 0.01 * volume)
             assert answer[f"{key}_mesh"]["watertight"]
-    assert found["dexterous_mesh"]["volume"] < 0.97 * b4["dexterous_mesh"]["volume"]
+    assert found["total_mesh"]["volume"] < 0.97 * b4["total_mesh"]["volume"]
 
 
 def test_capability_and_orientations_are_those_of_the_tool(

@@ -22,8 +22,8 @@ from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import (
     convex_hull,
-    dexterous_solid,
-    reachable_solid,
+    inclusive_solid,
+    total_solid,
     workspace_solid,
 )
 
@@ -123,16 +123,16 @@ def test_workspace_ranges_and_tilts_add_two_volumes(
     pitch = float(home[1])
     rotations = yaw_pitch_roll_range([-80.0, pitch, 0.0], [-65.0, pitch, 6.0], [3, 1, 3])
     assert found["orientations"] == 9
-    for key, make in (("reachable_mesh", reachable_solid), ("dexterous_mesh", dexterous_solid)):
+    for key, make in (("inclusive_mesh", inclusive_solid), ("total_mesh", total_solid)):
         assert set(found[key]) == {"volume", "triangles", "watertight"}
         assert found[key]["volume"] == pytest.approx(make(OPTIMAL, rotations, 0.4).volume, rel=1e-6)
-    assert found["dexterous_mesh"]["volume"] < found["mesh"]["volume"]
-    assert found["mesh"]["volume"] < found["reachable_mesh"]["volume"]
+    assert found["total_mesh"]["volume"] < found["mesh"]["volume"]
+    assert found["mesh"]["volume"] < found["inclusive_mesh"]["volume"]
     tilted = cli.answer("--tilt", "8", "--samples", "5", *COARSE)
     rotations = cone_of_directions(explorer.home_pose(OPTIMAL).rotation, 8.0, 5)
     assert tilted["orientations"] == 5
-    volume = reachable_solid(OPTIMAL, rotations, 0.4).volume
-    assert tilted["reachable_mesh"]["volume"] == pytest.approx(volume, rel=1e-6)
+    volume = inclusive_solid(OPTIMAL, rotations, 0.4).volume
+    assert tilted["inclusive_mesh"]["volume"] == pytest.approx(volume, rel=1e-6)
 
 
 def test_workspace_capability_is_over_the_given_orientations(
@@ -150,9 +150,9 @@ def test_workspace_capability_is_over_the_given_orientations(
 def test_workspace_text_has_every_measure(cli: CommandLine) -> None:
     words = ["--hull", "--tilt", "5", "--samples", "3", "--capability", "10", "5", "9", *COARSE]
     page = cli.text(*words)
-    for word in ("exact volume", "node volume", "999 nodes", "mesh", "convex hull", "reachable"):
+    for word in ("exact volume", "node volume", "999 nodes", "mesh", "convex hull", "inclusive"):
         assert word in page
-    for word in ("dexterous", "3 orientations", "watertight", "b1x", "capability"):
+    for word in ("total", "3 orientations", "watertight", "b1x", "capability"):
         assert word in page
 
 
@@ -186,14 +186,14 @@ def test_workspace_interference_adds_the_accessible_volume(
 ) -> None:
     found = cli.answer("--interference", "--radii", "0.2")
     assert set(found) == KEYS | {
-        *("reachable_volume", "reachable_node_count", "harmless_radius", "pairs"),
-        "reachable_solid",
+        *("accessible_volume", "accessible_node_count", "harmless_radius", "pairs"),
+        "accessible_solid",
     }
-    expected = explorer.reachable_workspace(with_radius(OPTIMAL, 0.2))
-    assert found["reachable_volume"] == pytest.approx(expected.reachable_volume, rel=1e-9)
-    assert found["reachable_volume"] < found["volume"]
-    assert found["reachable_node_count"] == expected.reachable_node_count < found["node_count"]
-    assert found["reachable_solid"]["watertight"]
+    expected = explorer.accessible_workspace(with_radius(OPTIMAL, 0.2))
+    assert found["accessible_volume"] == pytest.approx(expected.accessible_volume, rel=1e-9)
+    assert found["accessible_volume"] < found["volume"]
+    assert found["accessible_node_count"] == expected.accessible_node_count < found["node_count"]
+    assert found["accessible_solid"]["watertight"]
     assert [tuple(pair["legs"]) for pair in found["pairs"]] == list(explorer.PAIRS)
     for pair, own in zip(found["pairs"], expected.pairs, strict=True):
         assert set(pair) == {"legs", "clearance", "bound", "blocked_volume"}
@@ -209,7 +209,7 @@ def test_workspace_interference_empty_workspace_has_no_accessible_volume(
 ) -> None:
     level = ("--yaw-pitch-roll", "0", "0", "0")
     found = cli.answer("--interference", *level)
-    assert found["reachable_volume"] == found["reachable_node_count"] == 0
+    assert found["accessible_volume"] == found["accessible_node_count"] == 0
     assert [pair["clearance"] for pair in found["pairs"]] == [None] * 6
     assert "joined" not in cli.text("--interference", *level)
 

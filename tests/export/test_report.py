@@ -37,7 +37,7 @@ from explorer.prototype.assembly import make_prototype
 from explorer.prototype.bill import bill_of_materials
 from explorer.singularity.ellipsoids import certified_radius, performance, singularity_free_ball
 from explorer.workspace.accessible.radii import with_radius
-from explorer.workspace.accessible.workspace import reachable_workspace
+from explorer.workspace.accessible.workspace import accessible_workspace
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.slices.outline import slice_outline
 from explorer.workspace.solids.solids import convex_hull, workspace_solid
@@ -214,10 +214,10 @@ def test_report_singularity_and_leg_tables_hold_snapshot(seed: int) -> None:
 
 def test_report_thick_legs_give_accessible_volume() -> None:
     design = with_radius(OPTIMAL, 0.2)
-    page, found = page_of(design), reachable_workspace(design)
+    page, found = page_of(design), accessible_workspace(design)
     row = table_of(page, "Volumes")["accessible"].values
-    assert row[0] == found.reachable_volume
-    assert row[2:] == [found.reachable_node_count, found.node_count]
+    assert row[0] == found.accessible_volume
+    assert row[2:] == [found.accessible_node_count, found.node_count]
     assert "legs collide" in page.text
     assert "--interference" in page.one(id="commands").text
 
@@ -364,7 +364,7 @@ def test_report_missing_values_give_reasons_in_their_place() -> None:
     page = in_order(report_html(tight, DAY))
     assert "Its parts cannot be made" in page.text
     # Nor are there commands that would only tell so again.
-    assert isinstance(tight.reachable, Missing)
+    assert isinstance(tight.accessible, Missing)
     commands = page.one(id="commands").text
     assert "export mechanism" not in commands
     assert "--interference" not in commands

@@ -86,12 +86,12 @@ def test_extremes_of_random_designs_hold_for_samples_and_are_reached(design: Des
 
 def test_measures_at_a_pose_are_of_its_orientation() -> None:
     pose = Pose.of_yaw_pitch_roll((9.0, 4.0, 8.0), (-60.0, 5.0, 2.0))
-    names = [*measures_in("compare"), "worst_margin", "reachable_volume"]
+    names = [*measures_in("compare"), "worst_margin", "accessible_volume"]
     turned = msgspec.structs.replace(OPTIMAL, home=pose)
     assert home_pose(turned) == pose
     at_pose = measure_design(Case(OPTIMAL, pose=pose), names)
     assert at_pose["volume"] == workspace_volume(OPTIMAL, pose.rotation).volume
-    own = measure_design(Case(turned), [name for name in names if name != "reachable_volume"])
+    own = measure_design(Case(turned), [name for name in names if name != "accessible_volume"])
     assert own.values == {name: at_pose[name] for name in own.values}
 
 

@@ -17,13 +17,13 @@ from explorer import (
     PRESETS,
     InputError,
     Limits,
+    accessible_workspace,
     home_pose,
     inverse,
     largest_payload,
     leg_clearances,
     limit_shares,
     margins,
-    reachable_workspace,
     reactions,
     workspace_nodes,
     workspace_volume,
@@ -388,7 +388,7 @@ def test_measures_of_a_row_match_the_public_functions() -> None:
     assert found["mean_inverse_condition"] == pytest.approx(at_nodes.mean())
     at_home = inverse_condition(jacobian(design, home.position, home.rotation), design.reach)
     assert found["inverse_condition"] == pytest.approx(float(at_home))
-    assert found["reachable_volume"] == reachable_workspace(design).reachable_volume
+    assert found["accessible_volume"] == accessible_workspace(design).accessible_volume
     # The nodes see no less than there is.
     assert isinstance(found["least_clearance"], float)
     assert found["least_clearance"] <= min(nodes.clearances) + 1e-3 * design.reach
@@ -553,7 +553,7 @@ def test_empty_workspace_is_a_row_with_a_reason() -> None:
     assert rows["status"] == ["empty workspace"] * 2
     assert "box" in str(rows["reason"][0])
     assert rows["volume"] == [0.0, 0.0]
-    assert rows["reachable_volume"] == [0.0, 0.0]
+    assert rows["accessible_volume"] == [0.0, 0.0]
     assert isinstance(rows["reach"][0], float)
     assert rows["clearance"] == rows["mean_margin"] == rows["least_clearance"] == [None, None]
 
@@ -590,10 +590,10 @@ def test_invalid_design_is_a_row_with_a_reason() -> None:
     assert rows["volume"][1] is None
 
 
-def test_home_that_collides_has_no_reachable_volume_and_a_reason() -> None:
-    study = sampled("grid", 2, variables={"radius": [0, 3]}, measures=["reachable_volume"])
+def test_home_that_collides_has_no_accessible_volume_and_a_reason() -> None:
+    study = sampled("grid", 2, variables={"radius": [0, 3]}, measures=["accessible_volume"])
     rows = columns(study, 0, 2)
-    assert rows["reachable_volume"][1] is None
+    assert rows["accessible_volume"][1] is None
     assert rows["reason"][0] == ""
     assert "legs" in str(rows["reason"][1])
 

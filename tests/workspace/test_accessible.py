@@ -19,11 +19,11 @@ from explorer import (
     InputError,
     Limits,
     Pose,
+    accessible_workspace,
     home_pose,
     leg_clearances,
     moves_are_clear,
     radius_curve,
-    reachable_workspace,
     rotation_from_yaw_pitch_roll,
     workspace_nodes,
     workspace_solid,
@@ -74,8 +74,8 @@ def random_design(seed: int) -> Design | None:
 def test_accessible_workspace_with_thin_legs_loses_nodes_of_the_base_plane_alone(
     design: Design,
 ) -> None:
-    found = reachable_workspace(design)
-    assert found.reachable_volume == found.volume == workspace_volume(design).volume
+    found = accessible_workspace(design)
+    assert found.accessible_volume == found.volume == workspace_volume(design).volume
     assert found.solid.volume == pytest.approx(workspace_solid(design).volume, rel=1e-12)
     assert all(pair.blocked_volume == 0.0 for pair in found.pairs)
     nodes = workspace_nodes(design)
@@ -87,8 +87,8 @@ def test_accessible_workspace_with_thin_legs_loses_nodes_of_the_base_plane_alone
     near = 1e-9 * design.reach
     crossing = (leg_clearances(design, flat, r).clearance <= near).any(axis=-1)
     assert found.node_count is not None
-    assert found.reachable_node_count is not None
-    assert found.node_count - found.reachable_node_count == int((within & crossing).sum()) > 0
+    assert found.accessible_node_count is not None
+    assert found.node_count - found.accessible_node_count == int((within & crossing).sum()) > 0
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -96,10 +96,10 @@ def test_accessible_solid_of_random_designs_holds_the_ends_of_clear_moves_alone(
     design = random_design(seed)
     if design is None:
         return
-    found, r = reachable_workspace(design, nodes=24), home_rotation(design)
+    found, r = accessible_workspace(design, nodes=24), home_rotation(design)
     solid = found.solid
     assert solid.is_watertight
-    assert 0.0 < found.reachable_volume <= found.volume
+    assert 0.0 < found.accessible_volume <= found.volume
     lows, highs = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     step = float(((highs - lows) / 23.0).max())
     rng = np.random.default_rng(seed)
@@ -124,8 +124,8 @@ def test_random_designs_are_thick_thin_cut_and_whole() -> None:
     for seed in range(40):
         design = random_design(seed)
         if design is not None:
-            found = reachable_workspace(design, nodes=12)
-            whole = found.reachable_volume > (1.0 - 1e-6) * found.volume
+            found = accessible_workspace(design, nodes=12)
+            whole = found.accessible_volume > (1.0 - 1e-6) * found.volume
             kinds.add((design.limits.leg_radii[0] > 0.0, whole))
     assert {(True, False), (False, False)} <= kinds
 
@@ -134,7 +134,7 @@ def test_random_designs_are_thick_thin_cut_and_whole() -> None:
 @pytest.mark.parametrize("radius", [0.0025, 0.01])
 def test_accessible_volume_agrees_with_random_positions(design: Design, radius: float) -> None:
     design, r = thick(design, radius), home_rotation(design)
-    found = reachable_workspace(design)
+    found = accessible_workspace(design)
     rng = np.random.default_rng(5)
     lows, highs = design.limits.box or (-design.reach, design.reach)
     points = rng.uniform(lows, highs, (400_000, 3))
@@ -142,12 +142,12 @@ def test_accessible_volume_agrees_with_random_positions(design: Design, radius: 
     clear = (leg_clearances(design, points, r).clearance > 0.0).all(axis=-1)
     # In these designs everything that is clear hangs together.
     share, error = clear.mean(), clear.std() / math.sqrt(len(points))
-    assert found.reachable_volume / found.volume == pytest.approx(share, abs=4.0 * error + 5e-4)
+    assert found.accessible_volume / found.volume == pytest.approx(share, abs=4.0 * error + 5e-4)
 
 
 def test_accessible_solid_faces_name_their_limit_or_pair() -> None:
     design = thick(OPTIMAL, 0.01)
-    solid = reachable_workspace(design).solid
+    solid = accessible_workspace(design).solid
     centres = solid.vertices[solid.faces].mean(axis=1)
     clearance = leg_clearances(design, centres, home_rotation(design)).clearance
     seen: set[str] = {solid.limits[index] for index in solid.limit_of_face.tolist()}
@@ -164,12 +164,12 @@ def test_accessible_solid_faces_name_their_limit_or_pair() -> None:
 
 def test_blocked_volume_is_that_of_a_pair_alone() -> None:
     design = limited(OPTIMAL, leg_radii=(0.0, 0.2, 0.0, 0.2))
-    found = reachable_workspace(design)
+    found = accessible_workspace(design)
     blocked = {pair.legs: pair.blocked_volume for pair in found.pairs}
-    alone = reachable_workspace(limited(OPTIMAL, leg_radii=(0.0, 0.0, 0.0, 0.4)))
+    alone = accessible_workspace(limited(OPTIMAL, leg_radii=(0.0, 0.0, 0.0, 0.4)))
     assert blocked[(2, 4)] > blocked[(3, 4)] > 0.0
     assert blocked[(1, 2)] == blocked[(1, 3)] == blocked[(2, 3)] == 0.0
-    lost = found.volume - found.reachable_volume
+    lost = found.volume - found.accessible_volume
     assert max(blocked.values()) <= lost <= sum(blocked.values())
     # The pair (2, 4) has the sum of radii 0.4 in both designs.
     again = {pair.legs: pair.blocked_volume for pair in alone.pairs}
@@ -179,19 +179,19 @@ def test_blocked_volume_is_that_of_a_pair_alone() -> None:
 @pytest.mark.parametrize("by", [1e-6, 1e6])
 def test_accessible_workspace_of_a_scaled_design_is_scaled(by: float) -> None:
     small, large = thick(OPTIMAL, 0.01), scaled_design(thick(OPTIMAL, 0.01), by)
-    one, other = reachable_workspace(small, nodes=20), reachable_workspace(large, nodes=20)
-    assert other.reachable_volume / by**3 == pytest.approx(one.reachable_volume, rel=2e-5)
-    assert other.reachable_node_count == one.reachable_node_count
+    one, other = accessible_workspace(small, nodes=20), accessible_workspace(large, nodes=20)
+    assert other.accessible_volume / by**3 == pytest.approx(one.accessible_volume, rel=2e-5)
+    assert other.accessible_node_count == one.accessible_node_count
 
 
 def test_accessible_volume_with_a_finer_grid_is_the_same() -> None:
-    coarse, fine = (reachable_workspace(thick(INITIAL, 0.01), nodes=n) for n in (30, 60))
-    assert coarse.reachable_volume == pytest.approx(fine.reachable_volume, rel=2e-3)
+    coarse, fine = (accessible_workspace(thick(INITIAL, 0.01), nodes=n) for n in (30, 60))
+    assert coarse.accessible_volume == pytest.approx(fine.accessible_volume, rel=2e-3)
 
 
 def test_accessible_workspace_within_empty_limits_is_empty() -> None:
-    found = reachable_workspace(limited(OPTIMAL, l1=(0.0, 1.0), l4=(0.0, 0.1)))
-    assert found.volume == found.reachable_volume == found.reachable_node_count == 0
+    found = accessible_workspace(limited(OPTIMAL, l1=(0.0, 1.0), l4=(0.0, 0.1)))
+    assert found.volume == found.accessible_volume == found.accessible_node_count == 0
     assert found.solid.is_empty
     assert found.solid.empty_because
 
@@ -201,11 +201,11 @@ def test_accessible_workspace_without_volume_counts_its_nodes(home_z: float) -> 
     home = Pose.of((10.0, 5.0, home_z), home_rotation(OPTIMAL))
     flat = limited(OPTIMAL, box=((0.0, -12.0, 8.0), (20.0, 22.0, 8.0)))
     design = msgspec.structs.replace(flat, home=home)
-    found, count = reachable_workspace(design), workspace_nodes(design).count
+    found, count = accessible_workspace(design), workspace_nodes(design).count
     assert found.solid.is_empty
     assert found.node_count == count > 0
     # Nothing is accessible from a home that breaks a limit.
-    assert found.reachable_node_count == (count if home_z == 8.0 else 0)
+    assert found.accessible_node_count == (count if home_z == 8.0 else 0)
 
 
 HUNDREDTH = 0.01 * OPTIMAL.reach
@@ -225,7 +225,7 @@ def test_accessible_workspace_from_an_invalid_home_names_cause_and_remedy(
     design = limited(OPTIMAL, leg_radii=radii)
     design = msgspec.structs.replace(design, home=Pose.of(home, home_rotation(OPTIMAL)))
     with pytest.raises(InputError, match=words):
-        reachable_workspace(design)
+        accessible_workspace(design)
 
 
 def test_nearest_clear_position_has_no_nearer_one() -> None:
@@ -247,9 +247,9 @@ def test_nearest_clear_position_has_no_nearer_one() -> None:
 @pytest.mark.parametrize("nodes", [0, 7, 161])
 def test_accessible_workspace_with_a_grid_out_of_range_is_refused(nodes: int) -> None:
     with pytest.raises(InputError, match=f"from 8 to 160; got {nodes}"):
-        reachable_workspace(OPTIMAL, nodes=nodes)
+        accessible_workspace(OPTIMAL, nodes=nodes)
     with pytest.raises(InputError, match="at most"):
-        reachable_workspace(OPTIMAL, node_step=1e-3)
+        accessible_workspace(OPTIMAL, node_step=1e-3)
 
 
 def test_accessible_nodes_are_a_component_of_clear_steps() -> None:
@@ -338,7 +338,7 @@ def test_radius_curve_agrees_with_solids(design: Design) -> None:
     assert curve.harmless == curve.harmless_bound == 0.0
     for share in (0.25, 0.5, 0.9):
         radius = share * float(curve.radii[-1])
-        solid = reachable_workspace(with_radius(design, radius)).reachable_volume
+        solid = accessible_workspace(with_radius(design, radius)).accessible_volume
         assert np.interp(radius, curve.radii, curve.volumes) == pytest.approx(solid, rel=5e-3)
     assert curve.radius_at(0.99) < curve.radius_at(0.95)
 
@@ -348,10 +348,10 @@ def test_harmless_radius_blocks_nothing_and_a_larger_one_does() -> None:
     curve = radius_curve(design, cells=20)
     assert 0.0 < curve.harmless_bound <= curve.harmless
     under, over = (with_radius(design, share * curve.harmless) for share in (0.98, 1.5))
-    untouched = reachable_workspace(under)
-    assert untouched.reachable_volume == pytest.approx(untouched.volume, rel=1e-6)
-    touched = reachable_workspace(over, nodes=60)
-    assert touched.reachable_volume < touched.volume * (1.0 - 1e-6)
+    untouched = accessible_workspace(under)
+    assert untouched.accessible_volume == pytest.approx(untouched.volume, rel=1e-6)
+    touched = accessible_workspace(over, nodes=60)
+    assert touched.accessible_volume < touched.volume * (1.0 - 1e-6)
 
 
 def test_radius_curve_of_an_empty_workspace_is_zero() -> None:
@@ -365,6 +365,6 @@ def test_accessible_workspace_of_another_orientation_and_start_holds_the_start()
     # Another orientation than the home's, from a start of one's own.
     r: FloatArray = rotation_from_yaw_pitch_roll((-60.0, 5.0, 5.0))
     design = msgspec.structs.replace(OPTIMAL, limits=Limits(leg_radii=(0.1, 0.1, 0.1, 0.1)))
-    found = reachable_workspace(design, r, start=(10.0, 5.0, 9.0), nodes=16)
-    assert 0.0 < found.reachable_volume <= workspace_volume(design, r).volume
+    found = accessible_workspace(design, r, start=(10.0, 5.0, 9.0), nodes=16)
+    assert 0.0 < found.accessible_volume <= workspace_volume(design, r).volume
     assert found.solid.winding(np.array([10.0, 5.0, 9.0])) == pytest.approx(1.0)

@@ -32,7 +32,7 @@ from explorer import (
 from explorer.mechanism.design import LENGTHS
 from explorer.workspace.limits.constraints import CARRIAGE_ORDER, Never, constraints, demanded_order
 from explorer.workspace.orientations.share import orientations_within
-from explorer.workspace.solids.solids import dexterous_solid, reachable_solid, workspace_solid
+from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -85,15 +85,15 @@ def test_workspace_with_the_carriages_in_the_other_order_is_empty() -> None:
     assert workspace_nodes(plain, MIRRORED).count > 100
 
 
-def test_reachable_and_dexterous_solids_respect_the_order() -> None:
+def test_inclusive_and_total_solids_respect_the_order() -> None:
     design = limited(OPTIMAL, margin=None)
     both = np.stack([home_pose(design).rotation, MIRRORED])
     alone = workspace_solid(design).volume
-    assert reachable_solid(design, both).volume == pytest.approx(alone, rel=1e-3)
-    assert dexterous_solid(design, both).empty_because == (CARRIAGE_ORDER,)
+    assert inclusive_solid(design, both).volume == pytest.approx(alone, rel=1e-3)
+    assert total_solid(design, both).empty_because == (CARRIAGE_ORDER,)
     plain = limited(design, carriage_order="any")
-    assert reachable_solid(plain, both).volume > 1.005 * alone
-    assert not dexterous_solid(plain, both).is_empty
+    assert inclusive_solid(plain, both).volume > 1.005 * alone
+    assert not total_solid(plain, both).is_empty
 
 
 def test_order_violation_is_worded_with_its_sign_at_home() -> None:

@@ -21,8 +21,8 @@ from explorer.workspace.solids.solids import (
     HULL,
     convex_hull,
     cut_solid,
-    dexterous_solid,
-    reachable_solid,
+    inclusive_solid,
+    total_solid,
     workspace_solid,
 )
 
@@ -95,13 +95,13 @@ def test_hull_is_convex_and_contains_the_solid(seed: int) -> None:
     assert float(heights.max()) < 1e-6 * design.reach
 
 
-def test_reachable_and_dexterous_solids_are_union_and_intersection() -> None:
+def test_inclusive_and_total_solids_are_union_and_intersection() -> None:
     tolerance = 0.1
     each = [workspace_solid(OPTIMAL, r, tolerance) for r in YAWS]
-    reachable = reachable_solid(OPTIMAL, YAWS, tolerance)
-    dexterous = dexterous_solid(OPTIMAL, YAWS, tolerance)
-    assert reachable.is_watertight
-    assert dexterous.is_watertight
+    inclusive = inclusive_solid(OPTIMAL, YAWS, tolerance)
+    total = total_solid(OPTIMAL, YAWS, tolerance)
+    assert inclusive.is_watertight
+    assert total.is_watertight
     rng = np.random.default_rng(0)
     points = rng.uniform([-1.0, -13.0, -1.0], [21.0, 23.0, 19.0], (400, 3))
     slack = np.stack(
@@ -110,12 +110,12 @@ def test_reachable_and_dexterous_solids_are_union_and_intersection() -> None:
     clear = (np.abs(slack) > 2.0 * tolerance).all(axis=0)
     points, kept = points[clear], slack[:, clear] > 0.0
     assert kept.any(axis=0).sum() > 50
-    for solid, expected in ((reachable, kept.any(axis=0)), (dexterous, kept.all(axis=0))):
+    for solid, expected in ((inclusive, kept.any(axis=0)), (total, kept.all(axis=0))):
         windings = [solid.winding(point) for point in points]
         np.testing.assert_allclose(windings, expected, atol=1e-6)
     volumes = [solid.volume for solid in each]
-    assert reachable.volume > max(volumes)
-    assert dexterous.volume < min(volumes)
+    assert inclusive.volume > max(volumes)
+    assert total.volume < min(volumes)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -156,14 +156,14 @@ def test_shifted_limits_have_the_slacks_and_rates_of_their_positions(seed: int) 
 
 
 @pytest.mark.parametrize("tool", [(0.0, 0.0, 6.0), (3.0, -2.0, -5.0)])
-def test_reachable_and_dexterous_solids_of_the_tool_hold_its_positions(
+def test_inclusive_and_total_solids_of_the_tool_hold_its_positions(
     tool: tuple[float, float, float],
 ) -> None:
     tolerance = 0.1
     rotations = cone_of_directions(home_rotation(OPTIMAL), 12.0, 7)
-    reachable = reachable_solid(OPTIMAL, rotations, tolerance, tool)
-    dexterous = dexterous_solid(OPTIMAL, rotations, tolerance, tool)
-    low, high = reachable.vertices.min(axis=0) - 1.0, reachable.vertices.max(axis=0) + 1.0
+    inclusive = inclusive_solid(OPTIMAL, rotations, tolerance, tool)
+    total = total_solid(OPTIMAL, rotations, tolerance, tool)
+    low, high = inclusive.vertices.min(axis=0) - 1.0, inclusive.vertices.max(axis=0) + 1.0
     points = np.random.default_rng(0).uniform(low, high, (1500, 3))
     offsets = rotations @ np.array(tool)
     # Membership from the poses themselves: those of b4 that put the tool at a point.
@@ -178,34 +178,34 @@ def test_reachable_and_dexterous_solids_of_the_tool_hold_its_positions(
     for step in steps:
         clear &= (allowed(step) == within).all(axis=1)
     any_of, all_of = (np.asarray(reduce(within, axis=1)) for reduce in (np.any, np.all))
-    for solid, expected in ((reachable, any_of), (dexterous, all_of)):
+    for solid, expected in ((inclusive, any_of), (total, all_of)):
         assert solid.is_watertight
         assert 20 < expected[clear].sum() < clear.sum() - 20
         windings = np.array([solid.winding(point) for point in points[clear]])
         np.testing.assert_allclose(windings, expected[clear], atol=1e-6)
-    at_b4 = reachable_solid(OPTIMAL, rotations, tolerance)
-    assert abs(reachable.volume - at_b4.volume) > 0.01 * at_b4.volume
+    at_b4 = inclusive_solid(OPTIMAL, rotations, tolerance)
+    assert abs(inclusive.volume - at_b4.volume) > 0.01 * at_b4.volume
 
 
-def test_reachable_and_dexterous_solids_of_a_tool_at_b4_are_those_of_b4() -> None:
-    for make in (reachable_solid, dexterous_solid):
+def test_inclusive_and_total_solids_of_a_tool_at_b4_are_those_of_b4() -> None:
+    for make in (inclusive_solid, total_solid):
         ours, b4 = make(OPTIMAL, YAWS, 0.2, (0.0, 0.0, 0.0)), make(OPTIMAL, YAWS, 0.2)
         np.testing.assert_array_equal(ours.vertices, b4.vertices)
 
 
-def test_reachable_and_dexterous_solids_of_one_orientation_are_its_workspace() -> None:
+def test_inclusive_and_total_solids_of_one_orientation_are_its_workspace() -> None:
     one = workspace_solid(OPTIMAL)
     same = np.array([home_rotation(OPTIMAL)] * 3)
-    for family in (reachable_solid(OPTIMAL, same), dexterous_solid(OPTIMAL, same)):
+    for family in (inclusive_solid(OPTIMAL, same), total_solid(OPTIMAL, same)):
         assert family.volume == pytest.approx(one.volume, rel=1e-9)
         assert {family.limits[k] for k in family.limit_of_face} == {
             one.limits[k] for k in one.limit_of_face
         }
 
 
-def test_reachable_and_dexterous_solids_lie_on_their_limits() -> None:
+def test_inclusive_and_total_solids_lie_on_their_limits() -> None:
     everything = [x for r in YAWS for x in constraints(OPTIMAL, r)]
-    for solid in (reachable_solid(OPTIMAL, YAWS), dexterous_solid(OPTIMAL, YAWS)):
+    for solid in (inclusive_solid(OPTIMAL, YAWS), total_solid(OPTIMAL, YAWS)):
         for index, name in enumerate(solid.limits):
             faces = solid.faces[solid.limit_of_face == index]
             if len(faces):
@@ -214,29 +214,29 @@ def test_reachable_and_dexterous_solids_lie_on_their_limits() -> None:
                 assert np.min(off, axis=0).max() <= solid.tolerance * (1.0 + 1e-6)
 
 
-def test_reachable_solid_of_many_orientations_has_few_faces() -> None:
+def test_inclusive_solid_of_many_orientations_has_few_faces() -> None:
     tilts = (-8.0, 0.0, 8.0)
     angles = list(itertools.product((-81.0, -73.0, -65.0), tilts, tilts))
-    solid = reachable_solid(OPTIMAL, rotation_from_yaw_pitch_roll(angles), 0.2)
+    solid = inclusive_solid(OPTIMAL, rotation_from_yaw_pitch_roll(angles), 0.2)
     assert solid.is_watertight
     assert len(solid.faces) < 2000
 
 
-def test_reachable_and_dexterous_solids_empty_name_limits() -> None:
+def test_inclusive_and_total_solids_empty_name_limits() -> None:
     opposite = rotation_from_yaw_pitch_roll([(-73.1, 0.0, 0.0), (73.1, 0.0, 0.0)])
-    nothing = dexterous_solid(OPTIMAL, opposite)
+    nothing = total_solid(OPTIMAL, opposite)
     assert nothing.is_empty
     assert nothing.empty_because == ("margin δ2",)
-    assert not reachable_solid(OPTIMAL, opposite).is_empty
+    assert not inclusive_solid(OPTIMAL, opposite).is_empty
     level = np.eye(3)[None]
-    assert reachable_solid(OPTIMAL, level).empty_because == ("margin δ2",)
+    assert inclusive_solid(OPTIMAL, level).empty_because == ("margin δ2",)
 
 
 def test_solids_over_invalid_rotations_are_refused() -> None:
-    for make in (reachable_solid, dexterous_solid):
+    for make in (inclusive_solid, total_solid):
         with pytest.raises(InputError, match="tool must be finite"):
             make(OPTIMAL, YAWS, None, (0.0, 0.0, np.inf))
     for rotations in (np.eye(3), np.zeros((0, 3, 3)), 2.0 * np.eye(3)[None], "x"):
-        for make in (reachable_solid, dexterous_solid):
+        for make in (inclusive_solid, total_solid):
             with pytest.raises(ExplorerError):
                 make(OPTIMAL, rotations)

@@ -36,7 +36,7 @@ from explorer.workspace.solids.solids import (
     carved_solid,
     convex_hull,
     cut_solid,
-    reachable_solid,
+    inclusive_solid,
     workspace_solid,
 )
 
@@ -358,7 +358,7 @@ def test_solid_of_too_many_faces_error_names_a_tolerance() -> None:
     allowed = float(str(refusal.value).rpartition(" ")[2])
     assert 1e-7 < allowed < 1e-2
     with pytest.raises(InputError, match="fewer orientations"):
-        reachable_solid(OPTIMAL, np.array([home_rotation(OPTIMAL)] * 2), 1e-6)
+        inclusive_solid(OPTIMAL, np.array([home_rotation(OPTIMAL)] * 2), 1e-6)
 
 
 def test_solid_with_a_huge_tolerance_is_not_empty() -> None:

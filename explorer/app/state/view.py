@@ -39,7 +39,7 @@ class WorkspaceView:
     """
 
     solid: bool = False
-    region: Literal["limits", "reachable", "held"] = "limits"
+    region: Literal["limits", "accessible", "held"] = "limits"
     start: Literal["home", "pose"] = "home"
     hull: bool = False
     planes: bool = False
@@ -68,7 +68,7 @@ class OrientationView:
     """
 
     tilts: bool = False
-    over: Literal["none", "reachable", "dexterous"] = "none"
+    over: Literal["none", "inclusive", "total"] = "none"
     range: float = 20.0
     turn: float = 0.0
 

@@ -11,7 +11,12 @@ from typing import Annotated, Any, cast
 
 import msgspec
 
-from explorer.app.storage.packing import present_design, present_paths, present_view
+from explorer.app.storage.packing import (
+    present_design,
+    present_paths,
+    present_view,
+    present_words,
+)
 from explorer.errors import InputError
 from explorer.optimise.problem import Problem
 from explorer.optimise.record import Step, iterate_of
@@ -110,4 +115,5 @@ def _upgrade_designs(value: Any) -> Any:
     if not isinstance(value, dict):
         return value
     fields = cast("dict[str, Any]", value)
-    return present_design({name: _upgrade_designs(old) for name, old in fields.items()})
+    present = {name: _upgrade_designs(old) for name, old in fields.items()}
+    return present_design(present_words(present))

@@ -21,6 +21,7 @@ from explorer.app.state.actions import SetJoint
 from explorer.app.state.parts import saved_fields
 from explorer.app.state.state import State, joints_of
 from explorer.errors import InputError, StorageError
+from explorer.measures.catalogue import FORMER_NAMES
 from explorer.mechanism.design_file import MIGRATIONS as MIGRATIONS_OF_DESIGNS, migrate
 
 REFERENCE = "#"
@@ -38,6 +39,13 @@ _FORMER_KINDS = {"modes": "straight", "plan": "planned"}
 
 # Fields of the view of an older explorer.
 _FORMER_VIEW = frozenset({"twin", "prototype"})
+
+# Present words of fields by those in files of older explorers.
+_FORMER_WORDS: dict[str, Mapping[str, str]] = {
+    "region": {"reachable": "accessible"},
+    "over": {"reachable": "inclusive", "dexterous": "total"},
+    **dict.fromkeys(("measures", "objectives", "axis", "across", "up", "colour"), FORMER_NAMES),
+}
 
 
 class Packer:
@@ -131,8 +139,8 @@ class Unpacker:
 def resolve(objects: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return objects with those that they refer to in place of the references.
 
-    Designs of an older schema become designs of the present one, paths and views of an older
-    explorer those of the present one.
+    Designs of an older schema become designs of the present one, paths, views and words of an
+    older explorer those of the present one.
 
     Raises:
         InputError: a reference to an object that does not come before.
@@ -153,7 +161,7 @@ def resolve(objects: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
     for each in objects:
         fields = {name: value_of(raw) for name, raw in each.items()}
-        resolved.append(present_view(present_paths(present_design(fields))))
+        resolved.append(present_view(present_paths(present_design(present_words(fields)))))
     return resolved
 
 
@@ -193,6 +201,20 @@ def present_view(fields: dict[str, Any]) -> dict[str, Any]:
     is_prototype = prototype.pop("shown", False)
     drawn_as = "6-4 twin" if fields["twin"] else "prototype" if is_prototype else "schematic"
     return present | {"prototype": prototype, "drawn_as": drawn_as}
+
+
+def present_words(fields: dict[str, Any]) -> dict[str, Any]:
+    """Return an object with the present words and names of measures in place of former ones."""
+
+    def present(value: Any, former: Mapping[str, str]) -> Any:
+        if isinstance(value, list):
+            return [present(each, former) for each in cast("list[Any]", value)]
+        return former.get(value, value) if isinstance(value, str) else value
+
+    words = _FORMER_WORDS.items()
+    return fields | {
+        name: present(fields[name], former) for name, former in words if name in fields
+    }
 
 
 def _checked(state: State) -> State:

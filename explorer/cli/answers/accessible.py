@@ -21,16 +21,16 @@ from explorer.numerics.arrays import FloatArray
 
 if TYPE_CHECKING:
     from explorer.workspace.accessible.radii import RadiusCurve
-    from explorer.workspace.accessible.workspace import ReachableWorkspace
+    from explorer.workspace.accessible.workspace import AccessibleWorkspace
 
 # The number of rows of the radius curve in a table, less one.
 ROWS = 10
 
 
-def interference_json(workspace: ReachableWorkspace) -> dict[str, object]:
+def interference_json(workspace: AccessibleWorkspace) -> dict[str, object]:
     """Return the accessible workspace as plain values, added to those of the workspace."""
     return {
-        **attributes(workspace, "reachable_volume reachable_node_count"),
+        **attributes(workspace, "accessible_volume accessible_node_count"),
         "harmless_radius": finite(workspace.harmless_radius),
         "pairs": [
             {
@@ -41,11 +41,11 @@ def interference_json(workspace: ReachableWorkspace) -> dict[str, object]:
             }
             for pair in workspace.pairs
         ],
-        "reachable_solid": mesh_json(workspace.solid),
+        "accessible_solid": mesh_json(workspace.solid),
     }
 
 
-def interference_table(design: Design, workspace: ReachableWorkspace) -> str:
+def interference_table(design: Design, workspace: AccessibleWorkspace) -> str:
     """Return the table of pairs of legs and the volumes that they block."""
     rows: list[tuple[str, ...]] = [
         ("legs", "least clearance", "certified", "blocked alone (units³)")

@@ -30,7 +30,7 @@ from explorer.numerics.arrays import FloatArray
 
 if TYPE_CHECKING:
     from explorer.workspace.accessible.radii import RadiusCurve
-    from explorer.workspace.accessible.workspace import ReachableWorkspace
+    from explorer.workspace.accessible.workspace import AccessibleWorkspace
     from explorer.workspace.held import HeldWorkspace
     from explorer.workspace.solids.solid import Solid
 
@@ -49,8 +49,8 @@ class WorkspaceMeasures:
         solid: Mesh of the workspace.
         hull: Convex hull of the mesh.
         orientations: Number of orientations of the next three.
-        reachable: Union of the workspaces over the orientations.
-        dexterous: Intersection of the workspaces over the orientations.
+        inclusive: Union of the workspaces over the orientations.
+        total: Intersection of the workspaces over the orientations.
         capability: Share of feasible orientations at a position, from 0 to 1.
         interference: Accessible workspace.
         curve: Accessible volume as a function of the radius of all legs.
@@ -62,10 +62,10 @@ class WorkspaceMeasures:
     solid: Solid
     hull: Solid | None
     orientations: int | None
-    reachable: Solid | None
-    dexterous: Solid | None
+    inclusive: Solid | None
+    total: Solid | None
     capability: float | None
-    interference: ReachableWorkspace | None
+    interference: AccessibleWorkspace | None
     curve: RadiusCurve | None
     held: HeldWorkspace | None
 
@@ -94,10 +94,10 @@ class WorkspaceMeasures:
             answer["mesh_agrees"] = False
         if self.hull is not None:
             answer["hull_volume"] = self.hull.volume
-        if self.reachable is not None and self.dexterous is not None:
+        if self.inclusive is not None and self.total is not None:
             answer["orientations"] = self.orientations
-            answer["reachable_mesh"] = mesh_json(self.reachable)
-            answer["dexterous_mesh"] = mesh_json(self.dexterous)
+            answer["inclusive_mesh"] = mesh_json(self.inclusive)
+            answer["total_mesh"] = mesh_json(self.total)
         if self.held is not None:
             answer["held_volume"] = self.held.held_volume
             answer["held_mesh"] = mesh_json(self.held.solid)
@@ -127,9 +127,9 @@ class WorkspaceMeasures:
         volumes += self._volumes_of_meshes()
         accessible = self.interference
         if accessible is not None:
-            remark = f"{accessible.reachable_node_count} of {accessible.node_count} nodes"
-            title = CATALOGUE["reachable_volume"].heading
-            volumes.append((title, accessible.reachable_volume, remark))
+            remark = f"{accessible.accessible_node_count} of {accessible.node_count} nodes"
+            title = CATALOGUE["accessible_volume"].heading
+            volumes.append((title, accessible.accessible_volume, remark))
         cubic = (0.1 * design.unit_mm) ** 3
         rows = [("", "units³", "cm³", "")]
         rows += [(name, figure(v), figure(v * cubic), remark) for name, v, remark in volumes]
@@ -159,7 +159,7 @@ class WorkspaceMeasures:
         yield "mesh", self.solid.volume, _mesh_remark(self.solid)
         if self.hull is not None:
             yield "convex hull", self.hull.volume, ""
-        for name, solid in (("reachable", self.reachable), ("dexterous", self.dexterous)):
+        for name, solid in (("inclusive", self.inclusive), ("total", self.total)):
             if solid is not None:
                 remark = f"{self.orientations} orientations, {_mesh_remark(solid)}"
                 yield name, solid.volume, remark

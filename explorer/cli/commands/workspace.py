@@ -33,7 +33,7 @@ from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 if TYPE_CHECKING:
     from explorer.numerics.arrays import FloatArray
     from explorer.workspace.accessible.radii import RadiusCurve
-    from explorer.workspace.accessible.workspace import ReachableWorkspace
+    from explorer.workspace.accessible.workspace import AccessibleWorkspace
     from explorer.workspace.held import HeldWorkspace
 
 Ends = tuple[float, float]
@@ -47,7 +47,7 @@ SAMPLES_OF_TILT = 33
 class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, DesignOptions):
     """Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.
 
-    Ranges or a tilt add the reachable volume (union over these orientations) and the dexterous
+    Ranges or a tilt add the inclusive volume (union over these orientations) and the total
     volume (intersection). An empty workspace is an answer too, with the limits that empty it.
     With `--at tool` it is the workspace of the tool point: at one orientation moved as a whole,
     over several each by its own vector.
@@ -134,30 +134,30 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
         shift, tool = self.shift(design, pose), self.tool(design)
         if shift is not None:
             solid = solid.shifted(shift)
-        reachable = dexterous = None
+        inclusive = total = None
         if orientations is not None:
-            reachable = solids.reachable_solid(design, orientations, self.tolerance, tool)
-            dexterous = solids.dexterous_solid(design, orientations, self.tolerance, tool)
+            inclusive = solids.inclusive_solid(design, orientations, self.tolerance, tool)
+            total = solids.total_solid(design, orientations, self.tolerance, tool)
         return WorkspaceMeasures(
             case=case,
             shift=shift,
             solid=solid,
             hull=solids.convex_hull(solid) if self.hull else None,
             orientations=None if orientations is None else len(orientations),
-            reachable=reachable,
-            dexterous=dexterous,
+            inclusive=inclusive,
+            total=total,
             capability=self._share(design, orientations),
             held=self._held(design, pose),
             interference=self._interference(design, pose),
             curve=self._curve(design, pose),
         )
 
-    def _interference(self, design: Design, pose: Pose) -> ReachableWorkspace | None:
+    def _interference(self, design: Design, pose: Pose) -> AccessibleWorkspace | None:
         if not self.interference:
             return None
-        from explorer.workspace.accessible.workspace import reachable_workspace
+        from explorer.workspace.accessible.workspace import accessible_workspace
 
-        return reachable_workspace(
+        return accessible_workspace(
             design, pose.rotation, node_step=self.step, tolerance=self.tolerance
         )
 

@@ -31,7 +31,7 @@ from explorer.singularity.ellipsoids import (
     singularity_free_ball,
 )
 from explorer.statics.tool_precision import ToolPrecision
-from explorer.workspace.accessible.workspace import ReachableWorkspace, reachable_workspace
+from explorer.workspace.accessible.workspace import AccessibleWorkspace, accessible_workspace
 from explorer.workspace.held import HeldWorkspace
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.slices.volume import NodeCount, Volume
@@ -65,7 +65,7 @@ class ReportData:
         solid: Mesh of the workspace.
         hull_volume: Volume of the convex hull of the mesh, in cubed design units.
         least: Least clearances of the legs over the workspace.
-        reachable: Accessible part of the workspace; None where all legs have zero radius.
+        accessible: Accessible part of the workspace; None where all legs have zero radius.
         performance: Ellipsoids of the pose.
         ball: Largest ball of positions about the pose that holds no singular one.
         certified: Root-mean-square displacement of b1 to b4, in design units, below which no
@@ -85,7 +85,7 @@ class ReportData:
     solid: Solid | Missing
     hull_volume: float | Missing
     least: LeastClearances
-    reachable: ReachableWorkspace | Missing | None
+    accessible: AccessibleWorkspace | Missing | None
     performance: Performance
     ball: SingularityFreeBall
     certified: float
@@ -134,9 +134,9 @@ def gather_report_data(
         solid = _compute(lambda: workspace_solid(design, r, volume=case.volume))
     if not isinstance(solid, Missing):
         case.mesh = solid
-    reachable = None
+    accessible = None
     if any(design.limits.leg_radii):
-        reachable = _compute(lambda: reachable_workspace(design, r, start=at.position))
+        accessible = _compute(lambda: accessible_workspace(design, r, start=at.position))
     held = None
     if case.is_loaded and case.is_limited:
         held = _compute(lambda: case.held)
@@ -149,7 +149,7 @@ def gather_report_data(
         solid=solid,
         hull_volume=solid if isinstance(solid, Missing) else _compute(lambda: _hull(solid)),
         least=least_clearances(design, r),
-        reachable=reachable,
+        accessible=accessible,
         performance=performance(design, at),
         ball=singularity_free_ball(at),
         certified=certified_radius(design, at),

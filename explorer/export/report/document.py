@@ -36,7 +36,7 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design_file import PRESETS, encode_design
 from explorer.mechanism.tool_point import tool_position
 from explorer.numerics.number_text import format_number
-from explorer.workspace.accessible.workspace import ReachableWorkspace
+from explorer.workspace.accessible.workspace import AccessibleWorkspace
 
 # The page may fetch nothing.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
@@ -165,7 +165,7 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
     # With --at tool a position is that of the tool.
     tool = tool_position(pose, data.design.tool.position)
     at_tool = "" if data.is_home else f" --position {_words(tool)}{turned}"
-    legs = " --interference" if isinstance(data.reachable, ReachableWorkspace) else ""
+    legs = " --interference" if isinstance(data.accessible, AccessibleWorkspace) else ""
     record = "" if data.record is None else " --record record.json"
     yield f"explorer report --design {source}{at}{record} --out report.html"
     yield f"explorer workspace --design {source}{turned} --hull{legs}"

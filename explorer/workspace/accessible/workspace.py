@@ -81,27 +81,27 @@ class PairCost:
 
 
 @dataclass(frozen=True)
-class ReachableWorkspace:
+class AccessibleWorkspace:
     """A constant-orientation workspace within the limits, and its accessible part.
 
     Attributes:
         volume: Exact volume within the limits, in cubed design units.
-        reachable_volume: Volume of the accessible part, in cubed design units.
+        accessible_volume: Volume of the accessible part, in cubed design units.
         solid: The accessible part.
         step: Step of the paper's grid of nodes, as in
             `explorer.workspace.slices.volume.NodeCount`.
         node_count: Number of nodes of that grid within the limits; None if not counted.
-        reachable_node_count: Number of its nodes that clear steps of the grid lead to; None if not
+        accessible_node_count: Number of its nodes that clear steps of the grid lead to; None if not
             counted.
         pairs: The six pairs of legs, in the order of `PAIRS`.
     """
 
     volume: float
-    reachable_volume: float
+    accessible_volume: float
     solid: Solid
     step: float
     node_count: int | None
-    reachable_node_count: int | None
+    accessible_node_count: int | None
     pairs: tuple[PairCost, ...]
 
     @property
@@ -110,7 +110,7 @@ class ReachableWorkspace:
         return max(0.0, 0.5 * min(pair.clearance for pair in self.pairs))
 
 
-def reachable_workspace(
+def accessible_workspace(
     design: Design,
     rotation: ArrayLike | None = None,
     *,
@@ -120,7 +120,7 @@ def reachable_workspace(
     most_nodes: int | None = None,
     tolerance: float | None = None,
     watch: Watch = unwatched,
-) -> ReachableWorkspace:
+) -> AccessibleWorkspace:
     """Compute the accessible workspace at one orientation.
 
     Args:
@@ -157,7 +157,7 @@ def reachable_workspace(
         # A workspace without volume, such as a part of a plane, may hold nodes of the grid.
         counts = _paper_nodes(design, r, limits, p, step, most_nodes)
         pairs = (_cost(pair, least, 0.0) for pair in ALL_PAIRS)
-        return ReachableWorkspace(0.0, 0.0, whole, step, *counts, tuple(pairs))
+        return AccessibleWorkspace(0.0, 0.0, whole, step, *counts, tuple(pairs))
     check_start(design, r, p)
     volume = exact.volume
     stages.begin("grid of positions")
@@ -174,7 +174,7 @@ def reachable_workspace(
     costs = [_cost(pair, least, blocked.get(pair, 0.0)) for pair in ALL_PAIRS]
     stages.begin("nodes of the grid")
     counts = _paper_nodes(design, r, limits, p, step, most_nodes)
-    return ReachableWorkspace(volume, accessible, solid, step, *counts, tuple(costs))
+    return AccessibleWorkspace(volume, accessible, solid, step, *counts, tuple(costs))
 
 
 def _cost(pair: int, least: LeastClearances, blocked: float) -> PairCost:

@@ -168,13 +168,13 @@ def _below_zero(surface: Surface, frame: Frame, face_id: int) -> Manifold:
     return manifold_of((frame.to_frame(points), faces), (face_id,), (len(faces),))
 
 
-def reachable_solid(
+def inclusive_solid(
     design: Design,
     rotations: ArrayLike,
     tolerance: float | None = None,
     tool: ArrayLike | None = None,
 ) -> Solid:
-    """Return the reachable workspace of n orientations, the union over them, as a mesh.
+    """Return the inclusive workspace of n orientations, the union over them, as a mesh.
 
     Args:
         design: The manipulator.
@@ -203,15 +203,15 @@ def reachable_solid(
     return replace(solid, empty_because=tuple(because))
 
 
-def dexterous_solid(
+def total_solid(
     design: Design,
     rotations: ArrayLike,
     tolerance: float | None = None,
     tool: ArrayLike | None = None,
 ) -> Solid:
-    """Return the dexterous workspace of n orientations, the intersection over them, as a mesh.
+    """Return the total workspace of n orientations, the intersection over them, as a mesh.
 
-    Arguments and errors are those of `reachable_solid`.
+    Arguments and errors are those of `inclusive_solid`.
     """
     limits = [limit for family in constraints_over(design, rotations, tool) for limit in family]
 

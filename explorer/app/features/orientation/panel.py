@@ -45,7 +45,7 @@ from explorer.workspace.orientations.tilts import (
 )
 from explorer.workspace.orientations.torsions import torsion_range
 
-OVER = {"none": "none", "reachable": "reachable", "dexterous": "dexterous"}
+OVER = {"none": "none", "inclusive": "inclusive", "total": "total"}
 SPANS = (Span(-180.0, 180.0, 0.1), Span(0.0, 180.0, 0.1), Span(-180.0, 180.0, 0.1))
 HINTS = (
     "Direction in the base's xy-plane, from x towards y, that the platform's z-axis tilts towards.",
@@ -54,8 +54,8 @@ HINTS = (
 )
 VOLUME_HINT = "Volume of the solid as drawn. A sample of orientations stands for the range:"
 BOUNDS = {
-    "reachable": ("at least", "positions that have only others of the range are left out."),
-    "dexterous": ("at most", "positions that lack only others of the range are in it."),
+    "inclusive": ("at least", "positions that have only others of the range are left out."),
+    "total": ("at most", "positions that lack only others of the range are in it."),
 }
 # Tilt below which the azimuth has no effect, in degrees.
 LEVEL = 1e-6
@@ -95,8 +95,8 @@ class OrientationPanel:
             self._tilts_under_way = UnderWay(gui, "tilts", self._tilts)
             controls.dropdown(
                 "Solid over tilts",
-                "Draw the positions that have at least one (reachable) or all (dexterous) of the "
-                "orientations to which a tilt and a turn from the orientation of home lead.",
+                "Draw the inclusive orientation workspace, positions that have at least one of the "
+                "orientations to which a tilt and a turn from home lead, or the total one (all).",
                 OVER,
                 "view.orientation.over",
             )

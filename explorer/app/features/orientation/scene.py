@@ -20,7 +20,7 @@ from explorer.app.widgets.colours import Rgb
 from explorer.measures.size import corners_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 
-COLOURS: dict[str, Rgb] = {"reachable": (96, 140, 196), "dexterous": (30, 150, 135)}
+COLOURS: dict[str, Rgb] = {"inclusive": (96, 140, 196), "total": (30, 150, 135)}
 OPACITY = 0.22
 # Size of a point over the distance of nodes.
 POINT_SHARE = 0.12

@@ -23,7 +23,7 @@ from explorer.workspace.orientations.share import OrientationShare, orientation_
 from explorer.workspace.orientations.tilts import greatest_tilts
 from explorer.workspace.orientations.torsions import TiltByTorsion, tilt_by_torsion
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import dexterous_solid, reachable_solid, workspace_solid
+from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid
 
 NODES = 20
 """Number of nodes on each axis of the extent, at which tilts are computed."""
@@ -152,7 +152,7 @@ class RangeRequest:
     home: Pose
     tilt: float
     turn: float
-    over: Literal["reachable", "dexterous"]
+    over: Literal["inclusive", "total"]
     tool: Triple | None = None
 
 
@@ -177,7 +177,7 @@ def orientations_over(request: RangeRequest) -> FloatArray:
 def range_solid(request: RangeRequest) -> RangeDrawing:
     """Return the workspace over a range of orientations."""
     design = request.design
-    make = reachable_solid if request.over == "reachable" else dexterous_solid
+    make = inclusive_solid if request.over == "inclusive" else total_solid
     tolerance = LIVE_TOLERANCE * design.reach
     solid = make(design, orientations_over(request), tolerance, request.tool)
     return RangeDrawing(request, solid)

@@ -61,7 +61,7 @@ def workspace_request(frame: Frame) -> WorkspaceRequest | None:
         design=loaded_design(frame.state) if is_loaded else frame.state.design,
         rotation=workspace_rows(frame),
         region=view.region,
-        start=workspace_start(frame) if view.region == "reachable" else None,
+        start=workspace_start(frame) if view.region == "accessible" else None,
         colour=colour,
         cut=view.cut,
         level=level if is_cut else None,

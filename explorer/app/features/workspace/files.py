@@ -39,7 +39,7 @@ class WorkspaceFiles:
         """Send the workspace that is shown, or its hull."""
         state = self._session.settled()
         frame, region = Frame(state), state.view.workspace.region
-        start = workspace_start(frame) if region == "reachable" else None
+        start = workspace_start(frame) if region == "accessible" else None
         self._send(who, state, region, what, file_format, workspace_rows(frame), start)
 
     def send_hull_at_home(self, file_format: str, who: Who) -> None:

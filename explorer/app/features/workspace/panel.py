@@ -73,8 +73,8 @@ SHOWN = {
 
 REGIONS: dict[str, tuple[Region, Literal["home", "pose"]]] = {
     "within the limits": ("limits", "home"),
-    "accessible from home": ("reachable", "home"),
-    "accessible from the present position": ("reachable", "pose"),
+    "accessible from home": ("accessible", "home"),
+    "accessible from the present position": ("accessible", "pose"),
     "holds the load": ("held", "home"),
 }
 """Region and start of the paths."""
@@ -327,7 +327,7 @@ def _region(frame: Frame) -> str:
     return next(
         words
         for words, (region, start) in REGIONS.items()
-        if region == view.region and (region != "reachable" or start == view.start)
+        if region == view.region and (region != "accessible" or start == view.start)
     )
 
 

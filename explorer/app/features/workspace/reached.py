@@ -17,9 +17,9 @@ from explorer.numerics.number_text import format_number
 from explorer.numerics.stages import Watch
 from explorer.workspace.accessible.start import StartError
 from explorer.workspace.accessible.workspace import (
+    AccessibleWorkspace,
     PairCost,
-    ReachableWorkspace,
-    reachable_workspace,
+    accessible_workspace,
 )
 from explorer.workspace.held import HeldWorkspace, held_workspace
 
@@ -67,18 +67,18 @@ class Reached:
     harmless_radius: float
 
 
-_cache: dict[tuple[Design, Rows, Triple | None, float], ReachableWorkspace | Trouble] = {}
+_cache: dict[tuple[Design, Rows, Triple | None, float], AccessibleWorkspace | Trouble] = {}
 
 
 def reach_workspace(
     design: Design, rotation: Rows, start: Triple | None, tolerance: float, watch: Watch
-) -> ReachableWorkspace | Trouble:
+) -> AccessibleWorkspace | Trouble:
     """Return the accessible workspace, or why there is none; cache the newest few."""
     key = (design, rotation, start, tolerance)
     result = _cache.pop(key, None)
     if result is None:
         try:
-            result = reachable_workspace(
+            result = accessible_workspace(
                 design,
                 np.array(rotation),
                 start=start,
@@ -103,11 +103,11 @@ def trouble_of(error: ExplorerError) -> Trouble:
     return Trouble(str(error), (x, y, z))
 
 
-def reached_of(workspace: ReachableWorkspace) -> Reached:
+def reached_of(workspace: AccessibleWorkspace) -> Reached:
     """Return the numbers of an accessible workspace."""
     return Reached(
-        workspace.reachable_volume,
-        workspace.reachable_node_count,
+        workspace.accessible_volume,
+        workspace.accessible_node_count,
         workspace.pairs,
         workspace.harmless_radius,
     )

@@ -44,7 +44,7 @@ from explorer.workspace.slices.volume import NodeCount, workspace_nodes
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import convex_hull, cut_solid, workspace_solid
 
-Region = Literal["limits", "reachable", "held"]
+Region = Literal["limits", "accessible", "held"]
 
 # Chord tolerance of a live solid, as a share of the reach.
 LIVE_TOLERANCE = 0.004
@@ -188,7 +188,7 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         surface = draw(workspace_faces(limits))
     whole = workspace_solid(design, rotation, tolerance, volume=measured)
     reached = trouble = held_volume = part = None
-    if request.region == "reachable":
+    if request.region == "accessible":
         result = reach_workspace(design, request.rotation, request.start, tolerance, watch)
         reached, trouble = (None, result) if isinstance(result, Trouble) else (result, None)
         part = None if reached is None else reached.solid
@@ -306,7 +306,7 @@ def _exact_file(
     if what == "hull":
         raise InputError(f"STEP takes exact faces, and a convex hull consists of facets; {meshes}")
     if region != "limits":
-        cause = "legs begin to collide" if region == "reachable" else "a part takes its limit"
+        cause = "legs begin to collide" if region == "accessible" else "a part takes its limit"
         raise InputError(
             f"STEP takes exact faces, and the surface along which {cause} consists of facets; "
             f'{meshes}, or choose the region "within the limits"'
@@ -327,7 +327,7 @@ def exported_name(region: Region, what: str, offset: Triple | None = None) -> st
     match region:
         case "limits":
             return what
-        case "reachable":
+        case "accessible":
             return f"accessible {what}"
         case "held":
             return f"{what} that holds the load"

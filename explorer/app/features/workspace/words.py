@@ -85,12 +85,14 @@ def _part_words(state: State, drawing: WorkspaceDrawing, waiting: str) -> str:
     if drawing.volume <= 0.0:
         return ""
     percent = 100.0 * volume / drawing.volume
-    does, rest = ("accessible", COLLIDING) if region == "reachable" else ("hold the load", AT_LIMIT)
+    does, rest = (
+        ("accessible", COLLIDING) if region == "accessible" else ("hold the load", AT_LIMIT)
+    )
     words = (
         f'<div class="ex-line"><span>{format_number(volume, 6)} units³ {does}, '
         f"{format_number(percent, 4)} %</span>{dim(waiting)}</div>" + meter(percent, PLAIN, rest)
     )
-    if region == "reachable":
+    if region == "accessible":
         return words
     if not has_limits(state.design):
         return words + caption("The design has no limits of forces, so that it holds any load.")

@@ -14,7 +14,7 @@ from explorer.legs.clearance import PAIRS
 def legs_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on the clearances of the legs."""
     unit, at = data.design.unit_mm, data.snapshot.clearances
-    least, reachable = data.least, data.reachable
+    least, accessible = data.least, data.accessible
     yield element("h2", "Legs")
     yield paragraph(
         "The clearance of a pair is the distance of the legs’ axes minus both radii; below zero "
@@ -27,9 +27,9 @@ def legs_section(data: ReportData) -> Iterator[Element]:
         rows.append([element("b", f"{first}–{second}")])
         for clearance in (float(at.clearance[index]), float(least.clearance[index])):
             rows[-1] += [_known(clearance), _known(clearance * unit)]
-    if reachable is not None and not isinstance(reachable, Missing):
+    if accessible is not None and not isinstance(accessible, Missing):
         heads.append("blocks, units³")
-        for row, pair in zip(rows, reachable.pairs, strict=True):
+        for row, pair in zip(rows, accessible.pairs, strict=True):
             row.append(pair.blocked_volume)
     yield table(heads, rows, align="<" + ">" * (len(heads) - 1))
 

@@ -52,8 +52,8 @@ def workspace_section(data: ReportData) -> Iterator[Element]:
     else:
         yield from _pictures(data, solid)
     yield _volumes(data)
-    if isinstance(data.reachable, Missing):
-        reason = data.reachable.reason
+    if isinstance(data.accessible, Missing):
+        reason = data.accessible.reason
         yield paragraph(f"The accessible workspace cannot be computed: {reason}.", class_="note")
     bounding = _bounding(solid) if isinstance(solid, Solid) and not solid.is_empty else None
     gradient = _gradient(data) if data.volume.gradient else None
@@ -100,7 +100,7 @@ def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
 
 
 def _volumes(data: ReportData) -> Element:
-    nodes, hull, reachable = data.nodes, data.hull_volume, data.reachable
+    nodes, hull, accessible = data.nodes, data.hull_volume, data.accessible
     remarks: dict[str, Cell] = {}
     is_exact = data.volume.error <= 1e-6 * data.volume.volume
     remarks["volume"] = "exact" if is_exact else "to four digits"
@@ -122,13 +122,13 @@ def _volumes(data: ReportData) -> Element:
         add("convex hull", None, hull.reason)
     else:
         add("convex hull", hull, "of the mesh")
-    if reachable is not None and not isinstance(reachable, Missing):
-        count, within = reachable.reachable_node_count, reachable.node_count
+    if accessible is not None and not isinstance(accessible, Missing):
+        count, within = accessible.accessible_node_count, accessible.node_count
         share: tuple[Piece, ...] = ()
         if count is not None and within is not None:
             share = ("; ", whole(count), " of ", whole(within), " nodes")
-        name = CATALOGUE["reachable_volume"].heading
-        add(name, reachable.reachable_volume, ("without a collision of legs", *share))
+        name = CATALOGUE["accessible_volume"].heading
+        add(name, accessible.accessible_volume, ("without a collision of legs", *share))
     return table(("volume", "units³", "cm³", ""), rows, align="<>><", caption="Volumes")
 
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
-from explorer import PRESETS, radius_curve, reachable_workspace
+from explorer import PRESETS, accessible_workspace, radius_curve
 from explorer.legs.clearance import PAIRS, leg_axes
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
@@ -34,9 +34,9 @@ def run() -> Iterator[Row]:
     thick = with_radius(DESIGN, RADIUS)
     r = home_rotation(DESIGN)
     for design, words in ((DESIGN, "no radii"), (thick, f"radius {RADIUS:g}, three pairs block")):
-        took = best_of(ROUNDS, lambda design=design: reachable_workspace(design, nodes=NODES))
+        took = best_of(ROUNDS, lambda design=design: accessible_workspace(design, nodes=NODES))
         yield Row(
-            f"reachable workspace, {NODES} nodes an axis, solid and cost of each pair, {words}",
+            f"accessible workspace, {NODES} nodes an axis, solid and cost of each pair, {words}",
             seconds(took),
             "1 s",
         )
@@ -49,7 +49,7 @@ def run() -> Iterator[Row]:
         beside=_fcl(grid.positions.reshape(-1, 3), r, surveyed),
     )
     took = best_of(ROUNDS, lambda: radius_curve(DESIGN, cells=NODES))
-    yield Row("reachable volume against the radius, the whole curve", seconds(took))
+    yield Row("accessible volume against the radius, the whole curve", seconds(took))
 
 
 def _fcl(nodes: FloatArray, rotation: FloatArray, ours: float) -> str:
