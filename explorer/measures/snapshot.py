@@ -28,9 +28,9 @@ from explorer.singularity.bruhat import incidences
 from explorer.singularity.gaps import FlagGaps, flag_gaps
 from explorer.singularity.jacobian import (
     determinant,
-    inverse_condition,
     jacobian,
     scaled_margins,
+    singular_values,
     tetrahedron_volumes,
 )
 from explorer.singularity.nearest import (
@@ -104,10 +104,22 @@ class Snapshot:
         return abs(float(determinant(self.design, self.joints, enlarged)))
 
     @cached_property
+    def _singular_values(self) -> FloatArray:
+        matrix = jacobian(self.design, self.pose.position, self.rotation)
+        return singular_values(matrix, self.design.reach)
+
+    @property
     def inverse_condition(self) -> float:
         """The inverse condition number of J, made homogeneous by the reach, 0 (singular) to 1."""
-        matrix = jacobian(self.design, self.pose.position, self.rotation)
-        return float(inverse_condition(matrix, self.design.reach))
+        return float(self._singular_values[-1] / self._singular_values[0])
+
+    @property
+    def smallest_singular_value(self) -> float:
+        """The smallest singular value σ of J, made homogeneous by the reach; 0 if singular.
+
+        Errors of actuators and loads are enlarged at most 1/σ times, see `singular_values`.
+        """
+        return float(self._singular_values[-1])
 
     @cached_property
     def least_turns(self) -> tuple[float, float, float]:

@@ -5,20 +5,24 @@ is singular if its flags have an incidence, to rounding. Otherwise four measures
 warning value of its own, and the pose is near a singularity if any is below:
 
 - the margin |δ| of an incidence, in design units. Its warning length is the user's, at first a
-  share of the reach (`WARN_SHARE`);
-- the distance of its nearest singular pose: the root-mean-square displacement of b1 to b4, with
-  any shift and turn (`explorer.singularity.nearest`). Its warning length is a third of that of
-  margins (`DISTANCE_SHARE`): the platform may turn as well as shift, so that its points move by
-  less than the margin;
-- the least turn that leads to it (`explorer.singularity.turning`), below 10° (`WARN_TURN`): the
-  sine of this angle is the share of a leg's force that acts, so that there the legs push six times
-  as hard as where lines and planes are at right angles. A small platform is displaced little by
-  such a turn, a large one much, so that the distance alone does not tell;
-- the inverse condition number of J, below 0.001 (`WARN_CONDITION`): a change of J by this share
-  makes it singular (Eckart and Young), and forces and errors grow a thousandfold. J is singular
-  only where a margin is zero, but margins and distances do not bound its conditioning: in a
-  nearly degenerate design, or far from the base, it is low in every pose. It counts for the
-  incidence with the least scaled margin (`explorer.singularity.jacobian.scaled_margins`).
+  share of the reach (`WARN_SHARE`). It is one for all three, though δ2 is no distance but a
+  distance times a sine;
+- the distance of its nearest singular pose: the root-mean-square displacement of b1 to b4, a
+  metric of Nawratil, with any shift and turn (`explorer.singularity.nearest`). Its warning length
+  is a third of that of margins (`DISTANCE_SHARE`): the platform may turn as well as shift, so that
+  its points move by less than the margin;
+- the least turn that leads to it (`explorer.singularity.turning`), below 10° (`WARN_TURN`). It is
+  a transmission angle: its sine is the share of a leg's force that acts, so that at 10° the legs
+  push six times as hard as where lines and planes are at right angles. Textbooks keep such angles
+  above 30° to 45° in continuous service; this value only warns of a singularity. A small platform
+  is displaced little by such a turn, a large one much, so that the distance alone does not tell;
+- the inverse condition number of J, below 0.01 (`WARN_CONDITION` in `explorer.singularity.colours`,
+  which the maps read too): a change of J by this share makes it singular (Eckart and Young). It
+  does not say how much forces and errors grow: that is one over the smallest singular value
+  (`explorer.singularity.jacobian.singular_values`). J is singular only where a margin is zero, but
+  margins and distances do not bound its conditioning: in a nearly degenerate design, or far from
+  the base, it is low in every pose. It counts for the incidence with the least scaled margin
+  (`explorer.singularity.jacobian.scaled_margins`).
 
 All warning values grow with the user's warning length.
 """
@@ -33,13 +37,12 @@ from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.margins import INCIDENCES
 from explorer.numerics.number_text import format_number
 from explorer.singularity.bruhat import incidences
-from explorer.singularity.colours import WARN_SHARE
+from explorer.singularity.colours import WARN_SHARE, warning_condition
 
 # Warning length of distances, as a share of that of margins.
 DISTANCE_SHARE = 1.0 / 3.0
-# Warning angle in radians, and warning value of 1/cond J, at a warning length of `WARN_SHARE`.
+# Warning angle in radians at a warning length of `WARN_SHARE`.
 WARN_TURN = math.radians(10.0)
-WARN_CONDITION = 1e-3
 
 Kind = Literal["singular", "near", "clear"]
 Cause = Literal["distance", "turn", "condition"]
@@ -147,8 +150,8 @@ def warnings(reach: float, warn_below: float | None = None) -> Warnings:
     """
     default = WARN_SHARE * reach
     margin = default if warn_below is None else warn_below
-    share = margin / default
-    return Warnings(margin, DISTANCE_SHARE * margin, share * WARN_TURN, share * WARN_CONDITION)
+    condition = warning_condition(reach, margin)
+    return Warnings(margin, DISTANCE_SHARE * margin, margin / default * WARN_TURN, condition)
 
 
 def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:

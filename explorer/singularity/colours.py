@@ -31,12 +31,22 @@ TEXT_SHARE = 0.4
 
 # Default warning length as a share of the reach.
 WARN_SHARE = 0.05
-# An inverse condition number below this is coloured as a warning.
+# Warning value of the inverse condition number at that length; see `warning_condition`.
 WARN_CONDITION = 0.01
 # Number of warning lengths at which the scale ends.
 FAR_WARNINGS = 4.0
 # Edges of the colour bands of a surface, in warning lengths.
 BAND_EDGES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, FAR_WARNINGS)
+
+
+def warning_condition(reach: float, warn_below: float) -> float:
+    """Return the warning value of the inverse condition number, which grows with that of margins.
+
+    Args:
+        reach: Reach of the design, in design units.
+        warn_below: Warning length of the margins, in design units.
+    """
+    return WARN_CONDITION * (warn_below / (WARN_SHARE * reach))
 
 
 def proximity_colour(level: float) -> Rgb:

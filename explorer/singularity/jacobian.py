@@ -106,18 +106,29 @@ def scaled_margins(design: Design, joints: FloatArray, margin: FloatArray) -> Fl
     return np.divide(sizes, lengths, out=np.zeros(sizes.shape), where=lengths > 0.0)
 
 
-def inverse_condition(jacobian: FloatArray, length: float) -> FloatArray:
-    """Return the inverse condition number of the homogeneous J, from 0 to 1, shape (...).
+def singular_values(jacobian: FloatArray, length: float) -> FloatArray:
+    """Return the singular values of the homogeneous J, dimensionless, descending, shape (..., 6).
 
-    It is the smallest singular value over the largest.
+    One over the smallest is the largest factor by which J⁻¹ enlarges errors of the actuators, to
+    those of the platform (displacement; length × turn), and loads (force; moment / length), to
+    forces of the actuators; all as Euclidean norms of six numbers.
 
     Args:
         jacobian: Matrices J, shape (..., 6, 6).
-        length: Characteristic length that divides the columns of the angular velocity, in
-            design units.
+        length: Normalising length that divides the columns of the angular velocity, in design
+            units.
     """
     homogeneous = jacobian / np.array([1.0, 1.0, 1.0, length, length, length])
-    values = np.linalg.svd(homogeneous, compute_uv=False)
+    return np.asarray(np.linalg.svd(homogeneous, compute_uv=False), dtype=np.float64)
+
+
+def inverse_condition(jacobian: FloatArray, length: float) -> FloatArray:
+    """Return the inverse condition number of the homogeneous J, from 0 to 1, shape (...).
+
+    It is the smallest singular value over the largest. The arguments are those of
+    `singular_values`.
+    """
+    values = singular_values(jacobian, length)
     return np.asarray(values[..., -1] / values[..., 0])
 
 

@@ -24,11 +24,11 @@ from explorer.singularity.colours import (
     CLEAR,
     FAR,
     SINGULAR,
-    WARN_CONDITION,
     WARNED,
     Rgb,
     band_colours,
     mix,
+    warning_condition,
 )
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.accuracy import actuator_errors, worst_error
@@ -109,7 +109,8 @@ def position_bands(
         design: The manipulator.
         rotation: Platform to base, shape (3, 3).
         measure: The measure.
-        warn_below: Length below which margins raise a warning, in design units.
+        warn_below: Length below which margins raise a warning, in design units; the warning value
+            of the inverse condition number follows it.
         load: (F; M) on the platform at the tool point besides the payload, base axes, shape (6,),
             in N and N × unit; None for none. Only measures of a load need it.
     """
@@ -120,12 +121,13 @@ def position_bands(
 
         return _proximity(measure, warn_below, smallest_margin)
     if measure == "condition":
+        warn = warning_condition(design.reach, warn_below)
 
         def condition(points: FloatArray) -> FloatArray:
             rates = jacobian(design, points, rotation)
-            return inverse_condition(rates, design.reach) / WARN_CONDITION
+            return inverse_condition(rates, design.reach) / warn
 
-        return _proximity(measure, WARN_CONDITION, condition)
+        return _proximity(measure, warn, condition)
     w = np.zeros(6) if load is None else load
     if measure == "error":
         errors, tool = actuator_errors(design), design.tool.position

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -22,10 +23,12 @@ from explorer.measures.snapshot import evaluate
 from explorer.measures.verdict import DISTANCE_SHARE, TITLES, verdict, warnings
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
-from explorer.singularity.colours import css
+from explorer.singularity.colours import WARN_SHARE, css
 from explorer.singularity.jacobian import scaled_margins
 from explorer.singularity.uncoupled import UNCOUPLED
+from explorer.workspace.position_bands import position_bands
 
 OPTIMAL = PRESETS["paper-optimal"]
 ABOUT_PLATFORM_Z = next(
@@ -81,7 +84,7 @@ def test_verdict_of_poses_with_an_ill_conditioned_jacobian_is_never_clear() -> N
         state = GoToSingularity(int(rng.integers(1, 4))).apply(opened(OPTIMAL, start))
         x, y, z = (np.array(state.pose.position) + rng.normal(scale=0.03, size=3)).tolist()
         snapshot = evaluate(OPTIMAL, Pose((x, y, z), state.pose.quaternion))
-        if snapshot.inverse_condition < 5e-4:
+        if snapshot.inverse_condition < 9e-3:
             ill += 1
             assert verdict(snapshot).kind != "clear"
     assert ill > 50
@@ -118,6 +121,25 @@ def test_verdict_is_the_worst_of_margins_distances_turns_and_conditioning(case: 
         assert found.distance == min(each.distance for each in snapshot.nearest)
         assert found.distance >= warn.distance
         assert snapshot.inverse_condition >= warn.condition
+
+
+@pytest.mark.parametrize("design", PRESETS.values(), ids=lambda design: design.name)
+@pytest.mark.parametrize("measure", ["margin", "condition"])
+@pytest.mark.parametrize("share", [None, 0.02, 0.11])
+def test_verdict_where_the_map_warns_is_never_clear(
+    design: Design, measure: Literal["margin", "condition"], share: float | None
+) -> None:
+    rng, reach = np.random.default_rng(7), design.reach
+    warn_below = WARN_SHARE * reach if share is None else share * reach
+    place = home_pose(design)
+    bands = position_bands(design, place.rotation, measure, warn_below=warn_below)
+    points = rng.uniform([-reach, -reach, 0.0], reach, (2000, 3))
+    warned = points[bands.values(points) < 1.0][:60]
+    assert len(warned) > 20
+    for x, y, z in warned.tolist():
+        snapshot = evaluate(design, Pose((x, y, z), place.quaternion))
+        own = None if share is None else warn_below
+        assert verdict(snapshot, own).kind != "clear"
 
 
 def random_pose(design: Design, rng: np.random.Generator) -> Pose:

@@ -29,13 +29,13 @@ from explorer.app.state.actions import GoHome, Set, SetAngle, SetPosition, SetVa
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.export.report.drawings.slices import Slices
+from explorer.measures.verdict import warnings
 from explorer.mechanism.design import Design, Swing
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.singularity.colours import WARN_CONDITION
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.workspace.limits.constraints import HalfSpace
 from explorer.workspace.position_bands import position_bands
@@ -384,6 +384,7 @@ def test_bands_of_the_condition_number_end_at_its_levels(
     solid = workspace_solid(OPTIMAL, rotation, 0.1)
     extent = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     bands = position_bands(OPTIMAL, rotation, "condition", warn_below=1.0)
+    warn = warnings(OPTIMAL.reach, 1.0).condition
     slices = Slices.of(OPTIMAL, rotation, extent, bands)
     level, ends = 5.0, (slices.lows[[0, 2]], slices.highs[[0, 2]])
     beyond = slices.beyond("y", level)
@@ -393,7 +394,7 @@ def test_bands_of_the_condition_number_end_at_its_levels(
             inner = ((polygon > ends[0] + 1e-9) & (polygon < ends[1] - 1e-9)).all(axis=1)
             points = np.insert(polygon[inner], 1, level, axis=1)
             values = inverse_condition(jacobian(OPTIMAL, points, rotation), OPTIMAL.reach)
-            errors.extend(np.abs(values / WARN_CONDITION / share - 1.0).tolist())
+            errors.extend(np.abs(values / warn / share - 1.0).tolist())
     assert len(errors) > 100
     assert float(np.quantile(errors, 0.99)) < 0.05
 

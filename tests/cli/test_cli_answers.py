@@ -64,6 +64,7 @@ def test_singularity_json_has_the_snapshot(cli: CommandLine) -> None:
         "volumes": expected.volumes.tolist(),
         "determinant": expected.determinant,
         "inverse_condition": expected.inverse_condition,
+        "smallest_singular_value": expected.smallest_singular_value,
         "stratum": list(expected.stratum),
         "stratum_dimension": expected.stratum_dimension,
         "mode": expected.mode,

@@ -37,6 +37,7 @@ from explorer import (
     rotation_from_quaternion,
 )
 from explorer.mechanism.margins import TETRAHEDRA, mode_name, mode_of, signs_of
+from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import determinant, inverse_condition, tetrahedron_volumes
 
@@ -160,6 +161,24 @@ def test_jacobian_where_no_margin_vanishes_is_regular(case: Case) -> None:
     assume(case.regularity > 1e-2)
     assert condition_of(case) > 1e-9
     assert determinant_of(case) != 0.0
+
+
+@given(ordinary_cases(), st.integers(0, 2**32 - 1))
+def test_errors_and_loads_grow_at_most_by_the_smallest_singular_value(
+    case: Case, seed: int
+) -> None:
+    assume(case.regularity > 1e-2)
+    snapshot = evaluate(case.design, Pose.of(case.position, case.rotation))
+    least, size = snapshot.smallest_singular_value, case.design.reach
+    scale = np.array([1.0, 1.0, 1.0, size, size, size])
+    j, changes = jacobian_of(case), np.random.default_rng(seed).normal(size=6)
+    length = np.linalg.norm(changes) * (1.0 + 1e-6)
+    assert np.linalg.norm(scale * np.linalg.solve(j, changes)) <= length / least
+    assert np.linalg.norm(np.linalg.solve(j.T, scale * changes)) <= length / least
+    # The bound is attained.
+    most = np.linalg.norm(np.linalg.inv(j / scale), 2)
+    assert least * most == pytest.approx(1.0, rel=1e-6)
+    assert snapshot.inverse_condition <= least
 
 
 def test_determinant_where_a_margin_is_zero_is_exactly_zero() -> None:

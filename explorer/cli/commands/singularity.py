@@ -47,9 +47,9 @@ class Singularity(JsonOptions, PoseOptions, DesignOptions):
 
 
 def _as_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
-    names = "margins volumes determinant inverse_condition stratum stratum_dimension mode signs"
+    names = "margins volumes determinant inverse_condition smallest_singular_value proximity"
     return {
-        **attributes(snapshot, f"{names} proximity"),
+        **attributes(snapshot, f"{names} stratum stratum_dimension mode signs"),
         "incidences": incidences(snapshot.stratum),
         "nearest": [
             {
@@ -126,6 +126,7 @@ def _measures(snapshot: Snapshot) -> str:
     names = [INCIDENCES[index - 1] for index in incidences(snapshot.stratum)]
     here = verdict(snapshot)
     condition = figure(snapshot.inverse_condition, 1.0)
+    least = figure(snapshot.smallest_singular_value, 1.0)
     rows = [
         ("verdict", f"{here.title.lower()}: {here.reason(snapshot.design.unit_mm)}"),
         ("singular", " and ".join(names) or "no"),
@@ -133,6 +134,7 @@ def _measures(snapshot: Snapshot) -> str:
         ("stratum", f"{stratum}: {describe_stratum(snapshot.stratum)}"),
         ("det J", figure(snapshot.determinant, snapshot.determinant_size)),
         ("inverse condition", f"{condition} (0 singular, 1 best)"),
+        ("least σ of J", f"{least} (errors and loads grow at most 1/σ times)"),
         ("proximity", f"{figure(snapshot.proximity, 1.0)} (least |δ| over the reach)"),
     ]
     return table(rows, "<<")

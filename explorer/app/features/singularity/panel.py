@@ -129,6 +129,12 @@ def _rows(frame: Frame) -> Iterator[str]:
         hint="Inverse condition number of J, with lengths divided by the reach; 0 is singular",
     )
     yield row(
+        dim("least σ of J"),
+        share(snapshot.smallest_singular_value),
+        hint="Smallest singular value of J, with lengths divided by the reach: errors of actuators "
+        "and loads grow at most 1/σ times to those of the platform and of the actuators",
+    )
+    yield row(
         dim("min |δ| / reach"),
         share(snapshot.proximity),
         hint="Smallest margin over the reach |a3|",

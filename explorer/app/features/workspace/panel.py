@@ -47,6 +47,7 @@ from explorer.app.widgets.chips import Chip, Chips, Effect, turn
 from explorer.app.widgets.commands import Key, shift
 from explorer.app.widgets.markup import alert, box, note, sentence
 from explorer.app.widgets.under_way import UnderWay
+from explorer.measures.verdict import warnings
 from explorer.mechanism.pose import Pose, Triple
 from explorer.workspace.position_bands import LOAD_MEASURES, MEASURE_WORDS
 
@@ -195,7 +196,9 @@ class WorkspacePanel:
             words = unstated_words(view.colour, map(_colour_button, NEED_NO_LIMITS))
         if colour != "plain" or mapped is not None:
             measure = map_measure(state.design, colour, holds=view.region == "held")
-            words += legend(measure, state.warn_below, drawing)
+            warn = warnings(state.design.reach, state.warn_below)
+            warn_below = warn.condition if measure == "condition" else warn.margin
+            words += legend(measure, warn_below, drawing)
         if colour in LOAD_MEASURES and view.region != "held":
             any_direction = colour != "deflection"
             words += note(f"{load_words(state, any_direction=any_direction)}.")

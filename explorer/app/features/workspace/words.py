@@ -34,7 +34,7 @@ from explorer.export.report.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBL
 from explorer.legs.clearance import pair_name
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
-from explorer.singularity.colours import BAND_EDGES, WARN_CONDITION, band_colours
+from explorer.singularity.colours import BAND_EDGES, band_colours
 from explorer.statics.reactions import has_limits
 from explorer.workspace.accessible.workspace import PairCost
 from explorer.workspace.position_bands import (
@@ -271,7 +271,13 @@ def _pair(pair: PairCost) -> str:
 
 
 def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None) -> str:
-    """Return the bands of colours with the values at their edges, and the colours of the map."""
+    """Return the bands of colours with the values at their edges, and the colours of the map.
+
+    Args:
+        measure: The measure that is coloured.
+        warn_below: Warning value of that measure.
+        drawing: The workspace that is drawn; None for none.
+    """
     if measure in MEASURE_WORDS:
         words, unit, factor = MEASURE_WORDS[measure]
         name = f"{words.capitalize()} ({unit})"
@@ -281,15 +287,11 @@ def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None
         # The ends of bands, and the infinity of singular planes.
         edges = [(100.0 * k / len(colours), text) for k, text in enumerate(texts)]
     else:
-        unit, name = (
-            (WARN_CONDITION, "1 / cond J")
-            if measure == "condition"
-            else (warn_below, "Smallest |δ| (units)")
-        )
+        name = "1 / cond J" if measure == "condition" else "Smallest |δ| (units)"
         colours = band_colours()
         # All bands are drawn equally wide, so the values at their edges are not evenly spaced.
         edges = [
-            (100.0 * index / len(colours), format_number(BAND_EDGES[index] * unit, 2))
+            (100.0 * index / len(colours), format_number(BAND_EDGES[index] * warn_below, 2))
             for index in (0, 2, 4, 6, 9)
         ]
     width = 100.0 / len(colours)

@@ -55,6 +55,11 @@ def singularity_section(data: ReportData) -> Iterator[Element]:
                 snapshot.inverse_condition,
                 "0 singular, 1 best",
             ),
+            (
+                "smallest singular value σ of J, with the reach",
+                snapshot.smallest_singular_value,
+                "errors and loads grow at most 1/σ times",
+            ),
             ("proximity: smallest |δ| over the reach", snapshot.proximity, ""),
             ("assembly mode", _mode_figure(snapshot.bordering_modes), snapshot.sign_words),
             (
