@@ -195,7 +195,8 @@ class OrientationOptions:
         numbers("--tilt-torsion", "azimuth tilt torsion"),
         hint("instead of --quaternion"),
     ] = None
-    """Orientation of the platform: azimuth and angle of its tilt, and its torsion, in degrees."""
+    """Orientation of the platform in T&T angles: azimuth and angle of its tilt, and its torsion, in
+    degrees."""
 
     def oriented_home(self, design: Design) -> Pose:
         """Return the home pose of the design with the given orientation, as `make_pose` does."""

@@ -177,11 +177,16 @@ def _sizes() -> Iterable[Measure]:
         )
 
 
+# What margins that are compared with one another are.
+_KINDS = "δ1 and δ3 are distances, δ2 is a distance times a sine"
+
+
 def _margins() -> Iterable[Measure]:
     yield Margin(
         "least_margin",
         "worst margin",
-        "The least |δ| anywhere in the workspace, exact; 0 where it goes up to a singularity",
+        "The least |δ| anywhere in the workspace, exact; 0 where it goes up to a singularity. "
+        f"{_KINDS}",
         lambda case: float(case.least_margins.min()),
         cost="high",
         places=COMPARE,
@@ -189,13 +194,13 @@ def _margins() -> Iterable[Measure]:
     yield MarginAtNodes(
         "worst_margin",
         "worst margin at nodes",
-        "Smallest |δ| over the nodes of the workspace",
+        f"Smallest |δ| over the nodes of the workspace. {_KINDS}",
         lambda case: float(case.at_nodes.margins.min()),
     )
     yield MarginAtNodes(
         "mean_margin",
         "mean margin at nodes",
-        "Mean over the nodes of the workspace of the smallest |δ|",
+        f"Mean over the nodes of the workspace of the smallest |δ|. {_KINDS}",
         lambda case: case.at_nodes.mean_margin,
         places=COMPARE | STUDIES,
     )
@@ -209,14 +214,14 @@ def _margins() -> Iterable[Measure]:
     yield Margin(
         "home_margin",
         "margin at home",
-        "The smallest |δ| in the home pose",
+        f"The smallest |δ| in the home pose. {_KINDS}",
         lambda case: float(np.abs(margins(case.at.position, case.rotation)).min()),
         places=COMPARE,
     )
     yield Margin(
         "box_margin",
         "margin over the box",
-        "The least |δ| over the required box",
+        f"The least |δ| over the required box. {_KINDS}",
         lambda case: math.nan if case.box is None else box_margin(case.box, case.rotation),
         needs=("box",),
         places=OPTIMISE,

@@ -282,7 +282,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def reach(self) -> float:
-        """The characteristic length |a3|, in design units."""
+        """The reach |a3|, the normalising length, in design units."""
         return math.hypot(*self.a3)
 
     @property

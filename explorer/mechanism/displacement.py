@@ -1,5 +1,8 @@
 """The distance between two poses: the root-mean-square displacement of b1, b2, b3 and b4.
 
+It is a metric of G. Nawratil ("New performance indices for 6-dof UPS and 3-dof RPR parallel
+manipulators", 2009), who calls its least value to a singular pose the singularity distance.
+
 Its square is |g' − g|² + 2 tr M − 2 tr(R' M Rᵀ), with the centroid g of the four points and
 their scatter M about it (Kabsch 1976; Horn 1987). The distance has the unit of the design,
 needs no length that weights angles, and does not depend on the frames.

@@ -2,9 +2,11 @@
 
 The manipulator is singular exactly where one of three tetrahedra is flat, that is where two
 elements of the base and platform flags are incident (the paper's section on singularities).
-Each margin is a signed length that is zero at one of these incidences, linear in the position
-at a fixed orientation. The set of poses with one sign triple is an *aspect* in the field's
-terms. Margins depend on the pose alone, not on the design.
+These singularities are parallel, type 2 of Gosselin and Angeles (1990): an instantaneous freedom
+with locked actuators. Each margin is a signed number in design units that is zero at one of these
+incidences, linear in the position at a fixed orientation. The set of poses with one sign triple is
+an *aspect* in the field's terms; no path leaves it without a singular pose, so that the mechanism
+is non-cuspidal. Margins depend on the pose alone, not on the design.
 """
 
 from __future__ import annotations
@@ -33,8 +35,8 @@ def margins(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
 
     δ1 = -(R ẑ)·p is zero where a1 lies on the platform plane, δ2 = (x̂ × R x̂)·p where the
     lines a1a2 and b2b3 meet or are parallel, δ3 = ẑ·p where b4 lies on the base plane. δ1 and
-    δ3 are distances from the plane; δ2 is the distance of the lines times the sine between
-    them.
+    δ3 are distances from the plane; δ2 is the mutual moment of the two unit lines, their distance
+    times the sine between them.
 
     Args:
         position: b4 in the base frame, shape (..., 3), in design units.

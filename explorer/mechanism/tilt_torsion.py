@@ -1,4 +1,4 @@
-"""Orientations as azimuth, tilt and torsion, the angles in which orientation ranges are drawn.
+"""Orientations as azimuth, tilt and torsion (T&T angles), in which orientation ranges are drawn.
 
 The platform tilts by θ about a horizontal axis, towards the azimuth φ of the base, and turns by
 the torsion σ about its own axis: R = Rz(φ) Ry(θ) Rz(σ − φ), platform to base. At tilt zero the

@@ -111,7 +111,8 @@ def performance(design: Design, pose: Pose, tool: ArrayLike | None = None) -> Pe
 def planes_of_singularity(rotation: ArrayLike) -> FloatArray:
     """Return the gradients of (δ1, δ2, δ3) with respect to p, shape (..., 3, 3), in rows.
 
-    At a fixed orientation the singular positions are the planes through a1 with these normals.
+    At a fixed orientation the singular positions are up to three planes through a1 with these
+    normals; the first and the third coincide where the planes of platform and base are parallel.
     The gradient of δ2 has the length of the sine between the lines a1a2 and b2b3, which is zero
     if they are parallel; the others have unit length. The rotation has the shape (..., 3, 3).
     """
@@ -124,7 +125,7 @@ def planes_of_singularity(rotation: ArrayLike) -> FloatArray:
 
 
 def singular_plane_distances(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
-    """Return the distances of positions from the three singular planes, shape (..., 3).
+    """Return the distances of positions from the singular planes of δ1 to δ3, shape (..., 3).
 
     If the lines a1a2 and b2b3 are parallel every position is singular, and the distance for δ2
     is zero. Arguments and errors are those of `margins`.
@@ -141,8 +142,8 @@ def singular_plane_distances(position: ArrayLike, rotation: ArrayLike) -> FloatA
 def singularity_free_ball(pose: Pose) -> SingularityFreeBall:
     """Return the largest open ball of positions about a pose without a singular position.
 
-    The orientation is fixed. The ball about b4 touches the nearest of the three singular
-    planes, so it is exact.
+    The orientation is fixed. The ball about b4 touches the nearest of the singular planes, so
+    it is exact.
     """
     distances = singular_plane_distances(pose.position, pose.rotation)
     index = int(distances.argmin())

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray, batch_shape, dot, finite_array
 
-# Tolerance of an incidence: a share of the characteristic length, or an angle in radians.
+# Tolerance of an incidence: a share of the normalising length, or an angle in radians.
 TOLERANCE = 1e-9
 
 GENERIC = (4, 3, 2, 1)

@@ -2,8 +2,8 @@
 
 A load is a wrench (F; M) that acts on the platform at the tool point, along the axes of the base,
 in newtons and newtons times the design unit. A positive actuator force pushes its joint's value
-up. Legs 1 and 4 carry forces along their axes only; legs 2 and 3 also carry a force along the
-guide, which bends their struts. In a singular pose all forces are infinite.
+up. The legs are weightless: legs 1 and 4 then carry forces along their axes only; legs 2 and 3 also
+carry a force along the guide, which bends their struts. In a singular pose all forces are infinite.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class WorkspaceView:
             the part that holds the load.
         start: Whether the accessible part starts at the home position, or at the present one.
         hull: Whether its convex hull is drawn.
-        planes: Whether the three singularity planes are drawn.
+        planes: Whether the planes of singular positions, up to three, are drawn.
         orientation: Whether the orientation is that of the present pose, or of the home pose.
         colour: The quantity by which the surface is coloured.
         cut: The axis along which it is cut open, or None.

@@ -33,9 +33,10 @@ from explorer.singularity.jacobian import inverse_condition, jacobian
 class Singularity(JsonOptions, PoseOptions, DesignOptions):
     """Measure how near a pose is to a singularity, and to which.
 
-    A margin is zero where its tetrahedron is flat; the signs of the three margins name the
-    assembly mode. The nearest singular poses minimise the root-mean-square displacement of the
-    platform's points b1 to b4. With `--at tool` the ellipsoids of speeds and forces at the tool
+    A margin is zero where its tetrahedron is flat; δ1 and δ3 are distances, δ2 is a distance times
+    a sine. The signs of the three margins name the assembly mode. The nearest singular poses
+    minimise the root-mean-square displacement of the platform's points b1 to b4, Nawratil's metric.
+    With `--at tool` the ellipsoids of speeds and forces at the tool
     follow; the singular poses themselves do not depend on the tool.
     """
 

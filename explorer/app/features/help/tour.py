@@ -104,7 +104,7 @@ STEPS = (
     Step(
         "See the workspace",
         "Press Solid in Workspace: all positions of b4 within the limits. Cut it open, or colour "
-        "it by the distance to the nearest singularity.",
+        "it by the smallest margin.",
         "Workspace",
         _is_solid,
         _show_solid,

@@ -49,7 +49,7 @@ OVER = {"none": "none", "inclusive": "inclusive", "total": "total"}
 SPANS = (Span(-180.0, 180.0, 0.1), Span(0.0, 180.0, 0.1), Span(-180.0, 180.0, 0.1))
 HINTS = (
     "Direction in the base's xy-plane, from x towards y, that the platform's z-axis tilts towards.",
-    "Angle between the z-axes of platform and base.",
+    "Angle between the z-axes of platform and base. With azimuth and torsion: the T&T angles.",
     "Turn of the platform about its own z-axis; at tilt 0 it is the yaw.",
 )
 VOLUME_HINT = "Volume of the solid as drawn. A sample of orientations stands for the range:"

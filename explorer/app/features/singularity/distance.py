@@ -30,12 +30,21 @@ GO = "singular.go"
 GO_HINT = "Move the mechanism to the nearest pose with this incidence."
 COLUMNS = (
     ("", ""),
-    ("δ units", "The margin: zero where the mechanism is singular. Its sign is that of the mode."),
+    (
+        "δ units",
+        (
+            "The margin: zero where the mechanism is singular. δ1 and δ3 are distances, δ2 is the "
+            "mutual moment of two lines, a distance times a sine. Its sign is that of the mode."
+        ),
+    ),
     (
         "distance",
-        "To the nearest pose with δ = 0: the root-mean-square displacement of b1 to b4, in mm.",
+        (
+            "To the nearest pose with δ = 0: the root-mean-square displacement of b1 to b4 "
+            "(Nawratil's metric), in mm."
+        ),
     ),
-    ("turn", "The least turn about b4 or a1 that leads to δ = 0."),
+    ("turn", "The least turn about b4 or a1 that leads to δ = 0, a transmission angle."),
     ("", ""),
 )
 

@@ -32,8 +32,8 @@ from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import Kind, warnings
 
 VERDICT_HINT = (
-    "The distance is the root-mean-square displacement of b1 to b4 to the nearest singular pose, "
-    "of any position and orientation"
+    "The distance is the root-mean-square displacement of b1 to b4 (Nawratil's metric) to the "
+    "nearest singular pose, of any position and orientation"
 )
 LOOKS: dict[Kind, Look] = {"clear": "within", "near": "close", "singular": "beyond"}
 
@@ -104,7 +104,8 @@ def legend(frame: Frame) -> str:
         "The colour of an incidence: the least of its measures over their warning values, which "
         f"are {format_number(warn.margin, 3)} units of the margin, "
         f"{format_number(warn.distance * design.unit_mm, 3)} mm of the distance, "
-        f"{format_number(math.degrees(warn.turn), 3)}° of turning, and "
+        f"{format_number(math.degrees(warn.turn), 3)}° of turning (a transmission angle, which "
+        "mechanisms usually keep above 30° to 45°), and "
         f"{format_number(warn.condition, 3)} of 1/cond J"
     )
     places = ticks((0.0, "0"), (edge, "warned below"), (100.0, f"≥ {FAR_WARNINGS:g} times"))
@@ -137,5 +138,5 @@ def _rows(frame: Frame) -> Iterator[str]:
     yield row(
         dim("min |δ| / reach"),
         share(snapshot.proximity),
-        hint="Smallest margin over the reach |a3|",
+        hint="Smallest margin over the reach |a3|; δ2 is of another kind, a distance times a sine",
     )

@@ -67,7 +67,7 @@ SHOWN = {
     "hull": ("Convex hull", "Draw the convex hull of the workspace."),
     "planes": (
         "Singular planes",
-        "Draw the three planes of singular positions, at the present orientation.",
+        "Draw the planes of singular positions, up to three, at the present orientation.",
     ),
 }
 """Words and hint of each part that can be shown."""
@@ -141,9 +141,10 @@ class WorkspacePanel:
         )
         controls.dropdown(
             "Colour by",
-            "One colour, the smallest margin |δ|, the inverse condition number, what the load of "
-            "the tab Forces asks of actuators and struts, or how far the errors of the actuators "
-            "or that load move the tool.",
+            "One colour, the smallest margin |δ| (δ2 is a distance times a sine, the others are "
+            "distances), the inverse condition number, what the load of the tab Forces asks of "
+            "actuators and struts, or how far the errors of the actuators or that load move the "
+            "tool.",
             COLOURINGS,
             "view.workspace.colour",
         )

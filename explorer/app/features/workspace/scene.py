@@ -177,7 +177,7 @@ class WorkspaceScene(ScenePart):
 
 
 class _SingularPlane:
-    """One of the three planes of singular positions; those of b4 all pass through a1."""
+    """One of up to three planes of singular positions; those of b4 all pass through a1."""
 
     def __init__(self, scene: viser.SceneApi, index: int) -> None:
         self._index = index

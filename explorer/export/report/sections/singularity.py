@@ -28,7 +28,8 @@ def singularity_section(data: ReportData) -> Iterator[Element]:
         yield paragraph(f"{here.title}: {here.reason(unit)}.", class_=note)
     yield paragraph(
         "The mechanism is singular exactly where one of three margins is zero: there a "
-        "tetrahedron is flat. The signs of the three name the assembly mode."
+        "tetrahedron is flat. δ1 and δ3 are distances, δ2 is the mutual moment of two lines, a "
+        "distance times a sine. The signs of the three name the assembly mode."
     )
     yield table(
         ("margin", "zero when", "units", "mm", "tetrahedron", "volume, units³"),
@@ -117,7 +118,8 @@ def _nearest(data: ReportData) -> Element:
         ("nearest with", "units", "mm", "x", "y", "z", "yaw", "pitch", "roll"),
         rows,
         align="<>>>>>>>>",
-        caption="Nearest singular poses, by the root-mean-square displacement of b1 to b4",
+        caption="Nearest singular poses, by the root-mean-square displacement of b1 to b4 "
+        "(Nawratil’s metric)",
     )
 
 
