@@ -26,7 +26,8 @@ OUR_READING = (
 SIX_LEGS = (
     "The paper compares with no design. Here it is the 6-4 twin with a2 at two places, and an "
     "octahedral Stewart-Gough platform of the same reach, whose base and platform are equilateral "
-    "triangles with the areas of a1 a2 a3 and b1 b2 b3 for a2x at the reach."
+    "triangles with the areas of a1 a2 a3 and b1 b2 b3 for a2x at the reach. All six actuators of "
+    "each have the same stroke, from 0 to the reach; the carriages of the 4-4 have it from a1 on."
 )
 
 CLAIMS: Mapping[str, Claim] = MappingProxyType(

@@ -19,10 +19,10 @@ from explorer.workspace.limits.valid_poses import poses_are_valid
 from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
-# The optimum with no limit but its lengths, its mode and the order of its carriages.
-FREE = msgspec.structs.replace(
-    OPTIMAL, limits=msgspec.structs.replace(OPTIMAL.limits, box=None), home=home_pose(OPTIMAL)
-)
+# The optimum with no limit but its mode, the order of its carriages, and a stroke of one reach for
+# each actuator, as the legs of the others have: the guide goes from a1 to a2.
+STROKES = msgspec.structs.replace(OPTIMAL.limits, box=None, guide=(0.0, OPTIMAL.reach))
+FREE = msgspec.structs.replace(OPTIMAL, limits=STROKES, home=home_pose(OPTIMAL))
 A2X = (10.0, OPTIMAL.reach)
 """Positions of a2 at which the twin is measured, in design units."""
 
@@ -84,8 +84,8 @@ def judge_workspace(ours: Workspace, others: Sequence[Workspace]) -> Measurement
     lines = [f"{'':18}{'volume/reach³':>14}{'error':>8}"]
     lines += [f"{each.name:18}{each.volume:14.3f}{each.error:8.3f}" for each in (ours, *others)]
     text = (
-        "With legs up to the reach and no other limit, at home's orientation and in home's mode, "
-        f"the volume over the cubed reach is {ours.volume:.3f}, beside "
+        "With a stroke of one reach for each actuator and no other limit, at home's orientation "
+        f"and in home's mode, the volume over the cubed reach is {ours.volume:.3f}, beside "
         + ", ".join(f"{each.volume:.3f} ({each.name})" for each in others)
         + "."
     )
@@ -145,7 +145,7 @@ def judge_orientations(ours: Abilities, others: Sequence[Abilities]) -> Measurem
 
 
 def four_four(position: FloatArray, rotation: FloatArray) -> BoolArray:
-    """Return whether poses keep the lengths, the mode and the order of the carriages of home."""
+    """Return whether poses keep the strokes, the mode and the order of the carriages of home."""
     return poses_are_valid(FREE, position, rotation)
 
 

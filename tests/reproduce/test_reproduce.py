@@ -174,6 +174,21 @@ def test_octahedral_platform_has_the_areas_of_the_design() -> None:
     assert area == pytest.approx(0.5 * OPTIMAL.a2x * OPTIMAL.a3[1], rel=1e-12)
 
 
+def test_compared_mechanisms_have_actuators_of_one_stroke() -> None:
+    reach, random = OPTIMAL.reach, np.random.default_rng(3)
+    position = random.uniform(-2.0 * reach, 2.0 * reach, (200_000, 3))
+    for rotation in (
+        home_pose(OPTIMAL).rotation,
+        np.asarray(Rotation.random(rng=random).as_matrix()),
+    ):
+        turned = np.broadcast_to(rotation, (len(position), 3, 3))
+        kept = inverse(OPTIMAL, position, rotation)[comparison.four_four(position, turned)]
+        assert (np.ptp(kept, axis=0) <= reach).all()
+    for mechanism in (six_four_twin(OPTIMAL, 12.0), octahedral(OPTIMAL)):
+        held = mechanism.holds(position, mechanism.home[1])
+        assert (mechanism.lengths(position[held], mechanism.home[1]) <= reach).all()
+
+
 def test_share_of_the_four_four_is_that_of_its_own_measure() -> None:
     turns = np.asarray(Rotation.random(40_000, rng=np.random.default_rng(2)).as_matrix())
     share = comparison.four_four(np.tile([10.0, 5.0, 9.0], (len(turns), 1)), turns).mean()
