@@ -112,15 +112,29 @@ def suggestion(word: str, known: Iterable[str]) -> str | None:
 
 
 def _check_options(command: type[Command], argv: Sequence[str]) -> None:
-    known = ["--help"]
+    """Refuse options that the command lacks, and options given twice, of which the last would win.
+
+    Raises:
+        UsageError: There is one.
+    """
+    known = {"--help": "help"}
     for field in dataclasses.fields(command):
         # A field whose name Python reserves, such as from, ends in an underscore.
         option = field.name.rstrip("_").replace("_", "-")
-        known.append(f"--{option}")
+        known[f"--{option}"] = field.name
         if isinstance(field.default, bool):
-            known.append(f"--no-{option}")
+            known[f"--no-{option}"] = field.name
+    given: dict[str, str] = {}
     for argument in argv:
         option = argument.partition("=")[0].replace("_", "-")
-        if option.startswith("--") and option not in known:
+        if not option.startswith("--"):
+            continue
+        if option not in known:
             hint = suggestion(option, known)
             raise UsageError(f"no option {option}" + (f" ({hint})" if hint else ""))
+        field = known[option]
+        if given.get(field, option) != option:
+            raise UsageError(f"{given[field]} and {option} contradict each other")
+        if field in given:
+            raise UsageError(f"{option} is given twice; give it once, with all its values")
+        given[field] = option

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from command_line import CommandLine
 
 from explorer.cli import COMMANDS
-from explorer.cli.parsing import condense
+from explorer.cli.parsing import condense, load_command
 
 SIX = ["1", "2", "3", "4", "5", "6"]
 
@@ -86,6 +88,29 @@ def test_misspelt_option_gets_a_suggestion(cli: CommandLine) -> None:
     assert message == (
         "explorer forward: no option --joint (did you mean --joints?); see explorer forward --help"
     )
+
+
+def options() -> Iterator[tuple[str, str]]:
+    """Yield every option of every command, with the command."""
+    for name in COMMANDS:
+        for field in dataclasses.fields(load_command(name, COMMANDS)):
+            yield name, f"--{field.name.rstrip('_').replace('_', '-')}"
+
+
+@pytest.mark.parametrize(("command", "option"), [*options()])
+def test_option_given_twice_is_refused(cli: CommandLine, command: str, option: str) -> None:
+    for first, second in (
+        ([option, "1", "2", "3"], [option, "4", "5", "6"]),
+        ([f"{option}=a"], [option.replace("-", "_").replace("__", "--", 1)]),
+        ([option], [option]),
+    ):
+        message = cli.refusal(command, *first, *second)
+        assert message.startswith(f"explorer {command}: {option} is given twice; ")
+
+
+def test_flag_and_its_opposite_are_refused(cli: CommandLine) -> None:
+    message = cli.refusal("screenshot", "--panels", "--no-panels")
+    assert "--panels and --no-panels contradict each other" in message
 
 
 def test_misspelt_command_gets_a_suggestion(cli: CommandLine) -> None:
