@@ -3,19 +3,21 @@
 A command is a frozen dataclass with a `run` method; its fields are its options. Only the
 module of the chosen command is imported, so that no command waits for the imports of another.
 
-The exit status is 0 (done), 1 (the question has no answer) or 2 (bad input). An error is one
-line on standard error, never a traceback.
+The exit status is 0 (done), 1 (the question has no answer, or a part of the answer could not be
+written) or 2 (bad input). An error is one line on standard error, never a traceback. With `--json`
+standard output has one object, or with status 2 nothing.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
 
 from explorer.cli import streams
 from explorer.cli.usage import UsageError
-from explorer.errors import ExplorerError
+from explorer.errors import ExplorerError, NoAnswerError
 
 COMMANDS: Mapping[str, str] = {
     "serve": "Serve the explorer's page and open it in the browser (the default).",
@@ -95,8 +97,15 @@ def _dispatch(argv: list[str]) -> None:
     from explorer.cli.parsing import load_command, parse
 
     command = parse(argv[0], load_command(argv[0], COMMANDS), argv[1:])
-    if command is not None:
+    if command is None:
+        return
+    try:
         command.run()
+    except ExplorerError as error:
+        is_asked = getattr(command, "json", False) and not streams.answered.get()
+        if is_asked and error.exit_status == NoAnswerError.exit_status:
+            streams.write(json.dumps({"message": str(error)}) + "\n")
+        raise
 
 
 def _overview() -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, ClassVar
 
 import msgspec
 import numpy as np
@@ -14,7 +15,7 @@ import tyro
 
 from explorer.cli.output import write_json, write_lines
 from explorer.cli.values import DESIGN_NAME, Flag, hint, numbers
-from explorer.errors import DesignError, ExplorerError, InputError
+from explorer.errors import DesignError, ExplorerError, InputError, StorageError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design
 from explorer.mechanism.home import home_pose
@@ -57,6 +58,31 @@ def load(name: str) -> Design:
         raise
 
 
+class PartialAnswerError(ExplorerError):
+    """An answer that has been printed, without a file, or without what was searched for."""
+
+    exit_status: ClassVar[int] = 1
+
+
+def write_beside(files: Mapping[Path, bytes]) -> tuple[list[Path], list[StorageError]]:
+    """Write files besides the answer; return those written, and the errors of the others.
+
+    An error is for the end of the command, after its answer: work of hours shall not be lost
+    because a disk is full.
+    """
+    from explorer.files.writing import write_whole
+
+    written: list[Path] = []
+    errors: list[StorageError] = []
+    for path, data in files.items():
+        try:
+            write_whole(path, data)
+            written.append(path)
+        except StorageError as error:
+            errors.append(error)
+    return written, errors
+
+
 @dataclass(frozen=True, kw_only=True)
 class JsonOptions:
     """The option for JSON."""
@@ -65,13 +91,27 @@ class JsonOptions:
     """Write one JSON object to standard output, and nothing else."""
 
     def write(
-        self, as_json: Callable[[], Mapping[str, object]], as_lines: Callable[[], Iterable[str]]
+        self,
+        as_json: Callable[[], Mapping[str, object]],
+        as_lines: Callable[[], Iterable[str]],
+        errors: Sequence[ExplorerError] = (),
     ) -> None:
-        """Write the answer to standard output: as JSON with `--json`, otherwise as text."""
+        """Write the answer to standard output: as JSON with `--json`, otherwise as text.
+
+        Args:
+            as_json: Returns the answer as plain values.
+            as_lines: Returns the answer as lines of text.
+            errors: Errors that keep the answer from being whole.
+
+        Raises:
+            PartialAnswerError: There are errors; their messages are one line.
+        """
         if self.json:
             write_json(as_json())
         else:
             write_lines(*as_lines())
+        if errors:
+            raise PartialAnswerError("; ".join(map(str, errors)))
 
 
 @dataclass(frozen=True, kw_only=True)

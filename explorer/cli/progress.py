@@ -7,6 +7,8 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from explorer.cli.streams import write_progress
+
 if TYPE_CHECKING:
     from explorer.optimise.outcome import Iterate
 
@@ -39,8 +41,7 @@ class Meter:
     def clear(self) -> None:
         """Erase the bar from a terminal."""
         if self._last_width and self.is_terminal:
-            sys.stderr.write("\r" + " " * self._last_width + "\r")
-            sys.stderr.flush()
+            write_progress("\r" + " " * self._last_width + "\r")
         self._last_width = 0
 
     @property
@@ -62,11 +63,10 @@ class Meter:
         full = round(WIDTH * share)
         text = f"[{'#' * full}{'.' * (WIDTH - full)}] {text}"
         if self.is_terminal:
-            sys.stderr.write("\r" + text.ljust(self._last_width)[:200])
+            write_progress("\r" + text.ljust(self._last_width)[:200])
             self._last_width = len(text)
         else:
-            sys.stderr.write(text + "\n")
-        sys.stderr.flush()
+            write_progress(text + "\n")
 
 
 class SearchMeter(Meter):

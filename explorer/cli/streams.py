@@ -10,12 +10,17 @@ import codecs
 import os
 import sys
 import unicodedata
+from contextvars import ContextVar
 from io import TextIOWrapper
 
 from explorer.errors import ExplorerError
 
 # Characters of ASCII in place of those that a terminal cannot show.
 _PLAIN = str.maketrans({"−": "-", "–": "-", "×": "x", "≤": "<=", "≥": ">=", "“": '"', "”": '"'})
+
+
+answered: ContextVar[bool] = ContextVar("answered", default=False)
+"""Whether anything was written to standard output since `prepare`."""
 
 
 class OutputError(ExplorerError):
@@ -25,6 +30,7 @@ class OutputError(ExplorerError):
 def prepare() -> None:
     """Make both streams accept any text: replace closed ones, and characters that they lack."""
     codecs.register_error("explorer.plain", _write_plainly)
+    answered.set(False)
     # A stream that was closed when the process started is None.
     if sys.stdout is None or sys.stderr is None:
         nowhere = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
@@ -54,6 +60,7 @@ def write(text: str) -> None:
         OutputError: Standard output cannot be written.
         BrokenPipeError: The reader has closed the pipe.
     """
+    answered.set(True)
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
@@ -67,4 +74,14 @@ def write(text: str) -> None:
 
 def write_error(message: str) -> None:
     """Write one line to standard error."""
-    sys.stderr.write(" ".join(message.split()) + "\n")
+    write_progress(" ".join(message.split()) + "\n")
+
+
+def write_progress(text: str) -> None:
+    """Write text to standard error and flush it, or give it up for good if that fails."""
+    try:
+        sys.stderr.write(text)
+        sys.stderr.flush()
+    except OSError:
+        # There is no place left to tell it, and the answer goes elsewhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
-from explorer.files.writing import write_whole
 from explorer.mechanism.design import JOINTS
 from explorer.paths.trajectory import Trajectory
 
@@ -36,12 +33,3 @@ def trajectory_csv(trajectory: Trajectory) -> str:
     head = [f"{name} [unit = {unit} mm]" if name in LENGTHS else name for name in names]
     lines = [",".join(head), *(",".join(map(repr, row)) for row in rows.tolist())]
     return "\n".join(lines) + "\n"
-
-
-def write_trajectory(trajectory: Trajectory, path: Path) -> None:
-    """Write a trajectory as a CSV file.
-
-    Raises:
-        StorageError: The file cannot be written.
-    """
-    write_whole(path, trajectory_csv(trajectory).encode())

@@ -159,6 +159,47 @@ def test_ascii_terminal_gets_text_with_replacements() -> None:
     assert "?1" in done.stdout
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
+@pytest.mark.parametrize(
+    ("argv", "status"),
+    [
+        (("inverse", "--json"), 0),
+        (("inverse", "--design", "nowhere"), 2),
+        (("optimise", "--design", "paper-initial", "--target-volume", "900", "--json"), 0),
+    ],
+)
+def test_full_standard_error_keeps_answer_and_status(argv: tuple[str, ...], status: int) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [*PROGRAM, *argv], stdout=subprocess.PIPE, stderr=full, check=False, timeout=60
+        )
+    assert done.returncode == status
+    assert done.stdout.count(b"\n") == (status == 0)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
+def test_record_that_no_longer_fits_on_the_disk_keeps_design_and_answer(tmp_path: Path) -> None:
+    argv = ("optimise", "--design", "paper-initial", "--target-volume", "900", "--json")
+    # A file of at most 4 kB: the design fits, the record does not.
+    limit = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)); "
+    code = f"{limit}from explorer.cli import run; sys.exit(run(sys.argv[1:]))"
+    done = subprocess.run(
+        [sys.executable, "-c", code, *argv, "--out", str(tmp_path / "best.json")],
+        capture_output=True,
+        encoding="utf-8",
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 1
+    found = json.loads(done.stdout)
+    assert found["converged"] is True
+    assert found["files"] == [str(tmp_path / "best.json")]
+    assert explorer.load_design(found["files"][0]).name == found["design"]["name"]
+    assert [path.name for path in tmp_path.iterdir()] == ["best.json"]
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith(f"explorer: cannot write {str(tmp_path / 'best.record.json')!r}: ")
+
+
 LIKE = {"−": "-", "–": "-", "×": "x", "≤": "<=", "≥": ">=", "²": "2", "“": '"', "”": '"', "ö": "o",
         "ß": "?", "漢": "?", "δ": "?"}  # fmt: skip
 

@@ -9,7 +9,13 @@ from typing import Annotated
 
 import numpy as np
 
-from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions, TypicalOptions
+from explorer.cli.options import (
+    DesignOptions,
+    JsonOptions,
+    PoseOptions,
+    TypicalOptions,
+    write_beside,
+)
 from explorer.cli.output import (
     assumed_lines,
     attributes,
@@ -21,7 +27,7 @@ from explorer.cli.output import (
 )
 from explorer.cli.usage import UsageError
 from explorer.cli.values import FILE, OPTIONAL, Flag, hint, numbers, positive
-from explorer.files.writing import check_writable, write_whole
+from explorer.files.writing import check_writable
 from explorer.measures.positions import PositionSet, positions_over
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
@@ -53,7 +59,7 @@ class Answer:
         over: Kind of the positions.
         costs: Costs of the tolerances found, or else of those stated.
         found: Tolerances that keep the wanted precision; None if none is wanted.
-        out: File of the design with these tolerances.
+        out: File of the design with these tolerances; None if none is written.
     """
 
     design: Design
@@ -127,10 +133,12 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
             tool=tool,
             keep_actuators=self.keep_actuators,
         )
+        files: dict[Path, bytes] = {}
         if found is not None and self.out is not None:
-            write_whole(self.out, encode_design(with_tolerances(design, found.tolerances)))
-        answer = Answer(design, assumed, pose, tool, over, costs, found, self.out)
-        self.write(lambda: _as_json(answer), lambda: self._as_lines(answer))
+            files[self.out] = encode_design(with_tolerances(design, found.tolerances))
+        written, errors = write_beside(files)
+        answer = Answer(design, assumed, pose, tool, over, costs, found, next(iter(written), None))
+        self.write(lambda: _as_json(answer), lambda: self._as_lines(answer), errors)
 
     def _positions(self) -> tuple[PositionSet, tuple[Triple, Triple] | None]:
         """Return the kind of the positions, and the given box.

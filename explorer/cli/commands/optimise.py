@@ -15,7 +15,7 @@ from explorer.cli.answers.optimisation import (
     outcome_json,
     outcome_lines,
 )
-from explorer.cli.options import DesignOptions, JsonOptions
+from explorer.cli.options import DesignOptions, JsonOptions, write_beside
 from explorer.cli.output import heading, write_json
 from explorer.cli.progress import SearchMeter
 from explorer.cli.usage import UsageError
@@ -161,7 +161,8 @@ class Optimise(JsonOptions, DesignOptions):
         """Write the outcome of the search.
 
         Raises:
-            NoAnswerError: The search did not converge; the best iterate has been written.
+            PartialAnswerError: The search did not converge, and the best iterate has been
+                written; or a file could not be written.
         """
         if self.findings:
             from explorer.cli.commands.reproduce import claim_lines
@@ -181,13 +182,13 @@ class Optimise(JsonOptions, DesignOptions):
         problem, settings = self._problem()
         self._check_possible(problem)
         outcome = _search(problem, settings)
-        written = self._write_files(outcome, settings, record)
+        written, unwritten = write_beside(self._files(outcome, settings, record))
+        unsolved = [] if outcome.converged else [NoAnswerError(outcome.run.message)]
         self.write(
             lambda: outcome_json(outcome, written),
             lambda: (heading(optimised_design(outcome)), *outcome_lines(outcome, written)),
+            [*unsolved, *unwritten],
         )
-        if not outcome.converged:
-            raise NoAnswerError(outcome.run.message)
 
     def _problem(self) -> tuple[Problem, Settings]:
         """Return the problem and the settings that the options describe."""
@@ -265,19 +266,18 @@ class Optimise(JsonOptions, DesignOptions):
             write_json(infeasible_json(problem, refuted[0].limit, message))
         raise NoAnswerError(message)
 
-    def _write_files(self, outcome: Outcome, settings: Settings, record: Path | None) -> list[Path]:
-        """Write the requested files and return their paths."""
-        from explorer.files.writing import write_whole
+    def _files(
+        self, outcome: Outcome, settings: Settings, record: Path | None
+    ) -> dict[Path, bytes]:
+        """Return the requested files by their paths."""
         from explorer.optimise.record import encode_record, record_of
 
-        written: list[Path] = []
+        files: dict[Path, bytes] = {}
         if self.out is not None and outcome.converged:
-            write_whole(self.out, encode_design(optimised_design(outcome)))
-            written.append(self.out)
+            files[self.out] = encode_design(optimised_design(outcome))
         if record is not None and (outcome.converged or self.record is not None):
-            write_whole(record, encode_record(record_of(outcome, settings)))
-            written.append(record)
-        return written
+            files[record] = encode_record(record_of(outcome, settings))
+        return files
 
 
 def _search(problem: Problem, settings: Settings) -> Outcome:

@@ -17,6 +17,7 @@ from explorer.cli.options import (
     PointOptions,
     RadiiOptions,
     make_pose,
+    write_beside,
 )
 from explorer.cli.output import (
     attributes,
@@ -135,13 +136,14 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
         """Write the path.
 
         Raises:
+            EndError: The start or the goal is outside the limits or singular.
             NoPathError: There is no path, or the time ended before one was found.
             MissingExtraError: OMPL is not installed.
         """
-        from explorer.export.trajectory import write_trajectory
+        from explorer.export.trajectory import trajectory_csv
         from explorer.files.writing import check_writable
         from explorer.paths.loads import path_loads
-        from explorer.paths.planning import EndError, NoPathError, plan_path
+        from explorer.paths.planning import NoPathError, plan_path
         from explorer.paths.trajectory import trajectory
 
         design = self.with_radii(self.read_design())
@@ -166,19 +168,21 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
             check_writable(self.out)
         try:
             path = plan_path(design, start, goal, seconds=self.seconds, tool=tool, load=self.load)
-        except (EndError, NoPathError) as error:
+        except NoPathError as error:
             if self.json:
                 write_json({"found": False, "reason": error.reason, "poses": []})
             raise
         timed = trajectory(design, path.poses, speed=self.speed, samples=self.samples, tool=tool)
-        if self.out is not None:
-            write_trajectory(timed, self.out)
         largest = None
         if self.load is not None:
             largest = path_loads(design, path.poses, self.load, tool=tool).largest
+        files = {} if self.out is None else {self.out: trajectory_csv(timed).encode()}
+        written, errors = write_beside(files)
+        out = next(iter(written), None)
         self.write(
-            lambda: _as_json(path, timed, largest, self.out),
-            lambda: _as_lines(design, path, timed, largest, self.out),
+            lambda: _as_json(path, timed, largest, out),
+            lambda: _as_lines(design, path, timed, largest, out),
+            errors,
         )
 
 
