@@ -25,6 +25,7 @@ from explorer.cli import COMMANDS, run
 from explorer.cli.parsing import load_command, parse
 from explorer.errors import InputError
 from explorer.files.manual import list_pages, read_page
+from explorer.optimise.problem import OBJECTIVES
 
 ROOT = Path(__file__).resolve().parents[1]
 MANUAL = Path(explorer.__file__).parents[1] / "assets" / "manual"
@@ -50,6 +51,11 @@ def test_manual_pages_are_all_listed_glossary_first() -> None:
     for page in pages:
         assert read_page(page.file).startswith(f"# {page.title}\n")
         assert f"(assets/manual/{page.file})" in read("README.md")
+
+
+def test_manual_counts_the_objectives_of_the_optimiser() -> None:
+    count = ("five", "six", "seven", "eight", "nine")[len(OBJECTIVES) - 5]
+    assert f"The objective is one of {count}:" in read("optimise.md")
 
 
 @pytest.mark.parametrize("name", ["", "../README.md", "nothing.md", "glossary"])
