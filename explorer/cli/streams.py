@@ -16,8 +16,9 @@ from io import TextIOWrapper
 from explorer.errors import ExplorerError
 
 # Characters of ASCII in place of those that a terminal cannot show.
-_PLAIN = str.maketrans({"−": "-", "–": "-", "×": "x", "≤": "<=", "≥": ">=", "“": '"', "”": '"'})
-
+_PLAIN = {"±": "+-", "≤": "<=", "≥": ">=", "°": " deg"} | dict(
+    zip("−–—×·⁄›′‘’“”", "---x./>'''\"\"", strict=True)
+)
 
 answered: ContextVar[bool] = ContextVar("answered", default=False)
 """Whether anything was written to standard output since `prepare`."""
@@ -47,9 +48,9 @@ def _write_plainly(error: UnicodeError) -> tuple[str | bytes, int]:
     """
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    text = error.object[error.start : error.end].translate(_PLAIN)
-    letters = (each for each in unicodedata.normalize("NFKD", text))
-    plain = (each if each.isascii() else "?" for each in letters if not unicodedata.combining(each))
+    text = unicodedata.normalize("NFKD", error.object[error.start : error.end])
+    letters = (each for each in text if not unicodedata.combining(each))
+    plain = (each if each.isascii() else _PLAIN.get(each, "?") for each in letters)
     return "".join(plain), error.end
 
 

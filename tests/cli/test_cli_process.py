@@ -200,8 +200,8 @@ def test_record_that_no_longer_fits_on_the_disk_keeps_design_and_answer(tmp_path
     assert last.startswith(f"explorer: cannot write {str(tmp_path / 'best.record.json')!r}: ")
 
 
-LIKE = {"−": "-", "–": "-", "×": "x", "≤": "<=", "≥": ">=", "²": "2", "“": '"', "”": '"', "ö": "o",
-        "ß": "?", "漢": "?", "δ": "?"}  # fmt: skip
+ALIKE = ("−-", "–-", "⁻-", "×x", "≤<=", "≥>=", "²2", "³3", '“"', '”"', "′'", "öo", "±+-", "° deg")
+LIKE = {pair[0]: pair[1:] for pair in (*ALIKE, "½1/2", "ß?", "漢?", "δ?")}
 
 
 def encodes(letter: str, encoding: str) -> bool:
@@ -213,7 +213,7 @@ def encodes(letter: str, encoding: str) -> bool:
 
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "cp437", "latin-1", "shift-jis", "utf-8"])
 def test_terminal_gets_the_characters_most_like_those_that_it_lacks(encoding: str) -> None:
-    text = "−1.5 – 2×3 ≤ 4² ≥ “Größe” 漢δ"
+    text = "−1.5 – 2×3 ≤ 4² ≥ “Größe” 漢δ 10⁻³ ±½° V′"
     code = (
         "from explorer.cli import streams; streams.prepare(); "
         f"streams.write({text!r}); streams.write_error({text!r})"
