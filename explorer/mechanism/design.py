@@ -158,7 +158,8 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             low, high = ordered("limits.guide", *two("limits.guide", self.guide))
             _set(self, "guide", (low, high))
         _set(self, "gap", not_negative("limits.gap", self.gap))
-        one_of("limits.carriage_order", self.carriage_order, get_args(CarriageOrder))
+        order = one_of("limits.carriage_order", self.carriage_order, get_args(CarriageOrder))
+        _set(self, "carriage_order", order)
         if self.box is not None:
             lows, highs = two("limits.box", self.box)
             pairs = [
@@ -227,7 +228,9 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def __post_init__(self) -> None:
         if self.schema != 2:
             raise DesignError(f"schema must be 2; got {self.schema!r}")
+        _set(self, "schema", 2)
         instance("name", self.name, str)
+        _set(self, "name", str(self.name))
         if len(self.name) > 100 or not self.name.isprintable():
             raise DesignError("name must be one printable line of at most 100 characters")
         instance("limits", self.limits, Limits)

@@ -56,8 +56,10 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         norm = float(np.linalg.norm(unit))
         # A quaternion of unit length stays the same to the last bit, so that files round-trip.
         if abs(norm * size - 1.0) > 4e-16:
-            w, x, y, z = (unit / norm).tolist()
-            msgspec.structs.force_setattr(self, "quaternion", (w, x, y, z))
+            quaternion = unit / norm
+        # Plain numbers, whatever was given: others can be neither compared nor written to a file.
+        msgspec.structs.force_setattr(self, "position", tuple(position.tolist()))
+        msgspec.structs.force_setattr(self, "quaternion", tuple(quaternion.tolist()))
 
     @property
     def rotation(self) -> FloatArray:

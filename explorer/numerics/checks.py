@@ -6,8 +6,9 @@ Every function raises `DesignError` with one line: the field, what it must be, a
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping, Sequence, Set
-from typing import Any, cast
+from typing import Any, SupportsIndex, cast
 
 from explorer.errors import DesignError
 
@@ -80,11 +81,22 @@ def numbers(name: str, value: Any, count: int) -> list[float]:
     return [number(name, entry) for entry in entries]
 
 
-def one_of(name: str, value: object, allowed: Sequence[str]) -> None:
-    """Check that the value is one of the allowed words."""
-    if value not in allowed:
+def whole(name: str, value: object, low: int, high: int) -> int:
+    """Return the value as a plain integer from `low` to `high`."""
+    if isinstance(value, bool) or not isinstance(value, SupportsIndex):
+        raise DesignError(f"{name} must be a whole number; got {_short_repr(value)}", name)
+    checked = operator.index(value)
+    if not low <= checked <= high:
+        raise DesignError(f"{name} must lie within {low} to {high}; got {checked}", name)
+    return checked
+
+
+def one_of(name: str, value: object, allowed: Sequence[str]) -> str:
+    """Return the value as the plain string that it equals, one of the allowed words."""
+    if not isinstance(value, str) or value not in allowed:
         words = " or ".join(f'"{word}"' for word in allowed)
         raise DesignError(f"{name} must be {words}; got {_short_repr(value)}", name)
+    return str(value)
 
 
 def instance(name: str, value: object, *kinds: type) -> None:

@@ -71,6 +71,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         for field in ("clearance_margin", "least"):
             value = not_negative(f"the {field.replace('_', ' ')}", getattr(self, field))
             msgspec.structs.force_setattr(self, field, value)
+        msgspec.structs.force_setattr(self, "held", bool(self.held))
         if self.required_box is not None:
             lows, highs = two("the required box", self.required_box)
             pairs = [

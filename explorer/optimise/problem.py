@@ -72,6 +72,7 @@ class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     high: float
 
     def __post_init__(self) -> None:
+        msgspec.structs.force_setattr(self, "name", str(self.name))
         for field in ("low", "high"):
             value = number(f"the {field} bound of {self.name}", getattr(self, field))
             msgspec.structs.force_setattr(self, field, value)
@@ -103,6 +104,8 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
             msgspec.structs.force_setattr(self, "start", with_home)
         if self.objective not in OBJECTIVES:
             raise InputError(f"no objective {self.objective!r}; there are {', '.join(OBJECTIVES)}")
+        msgspec.structs.force_setattr(self, "objective", str(self.objective))
+        msgspec.structs.force_setattr(self, "variables", tuple(self.variables))
         if self.start.limits.swing != Swing():
             raise InputError(
                 "the volume has no gradient while joints bound the swing of legs: take these "

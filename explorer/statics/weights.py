@@ -20,6 +20,7 @@ from explorer.mechanism.kinematics import AttachmentPoints, attachment_points
 from explorer.mechanism.machine import STANDARD_GRAVITY, Payload
 from explorer.mechanism.pose import Quadruple
 from explorer.numerics.arrays import FloatArray, dot, finite_array, rotate
+from explorer.numerics.checks import numbers
 
 NOTHING: Quadruple = (0.0, 0.0, 0.0, 0.0)
 ON_GUIDE = np.array([False, True, True, False])
@@ -37,6 +38,9 @@ class Weights:
         cylinder_centres: Distances of their centres from the base joints, along the legs.
         rods: Masses of the rods, by leg.
         rod_centres: Distances of their centres from the platform joints, back along the legs.
+
+    Raises:
+        DesignError: A field of the legs is not four finite numbers.
     """
 
     on_platform: tuple[Payload, ...] = ()
@@ -45,6 +49,12 @@ class Weights:
     cylinder_centres: Quadruple = NOTHING
     rods: Quadruple = NOTHING
     rod_centres: Quadruple = NOTHING
+
+    def __post_init__(self) -> None:
+        # Plain numbers, whatever was given, so that weights can be compared.
+        object.__setattr__(self, "on_platform", tuple(self.on_platform))
+        for name in ("carriages", "cylinders", "cylinder_centres", "rods", "rod_centres"):
+            object.__setattr__(self, name, tuple(numbers(name, getattr(self, name), 4)))
 
     @property
     def has_legs(self) -> bool:

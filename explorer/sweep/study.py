@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
 import msgspec
 
@@ -23,7 +23,7 @@ from explorer.measures.catalogue import FORMER_NAMES, measures_in
 from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
-from explorer.numerics.checks import instance, number, positive, two
+from explorer.numerics.checks import instance, number, one_of, positive, two, whole
 from explorer.optimise.demands import Demands
 from explorer.optimise.problem import (
     OBJECTIVES,
@@ -80,18 +80,21 @@ class Sampling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not 0 <= self.seed <= LARGEST_SEED:
-            raise InputError(f"sampling.seed must lie within 0 to {LARGEST_SEED}; got {self.seed}")
+        _set(self, "method", one_of("sampling.method", self.method, get_args(Method)))
+        _set(self, "seed", whole("sampling.seed", self.seed, 0, LARGEST_SEED))
         if isinstance(self.count, dict):
             if self.method != "grid":
                 raise InputError(
                     f"sampling.count must be one number for {self.method}; only a grid takes "
                     "one for each variable"
                 )
-            for name, count in self.count.items():
-                _check_within(f"sampling.count.{name}", count, 1, MOST_DESIGNS)
+            counts = {
+                str(name): whole(f"sampling.count.{name}", count, 1, MOST_DESIGNS)
+                for name, count in self.count.items()
+            }
+            _set(self, "count", counts)
         else:
-            _check_within("sampling.count", self.count, 1, MOST_DESIGNS)
+            _set(self, "count", whole("sampling.count", self.count, 1, MOST_DESIGNS))
 
 
 class Polish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -118,7 +121,9 @@ class Polish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             raise InputError(
                 f"no objective {self.objective!r} to polish for; there are {', '.join(OBJECTIVES)}"
             )
-        _check_within("polish.iterations", self.iterations, 1, MOST_ITERATIONS)
+        _set(self, "objective", str(self.objective))
+        iterations = whole("polish.iterations", self.iterations, 1, MOST_ITERATIONS)
+        _set(self, "iterations", iterations)
         if self.variables is not None:
             ranges = _ranges("polish.variables", self.variables, POLISHED)
             _set(self, "variables", ranges)
@@ -130,13 +135,18 @@ class Objective(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         measure: The name of its column.
         sense: "min" or "max".
+
+    Raises:
+        InputError: another sense.
     """
 
     measure: str
     sense: Sense
 
     def __post_init__(self) -> None:
-        _set(self, "measure", FORMER_NAMES.get(self.measure, self.measure))
+        measure = str(self.measure)
+        _set(self, "measure", FORMER_NAMES.get(measure, measure))
+        _set(self, "sense", one_of("the sense of an objective", self.sense, get_args(Sense)))
 
 
 class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -176,19 +186,22 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     def __post_init__(self) -> None:
         if self.schema != 1:
             raise InputError(f"schema must be 1; got {self.schema!r}")
+        _set(self, "schema", 1)
         if not self.name or len(self.name) > LONGEST_NAME or not self.name.isprintable():
             raise InputError(f"name must be one printable line of 1 to {LONGEST_NAME} characters")
+        _set(self, "name", str(self.name))
         _set(self, "design", _complete(self.design))
         _set(self, "variables", _ranges("variables", self.variables, NAMES))
-        present = (FORMER_NAMES.get(name, name) for name in self.measures)
+        present = (FORMER_NAMES.get(name, name) for name in map(str, self.measures))
         _set(self, "measures", tuple(present))
         self._check_ranges()
         self._check_sampling()
         self._check_measures()
-        _check_within("nodes", self.nodes, FEWEST_NODES, MOST_NODES)
+        _set(self, "nodes", whole("nodes", self.nodes, FEWEST_NODES, MOST_NODES))
         if self.clearance_margin is not None:
             _set(self, "clearance_margin", positive("clearance_margin", self.clearance_margin))
-        _check_within("chunk", self.chunk, 1, MOST_IN_CHUNK)
+        _set(self, "chunk", whole("chunk", self.chunk, 1, MOST_IN_CHUNK))
+        _set(self, "objectives", tuple(self.objectives))
         for objective in self.objectives:
             if objective.measure not in (*self.varied, *self.measures):
                 raise InputError(
@@ -357,13 +370,8 @@ def _ranges(
                 f"the range of {name} is empty: {low:g} to {high:g}; the low end must lie below "
                 "the high one"
             )
-        ranges[name] = (low, high)
+        ranges[str(name)] = (low, high)
     return ranges
-
-
-def _check_within(field: str, value: int, low: int, high: int) -> None:
-    if not low <= value <= high:
-        raise InputError(f"{field} must lie within {low} to {high}; got {value}")
 
 
 def _check_unique(field: str, names: Iterable[str]) -> None:
