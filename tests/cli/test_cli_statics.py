@@ -139,6 +139,33 @@ def test_forces_of_payload_are_those_of_its_weight(cli: CommandLine, machine: Pa
     assert not any(none["actuator_forces"])
 
 
+def test_forces_json_has_what_the_process_may_add(cli: CommandLine, tmp_path: Path) -> None:
+    design = msgspec.structs.replace(MACHINE, payload=explorer.Payload(0.3, (0.0, 0.0, 1.0), 7.0))
+    path = tmp_path / "process.json"
+    path.write_bytes(explorer.encode_design(design))
+    tool = design.tool.position
+    given = ["--yaw-pitch-roll", "-60", "12.5", "-7", "--at", "tool", "--design", path]
+    found = cli.answer("forces", *given)
+    assert found["process"].keys() == found["shares"].keys()
+    # A force of any direction adds the length of the row of what unit forces along the axes do.
+    pose = explorer.Pose.of_yaw_pitch_roll((0.0, 0.0, 0.0), (-60.0, 12.5, -7.0))
+    home = explorer.tool_position(explorer.home_pose(design), tool)
+    at = home - pose.rotation @ tool, pose.rotation
+    units = np.eye(6)[:3]
+    rows = np.array([explorer.actuator_forces(design, *at, unit, tool) for unit in units])
+    bending = np.array([explorer.strut_bending(design, *at, unit, tool) for unit in units])
+    process = np.array(list(found["process"].values()))
+    assert_allclose(process[:6], 7.0 * np.linalg.norm(rows, axis=0))
+    assert_allclose(process[6:8], 7.0 * np.linalg.norm(bending, axis=0))
+    # The shares are those of the forces with what the process adds.
+    forces, push = np.array(found["actuator_forces"]), np.array(design.actuators.push_n)
+    shares = np.array(list(found["shares"].values()))[:6]
+    assert_allclose(shares, (np.abs(forces) + process[:6]) / push)
+    text = cli.text("forces", *given)
+    assert "process, ± N" in text
+    assert not any(cli.answer("forces", *POSE)["process"].values())
+
+
 def test_forces_of_density_are_those_of_the_machines_weight(cli: CommandLine) -> None:
     light, heavy = (
         cli.answer("forces", *POSE, "--density", density)["actuator_forces"]

@@ -131,6 +131,8 @@ def _as_json(answer: Answer) -> dict[str, object]:
         "joint_forces": held.joints,
         "guide_force": held.guide_force,
         "guide_moment": held.guide_moment,
+        # What the payload's force of any direction may add either way.
+        "process": dict(zip(LIMITED, held.spread.tolist(), strict=True)),
         "shares": dict(zip(LIMITED, loaded.shares.tolist(), strict=True)),
         "largest_payload": finite(loaded.largest_payload),
         "largest_force_by_all_parts": 1.0 / loaded.newton.share if loaded.newton.share else None,
