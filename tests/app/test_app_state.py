@@ -211,7 +211,7 @@ def test_limits_are_judged_where_the_mechanism_stands(state: State) -> None:
     assert [v.limit for v in Frame(tight).snapshot.violations] == ["l1"]
 
 
-@pytest.mark.parametrize("length", [0.0, -1.0, float("nan")])
+@pytest.mark.parametrize("length", [0.0, -1.0, float("nan"), 5e-324, 1e300])
 def test_a_warning_length_must_be_positive(state: State, length: float) -> None:
     with pytest.raises(InputError, match="positive"):
         Set("view", replace(state.view, warn_below=length)).apply(state)

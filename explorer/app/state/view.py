@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -99,7 +98,7 @@ class PrototypeView:
     def __post_init__(self) -> None:
         if not 0.0 <= self.exploded <= 1.0:
             raise InputError(f"the exploded view takes 0 to 1; got {format_number(self.exploded)}")
-        if not (math.isfinite(self.density) and self.density > 0.0):
+        if not SMALLEST_POSITIVE <= self.density <= LARGEST_NUMBER:
             raise InputError(
                 f"the density must be positive; got {format_number(self.density)} (aluminium: "
                 f"{format_number(ALUMINIUM)} kg/m³)"
@@ -136,7 +135,7 @@ class ForcesView:
                 raise InputError(
                     f"the {name} must be three finite numbers of at most {LARGEST_NUMBER:g} {unit}"
                 )
-        if not (math.isfinite(self.scale) and self.scale > 0.0):
+        if not SMALLEST_POSITIVE <= self.scale <= LARGEST_NUMBER:
             raise InputError(
                 f"the force whose arrow is as long as the reach must be positive, in N; got "
                 f"{format_number(self.scale)}"
@@ -264,5 +263,5 @@ class View:
 
     def __post_init__(self) -> None:
         warn = self.warn_below
-        if warn is not None and not (math.isfinite(warn) and warn > 0.0):
+        if warn is not None and not SMALLEST_POSITIVE <= warn <= LARGEST_NUMBER:
             raise InputError(f"the warning length must be positive; got {format_number(warn)}")
