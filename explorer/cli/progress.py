@@ -96,7 +96,7 @@ class SearchMeter(Meter):
         share = (iterate.run + min(1.0, self._steps / self.iterations)) / self.starts
         text = (
             f"start {iterate.run + 1} of {self.starts}, "
-            f"{iterate.phase} {self._steps}: {self.objective} {iterate.objective:.6g}, "
+            f"{iterate.phase} {self._steps}: {self.objective} {iterate.value:.6g}, "
             f"volume {iterate.volume:.6g}"
         )
         if iterate.spare < 0.0:

@@ -18,7 +18,7 @@ from explorer.legs.clearance import PAIRS
 from explorer.measures.case import Case
 from explorer.measures.loads import loads
 from explorer.measures.measure import Measure, Place
-from explorer.measures.size import box_margin, box_tilt, home_tilt, longest_leg
+from explorer.measures.size import box_margins, box_tilt, home_tilt, longest_leg
 from explorer.mechanism.design import LENGTHS, VARIABLES
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
@@ -221,8 +221,10 @@ def _margins() -> Iterable[Measure]:
     yield Margin(
         "box_margin",
         "margin over the box",
-        f"The least |δ| over the required box. {_KINDS}",
-        lambda case: math.nan if case.box is None else box_margin(case.box, case.rotation),
+        f"The least |δ| over the required box, 0 where a singular plane meets it. {_KINDS}",
+        lambda case: (
+            math.nan if case.box is None else float(box_margins(case.box, case.rotation).min())
+        ),
         needs=("box",),
         places=OPTIMISE,
     )

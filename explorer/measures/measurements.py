@@ -23,6 +23,7 @@ class Measurements:
         nearest: The two legs that have the least clearance; None if it was not measured.
         demanded_margin: Least |δ| at which the demanded clearance counts; None without demand.
         demanded_nearest: The two legs that have the least demanded clearance, or None.
+        infinite: Measures whose value is infinite, as that of forces in a singular pose.
     """
 
     design: Design
@@ -31,10 +32,15 @@ class Measurements:
     nearest: tuple[int, int] | None = None
     demanded_margin: float | None = None
     demanded_nearest: tuple[int, int] | None = None
+    infinite: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> float | None:
         """Return the value of a measure; None if there is none, or if it was not measured."""
         return self.values.get(name)
+
+    def value(self, name: str) -> float | None:
+        """Return the value of a measure, which may be infinite; None if there is none."""
+        return math.inf if name in self.infinite else self.values.get(name)
 
 
 def measure_design(case: Case, names: Iterable[str]) -> Measurements:
@@ -48,12 +54,15 @@ def measure_design(case: Case, names: Iterable[str]) -> Measurements:
         ExplorerError: a mesh that is needed cannot be made.
     """
     values: dict[str, float | None] = {}
+    infinite: list[str] = []
     for name in names:
         measure = CATALOGUE[name]
         if not all(map(case.has, measure.needs)):
             continue
         value = measure.function(case)
         values[name] = None if not math.isfinite(value) else value
+        if math.isinf(value):
+            infinite.append(name)
     return Measurements(
         design=case.design,
         values=values,
@@ -61,6 +70,7 @@ def measure_design(case: Case, names: Iterable[str]) -> Measurements:
         nearest=case.clearance[1] if "least_clearance" in values else None,
         demanded_margin=case.demanded_margin,
         demanded_nearest=case.demanded_clearance[1] if "demanded_clearance" in values else None,
+        infinite=tuple(infinite),
     )
 
 

@@ -1,4 +1,4 @@
-"""The size of a design and of its required box: longest leg, corners, margin."""
+"""The size of a design and of its required box: longest leg, corners, margins."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, lengths_of
+from explorer.statics.equilibrium import SINGULAR
 from explorer.workspace.orientations.tilts import greatest_tilts
 
 BOX_NODES = 9
@@ -41,17 +42,20 @@ def box_nodes(box: tuple[Triple, Triple]) -> FloatArray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def box_margin(box: tuple[Triple, Triple], rotation: FloatArray) -> float:
-    """Return the least |δ| at the corners of a box at an orientation, in design units.
+def box_margins(box: tuple[Triple, Triple], rotation: FloatArray) -> FloatArray:
+    """Return the least |δ1|, |δ2| and |δ3| over a box, shape (3,), in design units.
 
-    Margins are linear in the position: where none changes its sign within the box, this is the
-    least over all of it.
+    Margins are linear in the position, so that the corners decide: of one sign, they have the
+    least value; of both, there is a zero between them. What is zero but for rounding is 0.
 
     Args:
         box: Lows and highs of the positions.
         rotation: Platform to base, shape (3, 3).
     """
-    return float(np.abs(margins(corners_of(box), rotation)).min())
+    corners = corners_of(box)
+    at = margins(corners, rotation)
+    least = np.maximum(at.min(axis=0), -at.max(axis=0))
+    return np.where(least > SINGULAR * lengths_of(corners).max(), least, 0.0)
 
 
 def home_tilt(design: Design, pose: Pose) -> float:

@@ -2,7 +2,7 @@
 
 The load is the payload's weight and its force of any direction; the legs count as weightless.
 Forces are not linear in the position, so corners alone do not bound them; the grid has the corners
-among its nodes. Where a margin changes its sign within the box, all of them are infinite.
+among its nodes. Where a box is on or across a singular plane, all of them are infinite.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ from functools import cached_property
 
 import numpy as np
 
-from explorer.measures.size import box_nodes, corners_of
+from explorer.measures.size import box_margins, box_nodes
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse
-from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.accuracy import ToolError, actuator_errors, worst_error
@@ -66,8 +65,7 @@ class BoxStatics:
     @cached_property
     def is_regular(self) -> bool:
         """Whether no margin changes its sign or vanishes within the box."""
-        signs = np.sign(margins(corners_of(self.box), self.rotation))
-        return bool((np.abs(signs.sum(axis=0)) == len(signs)).all())
+        return bool(box_margins(self.box, self.rotation).all())
 
     @cached_property
     def positions(self) -> FloatArray:
@@ -120,8 +118,8 @@ class BoxStatics:
 
     @property
     def worst_actuator(self) -> float:
-        """The place in `JOINTS`, from 1, of the actuator with the largest share."""
-        return float(self.shares[:6].argmax() + 1) if self.is_regular else np.inf
+        """The place in `JOINTS`, from 1, of the actuator with the largest share; NaN for all."""
+        return float(self.shares[:6].argmax() + 1) if self.is_regular else math.nan
 
     @property
     def largest_bending(self) -> float:

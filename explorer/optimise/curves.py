@@ -46,7 +46,7 @@ class Curve:
 
     Attributes:
         kind: Quantity of the values.
-        values: Value of each iterate, shape (n,).
+        values: Value of each iterate, shape (n,); NaN for an infinite one.
         level: Value to compare the others with, or None.
         powers: Whether the values are exponents of ten.
     """
@@ -64,7 +64,7 @@ def curves_of(problem: Problem, iterates: Sequence[Iterate] | Sequence[Step]) ->
         problem: The problem.
         iterates: Iterates in their order; not empty.
     """
-    objective = np.array([iterate.objective for iterate in iterates])
+    objective = np.array([iterate.objective for iterate in iterates], dtype=np.float64)
     curves: list[Curve] = []
     if problem.objective == "match-volume":
         powers = np.log10(np.maximum(objective, LEAST))

@@ -5,6 +5,7 @@ All are plain values, to send to another process or write into a file.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -34,7 +35,8 @@ class Iterate:
         phase: Phase of the search.
         design: The design.
         values: Values of the variables of the problem.
-        objective: F = |1 − V/V′|, or the value of the measure that the objective improves.
+        objective: F = |1 − V/V′|, or the value of the measure that the objective improves; None
+            if it is infinite.
         volume: Exact volume of the workspace, in cubed design units.
         worst: Demand that is missed most, or has the least to spare; "" without demands.
         spare: Value of that demand, dimensionless: below zero where it is missed by more than
@@ -46,10 +48,15 @@ class Iterate:
     phase: Phase
     design: Design
     values: tuple[float, ...]
-    objective: float
+    objective: float | None
     volume: float
     worst: str
     spare: float
+
+    @property
+    def value(self) -> float:
+        """The objective as a number, which may be infinite."""
+        return math.inf if self.objective is None else self.objective
 
 
 @dataclass(frozen=True)

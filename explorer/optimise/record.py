@@ -38,7 +38,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     run: int
     phase: Phase
     values: tuple[float, ...]
-    objective: float
+    objective: float | None
     volume: float
     worst: str
     spare: float

@@ -63,6 +63,7 @@ from explorer.app.features.optimise.words import (
     refused_words,
     result_words,
     search_notice,
+    value_text,
     verdict_words,
 )
 from explorer.app.features.sharing.tasks import export_report
@@ -264,7 +265,7 @@ def test_it_finds_the_design_and_the_page_goes_through_all_iterates(bench: Bench
     assert run.verdict is not None
     assert run.verdict.status == "converged"
     assert run.best is not None
-    assert run.best.objective <= 1e-6
+    assert run.best.value <= 1e-6
     assert abs(workspace_volume(run.best.design).volume / 8000.0 - 1.0) <= 1e-6
     # A short search is shown iterate by iterate.
     drawn = [state.design.variables for state in bench.states if state.optimisation.is_on]
@@ -308,7 +309,7 @@ def test_cancel_ends_the_search_by_a_word_and_keeps_the_best_so_far(
     assert run.verdict.starts < 10_000
     rank = Trail(run.problem, None, None).rank
     assert rank(run.best)[0] == 0.0
-    assert run.best.objective <= run.iterates[0].objective * 10.0
+    assert run.best.value <= run.iterates[0].value * 10.0
     assert run.best in run.iterates
     assert bench.state.design.variables == run.best.design.variables
     phases = [s.optimisation.run.phase for s in bench.states if s.optimisation.run is not None]
@@ -654,7 +655,7 @@ def test_the_charts_are_of_one_start_and_of_what_was_asked() -> None:
     assert matched is not None
     powers = curves_of(matched)[0].values
     # Down to rounding, where exactly zero is drawn as the least power.
-    assert powers[0] == pytest.approx(np.log10(matched.iterates[0].objective))
+    assert powers[0] == pytest.approx(np.log10(matched.iterates[0].value))
     assert -16.0 <= powers[-1] <= -10.0
 
 
@@ -845,6 +846,34 @@ def test_the_chart_of_a_load_or_an_error_has_its_unit() -> None:
         run = Advance(run.number, (step,)).apply(state).optimisation.run
         assert run is not None
         assert curves_of(run)[0].caption == caption
+        last = Advance(run.number, (replace(step, objective=None),)).apply(state).optimisation.run
+        assert last is not None
+        assert curves_of(last)[0].caption == caption.replace("0.4", "infinite")
+        assert value_text(last.problem, last.iterates[-1]).endswith(" infinite")
+
+
+def test_the_table_tells_infinite_loads_beside_finite_ones() -> None:
+    design = msgspec.structs.replace(
+        OPTIMAL,
+        payload=Payload(force_n=1.0),
+        actuators=Actuators((50.0, 50.0, 50.0, 50.0, 50.0, 50.0)),
+        limits=msgspec.structs.replace(OPTIMAL.limits, box=None),
+    )
+    on_plane, off_plane = ((8.0, 3.0, 0.0), (12.0, 7.0, 8.0)), ((8.0, 3.0, 1.0), (12.0, 7.0, 9.0))
+    request = OptimisationRequest(objective="smallest-load", box=off_plane)
+    state = SetRequest("optimisation.request", request).apply(opened(design))
+    for boxes, cells in (
+        ((on_plane, off_plane), ("infinite", "0.")),
+        ((off_plane, on_plane), ("0.", "infinite")),
+    ):
+        run = StartRun().apply(state).optimisation.run
+        assert run is not None
+        run = replace(run, comparison=compare(design, design, None, boxes))
+        rows = {row[0]: row[1:] for row in rows_of(comparison_table(run))}
+        before, after, change = rows["load share over the box"]
+        assert before.startswith(cells[0])
+        assert after.startswith(cells[1])
+        assert change == ""
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -1006,7 +1035,7 @@ def test_one_press_and_another_solve_the_papers_problem_from_its_initial_row(
     assert run.verdict is not None
     assert run.verdict.status == "converged"
     assert run.best is not None
-    assert run.best.objective <= 1e-9
+    assert run.best.value <= 1e-9
     assert run.own.design.home == INITIAL.home
     assert not bench.complaints
     assert not {LIFT, PAPER_BOX} & {*bench.buttons}

@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import msgspec
 import pytest
 from command_line import CommandLine
 
@@ -140,6 +141,63 @@ def test_optimise_other_objectives_and_variables(cli: CommandLine) -> None:
     stroke = cli.answer("--target-volume", "5000", "--stroke-ratio", "2")
     low, high = stroke["design"]["limits"]["l1"]
     assert (low, high) == (pytest.approx(stroke["reach"] / 2.0), None)
+
+
+LOADED = ["--force", "10", "--most", "150"]
+ON_PLANE = ["--required-box", "8", "3", "0", "12", "7", "8"]
+ACROSS = ["--required-box", "8", "3", "-5", "12", "7", "5"]
+
+
+@pytest.mark.parametrize("box", [ON_PLANE, ACROSS])
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["--objective", "smallest-reach", "--target-volume", "5000", "--held"],
+        ["--objective", "smallest-load", "--target-volume", "5000"],
+        ["--objective", "largest-volume", "--held"],
+    ],
+)
+def test_optimise_refuses_a_box_where_no_load_is_held(
+    cli: CommandLine, monkeypatch: pytest.MonkeyPatch, argv: list[str], box: list[str]
+) -> None:
+    def never(*_: object, **__: object) -> None:
+        pytest.fail("it searches")
+
+    monkeypatch.setattr("explorer.optimise.solver.optimise_design", never)
+    refused = cli.refusal(*LOADED, "--box", "none", *argv, *box, status=1)
+    assert "no load is held at z = 0" in refused
+    found = cli.answer(*LOADED, "--box", "none", *argv, *box, status=1)
+    assert (found["objective"], found["holding"]) == (
+        None,
+        "margin" if box is ACROSS else "singular plane",
+    )
+
+
+def test_optimise_tells_infinite_loads_beside_finite_ones(
+    cli: CommandLine, tmp_path: Path, recwarn: pytest.WarningsRecorder
+) -> None:
+    limits = msgspec.structs.replace(
+        explorer.PRESETS["paper-optimal"].limits, margin=None, box=None
+    )
+    path, kept = tmp_path / "any-side.json", tmp_path / "run.json"
+    design = msgspec.structs.replace(explorer.PRESETS["paper-optimal"], limits=limits)
+    path.write_bytes(explorer.encode_design(design))
+    argv = ["--design", path, *LOADED, *ACROSS]
+    margin = cli.answer(*argv, "--objective", "largest-margin", "--free", "yaw")
+    assert margin["objective"] == 0.0
+    load = ["--objective", "smallest-load", "--target-volume", "3000", "--free", "shift-z"]
+    text = cli.text(*argv, *load, "--record", kept)
+    share = next(line for line in text.splitlines() if line.startswith("load share over the box"))
+    start, end = share.split()[5:]
+    assert start == "infinite"
+    assert float(end) < 1.0
+    record = load_record(kept)
+    assert record.history[0].objective is None
+    # A search that ends where loads are infinite says so in valid JSON.
+    few = cli.answer(*argv, *load, "--bounds", "shift-z=-3:6", "--iterations", "1", status=1)
+    assert few["converged"] is False
+    assert few["objective"] is None or few["objective"] > 0.0
+    assert not recwarn.list
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,7 @@ def assert_is_sound(outcome: Outcome) -> None:
     for name in DISTANCES:
         least = problem.demands.least - 1e-6 * problem.size
         assert abs(distance_of(outcome.design, name)) >= least
-    assert math.isfinite(best.objective)
+    assert math.isfinite(best.value)
     assert outcome.run.message
     assert "\n" not in outcome.run.message
 
@@ -124,7 +124,7 @@ def test_search_from_random_starts_converges() -> None:
         outcome = optimise_design(started_at(problem, values))
         assert_is_sound(outcome)
         assert outcome.converged
-        assert outcome.best.objective <= 1e-6
+        assert outcome.best.value <= 1e-6
 
 
 def test_search_enclosed_by_crossing_legs_restarts_elsewhere() -> None:
@@ -182,7 +182,7 @@ def test_several_starts_reach_an_optimum_that_one_misses() -> None:
     assert several.converged
     assert several.design.reach <= 17.90
     assert len(several.runs) == 4
-    assert several.best.objective <= min(run.best.objective for run in several.runs) + 1e-6
+    assert several.best.value <= min(run.best.value for run in several.runs) + 1e-6
     assert {each.run for each in several.history} == set(range(4))
 
 
@@ -197,8 +197,8 @@ def test_start_outdone_even_without_the_clearance_ends_there() -> None:
     assert least_clearance_by_sampling(first.best.design, margin, 100_000) >= 0.2
     # The second comes to what it comes to without the demand, which is worse than the first.
     alone = optimise_design(started_at(reach_problem(), second.start))
-    assert second.best.objective == pytest.approx(alone.best.objective, rel=1e-9)
-    assert second.best.objective > first.best.objective
+    assert second.best.value == pytest.approx(alone.best.value, rel=1e-9)
+    assert second.best.value > first.best.value
     # Its iterates say that the legs are too near.
     assert least_clearance_by_sampling(second.best.design, margin, 100_000) < 0.2
     assert second.best.spare < 0.0
@@ -206,7 +206,7 @@ def test_start_outdone_even_without_the_clearance_ends_there() -> None:
 
 
 def test_optimum_on_the_clearance_is_between_those_without_it_and_with_more() -> None:
-    reaches = [optimise_design(reach_problem(each)).best.objective for each in (None, 0.2, 0.5)]
+    reaches = [optimise_design(reach_problem(each)).best.value for each in (None, 0.2, 0.5)]
     # The optimum without the demand keeps 0.2, but not 0.5.
     assert reaches[0] == pytest.approx(reaches[1], rel=1e-9)
     assert reaches[1] < reaches[2] * (1.0 - 1e-3)
@@ -273,7 +273,7 @@ def test_largest_margin_with_free_yaw_and_shifts_is_the_height() -> None:
     )
     assert turned.converged
     # Square lines are farthest from meeting, and then the height is the least margin.
-    assert turned.best.objective == pytest.approx(6.0, abs=1e-8)
+    assert turned.best.value == pytest.approx(6.0, abs=1e-8)
     assert turned.best.values[-1] == pytest.approx(-90.0, abs=0.1)
     raised = optimise_design(
         make_problem(
@@ -287,7 +287,7 @@ def test_largest_margin_with_free_yaw_and_shifts_is_the_height() -> None:
     assert_is_sound(raised)
     assert raised.converged
     # The box of the design ends at a height of 18, that of the required one is 4.
-    assert raised.best.objective == pytest.approx(14.0, abs=1e-7)
+    assert raised.best.value == pytest.approx(14.0, abs=1e-7)
     moved = raised.problem.required_box_at(raised.best.values)
     rotation = home_pose(raised.design).rotation
     corners = np.array(
@@ -306,8 +306,8 @@ def test_reach_variable_sets_the_maximum_of_all_lengths() -> None:
     assert_is_sound(outcome)
     assert outcome.converged
     found = {outcome.design.length_range(name) for name in lengths}
-    assert found == {(0.0, outcome.best.objective)}
-    assert outcome.best.objective < 15.0
+    assert found == {(0.0, outcome.best.value)}
+    assert outcome.best.value < 15.0
 
 
 def test_stroke_ratio_sets_the_minimum_of_all_lengths() -> None:
@@ -608,7 +608,7 @@ def test_struts_of_the_design_found_bend_by_less_than_a_fifth() -> None:
         for design in (problem.start, outcome.design)
     )
     assert after.largest_bending < 0.2 * before.largest_bending
-    assert outcome.best.objective == pytest.approx(after.largest_bending, rel=1e-9)
+    assert outcome.best.value == pytest.approx(after.largest_bending, rel=1e-9)
     assert workspace_volume(outcome.design).volume >= 8000.0 * (1.0 - 1e-6)
     assert longest_leg(outcome.design) <= problem.start.reach * (1.0 + 1e-6)
 
@@ -656,7 +656,7 @@ def test_demand_of_a_displacement_is_kept_by_the_design_found(
         return getattr(BoxStatics(design, box, home_pose(design).rotation), measure)
 
     before, after = measured(start), measured(outcome.design)
-    assert outcome.best.objective == pytest.approx(after, rel=1e-9)
+    assert outcome.best.value == pytest.approx(after, rel=1e-9)
     assert after < before
     middle = 0.5 * (before + after)
     least = make_problem(

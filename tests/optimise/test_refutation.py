@@ -182,7 +182,7 @@ def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> No
         assert lifted.home == INITIAL.home
         outcome = optimise_design(paper_problem(lifted, clearance=0.2))
         assert outcome.converged
-        assert outcome.best.objective <= 1e-9
+        assert outcome.best.value <= 1e-9
     # Of what the paper's box does not hold either nobody is told to take it.
     assert paper_box(paper_problem(volume=12_300.0)) is None
     assert paper_box(paper_problem(volume=12_200.0)) == PAPER_BOX

@@ -149,7 +149,7 @@ def killed_result(problem: Problem, iterates: tuple[Iterate, ...]) -> SearchResu
     best = min(iterates, key=Trail(problem, None, None).rank)
     return SearchResult(
         "cancelled",
-        f"cancelled: {format_number(best.objective, 6)} is the best of {len(iterates)} iterates",
+        f"cancelled: {format_number(best.value, 6)} is the best of {len(iterates)} iterates",
         best,
         starts=iterates[-1].run + 1,
         iterations=sum(iterate.run == best.run for iterate in iterates) - 1,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -85,19 +86,17 @@ def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> Iterator[str]:
     problem = outcome.problem
     margin = None if problem.demands.clearance is None else problem.demands.clearance_margin
     box = problem.demands.required_box
-    if box is not None:
-        box = problem.required_box_at(outcome.best.values)
+    shifted = None if box is None else problem.required_box_at(outcome.best.values)
     before, after = (
-        measure_design(Case(design, demanded_margin=margin, box=box), measures_in("optimise"))
-        for design in (problem.start, outcome.design)
+        measure_design(Case(design, demanded_margin=margin, box=where), measures_in("optimise"))
+        for design, where in ((problem.start, box), (outcome.design, shifted))
     )
     optimum = "optimum" if outcome.converged else "best so far"
     rows: list[tuple[str, ...]] = [("", "start", optimum, "change")]
     for name, values in measure_rows(before, after):
-        old, new = values
-        change = "" if old is None or new is None else f"{new - old:+.6g}"
-        cells = ("none" if value is None else figure(value) for value in values)
-        rows.append((name, *cells, change))
+        finite = [value for value in values if value is not None and math.isfinite(value)]
+        change = f"{finite[1] - finite[0]:+.6g}" if len(finite) == len(values) else ""
+        rows.append((name, *map(_cell, values), change))
     if outcome.converged:
         yield from (outcome.run.message, "")
     yield table(rows, "<>>>")
@@ -114,6 +113,8 @@ def measure_rows(
 ) -> Iterator[tuple[str, tuple[float | None, float | None]]]:
     """Yield the label and the two values of each measure that the second design has.
 
+    A value may be infinite.
+
     Args:
         before: The measures of one design.
         after: The same measures of another.
@@ -121,11 +122,18 @@ def measure_rows(
     yield from zip(
         VARIABLES, zip(before.design.variables, after.design.variables, strict=True), strict=True
     )
-    for name, value in after.values.items():
-        if value is None:
+    for name in after.values:
+        new = after.value(name)
+        if new is None:
             continue
         measure = CATALOGUE[name]
         label = f"{measure.label} (degrees)" if measure.unit == "°" else measure.label
         if "demanded_margin" in measure.needs:
             label += f", margins ≥ {after.demanded_margin:.4g}"
-        yield label, (before[name], value)
+        yield label, (before.value(name), new)
+
+
+def _cell(value: float | None) -> str:
+    if value is None:
+        return "none"
+    return figure(value) if math.isfinite(value) else "infinite"

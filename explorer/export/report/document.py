@@ -109,7 +109,7 @@ def _headline(data: ReportData) -> Iterator[tuple[Piece, ...]]:
         measure = CATALOGUE[name]
         title = f"{measure.heading[:1].upper()}{measure.heading[1:]}"
         if value is None:
-            yield title, "–"
+            yield title, "infinite" if name in data.measured.infinite else "–"
         elif name == "node_volume" and not isinstance(data.nodes, Missing):
             count = element("span", whole(data.nodes.count), " nodes")
             yield title, number(value), _unit("units³, "), count

@@ -5,11 +5,13 @@ Each interval holds every value that such a design can have, and may be wider.
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import cached_property
 
 from explorer.mechanism.design import LENGTHS, VARIABLES, Pair
 from explorer.mechanism.home import home_pose
+from explorer.optimise.demands import Box
 from explorer.optimise.problem import REACH, SHIFTS, YAW, Problem
 from explorer.workspace.limits.constraints import home_signs
 
@@ -70,18 +72,55 @@ class Ranges:
     @cached_property
     def along(self) -> tuple[Pair, Pair, Pair]:
         """The intervals of the coordinates of the platform's x-axis in the base frame."""
-        x, y, z = home_pose(self.problem.start).rotation[:, 0].tolist()
+        return self._axis(0, 1)[0]
+
+    def _axis(self, column: int, pieces: int) -> list[tuple[Pair, Pair, Pair]]:
+        """Return the intervals of an axis of the platform in the base frame, by pieces of yaw."""
+        x, y, z = home_pose(self.problem.start).rotation[:, column].tolist()
         if not self.is_turning:
-            return (x, x), (y, y), (z, z)
+            return [((x, x), (y, y), (z, z))]
         low, high = (math.radians(end) for end in self._bounds[YAW])
         start_yaw = math.radians(self.problem.start_values[self.problem.names.index(YAW)])
-        angle, length = math.atan2(y, x), math.hypot(x, y)
-        turned = (angle + low - start_yaw, angle + high - start_yaw)
-        return (
-            product((length, length), _cosines(*turned)),
-            product((length, length), _cosines(*(end - 0.5 * math.pi for end in turned))),
-            (z, z),
-        )
+        angle, length = math.atan2(y, x) - start_yaw, math.hypot(x, y)
+        ends = [angle + low + (high - low) * piece / pieces for piece in range(pieces + 1)]
+        return [
+            (
+                product((length, length), _cosines(*turned)),
+                product((length, length), _cosines(*(end - 0.5 * math.pi for end in turned))),
+                (z, z),
+            )
+            for turned in itertools.pairwise(ends)
+        ]
+
+    def best_margin(self, index: int, side: int, box: Box) -> float:
+        """Return a bound of the margin that all of a box can have on one side, shifted or not.
+
+        It is exact unless the yaw may change.
+
+        Args:
+            index: Index of the margin, 0 to 2.
+            side: Sign of the margin on that side.
+            box: Lows and highs of the box before its shift.
+        """
+        still = (0.0, 0.0)
+        match index:
+            case 0:
+                normals = [(negative(x), negative(y), negative(z)) for x, y, z in self._axis(2, 64)]
+            case 1:
+                normals = [(still, negative(z), y) for _, y, z in self._axis(0, 64)]
+            case _:
+                normals = [(still, still, (1.0, 1.0))]
+
+        def best(slope: Pair, axis: int) -> float:
+            # Of the worst end and the best shift; it has a kink at a slope of zero.
+            return max(
+                min(each * box[0][axis], each * box[1][axis])
+                + max(each * shift for shift in self.of(SHIFTS[axis]))
+                for each in (side * slope[0], side * slope[1], 0.0)
+                if each or slope[0] <= 0.0 <= slope[1]
+            )
+
+        return max(sum(map(best, normal, range(3))) for normal in normals)
 
     @cached_property
     def arm_height(self) -> Pair:

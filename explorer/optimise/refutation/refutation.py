@@ -23,14 +23,21 @@ from explorer.optimise.refutation.lifting import BOX_LIMIT
 from explorer.optimise.refutation.most_volume import (
     LONGEST_LEG,
     ceilings,
-    margin_planes,
     near_singular_volume,
 )
-from explorer.optimise.refutation.ranges import Ranges, largest, smallest
+from explorer.optimise.refutation.ranges import Ranges, largest, negative, smallest, total
+from explorer.statics.equilibrium import SINGULAR
 from explorer.workspace.limits.constraints import GAP
 
 # Excess over its bound that makes a demand impossible, as a share: searches have tolerances.
 SPARE = 1e-6
+
+PLANES = {
+    2: "at z = 0",
+    0: "where a1 lies on the platform plane",
+    1: "where the lines a1a2 and b2b3 meet or are parallel",
+}
+"""Where each margin vanishes, by its index; where the platform is level, the first two agree."""
 
 PAPER_BOX = PRESETS["paper-optimal"].limits.box
 """Box of the paper's optimum."""
@@ -117,6 +124,7 @@ def _required_box(ranges: Ranges) -> Iterator[Refutation]:
         )
     yield from _box_within_box(ranges, required)
     yield from _box_beyond_margins(ranges, required)
+    yield from _box_on_plane(ranges, required)
     yield from _box_beyond_lengths(ranges, required)
 
 
@@ -139,12 +147,13 @@ def _box_within_box(ranges: Ranges, required: Box) -> Iterator[Refutation]:
 
 
 def _box_beyond_margins(ranges: Ranges, required: Box) -> Iterator[Refutation]:
-    for normal, least in margin_planes(ranges, ranges.problem.start.limits.margin):
-        best = 0.0
-        for axis, slope in enumerate(normal.tolist()):
-            low, high = required[0][axis], required[1][axis]
-            best += min(slope * low, slope * high)
-            best += max(slope * shift for shift in ranges.of(SHIFTS[axis]))
+    least = ranges.problem.start.limits.margin
+    if least is None:
+        return
+    for index, sign in enumerate(ranges.signs):
+        # The home's side of the plane of δ1 or δ2 may change as the platform turns.
+        sides = (1, -1) if ranges.is_turning and index < 2 else (sign,)
+        best = max(ranges.best_margin(index, side, required) for side in sides)
         if best < least - SPARE * ranges.problem.size:
             words = (
                 "at its worst corner the required box has a margin of at most "
@@ -152,6 +161,30 @@ def _box_beyond_margins(ranges: Ranges, required: Box) -> Iterator[Refutation]:
                 f"{format_number(least, 6)} units"
             )
             yield Refutation("margin", words)
+
+
+def _box_on_plane(ranges: Ranges, required: Box) -> Iterator[Refutation]:
+    problem, demands = ranges.problem, ranges.problem.demands
+    counts = {
+        "no load is held": demands.held or problem.objective == "smallest-load",
+        "errors are infinite": demands.error is not None or problem.objective == "smallest-error",
+        "deflections are infinite": demands.deflection is not None
+        or problem.objective == "smallest-deflection",
+    }
+    because = " and ".join(words for words, is_counted in counts.items() if is_counted)
+    if not because:
+        return
+    size = math.hypot(*_away(ranges, required, ((0.0, 0.0),) * 3))
+    can_move = ranges.is_turning or any(low < high for low, high in map(ranges.of, SHIFTS))
+    always = "always " if can_move else ""
+    for index, where in PLANES.items():
+        best = max(ranges.best_margin(index, side, required) for side in (1, -1))
+        if best <= SINGULAR * size:
+            words = (
+                f"the required box is {always}on or across the singular plane δ{index + 1} = 0: "
+                f"{because} {where}"
+            )
+            yield Refutation("singular plane", words)
 
 
 def _box_beyond_lengths(ranges: Ranges, required: Box) -> Iterator[Refutation]:
@@ -180,20 +213,18 @@ def _farthest_corner(ranges: Ranges, name: str, axes: tuple[int, ...], required:
         "d4": largest(ranges.of("b3")),
         "l4": 0.0,
     }[name]
-    # In each axis on its own the farther side of the box, where it can be shifted the nearest.
-    away = [
-        max(
-            smallest(
-                (
-                    required[side][axis] + ranges.of(SHIFTS[axis])[0] - centre[axis][1],
-                    required[side][axis] + ranges.of(SHIFTS[axis])[1] - centre[axis][0],
-                )
-            )
-            for side in (0, 1)
+    away = _away(ranges, required, centre)
+    return math.hypot(*(away[axis] for axis in axes)) - within
+
+
+def _away(ranges: Ranges, required: Box, centre: tuple[Pair, ...]) -> list[float]:
+    """Return how far the farther side of a box is from a centre along each axis, at the nearest."""
+    return [
+        max(smallest(total(total((end, end), shift), negative(middle))) for end in ends)
+        for ends, shift, middle in zip(
+            zip(*required, strict=True), map(ranges.of, SHIFTS), centre, strict=True
         )
-        for axis in axes
     ]
-    return math.hypot(*away) - within
 
 
 def _reach(ranges: Ranges) -> Iterator[Refutation]:

@@ -24,7 +24,8 @@ def default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
     name = CALLED[problem.objective]
     # F compares numbers of unit size.
     size = 1.0 if problem.objective == "match-volume" else 0.0
-    value = format_ascii(attempt.best.objective, 6, size=size)
+    objective = attempt.best.objective
+    value = "infinite" if objective is None else format_ascii(objective, 6, size=size)
     end = f"{name} = {value} after {steps} iterations"
     held = f", held by {attempt.holding}" if attempt.holding else ""
     match attempt.status:

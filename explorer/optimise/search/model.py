@@ -6,6 +6,7 @@ all of them, which keeps the functions smooth.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from explorer.errors import DesignError
+from explorer.measures.size import box_margins
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.optimise.problem import OF_THE_MACHINE, OVER_BOX, Problem
 from explorer.optimise.search.demands.clearances import ClearanceDemand
@@ -25,18 +27,18 @@ from explorer.optimise.search.demands.geometry import (
     MarginDemand,
     ReachDemand,
     VolumeDemand,
-    box_margins,
 )
 from explorer.optimise.search.demands.loads import (
     CAUSES,
     DisplacementDemand,
     LoadDemand,
-    largest_displacement,
-    largest_share,
 )
 from explorer.optimise.search.demands.tilts import tilt_demands
 from explorer.optimise.search.starts import first_positions
 from explorer.optimise.search.state import State, scales
+
+MISSED = 1e3
+"""Value of an objective that is not finite or of no design; with a minus, of such a demand."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,8 @@ class Model:
         if self.raises_worst:
             # The last one, see `_demands`.
             self.raised = self.demands[-1]
-            u = np.append(u, float(self.raised.measure(here).values.min()))
+            least = float(self.raised.measure(here).values.min())
+            u = np.append(u, least if math.isfinite(least) else -MISSED)
         if self._clearance is not None and not is_relaxed:
             self.demands.append(self._clearance)
         self.start: FloatArray = u
@@ -174,7 +177,15 @@ class Model:
             values.append(value)
             gradients.append(gradient)
         objective, slope = self._objective(state, u)
-        return Evaluation(u, state, objective, slope, np.concatenate(values), np.vstack(gradients))
+        every, rows = np.concatenate(values), np.vstack(gradients)
+        return Evaluation(
+            u,
+            state,
+            objective if math.isfinite(objective) else MISSED,
+            np.where(np.isfinite(slope), slope, 0.0),
+            np.where(np.isfinite(every), every, -MISSED),
+            np.where(np.isfinite(rows), rows, 0.0),
+        )
 
     def _objective(self, state: State, u: FloatArray) -> tuple[float, FloatArray]:
         match self.problem.objective:
@@ -221,7 +232,11 @@ class Model:
 
 
 def reported_objective(problem: Problem, state: State) -> float:
-    """Return the value that the objective of a problem is about, in its own unit."""
+    """Return the value that the objective of a problem is about, in its own unit.
+
+    It is infinite where the objective is about loads, errors or deflections and the required box is
+    on or across a singular plane.
+    """
     match problem.objective:
         case "match-volume":
             return abs(1.0 - state.volume / problem.wanted_volume)
@@ -230,11 +245,13 @@ def reported_objective(problem: Problem, state: State) -> float:
         case "largest-volume":
             return state.volume
         case "largest-margin":
-            return float(box_margins(state)[0].min())
+            return float(box_margins(state.box, state.rotation).min())
         case "smallest-load":
-            return largest_share(state)
+            return state.statics.largest_share
         case "smallest-error" | "smallest-deflection" as objective:
-            return largest_displacement(state, CAUSES[objective])
+            statics = state.statics
+            is_error = objective == "smallest-error"
+            return statics.worst_error if is_error else statics.largest_deflection
 
 
 def _demands(problem: Problem, start: State) -> list[Demand]:
@@ -257,19 +274,17 @@ def _demands(problem: Problem, start: State) -> list[Demand]:
     if demands.held and problem.objective != "smallest-load":
         machine.append(LoadDemand(start))
     if demands.error is not None and problem.objective != "smallest-error":
-        machine.append(DisplacementDemand("error", demands.error))
+        machine.append(DisplacementDemand(start, "error", demands.error))
     if demands.deflection is not None and problem.objective != "smallest-deflection":
-        machine.append(DisplacementDemand("deflection", demands.deflection))
+        machine.append(DisplacementDemand(start, "deflection", demands.deflection))
     listed += machine
     if machine or problem.objective in OF_THE_MACHINE:
-        # On the way to a singular pose loads and errors grow, and beyond it they fall again.
-        listed.append(MarginDemand())
+        listed.append(MarginDemand(start, is_open=True))
     # What an objective raises comes last.
     if problem.objective == "largest-margin":
-        listed.append(MarginDemand())
+        listed.append(MarginDemand(start))
     elif problem.objective == "smallest-load":
         listed.append(LoadDemand(start))
     elif problem.objective in CAUSES:
-        cause = CAUSES[problem.objective]
-        listed.append(DisplacementDemand(cause, largest_displacement(start, cause)))
+        listed.append(DisplacementDemand(start, CAUSES[problem.objective]))
     return listed

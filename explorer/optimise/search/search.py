@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import msgspec
@@ -249,7 +250,8 @@ class Search:
         """
         if self.problem.objective == "match-volume":
             return self._is_kept(model, at)
-        last = [iterate.objective for iterate in self.trail.history[-STILL_STEPS:]]
+        recent = self.trail.history[-STILL_STEPS:]
+        last = [each.objective for each in recent if each.objective is not None]
         if len(last) < STILL_STEPS or max(last) - min(last) > STILL * abs(last[-1]):
             return False
         near = nearest_feasible(model, at)
@@ -264,7 +266,9 @@ class Search:
         return self._meets(model, at) and self._meets(model, model.read_back(at))
 
     def _meets(self, model: Model, at: Evaluation) -> bool:
-        if self.problem.objective == "match-volume" and model.reported(at) > MATCHED:
+        most = MATCHED if self.problem.objective == "match-volume" else math.inf
+        # An infinite objective is no optimum.
+        if not model.reported(at) < most:
             return False
         return model.worst(at)[0] >= 0.0 and at.state.volume > at.state.measured.error
 

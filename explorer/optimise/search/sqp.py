@@ -13,12 +13,10 @@ import numpy as np
 
 from explorer.errors import DesignError
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.optimise.search.model import Evaluation, Model
+from explorer.optimise.search.model import MISSED, Evaluation, Model
 
 # SLSQP stops by itself once the objective changes by less than this.
 PRECISION = 1e-14
-# Value of the demands and the objective at a design that cannot exist, in a line search.
-NO_DESIGN = 1e3
 
 Values = Callable[[FloatArray], FloatArray]
 
@@ -96,7 +94,7 @@ def solve(
 
     def objective(u: FloatArray) -> float:
         evaluation = at(u)
-        return evaluation.objective if evaluation else NO_DESIGN
+        return evaluation.objective if evaluation else MISSED
 
     def slope(u: FloatArray) -> FloatArray:
         evaluation = at(u)
@@ -112,7 +110,7 @@ def solve(
 
         def values(u: FloatArray) -> FloatArray:
             evaluation = at(u)
-            return evaluation.values[which] if evaluation else np.full(count, -NO_DESIGN)
+            return evaluation.values[which] if evaluation else np.full(count, -MISSED)
 
         def gradients(u: FloatArray) -> FloatArray:
             evaluation = at(u)

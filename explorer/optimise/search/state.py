@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.mechanism.home import home_pose
@@ -85,6 +86,11 @@ class State:
     def box(self) -> Box:
         """The required box with its shift."""
         return self.problem.required_box_at(self.values.tolist())
+
+    @cached_property
+    def statics(self) -> BoxStatics:
+        """Loads, errors and deflections over the required box."""
+        return BoxStatics(self.design, self.box, self.rotation)
 
     @cached_property
     def limits(self) -> tuple[Constraint, ...]:

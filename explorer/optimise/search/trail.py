@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from explorer.optimise.outcome import Iterate, Phase
@@ -68,13 +69,14 @@ class Trail:
         self._add(state, "opening", worst, 0.0 if state.volume > 0.0 else -1.0)
 
     def _add(self, state: State, phase: Phase, worst: str, spare: float) -> None:
+        objective = reported_objective(self.problem, state)
         iterate = Iterate(
             number=len(self.history),
             run=self.run,
             phase=phase,
             design=state.design,
             values=tuple(state.values.tolist()),
-            objective=reported_objective(self.problem, state),
+            objective=objective if math.isfinite(objective) else None,
             volume=state.volume,
             worst=worst,
             spare=spare,
@@ -96,5 +98,4 @@ class Trail:
             short = 1.0 - iterate.volume / problem.demands.volume
             missed = max(missed, short) if short > MET else missed
         larger = problem.objective in ("largest-volume", "largest-margin")
-        objective = -iterate.objective if larger else iterate.objective
-        return iterate.volume <= 0.0, missed, objective
+        return iterate.volume <= 0.0, missed, -iterate.value if larger else iterate.value

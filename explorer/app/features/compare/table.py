@@ -113,7 +113,9 @@ def _cell(measure: Measure, column: Column, value: float | None, size: float) ->
         return "–" if column.problem is not None else "…"
     if measure.name == "volume" and not value:
         return "empty"
-    return "–" if value is None else value_text(measure, value, size)
+    if value is None:
+        return "infinite" if measure.name in column.measured.infinite else "–"
+    return value_text(measure, value, size)
 
 
 def _exact_text(measure: Measure, column: Column) -> str:

@@ -32,7 +32,7 @@ class Curve(NamedTuple):
 
     Attributes:
         caption: Name of the values, with the last one.
-        values: One value for each iterate.
+        values: One value for each iterate; NaN for an infinite one.
         level: Value to compare the others with, or None.
         powers: Whether the values are exponents of ten.
     """
@@ -91,11 +91,11 @@ def _name(problem: Problem, last: Iterate, curve: curves.Curve) -> str:
         target = "" if curve.level is None else f", required {format_number(curve.level, 6)}"
         return f"Volume (units³): {format_number(last.volume, 6)}{target}"
     if curve.powers:
-        value = format_number(last.objective, 2, size=1.0)
+        value = format_number(last.value, 2, size=1.0)
         return f"log10 of F = |1 − V / V′|; F = {value}"
     name = curves.CALLED[problem.objective].capitalize()
     unit = CATALOGUE[curves.GOALS[problem.objective]].unit_in("units")
-    return f"{name}{f' ({unit})' if unit else ''}: {format_number(last.objective, 6)}"
+    return f"{name}{f' ({unit})' if unit else ''}: {format_number(last.value, 6)}"
 
 
 def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:
@@ -122,8 +122,9 @@ def _series() -> tuple[uplot.Series, ...]:
 
 def _scales(curve: Curve) -> dict[str, uplot.Scale]:
     last = max(1.0, len(curve.values) - 1.0)
-    heights = [*curve.values.tolist(), *([] if curve.level is None else [curve.level])]
-    low, high = min(heights), max(heights)
+    levels = [] if curve.level is None else [curve.level]
+    heights = [value for value in (*curve.values.tolist(), *levels) if math.isfinite(value)]
+    low, high = min(heights, default=0.0), max(heights, default=0.0)
     if curve.powers:
         low = math.floor(low)
         edges = float(low), float(max(math.ceil(high), low + 1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -130,7 +131,9 @@ def value_text(problem: Problem, iterate: Iterate) -> str:
     """Return the name and the value of the objective of an iterate, with its unit."""
     name = CALLED[problem.objective]
     if problem.objective == "match-volume":
-        return f"{name} {format_number(iterate.objective, 3, size=1.0)}"
+        return f"{name} {format_number(iterate.value, 3, size=1.0)}"
+    if iterate.objective is None:
+        return f"{name} infinite"
     unit = CATALOGUE[GOALS[problem.objective]].unit_in("units")
     return f"{name} {format_number(iterate.objective, 6)} {unit}"
 
@@ -254,7 +257,7 @@ class Row:
     Attributes:
         name: Name, with the unit after a comma.
         hint: Meaning.
-        before, after: Values; None where there is none.
+        before, after: Values; None where there is none, and infinite ones.
         is_whole: Whether it is a count.
         names: Names of the whole numbers from 1, as in `Measure`.
         look: Whether the change keeps or breaks the demands, where that is defined.
@@ -311,8 +314,8 @@ def measure_rows(problem: Problem, before: Measurements, after: Measurements) ->
         yield Row(
             label,
             hint,
-            before[name],
-            after[name],
+            before.value(name),
+            after.value(name),
             measure.is_whole,
             measure.names,
             _look(problem, name, before, after),
@@ -322,7 +325,7 @@ def measure_rows(problem: Problem, before: Measurements, after: Measurements) ->
 
 def _look(problem: Problem, name: str, before: Measurements, after: Measurements) -> Look | None:
     """Return whether a change is good or bad for the problem; None if neither."""
-    old, new = before[name] or 0.0, after[name] or 0.0
+    old, new = before.value(name) or 0.0, after.value(name) or 0.0
     # Clearances are exact to this length.
     accuracy = CERTAIN * after.design.reach
     if name == "least_clearance":
@@ -342,13 +345,13 @@ def _look(problem: Problem, name: str, before: Measurements, after: Measurements
 
 def _row(line: Row, *, is_first: bool = False) -> str:
     """Return a row of the table; the first of a group has a line above."""
-    largest = max(
-        (abs(value) for value in (line.before, line.after) if value is not None), default=0.0
-    )
+    both = (line.before, line.after)
+    finite = [value for value in both if value is not None and math.isfinite(value)]
+    largest = max(map(abs, finite), default=0.0)
     digits = 0 if line.is_whole else decimals_of(largest)
     change = ""
-    if line.before is not None and line.after is not None and not line.names:
-        change = _change(line.after - line.before, digits)
+    if len(finite) == 2 and not line.names:
+        change = _change(finite[1] - finite[0], digits)
     if line.look is not None:
         change = f'<span class="ex-{line.look}">{change}</span>'
     name, _, unit = line.name.partition(", ")
@@ -370,6 +373,8 @@ def decimals_of(size: float) -> int:
 def _value(line: Row, value: float | None, digits: int) -> str:
     if value is None:
         return "none"
+    if math.isinf(value):
+        return "infinite"
     return line.names[round(value) - 1] if line.names else signed(value, digits)
 
 

@@ -78,9 +78,11 @@ def _chart(curve: Curve, left: float, width: float) -> list[Element]:
     if curve.level is not None:
         _, y = place(0.0, curve.level)
         pieces.append(element("line", x1=left, y1=y, x2=left + width, y2=y, class_="level"))
-    points = [place(index, value) for index, value in enumerate(curve.values.tolist())]
-    data = "M" + "L".join(f"{coordinate(x)},{coordinate(y)}" for x, y in points)
-    pieces.append(element("path", d=data, class_="curve"))
+    finite = [(i, value) for i, value in enumerate(curve.values.tolist()) if math.isfinite(value)]
+    points = [place(index, value) for index, value in finite]
+    if points:
+        data = "M" + "L".join(f"{coordinate(x)},{coordinate(y)}" for x, y in points)
+        pieces.append(element("path", d=data, class_="curve"))
     if len(points) <= 60:
         pieces += [element("circle", cx=x, cy=y, r=2.2, class_="point") for x, y in points]
     return pieces

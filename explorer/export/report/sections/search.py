@@ -38,7 +38,8 @@ def search_section(data: ReportData) -> Iterator[Element]:
     if problem.demands.volume is not None:
         rows.append(("demanded volume, units³", problem.demands.volume))
     if best is not None:
-        rows.append((CALLED[problem.objective], best.objective))
+        value = "infinite" if best.objective is None else best.objective
+        rows.append((CALLED[problem.objective], value))
         rows.append(("volume, units³", best.volume))
     rows += [
         ("iterations", whole(run.iterations)),

@@ -11,15 +11,22 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from explorer.measures.catalogue import CATALOGUE
-from explorer.measures.size import corners_of
-from explorer.mechanism.home import home_pose
+from explorer.measures.size import box_margins, corners_of
 from explorer.mechanism.margins import margins
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import BoolArray, FloatArray, lengths_of
 from explorer.optimise.demands import Box
 from explorer.optimise.problem import SHIFTS
 from explorer.optimise.search.state import State
 from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.workspace.limits.constraints import GAP, YAW, BallOrCylinder, Constraint, HalfSpace
+from explorer.statics.equilibrium import SINGULAR
+from explorer.workspace.limits.constraints import (
+    GAP,
+    YAW,
+    BallOrCylinder,
+    Constraint,
+    HalfSpace,
+    home_signs,
+)
 
 # Tolerance of a demand that is no limit, dimensionless.
 MET = 1e-8
@@ -242,37 +249,49 @@ def _slack_outside(
 
 
 class MarginDemand:
-    """The margins over a required box, each to be at least the worst, which is raised.
+    """The margins over a required box, on one side of each singular plane.
 
-    Margins are linear in p, so that the corners of the box have the worst one.
+    Margins are linear in p, so that the corners of the box have the worst one. The side is that
+    of home; where the limits demand no margin, the one with most of the box where a run starts.
+
+    Args:
+        start: The problem where a run starts.
+        is_open: Whether a box on a plane misses the demand, however large its tolerance.
     """
 
     is_equality = False
     is_limit = False
     names = tuple(f"margin δ{i} over the required box" for i in (1, 2, 3))
 
+    def __init__(self, start: State, *, is_open: bool = False) -> None:
+        self.is_open = is_open
+        self._signs: FloatArray | None = None
+        if start.design.limits.margin is None:
+            middle = planes_of_singularity(start.rotation) @ np.mean(start.box, axis=0)
+            self._signs = np.where(middle == 0.0, home_signs(start.design), np.sign(middle))
+
     def measure(self, state: State) -> Measured:
         """Return sign · δ at the corner that is worst for each δ, over the size of the start."""
-        value, gradient = box_margins(state)
-        worst = value.argmin(axis=1)
-        rows, size = np.arange(3), state.problem.size
-        return Measured(value[rows, worst] / size, gradient[rows, worst] / size)
+        corners, r, size = corners_of(state.box), state.rotation, state.problem.size
+        signs = self._signs_at(state)
+        u, normal, slopes = r[:, 0], r[:, 2], planes_of_singularity(r)
+        at = signs[:, None] * (slopes @ corners.T)
+        worst = at.argmin(axis=1)
+        # Turning about the base's z-axis moves x to y and y to −x.
+        turned = np.array([[normal[1], -normal[0], 0.0], [0.0, 0.0, u[0]], [0.0, 0.0, 0.0]])
+        gradients = np.einsum("ia,ia->i", turned, corners[worst])[:, None] * state.along({YAW: 1.0})
+        gradients = gradients + slopes @ np.array([state.along({shift: 1.0}) for shift in SHIFTS])
+        values: FloatArray = at.min(axis=1) / size
+        if self.is_open:
+            is_clear = (values > 0.0) & (box_margins(state.box, r) > 0.0)
+            values = np.where(is_clear, values, np.minimum(values, 0.0) - 2.0 * MET)
+        return Measured(values, signs[:, None] * gradients / size)
 
+    def keeps(self, state: State, positions: FloatArray) -> BoolArray:
+        """Return whether positions (n, 3) are on the side of all planes, shape (n,)."""
+        least = SINGULAR * lengths_of(positions)
+        signed = self._signs_at(state) * margins(positions, state.rotation)
+        return np.asarray((signed > least[:, None]).all(axis=1))
 
-def box_margins(state: State) -> tuple[FloatArray, FloatArray]:
-    """Return sign · δ at the corners of the required box, shape (3, 8), and (3, 8, n).
-
-    The signs are those of the home pose.
-    """
-    home = home_pose(state.design)
-    corners, n, r = corners_of(state.box), len(state.u), state.rotation
-    signs = np.sign(margins(home.position, r))
-    u, normal = r[:, 0], r[:, 2]
-    slopes = planes_of_singularity(r)
-    # Turning about the base's z-axis moves x to y and y to −x.
-    turned = np.array([[normal[1], -normal[0], 0.0], [0.0, 0.0, u[0]], [0.0, 0.0, 0.0]])
-    gradients = np.zeros((3, 8, n))
-    gradients += (turned @ corners.T)[:, :, None] * state.along({YAW: 1.0})
-    for axis, shift in enumerate(SHIFTS):
-        gradients += slopes[:, axis, None, None] * state.along({shift: 1.0})
-    return signs[:, None] * (slopes @ corners.T), signs[:, None, None] * gradients
+    def _signs_at(self, state: State) -> FloatArray:
+        return np.array(home_signs(state.design)) if self._signs is None else self._signs

@@ -3,6 +3,10 @@
 They are evaluated at the nodes of a grid over the box, see `explorer.measures.statics`. Of the
 nodes of each eighth of the box the worst one counts, so that only a few values have gradients and
 most of them stay smooth from step to step.
+
+Towards a singular plane they may grow beyond all bounds, and beyond it they would fall again. So
+only the nodes on the box's own side of all planes count; that all of the box is there is a demand
+of its own, an open `MarginDemand`.
 """
 
 from __future__ import annotations
@@ -14,9 +18,11 @@ import numpy as np
 
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import JOINTS, VARIABLES
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.optimise.problem import SHIFTS, ObjectiveName
-from explorer.optimise.search.demands.geometry import Measured
+from explorer.optimise.search.demands.geometry import MarginDemand, Measured
 from explorer.optimise.search.state import State
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.load_slopes import (
@@ -38,6 +44,10 @@ PARTS = (*JOINTS, "bending 2", "bending 3", "guide force 2", "guide force 3")
 """The loaded parts; the moment on the guide is the bending of the strut."""
 
 EIGHTHS = 8
+
+# Depth beyond a singular plane, over the size of the start, at which a box without a node on its
+# side misses a demand by twice as much as on the plane.
+BEYOND = 0.05
 
 Cause = Literal["error", "deflection"]
 """What displaces the tool: the actuators' errors, or the design's load."""
@@ -61,15 +71,21 @@ def _spare_slope(share: FloatArray) -> FloatArray:
     return np.asarray(-1.0 / np.maximum(1.0, share) ** 2)
 
 
-def _worst_nodes(box: BoxStatics, values: FloatArray) -> IntArray:
-    """Return the node with the largest of values (n, m) in each eighth, shape (8, m)."""
+def _worst_nodes(box: BoxStatics, values: FloatArray, counts: BoolArray) -> IntArray:
+    """Return the node with the largest of values (n, m) in each eighth, shape (8, m).
+
+    Args:
+        box: The box with its nodes.
+        values: Values at the nodes.
+        counts: Which nodes count, shape (n,); at least one.
+    """
     middle = np.mean(box.box, axis=0)
     eighths = (box.positions > middle) @ np.array([4, 2, 1])
     rows: list[IntArray] = []
     for eighth in range(EIGHTHS):
         # A box without depth along an axis has empty eighths.
-        members = np.flatnonzero(eighths == eighth)
-        members = members if len(members) else np.arange(len(values))
+        members = np.flatnonzero(counts & (eighths == eighth))
+        members = members if len(members) else np.flatnonzero(counts)
         rows.append(members[values[members].argmax(axis=0)])
     return np.array(rows)
 
@@ -85,6 +101,7 @@ class LoadDemand:
     is_limit = False
 
     def __init__(self, start: State) -> None:
+        self.margins = MarginDemand(start, is_open=True)
         self.limits = part_limits(start.design)
         self.counts: BoolArray = np.asarray(np.isfinite(self.limits).any(axis=0))
         self.names = tuple(
@@ -94,17 +111,15 @@ class LoadDemand:
             for _ in range(EIGHTHS)
         )
 
-    def largest_share(self, state: State) -> float:
-        """Return the largest share of a limit at the nodes."""
-        box = _statics_of(state)
-        return float(self._shares(state, _twists(box), box).max())
-
     def measure(self, state: State) -> Measured:
         """Return what the largest shares of each part leave, see `spare_of`."""
-        box = _statics_of(state)
-        shares = self._shares(state, _twists(box), box)
+        box, counts = state.statics, self.margins.keeps(state, state.statics.positions)
+        if not counts.any():
+            return _beyond(state, self.margins, len(self.names))
+        twists = np.where(counts[:, None, None], _twists(box), 0.0)
+        shares = self._shares(state, twists, box)
         parts = np.flatnonzero(self.counts)
-        worst = _worst_nodes(box, shares[:, parts]).T.ravel()
+        worst = _worst_nodes(box, shares[:, parts], counts).T.ravel()
         part = np.repeat(parts, EIGHTHS)
         nodes, row = np.unique(worst, return_inverse=True)
         slopes = twist_slopes(state.design, box.positions[nodes], state.rotation)
@@ -128,6 +143,7 @@ class DisplacementDemand:
     """The largest displacement of the tool by a cause, over the required box.
 
     Args:
+        start: The problem where a run starts.
         cause: Cause: the errors of the actuators, or the deflection under the design's load.
         most: Largest displacement allowed, in design units.
     """
@@ -135,15 +151,19 @@ class DisplacementDemand:
     is_equality = False
     is_limit = False
 
-    def __init__(self, cause: Cause, most: float) -> None:
+    def __init__(self, start: State, cause: Cause, most: float | None = None) -> None:
+        self.margins = MarginDemand(start, is_open=True)
         self.cause: Cause = cause
-        self.most = most
+        self.most = most or _size_of(start, cause)
         self.names = (f"{cause} over the required box",) * EIGHTHS
 
     def measure(self, state: State) -> Measured:
         """Return what the largest displacements leave, see `spare_of`."""
-        box, design = _statics_of(state), state.design
-        worst = _worst_nodes(box, _displacements(box, self.cause)[:, None])[:, 0]
+        box, design = state.statics, state.design
+        counts = self.margins.keeps(state, box.positions)
+        if not counts.any():
+            return _beyond(state, self.margins, len(self.names))
+        worst = _worst_nodes(box, _displacements(box, self.cause)[:, None], counts)[:, 0]
         slopes = twist_slopes(design, box.positions[worst], state.rotation)
         if self.cause == "error":
             largest, by = error_slopes(design, slopes)
@@ -154,22 +174,30 @@ class DisplacementDemand:
         return Measured(spare_of(share), _spare_slope(share)[:, None] * gradient)
 
 
-def largest_share(state: State) -> float:
-    """Return the largest share of a limit under the load over the required box."""
-    return LoadDemand(state).largest_share(state)
+def _beyond(state: State, margins: MarginDemand, count: int) -> Measured:
+    """Return what each of some demands misses of a box without a node on its side of all planes."""
+    value, gradient = margins.measure(state)
+    worst = int(value.argmin())
+    slope = gradient[worst] / BEYOND
+    return Measured(np.full(count, value[worst] / BEYOND - 1.0), np.tile(slope, (count, 1)))
 
 
-def largest_displacement(state: State, cause: Cause) -> float:
-    """Return the largest displacement of the tool over the required box, in design units."""
-    return float(_displacements(_statics_of(state), cause).max())
+def _size_of(start: State, cause: Cause) -> float:
+    """Return the largest displacement over the required box, in design units.
+
+    If it is infinite, the result is that at the node, or at home, farthest from singular planes.
+    """
+    box = start.statics
+    if not box.is_regular:
+        places = np.vstack([box.positions, home_pose(start.design).position])
+        least = np.abs(margins(places, start.rotation)).min(axis=1)
+        x, y, z = places[least.argmax()].tolist()
+        box = BoxStatics(start.design, ((x, y, z), (x, y, z)), start.rotation)
+    return float(_displacements(box, cause).max()) if box.is_regular else start.problem.size
 
 
 def _displacements(box: BoxStatics, cause: Cause) -> FloatArray:
     return box.errors.displacement if cause == "error" else box.deflections
-
-
-def _statics_of(state: State) -> BoxStatics:
-    return BoxStatics(state.design, state.box, state.rotation)
 
 
 def _twists(box: BoxStatics) -> FloatArray:

@@ -1,0 +1,355 @@
+"""A required box on or across a singular plane: no load is held there, and errors are infinite."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from explorer import Actuators, Design, Payload, Struts
+from explorer.measures.case import Case
+from explorer.measures.measurements import measure_design
+from explorer.mechanism.design import Triple
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.machine import Six
+from explorer.mechanism.margins import margins
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.optimise.curves import curves_of
+from explorer.optimise.defaults import make_problem
+from explorer.optimise.demands import Box
+from explorer.optimise.outcome import Outcome
+from explorer.optimise.problem import (
+    OF_THE_MACHINE,
+    OVER_BOX,
+    SHIFTS,
+    ObjectiveName,
+    Problem,
+    Variable,
+)
+from explorer.optimise.record import Settings, decode_record, encode_record, record_of
+from explorer.optimise.refutation.refutation import refutations, words_of
+from explorer.optimise.search.demands.geometry import Measured
+from explorer.optimise.search.model import Model
+from explorer.optimise.search.state import State
+from explorer.optimise.solver import optimise_design
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
+OPTIMAL = PRESETS["paper-optimal"]
+DEMANDS: tuple[dict[str, Any], ...] = ({"held": True}, {"error": 0.01}, {"deflection": 0.05})
+# Places of the near face of a box, beyond a plane where they are negative.
+BESIDE = (-0.5, -1e-3, -1e-9, 0.0, 1e-9, 1e-3)
+# Orientations by yaw, pitch and roll; where the platform is level, two planes are the same.
+TURNS = ((-73.1, 0.0, 0.0), (-70.0, 12.0, -8.0), (35.0, -20.0, 25.0))
+
+
+def same(value: float) -> Six:
+    """Return one value for each actuator."""
+    return value, value, value, value, value, value
+
+
+def machine(turn: Triple = TURNS[0], margin: float | None = None, source: Any = None) -> Design:
+    """Return a design with a load, limits, errors and stiffness, at an orientation."""
+    start = OPTIMAL if source is None else source
+    return msgspec.structs.replace(
+        start,
+        home=Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), turn),
+        limits=msgspec.structs.replace(start.limits, box=None, margin=margin),
+        payload=Payload(force_n=10.0),
+        actuators=Actuators(push_n=same(150.0), error_mm=same(0.02), stiffness_n_mm=same(900.0)),
+        struts=Struts(outer_mm=12.0),
+    )
+
+
+def planes(rotation: FloatArray) -> FloatArray:
+    """Return the gradients of the margins by the position, which is linear, in rows."""
+    return margins(np.eye(3), rotation).T
+
+
+def least_over(box: Box, rotation: FloatArray) -> FloatArray:
+    """Return the least |δ| over a box by its middle and its half edges, shape (3,)."""
+    lows, highs = np.array(box)
+    normals = planes(rotation)
+    away = np.abs(normals @ (0.5 * (lows + highs))) - np.abs(normals) @ (0.5 * (highs - lows))
+    return np.maximum(0.0, away)
+
+
+def boxes_at(design: Design, index: int, place: float) -> Box:
+    """Return a box whose worst corner has a margin, on the home's side of a plane or beyond."""
+    rotation = home_pose(design).rotation
+    normal = planes(rotation)[index]
+    # Far along the plane of each margin, so that the box touches no other.
+    middle = np.array([10.0, 5.0, 9.0])
+    side = math.copysign(1.0, float(normal @ middle))
+    half = np.array([0.8, 0.6, 1.0])
+    wanted = place + float(np.abs(normal) @ half)
+    middle = middle + normal * (side * wanted - normal @ middle) / float(normal @ normal)
+    low, high = (middle - half).tolist(), (middle + half).tolist()
+    return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+
+
+def problem_of(
+    design: Design, box: Box, objective: ObjectiveName, free: tuple[str, ...] = (), **demands: Any
+) -> Problem:
+    """Return a problem over a required box."""
+    needs_volume = objective in ("match-volume", "smallest-reach")
+    if objective == "largest-margin" and not free:
+        free = ("yaw",)
+    return make_problem(
+        design,
+        objective,
+        volume=3000.0 if needs_volume else None,
+        reach=25.0 if objective == "largest-volume" else None,
+        required_box=box,
+        free=free,
+        **demands,
+    )
+
+
+def counting(design: Design, box: Box) -> Iterator[Problem]:
+    """Yield a problem with each objective, and each demand, that counts forces or errors."""
+    for objective in OF_THE_MACHINE:
+        yield problem_of(design, box, objective)
+    objectives: tuple[ObjectiveName, ...] = ("match-volume", "smallest-reach", "largest-volume")
+    for objective, demand in itertools.product(objectives, DEMANDS):
+        yield problem_of(design, box, objective, **demand)
+
+
+def search(problem: Problem, iterations: int) -> Outcome:
+    """Return the outcome of a search that may not warn."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return optimise_design(problem, iterations=iterations)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_margin_over_a_box_is_the_least_over_all_of_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    for _ in range(50):
+        design = machine(tuple(rng.uniform(-180.0, 180.0, 3).tolist()))
+        index, place = int(rng.integers(3)), float(rng.choice(BESIDE))
+        box = boxes_at(design, index, place)
+        case = Case(design, box=box)
+        least = least_over(box, case.rotation)
+        names = ("box_margin", "load_share", "worst_error", "deflection")
+        measured = measure_design(case, names)
+        assert measured["box_margin"] == pytest.approx(least.min(), abs=1e-13)
+        inner = rng.uniform(box[0], box[1], (200, 3))
+        assert (measured["box_margin"] or 0.0) <= np.abs(margins(inner, case.rotation)).min()
+        on_plane = bool((least <= 1e-12).any())
+        assert measured.infinite == (names[1:] if on_plane else ())
+
+
+def test_margin_over_a_box_across_the_base_is_zero() -> None:
+    case = Case(machine(), box=((8.0, 3.0, -5.0), (12.0, 7.0, 5.0)))
+    assert measure_design(case, ["box_margin"])["box_margin"] == 0.0
+
+
+@pytest.mark.parametrize("margin", [None, 0.0])
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("index", range(3))
+def test_box_on_or_across_a_plane_is_refuted_where_forces_or_errors_count(
+    index: int, turn: Triple, margin: float | None
+) -> None:
+    design = machine(turn, margin)
+    for place in BESIDE:
+        box = boxes_at(design, index, place)
+        is_singular = bool((least_over(box, home_pose(design).rotation) <= 1e-12).any())
+        assert is_singular or place > 0.0
+        for problem in counting(design, box):
+            found = [each for each in refutations(problem) if each.limit == "singular plane"]
+            assert bool(found) == is_singular, (problem.objective, problem.demands, place)
+
+
+def test_refutation_of_a_box_on_the_base_tells_what_fails_where() -> None:
+    box = ((8.0, 3.0, 0.0), (12.0, 7.0, 8.0))
+    words = words_of(refutations(problem_of(machine(), box, "smallest-reach", **DEMANDS[0])))
+    assert "no load is held at z = 0" in words
+    both = problem_of(machine(), box, "smallest-error", **DEMANDS[2])
+    assert "errors are infinite and deflections are infinite at z = 0" in words_of(
+        refutations(both)
+    )
+    assert not refutations(problem_of(machine(), box, "largest-volume"))
+
+
+def test_refutations_of_boxes_that_may_move_are_never_contradicted() -> None:
+    rng = np.random.default_rng(3)
+    refuted = allowed = 0
+    for _ in range(120):
+        design = machine(TURNS[int(rng.integers(3))])
+        box = boxes_at(design, int(rng.integers(3)), float(rng.choice([*BESIDE, -1.2])))
+        names = [name for name in (*SHIFTS, "yaw") if rng.random() < 0.4]
+        yaw = home_yaw(design)
+        bounds = {
+            name: (yaw - 20.0, yaw + rng.uniform(0.0, 20.0))
+            if name == "yaw"
+            else (-float(rng.uniform(0.0, 2.0)), float(rng.uniform(0.0, 2.0)))
+            for name in names
+        }
+        problem = make_problem(
+            design,
+            "smallest-error",
+            required_box=box,
+            bounds=[Variable(name, *pair) for name, pair in bounds.items()],
+        )
+        is_refuted = bool(refutations(problem))
+        shares = rng.random((100, len(names)))
+        shares[::2] = np.round(shares[::2])
+        values = dict(zip(problem.names, problem.start_values, strict=True))
+        is_regular = False
+        for row in shares.tolist():
+            given = {
+                n: lo + s * (hi - lo) for (n, (lo, hi)), s in zip(bounds.items(), row, strict=True)
+            }
+            at = {**values, **given}.values()
+            rotation = home_pose(problem.design_at(at)).rotation
+            is_regular |= bool((least_over(problem.required_box_at(at), rotation) > 1e-9).all())
+        assert not (is_refuted and is_regular), problem
+        refuted, allowed = refuted + is_refuted, allowed + is_regular
+    assert refuted > 20
+    assert allowed > 20
+
+
+def home_yaw(design: Design) -> float:
+    """Return the yaw of home in degrees."""
+    rotation = home_pose(design).rotation
+    return math.degrees(math.atan2(rotation[1, 0], rotation[0, 0]))
+
+
+@pytest.mark.parametrize("objective", [*OVER_BOX, "smallest-reach", "largest-volume"])
+@pytest.mark.parametrize("index", range(3))
+def test_search_over_a_singular_box_never_converges_where_forces_or_errors_count(
+    index: int, objective: ObjectiveName
+) -> None:
+    rng = np.random.default_rng(index)
+    for place, demand in zip((-0.5, -1e-9, 0.0), rng.permutation(DEMANDS), strict=True):
+        own = np.array(OPTIMAL.variables) * rng.uniform(0.8, 1.25, 6)
+        design = machine(
+            TURNS[int(rng.integers(3))],
+            [None, 0.0][int(rng.integers(2))],
+            OPTIMAL.with_variables(own.tolist()),
+        )
+        box = boxes_at(design, index, place)
+        problem = problem_of(design, box, objective, **demand)
+        outcome = search(problem, 6)
+        measured = measure_design(
+            Case(outcome.design, box=problem.required_box_at(outcome.best.values)), ["worst_error"]
+        )
+        assert outcome.converged <= (measured["worst_error"] is not None)
+        assert all(each.objective is not None or each.spare < 0.0 for each in outcome.history)
+        if objective in OF_THE_MACHINE:
+            assert outcome.best.objective is None
+            assert "infinite" in outcome.run.message
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("objective", OF_THE_MACHINE)
+def test_search_moves_a_box_off_a_singular_plane_where_it_may(
+    objective: ObjectiveName, turn: Triple
+) -> None:
+    for place in (-0.5, 0.0):
+        design = machine(turn)
+        problem = make_problem(
+            design,
+            objective,
+            required_box=boxes_at(design, 2, place),
+            bounds=[Variable(name, -8.0, 8.0) for name in SHIFTS],
+        )
+        problem = msgspec.structs.replace(
+            problem, variables=tuple(each for each in problem.variables if each.name in SHIFTS)
+        )
+        assert not refutations(problem)
+        outcome = search(problem, 80)
+        best = outcome.best
+        assert best.objective is not None
+        assert math.isfinite(best.objective)
+        box = problem.required_box_at(best.values)
+        assert least_over(box, home_pose(outcome.design).rotation).min() > 0.0
+        assert best.spare >= 0.0
+
+
+def test_box_on_the_other_side_of_home_counts_where_no_margin_is_demanded() -> None:
+    box = ((8.0, 3.0, -12.0), (12.0, 7.0, -9.0))
+    outcome = search(problem_of(machine(), box, "smallest-error"), 100)
+    measured = measure_design(Case(outcome.design, box=box), ["worst_error", "box_margin"])
+    assert outcome.best.spare >= 0.0
+    assert outcome.best.objective == measured["worst_error"]
+    assert measured["box_margin"] == pytest.approx(
+        least_over(box, home_pose(OPTIMAL).rotation).min(), rel=0.2
+    )
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_largest_margin_is_that_of_the_table(turn: Triple) -> None:
+    for low in (-12.0, -5.0, 0.0, 2.0):
+        box = ((8.0, 3.0, low), (12.0, 7.0, low + 8.0))
+        problem = problem_of(machine(turn), box, "largest-margin", ("yaw",))
+        outcome = search(problem, 40)
+        measured = measure_design(Case(outcome.design, box=box), ["box_margin"])
+        assert outcome.best.objective == measured["box_margin"]
+        start = least_over(box, home_pose(problem.start).rotation).min()
+        assert (outcome.best.objective or 0.0) >= start - 1e-9
+
+
+class Undefined:
+    """A demand without a value, as of numbers that overflow."""
+
+    is_equality = False
+    is_limit = False
+    names = ("undefined",)
+
+    def __init__(self, value: float) -> None:
+        self.value = value
+
+    def measure(self, state: State) -> Measured:
+        """Return a value and a gradient that are not finite."""
+        return Measured(np.array([self.value]), np.full((1, len(state.u)), self.value))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_demand_that_is_not_finite_is_missed(value: float) -> None:
+    problem = make_problem(OPTIMAL, "smallest-reach", volume=5000.0)
+    model = Model(problem, problem.start_values)
+    model.demands.append(Undefined(value))
+    at = model.at(model.start)
+    spare, name = model.worst(at)
+    assert spare < 0.0
+    assert name == "undefined"
+    assert np.isfinite(at.values).all()
+    assert np.isfinite(at.gradients).all()
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_gradients_beyond_a_plane_are_those_of_differences(turn: Triple) -> None:
+    design = machine(turn)
+    box = boxes_at(design, 2, -0.53)
+    problem = problem_of(design, box, "largest-margin", ("yaw", *SHIFTS), held=True, error=0.01)
+    model = Model(problem, problem.start_values)
+    step = 1e-6
+    ahead, behind = (
+        np.array(
+            [model.at(model.start + side * step * unit).values for unit in np.eye(len(model.start))]
+        )
+        for side in (1.0, -1.0)
+    )
+    slopes = (ahead - behind).T / (2.0 * step)
+    smooth = [index for index, name in enumerate(model.names) if "volume" not in name]
+    assert_allclose(model.at(model.start).gradients[smooth], slopes[smooth], atol=1e-5)
+
+
+def test_record_of_infinite_objectives_is_read_back() -> None:
+    problem = problem_of(machine(), ((8.0, 3.0, -5.0), (12.0, 7.0, 5.0)), "smallest-error")
+    outcome = search(problem, 3)
+    record = record_of(outcome, Settings(iterations=3))
+    assert decode_record(encode_record(record), "the record") == record
+    assert {step.objective for step in record.history} == {None}
+    assert np.isnan(curves_of(problem, record.history)[0].values).all()
