@@ -20,7 +20,7 @@ from explorer.measures.loads import loads
 from explorer.measures.measure import Measure, Place
 from explorer.measures.size import box_margins, box_tilt, home_tilt, longest_leg
 from explorer.mechanism.design import LENGTHS, VARIABLES
-from explorer.mechanism.margins import margins
+from explorer.mechanism.margins import MARGIN_KINDS, margins
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.workspace.orientations.share import orientation_share
 
@@ -177,16 +177,12 @@ def _sizes() -> Iterable[Measure]:
         )
 
 
-# What margins that are compared with one another are.
-_KINDS = "δ1 and δ3 are distances, δ2 is a distance times a sine"
-
-
 def _margins() -> Iterable[Measure]:
     yield Margin(
         "least_margin",
         "worst margin",
         "The least |δ| anywhere in the workspace, exact; 0 where it goes up to a singularity. "
-        f"{_KINDS}",
+        f"{MARGIN_KINDS}",
         lambda case: float(case.least_margins.min()),
         cost="high",
         places=COMPARE,
@@ -194,13 +190,13 @@ def _margins() -> Iterable[Measure]:
     yield MarginAtNodes(
         "worst_margin",
         "worst margin at nodes",
-        f"Smallest |δ| over the nodes of the workspace. {_KINDS}",
+        f"Smallest |δ| over the nodes of the workspace. {MARGIN_KINDS}",
         lambda case: float(case.at_nodes.margins.min()),
     )
     yield MarginAtNodes(
         "mean_margin",
         "mean margin at nodes",
-        f"Mean over the nodes of the workspace of the smallest |δ|. {_KINDS}",
+        f"Mean over the nodes of the workspace of the smallest |δ|. {MARGIN_KINDS}",
         lambda case: case.at_nodes.mean_margin,
         places=COMPARE | STUDIES,
     )
@@ -214,14 +210,14 @@ def _margins() -> Iterable[Measure]:
     yield Margin(
         "home_margin",
         "margin at home",
-        f"The smallest |δ| in the home pose. {_KINDS}",
+        f"The smallest |δ| in the home pose. {MARGIN_KINDS}",
         lambda case: float(np.abs(margins(case.at.position, case.rotation)).min()),
         places=COMPARE,
     )
     yield Margin(
         "box_margin",
         "margin over the box",
-        f"The least |δ| over the required box, 0 where a singular plane meets it. {_KINDS}",
+        f"The least |δ| over the required box, 0 where a singular plane meets it. {MARGIN_KINDS}",
         lambda case: (
             math.nan if case.box is None else float(box_margins(case.box, case.rotation).min())
         ),

@@ -27,6 +27,9 @@ INCIDENCES = (
 TETRAHEDRA = (("b1", "b2", "b3", "a1"), ("a1", "a2", "b2", "b3"), ("b4", "a1", "a2", "a3"))
 """The tetrahedra of the three trilaterations, in the order δ1, δ2, δ3."""
 
+MARGIN_KINDS = "δ1 and δ3 are distances, δ2 is a distance times a sine"
+"""What the margins are, for texts that compare them with one another."""
+
 MODE_BITS = np.array([4, 2, 1])
 
 

@@ -159,7 +159,10 @@ class WorkspaceMeasures:
         yield "mesh", self.solid.volume, _mesh_remark(self.solid)
         if self.hull is not None:
             yield "convex hull", self.hull.volume, ""
-        for name, solid in (("inclusive", self.inclusive), ("total", self.total)):
+        for name, solid in (
+            ("inclusive workspace", self.inclusive),
+            ("total workspace", self.total),
+        ):
             if solid is not None:
                 remark = f"{self.orientations} orientations, {_mesh_remark(solid)}"
                 yield name, solid.volume, remark

@@ -31,6 +31,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Limits, Pair, Range
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.margins import MARGIN_KINDS
 from explorer.mechanism.pose import Triple
 
 VARIABLE_HINTS = {
@@ -215,7 +216,7 @@ class DesignPanel:
         )
         self._controls.slider(
             "margin",
-            "Minimum of |δ1|, |δ2| and |δ3|.",
+            f"Minimum of |δ1|, |δ2| and |δ3|, in units; {MARGIN_KINDS}.",
             At("design.limits.margin", default=lambda _: 0.0),
             length_span,
             disabled=lambda state: state.design.limits.margin is None,

@@ -28,7 +28,7 @@ from explorer.app.widgets.charts import (
 )
 from explorer.app.widgets.colours import MARGIN_COLOURS
 from explorer.app.widgets.markup import format_number, margin_name, signed, swatch
-from explorer.mechanism.margins import INCIDENCES, margins
+from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals
 
@@ -137,8 +137,8 @@ def crossing_words(journey: Journey) -> str:
         least = np.abs(along_path.margins).min(axis=0)
         index = int(least.argmin())
         return (
-            f'<div class="ex-within">No singular pose; least |δ{index + 1}| = '
-            f"{format_number(float(least[index]), 3)} units</div>"
+            f'<div class="ex-within" title="{MARGIN_KINDS}">No singular pose; '
+            f"least |δ{index + 1}| = {format_number(float(least[index]), 3)} units</div>"
         )
     more = len(places) - MOST_LISTED
     listed = "; ".join(places[:MOST_LISTED]) + (f"; and {more} more" if more > 0 else "")

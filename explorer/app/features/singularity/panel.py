@@ -30,6 +30,7 @@ from explorer.app.widgets.markup import (
 )
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import Kind, warnings
+from explorer.mechanism.margins import MARGIN_KINDS
 
 VERDICT_HINT = (
     "The distance is the root-mean-square displacement of b1 to b4 (Nawratil's metric) to the "
@@ -55,7 +56,7 @@ class SingularityPanel:
             self._performance = PerformancePanel(services)
         self._controls.number(
             "Warn below",
-            "Warning length of margins in design units, to which those of distances, turns and "
+            "Warning length of all margins in design units, to which those of distances, turns and "
             "1/cond J are proportional: what is below is orange.",
             At("view.warn_below", default=lambda state: state.warn_below),
             least=0.0,
@@ -138,5 +139,5 @@ def _rows(frame: Frame) -> Iterator[str]:
     yield row(
         dim("min |δ| / reach"),
         share(snapshot.proximity),
-        hint="Smallest margin over the reach |a3|; δ2 is of another kind, a distance times a sine",
+        hint=f"Smallest margin over the reach |a3|; {MARGIN_KINDS}",
     )

@@ -48,6 +48,7 @@ from explorer.app.widgets.commands import Key, shift
 from explorer.app.widgets.markup import alert, box, note, sentence
 from explorer.app.widgets.under_way import UnderWay
 from explorer.measures.verdict import warnings
+from explorer.mechanism.margins import MARGIN_KINDS
 from explorer.mechanism.pose import Pose, Triple
 from explorer.workspace.position_bands import LOAD_MEASURES, MEASURE_WORDS
 
@@ -141,10 +142,9 @@ class WorkspacePanel:
         )
         controls.dropdown(
             "Colour by",
-            "One colour, the smallest margin |δ| (δ2 is a distance times a sine, the others are "
-            "distances), the inverse condition number, what the load of the tab Forces asks of "
-            "actuators and struts, or how far the errors of the actuators or that load move the "
-            "tool.",
+            f"One colour, the smallest margin |δ| ({MARGIN_KINDS}), the inverse condition number, "
+            "what the load of the tab Forces asks of actuators and struts, or how far the errors "
+            "of the actuators or that load move the tool.",
             COLOURINGS,
             "view.workspace.colour",
         )
