@@ -94,6 +94,6 @@ def test_positions_are_coloured_and_ranges_have_volumes(tab: Tab) -> None:
     expect(tab.page.get_by_text("nodes, 0.", exact=False)).to_be_visible()
     tab.choose("Solid over tilts", "total")
     tab.wait_for(lambda: services.get(RangeFeed).drawing is not None, "the solid")
-    expect(tab.page.get_by_text("Dexterous volume", exact=True)).to_be_visible()
+    expect(tab.page.get_by_text("Total workspace", exact=True)).to_be_visible()
     tab.switch("Greatest tilts", on=False)
     tab.wait_for(lambda: services.get(TiltsFeed).drawing is None, "no tilts")

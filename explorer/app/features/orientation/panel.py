@@ -292,7 +292,7 @@ def range_words(feed: RangeFeed) -> str:
         return alert("This workspace is empty", f"Emptied by: {', '.join(solid.empty_because)}.")
     bound, hint = BOUNDS[drawing.request.over]
     text = f"{bound} {format_number(solid.volume, 5, size=design.reach**3)} units³"
-    name = dim(f"{drawing.request.over.capitalize()} volume")
+    name = dim(f"{drawing.request.over.capitalize()} workspace")
     return f'<div class="{look}">{table((row(name, text, hint=f"{VOLUME_HINT} {hint}"),))}</div>'
 
 

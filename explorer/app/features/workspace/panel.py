@@ -142,9 +142,9 @@ class WorkspacePanel:
         )
         controls.dropdown(
             "Colour by",
-            f"One colour, the smallest margin |δ| ({MARGIN_KINDS}), the inverse condition number, "
-            "what the load of the tab Forces asks of actuators and struts, or how far the errors "
-            "of the actuators or that load move the tool.",
+            f"One colour, the smallest margin |δ| ({MARGIN_KINDS}), 1 / cond J, what the load of "
+            "Forces asks of actuators and struts, or how far errors of actuators or that load move "
+            "the tool.",
             COLOURINGS,
             "view.workspace.colour",
         )
