@@ -10,6 +10,7 @@ import contextlib
 import difflib
 import json
 import re
+from collections import Counter
 from collections.abc import Generator, Iterator, Mapping
 from types import EllipsisType
 from typing import Any, Literal, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
@@ -27,7 +28,8 @@ _LONGEST_QUOTE = 60
 # Fields that are nested deeper than any of ours are not looked for.
 _DEEPEST = 16
 
-_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[{}\[\],:]|[^\s{}\[\],:"]+', re.DOTALL)
+# A text without its end is one token, so that texts of any kind take linear time.
+_TOKEN = re.compile(r'"(?:[^"\\]+|\\.)*+"?|[{}\[\],:]|[^\s{}\[\],:"]+', re.DOTALL)
 
 _Step = str | int | EllipsisType
 _Path = tuple[_Step, ...]
@@ -157,8 +159,8 @@ def _one_line(message: str) -> str:
 def _unique_fields(fields: list[tuple[str, object]]) -> dict[str, object]:
     unique = dict(fields)
     if len(unique) < len(fields):
-        names = [name for name, _ in fields]
-        twice = next(name for name in names if names.count(name) > 1)
+        counts = Counter(name for name, _ in fields)
+        twice = next(name for name, count in counts.items() if count > 1)
         raise InputError(f"the field {twice!r} is given twice; leave one of them out")
     return unique
 
@@ -239,7 +241,7 @@ def _path_of(written: str) -> _Path:
 def _path_in_words(error: InputError, places: Mapping[_Path, _Place], outer: _Path) -> _Path:
     """Return the path of the field that a message names first, within an outer one."""
     named = error.field if isinstance(error, DesignError) and error.field else str(error)
-    for word in re.findall(r"[a-z]\w*(?:\.\w+)*", named):
+    for word in re.findall(r"[a-z]\w*(?:\.\w+)*", named[:LONGEST_LINE]):
         steps = tuple(word.split("."))
         like = [
             each for each in places if each[-len(steps) :] == steps and outer == each[: len(outer)]
@@ -285,23 +287,24 @@ def _matching(places: Mapping[_Path, _Place], path: _Path, words: str) -> _Path:
     """Return the path of the value that msgspec refuses, which leaves names of some fields out."""
     if ... not in path:
         return path
+    lengths = Counter(each[:-1] for each in places if each)
     for each, place in places.items():
         is_like = len(each) == len(path) and all(
             b is ... or a == b for a, b in zip(each, path, strict=True)
         )
-        if is_like and _is_refused(places, each, place, words):
+        if is_like and _is_refused(place, lengths[each], words):
             return each
     return path[: path.index(...)]
 
 
-def _is_refused(places: Mapping[_Path, _Place], path: _Path, place: _Place, words: str) -> bool:
+def _is_refused(place: _Place, length: int, words: str) -> bool:
     """Return whether msgspec's words fit a value: its type, or the length of a list."""
     got = re.search(r"got `([a-z]+)`$", words)
     if got is not None:
         own = _TYPE_OF_LETTER.get(place.mark[0], "number")
         return own == {"int": "number", "float": "number"}.get(got[1], got[1])
-    length = re.search(r"of length ([0-9]+)$", words)
-    return length is None or int(length[1]) != sum(each[:-1] == path for each in places if each)
+    right = re.search(r"of length ([0-9]+)$", words)
+    return right is None or int(right[1]) != length
 
 
 def _allowed_at(kind: Any, path: _Path) -> list[str]:

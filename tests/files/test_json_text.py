@@ -259,8 +259,14 @@ def test_unusable_range_of_a_study_is_told_with_its_line() -> None:
         '{"schema": 2, "limits": {"box": ' + "[" * 90_000,
         '{"schema": 2, "a3": [1, 2], "name": ' + '"x' * 200_000,
         '{"schema": 2, "' + "x" * 400_000 + '": 1}',
+        '{"schema": 2, "a3": 1, "name": "' + '\\"' * 400_000,
+        '{"schema": 2, "a3": 1, "name": [' + '"", ' * 200_000,
+        '{"design": "' + "gap " * 200_000 + '", "variables": {"a3x": [1, 2]}, '
+        '"sampling": {"count": 1}}',
+        json.dumps({"variables": {f"a{k}": [1, 2] for k in range(10_000)} | {"b": [1]}}),
     ],
-    ids=["no-number", "deep", "long-text", "long-name"],
+    ids=["number", "deep", "quotes", "name", "escapes", "list", "words", "variables"],
 )
 def test_file_that_is_deep_or_long_is_refused_in_a_line(text: str) -> None:
-    assert len(refusal(decode_design, text.encode(), "it")) <= LONGEST_LINE + 1
+    for decode in (decode_design, decode_study):
+        assert len(refusal(decode, text.encode(), "it")) <= LONGEST_LINE + 1
