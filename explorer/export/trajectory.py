@@ -20,7 +20,7 @@ LENGTHS = (*JOINTS, "x", "y", "z", *TOOL_COLUMNS)
 def trajectory_csv(trajectory: Trajectory) -> str:
     """Return a trajectory as CSV: a header, then a line per sample.
 
-    The header has the unit of each length, such as "l1 [unit = 10 mm]". Numbers round-trip to the
+    The header has the unit of each length, such as "l1 [10 mm]". Numbers round-trip to the
     last bit.
     """
     columns = [trajectory.time, trajectory.joints, trajectory.position, trajectory.quaternion]
@@ -30,6 +30,6 @@ def trajectory_csv(trajectory: Trajectory) -> str:
         names += TOOL_COLUMNS
     rows = np.column_stack(columns)
     unit = repr(trajectory.unit_mm).removesuffix(".0")
-    head = [f"{name} [unit = {unit} mm]" if name in LENGTHS else name for name in names]
+    head = [f"{name} [{unit} mm]" if name in LENGTHS else name for name in names]
     lines = [",".join(head), *(",".join(map(repr, row)) for row in rows.tolist())]
     return "\n".join(lines) + "\n"

@@ -101,7 +101,7 @@ def test_paths_are_gone_along_planned_and_saved(tab: Tab, monkeypatch: pytest.Mo
         tab.push("Export CSV")
     assert download.value.suggested_filename == "paper-optimal-path.csv"
     rows = list(csv.reader(Path(download.value.path()).read_text().splitlines()))
-    assert rows[0][:2] == ["time_s", "l1 [unit = 10 mm]"]
+    assert rows[0][:2] == ["time_s", "l1 [10 mm]"]
     assert [float(v) for v in rows[1][7:10]] == list(home.position)
     assert [float(v) for v in rows[-1][7:10]] == list(goal.position)
 

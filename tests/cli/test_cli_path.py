@@ -43,7 +43,7 @@ def test_path_json_has_poses_and_trajectory(cli: CommandLine, tmp_path: Path) ->
     with file.open(encoding="utf-8", newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == len(course["time"]) == 21
-    assert [float(row["l4 [unit = 10 mm]"]) for row in rows] == [q[5] for q in course["joints"]]
+    assert [float(row["l4 [10 mm]"]) for row in rows] == [q[5] for q in course["joints"]]
     assert found["file"] == str(file)
 
 

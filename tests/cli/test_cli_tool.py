@@ -202,7 +202,7 @@ def test_path_of_the_tool_goes_straight(
     assert np.linalg.norm(off - (off @ straight)[:, None] * straight, axis=1).max() > 0.05
     assert explorer.poses_are_valid(TOOLED, positions, rotations).all()
     head, *rows = csv.reader(out.read_text(encoding="utf-8").splitlines())
-    assert head[-3:] == [f"tool_{axis} [unit = 10 mm]" for axis in "xyz"]
+    assert head[-3:] == [f"tool_{axis} [10 mm]" for axis in "xyz"]
     assert_allclose([[float(word) for word in row[-3:]] for row in rows], tools)
     assert "tool position" in cli.text("path", *where, *to, *tooled)
     assert "tool_position" not in cli.answer("path", "--to", "11", "5", "8")["trajectory"]

@@ -111,8 +111,8 @@ def test_trajectory_pose_is_that_of_the_nearest_sample() -> None:
 def test_trajectory_csv_reads_back_to_the_last_bit() -> None:
     found = trajectory(DESIGN, random_path(2, 3), samples=50)
     head, *rows = csv.reader(trajectory_csv(found).splitlines())
-    joints = [f"{name} [unit = 10 mm]" for name in ("l1", "d1", "d2", "d3", "d4", "l4")]
-    position = [f"{name} [unit = 10 mm]" for name in "xyz"]
+    joints = [f"{name} [10 mm]" for name in ("l1", "d1", "d2", "d3", "d4", "l4")]
+    position = [f"{name} [10 mm]" for name in "xyz"]
     assert head == ["time_s", *joints, *position, "qw", "qx", "qy", "qz"]
     values = np.array([[float(word) for word in row] for row in rows])
     expected = (found.time[:, None], found.joints, found.position, found.quaternion)
@@ -124,7 +124,8 @@ def test_trajectory_csv_reads_back_to_the_last_bit() -> None:
 def test_trajectory_csv_of_the_tool_has_its_positions_last() -> None:
     found = trajectory(DESIGN, random_path(2, 3), samples=9, tool=(0.0, 1.0, 2.0))
     head, *rows = csv.reader(trajectory_csv(found).splitlines())
-    assert head[-4:] == ["qz", *(f"tool_{axis} [unit = 10 mm]" for axis in "xyz")]
+    assert head[-4:] == ["qz", *(f"tool_{axis} [10 mm]" for axis in "xyz")]
+    assert len(",".join(head)) <= 200
     assert found.tool_position is not None
     assert [[float(word) for word in row[-3:]] for row in rows] == found.tool_position.tolist()
 
@@ -133,7 +134,7 @@ def test_trajectory_csv_of_the_tool_has_its_positions_last() -> None:
 def test_trajectory_csv_header_has_the_exact_unit(unit: float) -> None:
     found = trajectory(msgspec.structs.replace(DESIGN, unit_mm=unit), [HOME, HOME], samples=2)
     head = trajectory_csv(found).partition("\n")[0].split(",")
-    units = {name.partition(" [unit = ")[2].removesuffix(" mm]") for name in head if "[" in name}
+    units = {name.partition(" [")[2].removesuffix(" mm]") for name in head if "[" in name}
     assert [float(each) for each in units] == [unit]
 
 
