@@ -77,6 +77,7 @@ def start(
     host: str = "127.0.0.1",
     port: int = 8080,
     token: str | None = None,
+    allow_hosts: Sequence[str] = (),
     panels: bool = True,
     user_data: UserData | None = None,
     preferences: PreferenceFile | None = None,
@@ -91,7 +92,8 @@ def start(
         host: The address to listen on.
         port: The port to listen on; any free one if 0.
         token: What has to be known to get in; if None a random one is made, but none for
-            a host that only this machine reaches.
+            a host that only this machine reaches, without a proxy.
+        allow_hosts: Names of hosts by which a proxy passes requests on.
         panels: Whether there are panels beside the scene; else the scene is alone.
         user_data: The user's designs, where the session is saved and the history to go on with;
             None to save nothing.
@@ -101,12 +103,12 @@ def start(
 
     Raises:
         InputError: the design or the pose is too large to be drawn.
-        ServerError: the address or the port cannot be had, or the token cannot be used.
+        ServerError: the address or the port cannot be had, or the token or a name cannot be used.
     """
     history = None if user_data is None else user_data.history
     state = opened(design, pose, view) if history is None else history.step.state
     check_drawable(state)
-    access = Access.to(host, token)
+    access = Access.to(host, token, allow_hosts)
     guard = Guard(access)
     _check_free(host, port)
     server = start_viser(host, port, guard.guarded)
@@ -134,6 +136,7 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8080,
     token: str | None = None,
+    allow_hosts: Sequence[str] = (),
     open_browser: bool = True,
     studies: Sequence[Path] = (),
 ) -> None:
@@ -144,12 +147,13 @@ def serve(
         host: The address to listen on.
         port: The port to listen on; any free one if 0.
         token: What has to be known to get in; if None a random one is made, but none for
-            a host that only this machine reaches.
+            a host that only this machine reaches, without a proxy.
+        allow_hosts: Names of hosts by which a proxy passes requests on.
         open_browser: Whether to show the page in the user's browser.
         studies: Folders of results that the page offers beside those of the user's data.
 
     Raises:
-        ServerError: the address or the port cannot be had, or the token cannot be used.
+        ServerError: the address or the port cannot be had, or the token or a name cannot be used.
     """
     limit_arenas()
     user_data = open_user_data(resume=design is None)
@@ -162,6 +166,7 @@ def serve(
             host=host,
             port=port,
             token=token,
+            allow_hosts=allow_hosts,
             user_data=user_data,
             preferences=PreferenceFile(data_folder()),
             studies=StudyFolders(data_folder() / STUDIES_FOLDER, studies),
@@ -191,6 +196,10 @@ def _wait_for_interruption(running: Running, open_browser: bool) -> None:
             f"Listening on {access.host}: other machines open "
             f"{access.url(running.viser.get_port(), elsewhere)}; who has no token is refused. "
             "Nothing is encrypted.\n"
+        )
+    for name in access.names:
+        sys.stderr.write(
+            f"Through a proxy: {access.proxy_url(name)}   (http if the proxy does not encrypt)\n"
         )
     sys.stderr.flush()
     freeze_objects()

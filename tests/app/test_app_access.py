@@ -173,6 +173,76 @@ def test_host_beyond_loopback_is_an_address_or_the_machines_name() -> None:
         assert status(access.judge(page(host, cookie=COOKIE), PORT)) == HTTPStatus.FORBIDDEN
 
 
+PROXY = "lab.example.org"
+
+
+@pytest.mark.parametrize("listening", ["127.0.0.1", "0.0.0.0", "::1", "192.168.1.7"])
+@pytest.mark.parametrize("scheme", ["http", "https"])
+@pytest.mark.parametrize("host", [PROXY, f"{PROXY}:8443", PROXY.upper()])
+def test_host_of_a_proxy_passes_with_its_own_origin_and_the_token(
+    listening: str, scheme: str, host: str
+) -> None:
+    access = Access.to(listening, TOKEN, [PROXY])
+    other = Access.to(listening, TOKEN, [f"{PROXY}:8443"])
+    origin = f"{scheme}://{host}"
+    assert access.judge(page(host, cookie=COOKIE), PORT) is None
+    assert access.judge(websocket(host, origin, cookie=COOKIE), PORT) is None
+    # A name with a port is for that port.
+    is_its_port = host.endswith(":8443")
+    assert (other.judge(page(host, cookie=COOKIE), PORT) is None) == is_its_port
+    # The origin is still that of the host, to the port.
+    for wrong in (None, f"{scheme}://evil.example", f"{origin}:1", f"{scheme}://{HERE}", "null"):
+        refusal = access.judge(websocket(host, wrong, cookie=COOKIE), PORT)
+        assert status(refusal) == HTTPStatus.FORBIDDEN
+    assert status(access.judge(websocket(host, origin), PORT)) == HTTPStatus.UNAUTHORIZED
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", f"x.{PROXY}", f"{PROXY}.evil.example", "example.org", f"{PROXY}."]
+)
+def test_other_host_is_refused_beside_a_proxy_and_named_in_the_reason(host: str) -> None:
+    for access in (OPEN, CLOSED, Access.to("127.0.0.1", TOKEN, [PROXY])):
+        refusal = access.judge(page(host, cookie=COOKIE), PORT)
+        assert refusal is not None
+        assert refusal.status == HTTPStatus.FORBIDDEN
+        assert f"--allow-host {host}" in refusal.reason
+        assert refusal.reason.isprintable()
+        assert TOKEN not in refusal.reason
+
+
+@given(st.text(max_size=40))
+def test_reason_for_any_host_and_origin_is_one_printable_line(text: str) -> None:
+    for head in (page(text), websocket(origin=text), websocket(origin=f"https://{text}")):
+        refusal = OPEN.judge(head, PORT)
+        assert refusal is None or refusal.reason.isprintable()
+
+
+def test_proxy_needs_a_token_on_loopback_too() -> None:
+    first, second = (Access.to("127.0.0.1", names=[PROXY]) for _ in range(2))
+    assert first.token is not None
+    assert first.token != second.token
+    assert first.proxy_url(PROXY) == f"https://{PROXY}/?token={first.token}"
+    assert status(first.judge(page(), PORT)) == HTTPStatus.UNAUTHORIZED
+    with pytest.raises(ServerError, match="needs a token"):
+        Access("127.0.0.1", None, (PROXY,))
+
+
+@pytest.mark.parametrize(
+    "name", ["", "*", "*.example.org", "https://lab.example.org", "lab/x", "a b", "lab:x", "ä.de"]
+)
+def test_name_that_no_host_has_is_refused_in_one_line(name: str) -> None:
+    with pytest.raises(ServerError, match=r"^[^\n]*such as lab.example.org[^\n]*$"):
+        Access.to("127.0.0.1", TOKEN, [name])
+
+
+def test_reason_for_an_origin_that_a_proxy_hides_names_both_hosts() -> None:
+    refusal = OPEN.judge(websocket(origin=f"https://{PROXY}:8443"), PORT)
+    assert refusal is not None
+    assert f"{PROXY}:8443" in refusal.reason
+    assert HERE in refusal.reason
+    assert f"--allow-host {PROXY}" in refusal.reason
+
+
 @pytest.mark.parametrize(
     "query",
     [

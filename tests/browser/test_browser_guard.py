@@ -5,7 +5,9 @@ from __future__ import annotations
 import functools
 import http.server
 import math
+import re
 import socket
+import socketserver
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator
@@ -20,7 +22,7 @@ import numpy as np
 import pytest
 import viser
 from client import PROTOCOL, client_of, opened
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
@@ -211,6 +213,135 @@ def test_with_a_token_the_page_opens_in_a_browser_and_stays_open(
     finally:
         context.close()
         stranger.close()
+
+
+class Proxy(socketserver.ThreadingTCPServer):
+    """A proxy before an explorer, which changes the head of each request.
+
+    Args:
+        running: The explorer.
+        change: Function from the head of a request to the one that is passed on.
+    """
+
+    daemon_threads = True
+    allow_reuse_address = True
+
+    def __init__(self, running: Running, change: Callable[[bytes], bytes]) -> None:
+        super().__init__(("127.0.0.1", 0), _Passing)
+        self.running, self.change = running, change
+
+    @property
+    def port(self) -> int:
+        return int(self.server_address[1])
+
+
+class _Passing(socketserver.BaseRequestHandler):
+    def handle(self) -> None:
+        assert isinstance(self.server, Proxy)
+        # A browser may end a line at any time.
+        with suppress(OSError):
+            self._pass(self.server, self.request)
+
+    @staticmethod
+    def _pass(proxy: Proxy, line: socket.socket) -> None:
+        head = b""
+        while b"\r\n\r\n" not in head:
+            more = line.recv(4096)
+            if not more:
+                return
+            head += more
+        with socket.create_connection(("127.0.0.1", proxy.running.viser.get_port())) as onward:
+            onward.sendall(proxy.change(head))
+            back = threading.Thread(target=pass_on, args=(onward, line), daemon=True)
+            back.start()
+            pass_on(line, onward)
+            back.join()
+
+
+def pass_on(source: socket.socket, target: socket.socket) -> None:
+    """Pass on what one side says until it ends."""
+    with suppress(OSError):
+        while data := source.recv(65536):
+            target.sendall(data)
+        target.shutdown(socket.SHUT_WR)
+
+
+@contextmanager
+def proxy_before(running: Running, change: Callable[[bytes], bytes]) -> Generator[Proxy]:
+    with Proxy(running, change) as proxy:
+        thread = threading.Thread(target=proxy.serve_forever, daemon=True)
+        thread.start()
+        yield proxy
+        proxy.shutdown()
+        thread.join()
+
+
+def test_page_through_a_proxy_connects_once_its_name_is_allowed(browser: Browser) -> None:
+    running = start(DESIGN, port=0, token=TOKEN, allow_hosts=["lab.localhost"])
+    page = browser.new_page()
+    try:
+        with proxy_before(running, lambda head: head) as proxy:
+            other = page.goto(f"http://other.localhost:{proxy.port}/?token={TOKEN}")
+            assert other is not None
+            assert other.status == HTTPStatus.FORBIDDEN
+            assert "--allow-host other.localhost" in page.inner_text("main")
+            page.goto(f"http://lab.localhost:{proxy.port}/?token={TOKEN}")
+            wait_for(lambda: bool(running.viser.get_clients()))
+            assert page.locator(".ex-refused").count() == 0
+            page.close()
+    finally:
+        running.stop()
+
+
+def hides_host(running: Running) -> Callable[[bytes], bytes]:
+    host = f"Host: 127.0.0.1:{running.viser.get_port()}\r\n".encode()
+    return lambda head: re.sub(rb"(?i)\r\nhost:[^\r]*\r\n", b"\r\n" + host, head)
+
+
+def drops_upgrade(_: Running) -> Callable[[bytes], bytes]:
+    def change(head: bytes) -> bytes:
+        head = re.sub(rb"(?i)\r\nupgrade: [^\r]*", b"", head)
+        return re.sub(rb"(?i)\r\nconnection: upgrade", b"\r\nConnection: close", head)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("hides", "words"),
+    [(hides_host, "--allow-host lab.localhost"), (drops_upgrade, "Upgrade and Connection")],
+    ids=["host", "websockets"],
+)
+def test_page_says_what_a_proxy_does_not_pass_on(
+    browser: Browser, hides: Callable[[Running], Callable[[bytes], bytes]], words: str
+) -> None:
+    running = start(DESIGN, port=0, token=TOKEN, allow_hosts=["lab.localhost"])
+    page = browser.new_page()
+    try:
+        with proxy_before(running, hides(running)) as proxy:
+            page.goto(f"http://lab.localhost:{proxy.port}/?token={TOKEN}")
+            expect(page.get_by_role("alert").filter(has_text=words)).to_be_visible()
+            # The page goes on trying, and connects once it may.
+            proxy.change = bytes
+            wait_for(lambda: bool(running.viser.get_clients()))
+            expect(page.locator(".ex-refused")).to_have_count(0)
+            page.close()
+    finally:
+        running.stop()
+
+
+def test_open_page_says_that_its_token_has_expired(browser: Browser) -> None:
+    running = start(DESIGN, host="0.0.0.0", port=0, token=TOKEN)
+    port = running.viser.get_port()
+    page = browser.new_page()
+    try:
+        page.goto(running.url)
+        wait_for(lambda: bool(running.viser.get_clients()))
+        running.stop()
+        running = start(DESIGN, host="0.0.0.0", port=port)
+        expect(page.get_by_role("alert").filter(has_text="?token=")).to_be_visible()
+    finally:
+        page.close()
+        running.stop()
 
 
 NO_MESSAGES: dict[str, bytes | str] = {

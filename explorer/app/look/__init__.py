@@ -21,7 +21,7 @@ def read_script(name: str, *arguments: object) -> str:
         arguments: Values of JSON for the function that the script sets.
     """
     # Scripts come to a page in any order, so that each brings what all of them use.
-    source = _text("base.js") + _text(f"{name}.js")
+    source = read_file("base.js") + read_file(f"{name}.js")
     if not arguments:
         return source
     values = ", ".join(msgspec.json.encode(each).decode() for each in arguments)
@@ -30,8 +30,9 @@ def read_script(name: str, *arguments: object) -> str:
 
 def read_stylesheet() -> str:
     """Return the script that puts the stylesheet into a page, in place of an older one."""
-    return read_script("style", _text("page.css"))
+    return read_script("style", read_file("page.css"))
 
 
-def _text(file: str) -> str:
+def read_file(file: str) -> str:
+    """Return the text of a file of this folder."""
     return packaged_file(FOLDER, file).read_text("utf-8")

@@ -2,9 +2,9 @@
 
 On loopback every program of this machine may, but no web site: a page from elsewhere that
 the user's browser shows has another `Origin`, and a foreign name that resolves to this machine
-(DNS rebinding) is another `Host`. On any other address the explorer requires a token:
-in the address of the page, then in a cookie, since the page itself chooses the address of
-its websocket.
+(DNS rebinding) is another `Host`. On any other address, and where a proxy lets others in, the
+explorer requires a token: in the address of the page, then in a cookie, since the page itself
+chooses the address of its websocket.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ TOKEN = re.compile(r"[A-Za-z0-9_-]{16,128}")
 # Plain words, since viser's page would connect to the address of another server in its query.
 PLAIN_QUERY = re.compile(r"[A-Za-z0-9_.~,=&-]*")
 HOST = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:(?P<port>[0-9]{1,5}))?")
+ORIGIN = re.compile(rf"https?://(?P<host>{HOST.pattern})")
 HTTP_PORT = 80
 # Permissions of the page. Its program, its styles and its workers are all inside one file; it
 # connects to no other server than its own, so that no link can make it connect elsewhere.
@@ -80,16 +81,25 @@ class Access:
     Attributes:
         host: The address that it listens on.
         token: The token that a request must have; None for no token, on loopback only.
+        names: Further hosts that requests may name, those of a proxy before the server; each in
+            lower case, with a port or for any port.
 
     Raises:
-        ServerError: a host beyond loopback without a token, or an invalid token.
+        ServerError: a host beyond loopback or a proxy without a token, or an invalid token or name.
     """
 
     host: str
     token: str | None = None
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.token is None and not is_loopback(self.host):
+        for name in self.names:
+            if HOST.fullmatch(name) is None:
+                raise ServerError(
+                    "a proxy's host is a name such as lab.example.org, or one with a port; "
+                    f"got {name!r}"
+                )
+        if self.token is None and (self.names or not is_loopback(self.host)):
             raise ServerError(f"listening on {self.host!r} needs a token; others could connect")
         if self.token is not None and TOKEN.fullmatch(self.token) is None:
             raise ServerError(
@@ -97,15 +107,15 @@ class Access:
             )
 
     @staticmethod
-    def to(host: str, token: str | None = None) -> Access:
+    def to(host: str, token: str | None = None, names: Sequence[str] = ()) -> Access:
         """Return the rule for a host, with a new random token where one is needed and not given.
 
         Raises:
-            ServerError: the token cannot be used.
+            ServerError: the token or a name cannot be used.
         """
-        if token is None and not is_loopback(host):
+        if token is None and (names or not is_loopback(host)):
             token = secrets.token_urlsafe(TOKEN_BYTES)
-        return Access(host, token)
+        return Access(host, token, tuple(name.lower() for name in names))
 
     def url(self, port: int, host: str | None = None) -> str:
         """Return the address of the page, token included.
@@ -118,6 +128,10 @@ class Access:
         address = f"http://{_in_address(name)}:{port}"
         return address if self.token is None else f"{address}/?token={self.token}"
 
+    def proxy_url(self, name: str) -> str:
+        """Return the address of the page behind a proxy that encrypts, token included."""
+        return f"https://{name}/?token={self.token}"
+
     def judge(self, head: Head, port: int) -> Refusal | None:
         """Return why a request is refused, or None if it may pass.
 
@@ -127,10 +141,7 @@ class Access:
         """
         host = head.hosts[0].lower() if len(head.hosts) == 1 else ""
         if not self._is_own_host(host, port):
-            return Refusal(
-                HTTPStatus.FORBIDDEN,
-                f"This address is not one of the explorer's; open {self.url(port).split('?')[0]}",
-            )
+            return Refusal(HTTPStatus.FORBIDDEN, self._reason_for_host(host, port))
         _, _, query = head.target.partition("?")
         if PLAIN_QUERY.fullmatch(query) is None:
             return Refusal(
@@ -138,15 +149,12 @@ class Access:
                 "The explorer's page is opened with nothing but its token in the address.",
             )
         if head.upgrade and not self._is_own_page(head.origins, host):
-            return Refusal(
-                HTTPStatus.FORBIDDEN,
-                "Only the explorer's own page may connect: the Origin must be that of this Host.",
-            )
+            return Refusal(HTTPStatus.FORBIDDEN, _reason_for_origin(head.origins, host))
         if self.token is not None and not self._has_token(query, head.cookies, port):
             return Refusal(
                 HTTPStatus.UNAUTHORIZED,
-                "This explorer needs a token: open the whole address that it printed on start, "
-                "with ?token=...",
+                "This explorer needs a token, another one after each start unless you chose it: "
+                "open the whole address that it printed on start, with ?token=...",
             )
         return None
 
@@ -169,6 +177,8 @@ class Access:
         if parts is None:
             return False
         name = parts["name"]
+        if name in self.names or host in self.names:
+            return True
         if self.token is None:
             return name in {*LOOPBACK_NAMES, _in_address(self.host).lower()} and port == int(
                 parts["port"] or HTTP_PORT
@@ -177,6 +187,16 @@ class Access:
         short = name.partition(".")[0]
         known = (self.host.lower(), "localhost", socket.gethostname().lower())
         return _is_address(name.strip("[]")) or name in known or short == known[-1]
+
+    def _reason_for_host(self, host: str, port: int) -> str:
+        own = self.url(port).partition("?")[0].rstrip("/")
+        parts = HOST.fullmatch(host)
+        if parts is None:
+            return f"This address is not one of the explorer's; open {own}"
+        return (
+            f"The explorer does not answer to the name {host}. Open {own}, or if a proxy has that "
+            f"name, allow it on start: explorer --allow-host {parts['name']}"
+        )
 
     def _is_own_page(self, origins: Sequence[str], host: str) -> bool:
         # A program that is no browser can send any origin, so it can send this one as well.
@@ -200,6 +220,18 @@ class Access:
                 given.append(cookie.value)
         secret = (self.token or "").encode()
         return any(hmac.compare_digest(v.encode(errors="replace"), secret) for v in given)
+
+
+def _reason_for_origin(origins: Sequence[str], host: str) -> str:
+    reason = "Only the explorer's own page may connect: the Origin must be that of this Host."
+    origin = ORIGIN.fullmatch(origins[0].lower()) if len(origins) == 1 else None
+    if origin is None:
+        return reason
+    return (
+        f"{reason} The page comes from {origin['host']}, and this request names {host}. A proxy "
+        "must pass on the header Host, and its name must be allowed on start: explorer "
+        f"--allow-host {origin['name']}"
+    )
 
 
 def is_loopback(host: str) -> bool:

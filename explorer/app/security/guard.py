@@ -12,18 +12,19 @@ import logging
 import time
 from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from dataclasses import replace
 from http import HTTPStatus
 from typing import Any
 
 import viser
 from websockets.asyncio.server import Server, ServerConnection
-from websockets.datastructures import Headers
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 from websockets.protocol import State
 
 from explorer.app.security.access import Access, Head, Refusal
 from explorer.app.security.client_messages import LARGEST_PICTURE, Controls, Inbox
+from explorer.app.security.refusals import add_explanations, asked_origin, explain, refuse
 
 # Largest number of tabs. Each is sent the whole scene, and unread messages are kept for it.
 MOST_TABS = 100
@@ -105,18 +106,26 @@ class Guard:
     ) -> Response | None:
         port: int = connection.local_address[1]
         head = _head(request)
-        refusal = self._access.judge(head, port)
-        if refusal is None and head.upgrade and len(self._tabs) >= MOST_TABS:
-            refusal = Refusal(
-                HTTPStatus.SERVICE_UNAVAILABLE, f"{MOST_TABS} tabs are open; close one."
-            )
+        origin = asked_origin(head.target)
+        if origin is not None:
+            # The page asks why a websocket of its origin is refused.
+            judged = replace(head, target="/", origins=[origin], upgrade=True)
+            return explain(self._refusal(judged, port))
+        refusal = self._refusal(head, port)
         if refusal is not None:
-            return _refusal_response(refusal)
+            return refuse(refusal, as_page="text/html" in request.headers.get("Accept", ""))
         response = answer(connection, request)
         if response is not None:
+            add_explanations(response)
             for name, value in self._access.headers(head, port):
                 response.headers[name] = value
         return response
+
+    def _refusal(self, head: Head, port: int) -> Refusal | None:
+        refusal = self._access.judge(head, port)
+        if refusal is None and head.upgrade and len(self._tabs) >= MOST_TABS:
+            return Refusal(HTTPStatus.SERVICE_UNAVAILABLE, f"{MOST_TABS} tabs are open; close one.")
+        return refusal
 
     async def _handle(
         self, connection: ServerConnection, handler: Callable[[ServerConnection], Awaitable[None]]
@@ -198,19 +207,6 @@ def _head(request: Request) -> Head:
     return Head(
         request.path, values("Host"), values("Origin"), values("Cookie"), bool(values("Upgrade"))
     )
-
-
-def _refusal_response(refusal: Refusal) -> Response:
-    body = f"{refusal.reason}\n".encode()
-    headers = Headers(
-        {
-            "Content-Type": "text/plain; charset=utf-8",
-            "Content-Length": str(len(body)),
-            "X-Content-Type-Options": "nosniff",
-            "Cache-Control": "no-store",
-        }
-    )
-    return Response(refusal.status.value, refusal.status.phrase, headers, body)
 
 
 def _logger() -> logging.Logger:

@@ -31,6 +31,10 @@ class Serve:
     """Access token of 16 to 128 letters, digits, - and _; by default that of the environment
     variable EXPLORER_TOKEN, else a random one if other machines can connect."""
 
+    allow_host: Annotated[tuple[str, ...], hint("none", "NAME …")] = ()
+    """Names of hosts by which a proxy passes requests on, such as lab.example.org; a token is
+    then needed."""
+
     study: Annotated[tuple[Path, ...], hint("optional", "FOLDER …")] = ()
     """Results of explorer sweep to list on the page, beside the studies run there."""
 
@@ -42,7 +46,7 @@ class Serve:
 
         Raises:
             ServerError: The server cannot start, for instance because the port is in use, or
-                the token cannot be used.
+                the token or a name cannot be used.
         """
         design = None if self.design is None else load(self.design)
         from explorer.app.server import serve
@@ -57,6 +61,7 @@ class Serve:
             host=self.host,
             port=self.port,
             token=token,
+            allow_hosts=self.allow_host,
             open_browser=self.open,
             studies=self.study,
         )
