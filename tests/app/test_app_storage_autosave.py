@@ -24,7 +24,11 @@ from explorer.app.state.state import joints_of, opened
 from explorer.app.storage.autosaver import Autosaver
 from explorer.app.storage.folder import data_folder, lock_folder, try_lock
 from explorer.app.storage.session_file import MOST_ORPHANS, SessionFile
-from explorer.app.storage.session_format import decode_header, encode_session
+from explorer.app.storage.session_format import (
+    LARGEST_GENERATION,
+    decode_header,
+    encode_session,
+)
 from explorer.app.storage.user_data import open_user_data
 from explorer.errors import StorageError
 from explorer.mechanism.design_file import PRESETS
@@ -256,6 +260,16 @@ def test_file_of_a_newer_explorer_is_left_alone_and_new_saves_are_newer(tmp_path
     assert newer.read_bytes() == before
     assert store.save(numbered(2)) == 1001
     store.close()
+
+
+def test_largest_generation_does_not_make_later_sessions_unreadable(tmp_path: Path) -> None:
+    (tmp_path / "0.json").write_bytes(encode_session(numbered(1), LARGEST_GENERATION))
+    for number in (2, 3):
+        store = SessionFile(tmp_path)
+        assert number_of(store.resume().history) == number - 1
+        store.save(numbered(number))
+        store.close()
+    assert resume(tmp_path) == 3
 
 
 def test_folders_links_and_pipes_named_like_sessions_are_ignored(tmp_path: Path) -> None:

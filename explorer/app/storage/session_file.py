@@ -19,6 +19,7 @@ from explorer.app.session.history import History
 from explorer.app.storage.folder import LOCK, data_folder, lock_folder, try_lock
 from explorer.app.storage.session_format import (
     LARGEST_FILE,
+    LARGEST_GENERATION,
     LARGEST_HEADER,
     SchemaError,
     decode_header,
@@ -119,7 +120,9 @@ class SessionFile:
                 # Without its lock, which somebody has removed, the file has no owner.
                 self._release()
                 path = self._create()
-            generation = 1 + max(self._generation, self._newest_generation())
+            newest = max(self._generation, self._newest_generation())
+            # A file that says so much was written by no explorer; what is beyond cannot be read.
+            generation = min(1 + newest, LARGEST_GENERATION)
             write_whole(path, encode_session(history, generation))
             self._generation = generation
             return generation

@@ -28,6 +28,7 @@ MOST_BYTES = 300_000
 
 # Largest sizes in bytes of a file and of its first line; no explorer writes one near them.
 LARGEST_FILE, LARGEST_HEADER = 50_000_000, 200
+LARGEST_GENERATION = 2**62
 
 
 class SchemaError(StorageError):
@@ -43,7 +44,7 @@ class Header(msgspec.Struct, frozen=True):
     """
 
     schema: Annotated[int, msgspec.Meta(ge=1, le=2**31)]
-    generation: Annotated[int, msgspec.Meta(ge=0, le=2**62)]
+    generation: Annotated[int, msgspec.Meta(ge=0, le=LARGEST_GENERATION)]
 
 
 class _Signed(Header, frozen=True, forbid_unknown_fields=True):
