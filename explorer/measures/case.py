@@ -21,14 +21,9 @@ from explorer.statics.reactions import has_limits
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
 from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
-from explorer.workspace.solids.solid import Solid
 
 if TYPE_CHECKING:
     from explorer.workspace.held import HeldWorkspace
-
-MESH_TOLERANCE = 0.004
-"""Tolerance of the mesh on which a search for the farthest positions starts, as a share of the
-reach."""
 
 
 @dataclass
@@ -45,7 +40,6 @@ class Case:
         node_step: Step of the paper's nodes; that of the design if None.
         box: Box (lows, highs) over which the least |δ| is measured; not measured if None.
         demanded_margin: Least |δ| at which a demanded clearance counts; None without demand.
-        mesh: The workspace as a mesh of any tolerance, if there is one already.
         pose: Pose that has the orientation of the workspace; the home pose if None.
     """
 
@@ -55,7 +49,6 @@ class Case:
     node_step: float | None = None
     box: tuple[Triple, Triple] | None = None
     demanded_margin: float | None = None
-    mesh: Solid | None = None
     pose: Pose | None = None
 
     @property
@@ -115,30 +108,16 @@ class Case:
         return clearance_beyond(self.design, self.demanded_margin, self.rotation)
 
     @cached_property
-    def solid(self) -> Solid | None:
-        """The workspace as a mesh; None if it is empty."""
-        if self.mesh is None and self.volume.volume > 0.0:
-            # It loads the kernel of solids.
-            from explorer.workspace.solids.solids import workspace_solid
-
-            tolerance = MESH_TOLERANCE * self.design.reach
-            self.mesh = workspace_solid(self.design, self.rotation, tolerance, volume=self.volume)
-        return None if self.mesh is None or self.mesh.is_empty else self.mesh
-
-    @cached_property
     def extent(self) -> FloatArray:
         """The exact extents of the workspace on the axes, shape (3,); NaN if it is empty."""
-        if self.solid is None:
-            return np.full(3, math.nan)
-        lows, highs = extent_of(self.design, self.rotation, self.solid)
-        return highs - lows
+        ends = extent_of(self.design, self.rotation) if self.volume.volume > 0.0 else None
+        return np.full(3, math.nan) if ends is None else ends[1] - ends[0]
 
     @cached_property
     def least_margins(self) -> FloatArray:
         """The least |δ1|, |δ2|, |δ3| in the workspace, exact, shape (3,); NaN if it is empty."""
-        if self.solid is None:
-            return np.full(3, math.nan)
-        return least_margins(self.design, self.rotation, self.solid)
+        least = least_margins(self.design, self.rotation) if self.volume.volume > 0.0 else None
+        return np.full(3, math.nan) if least is None else least
 
     @cached_property
     def accessible_volume(self) -> tuple[float, str]:

@@ -130,7 +130,6 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
         # Too fine a grid is refused before anything else is computed.
         _ = case.paper_nodes
         solid = solids.workspace_solid(design, pose.rotation, self.tolerance, volume=case.volume)
-        case.mesh = solid
         shift, tool = self.shift(design, pose), self.tool(design)
         if shift is not None:
             solid = solid.shifted(shift)

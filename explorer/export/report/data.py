@@ -132,8 +132,6 @@ def gather_report_data(
     solid = Missing("the workspace is empty")
     if case.volume.volume > 0.0:
         solid = _compute(lambda: workspace_solid(design, r, volume=case.volume))
-    if not isinstance(solid, Missing):
-        case.mesh = solid
     accessible = None
     if any(design.limits.leg_radii):
         accessible = _compute(lambda: accessible_workspace(design, r, start=at.position))

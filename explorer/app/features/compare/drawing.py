@@ -11,7 +11,7 @@ from explorer.app.features.workspace.reached import Rows
 from explorer.app.scene.bands import Shell
 from explorer.app.scene.outline import outline
 from explorer.errors import ExplorerError
-from explorer.measures.case import MESH_TOLERANCE, Case
+from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import evaluate
@@ -25,6 +25,8 @@ from explorer.workspace.solids.solids import workspace_solid
 
 # Number of cached measurements and solids: of the compared designs, and of the last changes.
 CACHED = 8
+# Chord tolerance of a mesh without one of its own, as a share of the reach.
+MESH_TOLERANCE = 0.004
 NO_COLOUR: Rgb = (0, 0, 0)
 
 
@@ -98,8 +100,7 @@ def compared_drawing(request: ComparedRequest) -> ComparedDrawing:
 
 @lru_cache(maxsize=CACHED)
 def _measure(design: Design) -> Measurements:
-    case = Case(design, mesh=_solid(design, None, None))
-    return measure_design(case, measures_in("compare"))
+    return measure_design(Case(design), measures_in("compare"))
 
 
 @lru_cache(maxsize=CACHED)

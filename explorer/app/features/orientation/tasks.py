@@ -23,7 +23,7 @@ from explorer.workspace.orientations.share import OrientationShare, orientation_
 from explorer.workspace.orientations.tilts import greatest_tilts
 from explorer.workspace.orientations.torsions import TiltByTorsion, tilt_by_torsion
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid
+from explorer.workspace.solids.solids import inclusive_solid, total_solid
 
 NODES = 20
 """Number of nodes on each axis of the extent, at which tilts are computed."""
@@ -116,11 +116,10 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
     """
     design, watch = request.design, watch_of(channel)
     rotation = rotation_from_tilt_torsion((0.0, 0.0, request.torsion))
-    solid = workspace_solid(design, rotation)
-    if solid.is_empty:
+    ends = extent_of(design, rotation)
+    if ends is None:
         return TiltsDrawing(request, np.zeros((0, 3)), np.zeros(0), 0.0)
-    offset = tool_offset(rotation, request.tool)
-    lows, highs = (end + offset for end in extent_of(design, rotation, solid))
+    lows, highs = np.array(ends) + tool_offset(rotation, request.tool)
     # Nodes in the middle of cells: on the surface of the workspace no tilt is left.
     shares = (np.arange(NODES) + 0.5) / NODES
     axes = [low + shares * (high - low) for low, high in zip(lows, highs, strict=True)]

@@ -198,7 +198,7 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         held_volume, part = (held.held_volume, held.solid) if trouble is None else (None, None)
     solid = whole if part is None else part
     shown, mapped, level = solid, None, None
-    whole_extent = None if whole.is_empty else extent_of(design, rotation, whole)
+    whole_extent = None if whole.is_empty else extent_of(design, rotation)
     extent = whole_extent if part is None else _extent(solid)
     cut = None
     if request.cut is not None and extent is not None and whole_extent is not None:
