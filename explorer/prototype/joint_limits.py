@@ -1,4 +1,4 @@
-"""The limits of the prototype's actuators and joints: strokes, carriages, swings."""
+"""The limits of the prototype in a pose: strokes, carriages, swings, legs that come close."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ _SLACK = 1e-9
 
 
 def broken_joint_limits(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) -> tuple[str, ...]:
-    """Return the limits of actuators and joints that one pose breaks, as sentences.
+    """Return the limits of actuators, joints and distances that one pose breaks, as sentences.
 
-    Collisions between the parts of different legs are not checked.
+    Where none is broken, the parts of different legs keep their clearance. It may be kept in other
+    poses too, since each leg is taken as thick as capsules about its parts.
 
     Args:
         sizes: Sizes of the parts.
@@ -44,6 +45,10 @@ def broken_joint_limits(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) 
         lean = math.acos(float(np.clip(along @ normal, -1.0, 1.0)))
         if lean > BALL_SWING + _SLACK:
             broken.append(f"the ball joint at b{leg} leans {_angle_beyond(lean, BALL_SWING)}")
+    for axes, distance, needed in sizes.leg_distances(position, rotation):
+        if distance < needed * (1.0 - _SLACK):
+            apart = format_number(distance, size=needed)
+            broken.append(f"{axes} are {apart} mm apart and need {format_number(needed)} mm")
     return tuple(broken)
 
 

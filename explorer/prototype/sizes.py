@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from explorer.legs.clearance import PAIRS, leg_axes, pair_rows
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import platform_points
@@ -18,6 +20,11 @@ from explorer.prototype.dimensions import CLEARANCE, THINNEST, GuideSizes, LegSi
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.volume import bounds
+
+# Parts of a leg that are as thick as one capsule: its base joint, its tube and rod, its cup. Rows
+# combine the parts of the four legs in all ways.
+JOINT, TUBE, CUP = range(3)
+COMBINATIONS = np.array([*itertools.product((JOINT, TUBE, CUP), repeat=4)])
 
 
 @dataclass(frozen=True)
@@ -157,6 +164,45 @@ class Sizes:
         """The least distance between the centres of the carriages."""
         return self.radii[1] + self.radii[2] + CLEARANCE
 
+    def leg_distances(
+        self, position: ArrayLike, rotation: ArrayLike
+    ) -> Iterator[tuple[str, float, float]]:
+        """Yield the axes of each pair of legs, a distance of them in a pose, and what it must be.
+
+        The parts of a leg lie within three capsules about parts of its axis. Of the capsules of two
+        legs those two count that come nearest to each other: the distance is that of their axes,
+        and must be the sum of their radii and the clearance of parts. For the arguments see
+        `leg_axes`.
+        """
+        axes = leg_axes(self.design, position, rotation) * self.design.unit_mm
+        capsules, radii = np.repeat(axes[:, None], 3, axis=1), np.empty((4, 3))
+        for index, (axis, own) in enumerate(zip(axes, self.legs, strict=True)):
+            length = float(np.linalg.norm(axis[1] - axis[0]))
+            along = (axis[1] - axis[0]) / max(length, 1e-300)
+            capsules[index, CUP] = axis[1] - np.outer([own.end, own.rim], along)
+            capsules[index, JOINT, 1] = axis[0] + own.floor * along
+            radii[index] = own.swing, own.radius, own.cup
+            if index + 1 in ON_GUIDE:
+                # A ball about the carriage and the eye of the leg.
+                capsules[index, JOINT, 1] = axis[0]
+                radii[index, JOINT] = np.hypot(self.guide.eye, own.radius)
+        rows = capsules[np.arange(4), COMBINATIONS]
+        distance, points = np.empty((len(rows), 6)), np.empty((len(rows), 6, 2, 3))
+        pair_rows(len(rows), rows, distance, points)
+        thick = radii[np.arange(4), COMBINATIONS]
+        for pair, (first, second) in enumerate(PAIRS):
+            needed = thick[:, first - 1] + thick[:, second - 1] + CLEARANCE
+            spare = distance[:, pair] - needed
+            if (first, second) == ON_GUIDE:
+                # Carriages and eyes lie beside each other, below the cups.
+                spare[(COMBINATIONS[:, 1:3] == JOINT).any(axis=1)] = np.inf
+            row = int(spare.argmin())
+            yield (
+                f"the axes of legs {first} and {second}",
+                float(distance[row, pair]),
+                float(needed[row]),
+            )
+
     def tight_places(self) -> Iterator[tuple[str, float, float]]:
         """Yield places that may be tight: the parts, their distance, and the distance needed."""
         for leg, leg_sizes in zip(LEGS, self.legs, strict=True):
@@ -178,6 +224,9 @@ class Sizes:
         for leg, leg_sizes in zip(LEGS, self.legs, strict=True):
             # The stroke needs room on both sides of the home length.
             yield f"the ends of leg {leg} at home", self.home_length(leg), 1.1 * leg_sizes.dead
+        home = home_pose(self.design)
+        for axes, distance, needed in self.leg_distances(home.position, home.rotation):
+            yield f"{axes} at home", distance, needed
 
     @cached_property
     def worst(self) -> tuple[str, float, float] | None:

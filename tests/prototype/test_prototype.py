@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -13,11 +14,13 @@ import pytest
 import trimesh
 from hypothesis import given, strategies as st
 from limited_designs import limited
-from part_gaps import least_gap, overlaps
+from part_gaps import least_gap, overlaps, placed, touching
+from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, Design, InputError, Pose, home_pose, leg_clearances
 from explorer.errors import TooTightError
+from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import Prototype, make_prototype
 from explorer.prototype.bill import bill_of_materials
@@ -158,20 +161,11 @@ def motion(prototype: Prototype, many: int) -> Iterator[tuple[FloatArray, FloatA
     for phase in np.linspace(0.0, 2.0 * math.pi, many, endpoint=False).tolist():
         for width in np.geomspace(1.0, 0.01, 29).tolist():
             found = pose(phase, width)
-            if not prototype.broken_joint_limits(*found) and clear(prototype, *found):
+            if not prototype.broken_joint_limits(*found):
                 yield found
                 break
         else:
             pytest.fail("no pose in this direction is clear")
-
-
-def clear(prototype: Prototype, position: FloatArray, rotation: FloatArray) -> bool:
-    """Return whether the legs as capsules, as thick as cups and forks, keep apart."""
-    unit = prototype.design.unit_mm
-    cups, radii = [own.cup for own in prototype.sizes.legs], prototype.sizes.radii
-    wide = tuple(width / unit for width in (cups[0], *radii[1:3], cups[3]))
-    design = limited(prototype.design, leg_radii=wide)
-    return bool((leg_clearances(design, position, rotation).clearance > 0.0).all())
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -182,6 +176,92 @@ def test_parts_stay_clear_along_a_motion(name: str) -> None:
         assert pose_overlaps(prototype, position, rotation) == []
         far = max(far, float(np.linalg.norm(position - pose_of(prototype)[0])))
     assert far > 0.03 * prototype.design.reach
+
+
+def close_legs() -> tuple[Design, FloatArray, FloatArray]:
+    """Return a design, and a pose in which a cup meets another leg: position and rotation."""
+    row = read_reference("defects_prototype")
+    design = decode_design(json.dumps(row["design"]).encode(), "defects_prototype.json")
+    return design, np.array(row["position"]), np.array(row["rotation"])
+
+
+def leg_gap(prototype: Prototype, position: FloatArray, rotation: FloatArray) -> float:
+    """Return the least distance of parts of different legs in millimetres, at most 2 mm."""
+    unit, places = prototype.design.unit_mm, prototype.chains.places_at(position, rotation)
+    kinds = ("cross", "carriage", "cylinder", "rod")
+    moving = [part for part in prototype.parts if part.kind in kinds]
+    solids, boxes = placed(moving, places)
+    gap = 2.0 / unit
+    for i, j in itertools.combinations(range(len(moving)), 2):
+        low, high = boxes[i]
+        if moving[i].name[-1] != moving[j].name[-1] and touching((low - gap, high + gap), boxes[j]):
+            gap = min(gap, float(solids[i].min_gap(solids[j], gap)))
+    return gap * unit
+
+
+def test_legs_whose_parts_meet_are_named_though_their_capsules_are_clear() -> None:
+    design, position, rotation = close_legs()
+    prototype = make_prototype(design)
+    assert leg_gap(prototype, position, rotation) == 0.0
+    assert (leg_clearances(prototype.design, position, rotation).clearance > 0.0).all()
+    (problem,) = prototype.broken_joint_limits(position, rotation)
+    assert "the axes of legs 3 and 4 are 8.817 mm apart and need" in problem
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_legs_keep_the_clearance_of_parts_up_to_the_first_broken_limit(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    design, position, rotation = close_legs()
+    radii = np.array(design.limits.leg_radii) * rng.uniform(0.7, 1.1, 4)
+    prototype = make_prototype(limited(design, leg_radii=tuple(radii.tolist())))
+
+    def pose(away: FloatArray) -> tuple[FloatArray, FloatArray]:
+        turn = Rotation.from_rotvec(0.15 * away[3:]).as_matrix()
+        return position + 0.06 * design.reach * away[:3], rotation @ turn
+
+    def broken(away: FloatArray) -> tuple[str, ...]:
+        return prototype.broken_joint_limits(*pose(away))
+
+    found = rng.normal(size=(60, 6))
+    kept = [away for away in found if not broken(away)]
+    close = [away for away in found if "the axes of legs" in "".join(broken(away))]
+    assert min(len(kept), len(close)) > 2
+    gaps: list[float] = []
+    for inner, outer in zip(kept[:6], itertools.cycle(close)):
+        # The last pose on the way from one to the other that breaks no limit.
+        good, bad = inner, outer
+        for _ in range(40):
+            middle = 0.5 * (good + bad)
+            good, bad = (good, middle) if broken(middle) else (middle, bad)
+        gaps.append(leg_gap(prototype, *pose(good)))
+    assert min(gaps) >= CLEARANCE * (1.0 - 1e-6)
+    assert min(gaps) < 2.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_parts_of_legs_lie_within_their_capsules(name: str) -> None:
+    """Each vertex is near the axis of its leg, as the distances of legs take it."""
+    prototype = PROTOTYPES[name]
+    unit = prototype.design.unit_mm
+    for part in prototype.parts:
+        if part.kind not in ("cross", "carriage", "cylinder", "rod"):
+            continue
+        leg = int(part.name[-1])
+        own, points = prototype.sizes.legs[leg - 1], part.vertices * unit
+        joint = np.hypot(prototype.sizes.guide.eye, own.radius) if leg in ON_GUIDE else own.swing
+        top = 0.0 if leg in ON_GUIDE else own.floor
+        # A rod's origin is its ball, from which it extends down; others' is the base joint.
+        spans = (
+            [(-own.end, -own.rim, own.cup), (-math.inf, 0.0, own.radius)]
+            if part.kind == "rod"
+            else [(0.0, top, joint), (0.0, math.inf, own.radius)]
+        )
+        excess = [
+            np.hypot(np.hypot(*points.T[:2]), points[:, 2] - np.clip(points[:, 2], low, high))
+            - radius
+            for low, high, radius in spans
+        ]
+        assert np.min(excess, axis=0).max() <= 1e-9 * unit, part.name
 
 
 @pytest.mark.parametrize("name", [OPTIMAL.name, BELOW.name, LARGE.name])
