@@ -288,6 +288,17 @@ LIGHT = msgspec.structs.replace(
 HEAVY = msgspec.structs.replace(LIGHT, name="heavy", payload=Payload(2.0, force_n=10.0))
 
 
+def test_the_table_tells_infinite_loads_and_errors_of_a_singular_home() -> None:
+    home = Pose((10.0, 5.0, 0.0), home_pose(OPTIMAL).quaternion)
+    found = columns(compared(msgspec.structs.replace(HEAVY, home=home), live=LIGHT))
+    rows = cells(table(found, millimetres=True))
+    for name in ("load share at home %", "worst error at home mm", "worst turn at home °"):
+        assert number(rows[name][0]) > 0.0
+        assert rows[name][1] == "infinite"
+    assert rows["worst actuator at home"][1] == "–"
+    assert number(rows["largest payload at home kg"][1]) == 0.0
+
+
 def test_the_table_compares_loads_of_the_designs_that_have_them() -> None:
     found = columns(compared(HEAVY, INITIAL, live=LIGHT))
     html = table(found, millimetres=True)

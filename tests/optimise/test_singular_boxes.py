@@ -7,6 +7,7 @@ import math
 import warnings
 from collections.abc import Iterator
 from typing import Any
+from xml.etree.ElementTree import tostring
 
 import msgspec
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from explorer import Actuators, Design, Payload, Struts
+from explorer.export.report.drawings.history import charts
 from explorer.measures.case import Case
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Triple
@@ -184,7 +186,7 @@ def test_refutation_of_a_box_on_the_base_tells_what_fails_where() -> None:
 def test_refutations_of_boxes_that_may_move_are_never_contradicted() -> None:
     rng = np.random.default_rng(3)
     refuted = allowed = 0
-    for _ in range(120):
+    for _ in range(60):
         design = machine(TURNS[int(rng.integers(3))])
         box = boxes_at(design, int(rng.integers(3)), float(rng.choice([*BESIDE, -1.2])))
         names = [name for name in (*SHIFTS, "yaw") if rng.random() < 0.4]
@@ -202,7 +204,7 @@ def test_refutations_of_boxes_that_may_move_are_never_contradicted() -> None:
             bounds=[Variable(name, *pair) for name, pair in bounds.items()],
         )
         is_refuted = bool(refutations(problem))
-        shares = rng.random((100, len(names)))
+        shares = rng.random((40, len(names)))
         shares[::2] = np.round(shares[::2])
         values = dict(zip(problem.names, problem.start_values, strict=True))
         is_regular = False
@@ -215,8 +217,8 @@ def test_refutations_of_boxes_that_may_move_are_never_contradicted() -> None:
             is_regular |= bool((least_over(problem.required_box_at(at), rotation) > 1e-9).all())
         assert not (is_refuted and is_regular), problem
         refuted, allowed = refuted + is_refuted, allowed + is_regular
-    assert refuted > 20
-    assert allowed > 20
+    assert refuted > 10
+    assert allowed > 10
 
 
 def home_yaw(design: Design) -> float:
@@ -231,7 +233,8 @@ def test_search_over_a_singular_box_never_converges_where_forces_or_errors_count
     index: int, objective: ObjectiveName
 ) -> None:
     rng = np.random.default_rng(index)
-    for place, demand in zip((-0.5, -1e-9, 0.0), rng.permutation(DEMANDS), strict=True):
+    for place in (-0.5, -1e-9, 0.0):
+        demand = DEMANDS[int(rng.integers(len(DEMANDS)))]
         own = np.array(OPTIMAL.variables) * rng.uniform(0.8, 1.25, 6)
         design = machine(
             TURNS[int(rng.integers(3))],
@@ -300,12 +303,12 @@ def test_largest_margin_is_that_of_the_table(turn: Triple) -> None:
         assert (outcome.best.objective or 0.0) >= start - 1e-9
 
 
-class Undefined:
-    """A demand without a value, as of numbers that overflow."""
+class NotFinite:
+    """A demand without a finite value, as of numbers that overflow."""
 
     is_equality = False
     is_limit = False
-    names = ("undefined",)
+    names = ("not finite",)
 
     def __init__(self, value: float) -> None:
         self.value = value
@@ -319,11 +322,11 @@ class Undefined:
 def test_demand_that_is_not_finite_is_missed(value: float) -> None:
     problem = make_problem(OPTIMAL, "smallest-reach", volume=5000.0)
     model = Model(problem, problem.start_values)
-    model.demands.append(Undefined(value))
+    model.demands.append(NotFinite(value))
     at = model.at(model.start)
     spare, name = model.worst(at)
     assert spare < 0.0
-    assert name == "undefined"
+    assert name == "not finite"
     assert np.isfinite(at.values).all()
     assert np.isfinite(at.gradients).all()
 
@@ -353,3 +356,6 @@ def test_record_of_infinite_objectives_is_read_back() -> None:
     assert decode_record(encode_record(record), "the record") == record
     assert {step.objective for step in record.history} == {None}
     assert np.isnan(curves_of(problem, record.history)[0].values).all()
+    drawn = charts(record)
+    assert drawn is not None
+    assert b"nan" not in tostring(drawn)

@@ -37,7 +37,7 @@ PLANES = {
     0: "where a1 lies on the platform plane",
     1: "where the lines a1a2 and b2b3 meet or are parallel",
 }
-"""Where each margin vanishes, by its index; where the platform is level, the first two agree."""
+"""Where each margin vanishes, by its index; the first two are the same for a level platform."""
 
 PAPER_BOX = PRESETS["paper-optimal"].limits.box
 """Box of the paper's optimum."""

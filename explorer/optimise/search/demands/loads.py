@@ -101,7 +101,7 @@ class LoadDemand:
     is_limit = False
 
     def __init__(self, start: State) -> None:
-        self.margins = MarginDemand(start, is_open=True)
+        self.side = MarginDemand(start, is_open=True)
         self.limits = part_limits(start.design)
         self.counts: BoolArray = np.asarray(np.isfinite(self.limits).any(axis=0))
         self.names = tuple(
@@ -113,9 +113,9 @@ class LoadDemand:
 
     def measure(self, state: State) -> Measured:
         """Return what the largest shares of each part leave, see `spare_of`."""
-        box, counts = state.statics, self.margins.keeps(state, state.statics.positions)
+        box, counts = state.statics, self.side.keeps(state, state.statics.positions)
         if not counts.any():
-            return _beyond(state, self.margins, len(self.names))
+            return _beyond(state, self.side, len(self.names))
         twists = np.where(counts[:, None, None], _twists(box), 0.0)
         shares = self._shares(state, twists, box)
         parts = np.flatnonzero(self.counts)
@@ -152,7 +152,7 @@ class DisplacementDemand:
     is_limit = False
 
     def __init__(self, start: State, cause: Cause, most: float | None = None) -> None:
-        self.margins = MarginDemand(start, is_open=True)
+        self.side = MarginDemand(start, is_open=True)
         self.cause: Cause = cause
         self.most = most or _size_of(start, cause)
         self.names = (f"{cause} over the required box",) * EIGHTHS
@@ -160,9 +160,9 @@ class DisplacementDemand:
     def measure(self, state: State) -> Measured:
         """Return what the largest displacements leave, see `spare_of`."""
         box, design = state.statics, state.design
-        counts = self.margins.keeps(state, box.positions)
+        counts = self.side.keeps(state, box.positions)
         if not counts.any():
-            return _beyond(state, self.margins, len(self.names))
+            return _beyond(state, self.side, len(self.names))
         worst = _worst_nodes(box, _displacements(box, self.cause)[:, None], counts)[:, 0]
         slopes = twist_slopes(design, box.positions[worst], state.rotation)
         if self.cause == "error":
@@ -174,9 +174,9 @@ class DisplacementDemand:
         return Measured(spare_of(share), _spare_slope(share)[:, None] * gradient)
 
 
-def _beyond(state: State, margins: MarginDemand, count: int) -> Measured:
+def _beyond(state: State, side: MarginDemand, count: int) -> Measured:
     """Return what each of some demands misses of a box without a node on its side of all planes."""
-    value, gradient = margins.measure(state)
+    value, gradient = side.measure(state)
     worst = int(value.argmin())
     slope = gradient[worst] / BEYOND
     return Measured(np.full(count, value[worst] / BEYOND - 1.0), np.tile(slope, (count, 1)))
