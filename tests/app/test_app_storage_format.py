@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
@@ -116,6 +117,19 @@ def test_session_after_any_actions_is_read_back_to_the_last_bit(actions: list[Sa
         # As text, in which no bit of a number and no sign of a zero is lost.
         assert repr(found.state) == repr(saved(step.state))
         assert found.state == saved(step.state)
+
+
+def test_iterates_with_infinite_loads_are_read_back() -> None:
+    run = RICH.optimisation.run
+    assert run is not None
+    infinite = tuple(replace(each, objective=None) for each in run.iterates)
+    run = replace(run, iterates=infinite)
+    state = replace(RICH, optimisation=replace(RICH.optimisation, run=run))
+    found = decode_session(encode_session(history_of([state]), 1), "file").step.state
+    assert found == saved(state)
+    read = found.optimisation.run
+    assert read is not None
+    assert {each.value for each in read.iterates} == {math.inf}
 
 
 def test_run_under_way_is_saved_as_the_state_before_it() -> None:
