@@ -25,7 +25,13 @@ from explorer.numerics.arrays import FloatArray, finite_array
 from explorer.prototype.chains import ACTUATED, Chains, Places
 from explorer.statics.accuracy import A1_COLUMN, A3_COLUMN, B_COLUMN, GUIDE_COLUMN, TILT_COLUMN
 from explorer.statics.compliance import is_elastic
-from explorer.statics.error_sources import SOURCES, pose_error_by_source, source_errors
+from explorer.statics.error_sources import (
+    SOURCES,
+    UNITS,
+    drawing_values,
+    pose_error_by_source,
+    source_errors,
+)
 
 # Largest error of the joints of a solved pose, as a share of the reach.
 CLOSED = 1e-12
@@ -190,6 +196,18 @@ class ImperfectMachine:
         if not self.deviations.any():
             return home
         return self.pose(inverse(self.design, home.position, home.rotation), home)
+
+    def remarks(self) -> list[str]:
+        """Return what differs from the perfect machine, as lines of text."""
+        seed = "" if self.seed is None else f", drawn with seed {self.seed}"
+        values = drawing_values(self.design, self.deviations)
+        rows = zip(SOURCES, values.tolist(), UNITS, strict=True)
+        return [
+            f"An imperfect machine{seed}.",
+            "Values of the six actuated joints are what their encoders read: the true ones less",
+            "the deviation of the zero. The keyframe commands the joints of the perfect machine.",
+            *(f"{name}: {value:+.6g} {unit}" for name, value, unit in rows if value),
+        ]
 
     def tool_error(self) -> FloatArray:
         """Return displacement and turn of the tool from its place at home, shape (6,).

@@ -1,12 +1,13 @@
-"""Servos of the simulation that give way as actuators and struts do: stiffness, damping, step.
+"""Servos of the simulation: stiffness, damping, rotors, strokes, and forces that hold the weights.
 
-The inertia that the servos feel is that of all bodies in the home pose, per joint rate. The fastest
-motion is the largest eigenvalue of stiffness over inertia.
+Every servo is a spring with critical damping on a rotor, whose frequency stays at or below
+`FREQUENCY` whatever the pose, so that time steps of up to 4 ms are stable with every integrator of
+MuJoCo. The rotor has at least the inertia that its joint moves at home, and is the heavier, the
+stiffer the servo. That has no effect at rest; in a motion, the servo accelerates its rotor too.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -14,35 +15,88 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import NoAnswerError
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import inverse
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES, Chains
-from explorer.prototype.mass import Mass
+from explorer.prototype.mass import Mass, total_mass
+from explorer.prototype.weights import machine_weights
 from explorer.statics.compliance import stiffness_of
 from explorer.statics.equilibrium import twists_of_actuators
+from explorer.statics.forces import actuator_forces
+from explorer.statics.weights import carry
+
+FREQUENCY = 200.0
+"""Largest natural frequency of a servo and its rotor, in rad/s."""
 
 # Stiffness of what a design leaves rigid, over that of its stiffest spring.
 RIGID = 10.0
-# Angle of the fastest motion in a time step, in radians; models oscillate from about 0.6.
-FASTEST = 0.2
 # Share of the reach that the platform moves by for its velocities.
 STEP = 1e-5
 
 
 class Servos(NamedTuple):
-    """The six servos, in the order of `JOINTS`.
+    """The six servos, each an array of shape (6,) in the order of `JOINTS`.
 
     Attributes:
-        stiffness: Stiffness, shape (6,), in N/m.
-        damping: Damping, shape (6,), in N s/m, critical for each servo alone.
-        timestep: Largest time step of the simulation, in seconds.
+        stiffness: Stiffness, in N/m.
+        damping: Damping, in N s/m.
+        rotors: Inertia of the rotors, as masses that move with the joints, in kg.
+        weights: Forces that hold the weights of all bodies at home, in N.
+        forces: Forces at the commanded joint values, in N: the same, or zeros for servos that give
+            way as the design does.
     """
 
     stiffness: FloatArray
     damping: FloatArray
-    timestep: float
+    rotors: FloatArray
+    weights: FloatArray
+    forces: FloatArray
+
+    def droop(self, design: Design, forces: FloatArray) -> FloatArray:
+        """Return displacement and turn of the tool at home by the weights, shape (6,).
+
+        Args:
+            design: The manipulator.
+            forces: Forces at the commanded joint values, shape (6,), in N.
+        """
+        home = home_pose(design)
+        given = (self.weights - forces) / (1e-3 * design.unit_mm * self.stiffness)
+        twists = twists_of_actuators(design, home.position, home.rotation, design.tool.position)
+        return twists @ -given
+
+
+class Strokes(NamedTuple):
+    """The ranges of the actuated joints; what the home pose exceeds ends there.
+
+    Attributes:
+        ranges: Ranges of those joints that have one, in metres, by their names.
+        gap: Least distance of the carriages, in metres.
+        exceeded: Whether the home pose exceeds one of the limits.
+    """
+
+    ranges: Mapping[str, tuple[float, float]]
+    gap: float
+    exceeded: bool
+
+
+def strokes_of(design: Design, joints: FloatArray) -> Strokes:
+    """Return the ranges of the actuated joints of a design, given their values at home (6,)."""
+    metres, limits = 1e-3 * design.unit_mm, design.limits
+    at_home = dict(zip(JOINTS, joints.tolist(), strict=True))
+    gap = min(limits.gap, abs(at_home["d1"] - at_home["d3"]))
+    exceeded = gap < limits.gap
+    ranges: dict[str, tuple[float, float]] = {}
+    for name, value in at_home.items():
+        stated = limits.guide if name in ("d1", "d3") else design.length_range(name)
+        if stated is not None:
+            low, high = min(stated[0], value), max(stated[1], value)
+            exceeded |= (low, high) != stated
+            # MuJoCo refuses a range of zero width.
+            if high > low:
+                ranges[name] = low * metres, high * metres
+    return Strokes(ranges, gap * metres, exceeded)
 
 
 def servo_stiffness(design: Design) -> FloatArray | None:
@@ -64,23 +118,36 @@ def servo_stiffness(design: Design) -> FloatArray | None:
     return 1e3 / (softness * design.unit_mm)
 
 
-def spring_servos(design: Design, masses: Mapping[str, Mass]) -> Servos | None:
-    """Return the servos of a design with its stiffness; None if all of it is rigid.
+def servos_of(design: Design, masses: Mapping[str, Mass], *, elastic: bool) -> Servos:
+    """Return the servos of a design.
 
     Args:
         design: The manipulator.
-        masses: Masses of the bodies in their own frames, in metres and kilograms.
+        masses: Masses of the bodies without the payload, in their own frames, in metres and
+            kilograms.
+        elastic: Whether they have the stiffness that the design states. Others, and those of a
+            design that states none, are stiff for what they move, and hold the weights at home.
 
     Raises:
         NoAnswerError: The home pose is singular.
     """
-    stiffness = servo_stiffness(design)
+    moved = np.diag(joint_inertia(design, with_payload(design, masses)))
+    home = home_pose(design)
+    wrench = carry(design, home.position, home.rotation, machine_weights(design, masses)).wrench
+    weights = actuator_forces(design, home.position, home.rotation, wrench)
+    stiffness = servo_stiffness(design) if elastic else None
+    forces = weights if stiffness is None else np.zeros(6)
     if stiffness is None:
-        return None
-    inertia = joint_inertia(design, masses)
-    scale = np.sqrt(stiffness)
-    fastest = 1.0 / math.sqrt(np.linalg.eigvalsh(inertia / np.outer(scale, scale))[0])
-    return Servos(stiffness, 2.0 * np.sqrt(stiffness * np.diag(inertia)), FASTEST / fastest)
+        stiffness = FREQUENCY**2 * moved
+    rotors = np.maximum(moved, stiffness / FREQUENCY**2)
+    return Servos(stiffness, 2.0 * np.sqrt(stiffness * rotors), rotors, weights, forces)
+
+
+def with_payload(design: Design, masses: Mapping[str, Mass]) -> Mapping[str, Mass]:
+    """Return the masses of the bodies, the design's payload being part of the platform."""
+    centre = 1e-3 * design.unit_mm * np.array(design.payload.centre)
+    payload = Mass(design.payload.mass_kg, centre, np.zeros((3, 3)))
+    return {**masses, "platform": total_mass([masses["platform"], payload])}
 
 
 def joint_inertia(design: Design, masses: Mapping[str, Mass]) -> FloatArray:

@@ -1,13 +1,17 @@
 """The mechanism for physics engines: an MJCF model, in metres, kilograms and radians.
 
-Every leg is a chain of three joints from the base; the platform is free, and each ball
-joint is a `connect` that closes a loop. The home pose is the reference configuration; joint
-values are those of `explorer.prototype.chains`, with lengths in metres. Position servos move
-the six actuators.
+Every leg is a chain of three joints from the body `base`; the platform, with the payload, hangs on
+a ball joint at the end of leg 4, and three `connect` close the other loops. The home pose is the
+reference configuration. Six position servos move the actuators, see `explorer.export.servos`.
 
-The swing limit of a universal joint is a cone; its two hinges have the box around it. Limits
-of the ball joints and of the pose (box, margins) have no counterpart in MJCF and are left out, as
-is the payload, whose weight would need servos of its own size.
+The model is made to be part of a scene. It states no option and no compiler setting, which would
+hold for the whole scene; angles are zero at home and limited by tendons, so that the scene may
+count them in degrees or radians. Its defaults are a class of its own. Gravity is that of the scene,
+downwards; a base that stands otherwise is turned by a frame around it.
+
+MuJoCo's loops give way: by a ten-thousandth of what the bodies at their ends would do apart from
+each other, each as far as its centre of mass moves. A `connect` ends at a socket on the rod, a body
+without mass whose centre is the base joint, so that light legs do not let a heavy platform droop.
 
 The model of an imperfect machine has its dimensions, and starts where its loops close. A joint has
 the value that its encoder reads, which is off by the zero of the encoder: commands, ranges and
@@ -17,52 +21,70 @@ the value that its encoder reads, which is off by the zero of the encoder: comma
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
+from typing import cast
 from xml.etree import ElementTree as ET
 
+import msgspec
 import numpy as np
 
 from explorer import __version__
 from explorer.errors import InputError
 from explorer.export.imperfect import ImperfectMachine
-from explorer.export.servos import Servos, spring_servos
+from explorer.export.servos import servos_of, strokes_of, with_payload
 from explorer.mechanism.design import DOWN, JOINTS, Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import platform_points
-from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.mechanism.machine import Guide
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import (
-    ACTUATED,
-    BODIES,
-    CHAIN_JOINTS,
-    LEGS,
-    ON_GUIDE,
-    Chains,
-    Places,
-)
+from explorer.prototype.chains import ACTUATED, BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Chains
 from explorer.prototype.mass import Mass
-from explorer.prototype.sketch import BALL, ROD, leg_radii, sketch_masses
-from explorer.statics.error_sources import SOURCES, UNITS, drawing_values
+from explorer.prototype.sketch import BALL, ROD, leg_radii
+from explorer.prototype.weights import bar_masses
+from explorer.statics.compliance import is_elastic
+from explorer.statics.error_sources import source_errors
 from explorer.workspace.limits.constraints import demanded_order
 
 DENSITY = 1240.0
 """The default density of the bodies, in kg/m³: that of printed PLA."""
 
-TIMESTEP = 5e-4
-# The natural frequency of the servos, in rad/s; their own weight deflects them by g/ω².
-SERVO = 300.0
+SIMULATION_BODIES = tuple(name.replace(" ", "_") for name in BODIES)
+"""The bodies with mass, and the base."""
+
+SIMULATION_JOINTS = (*(name.replace(" ", "_") for name in CHAIN_JOINTS), "ball_4")
+"""The joints of the model, in the order of `qpos`."""
+
+CLASS = "flagged"
+# Settings of the class. A scene may have defaults of its own, which hold where nothing is stated.
+# Bodies overlap in their joints, so contacts are off. MuJoCo limits the impedance to 0.9999, and
+# the time constant of the loops to two time steps or more.
+DEFAULTS: Mapping[str, Mapping[str, str]] = {
+    "geom": {"contype": "0", "conaffinity": "0", "mass": "0"},
+    "joint": {
+        **dict.fromkeys(("armature", "damping", "frictionloss", "stiffness", "ref", "margin"), "0"),
+        **dict.fromkeys(("limited", "actuatorfrclimited", "actuatorgravcomp"), "false"),
+        "pos": "0 0 0",
+    },
+    "equality": {"solref": "1e-5 1", "solimp": "0.9999 0.9999 1e-5"},
+    "tendon": {"limited": "true", "damping": "0", "frictionloss": "0", "stiffness": "0"},
+    "general": {"dyntype": "none", "gaintype": "fixed", "biastype": "affine", "gear": "1"},
+}
 # MuJoCo treats lighter moving bodies as massless, in kg and kg m².
 LEAST_MASS = LEAST_INERTIA = 1e-14
+# A force that no servo has, in N; MuJoCo takes no infinite limits.
+NO_LIMIT = 1e10
 
-X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+# Index of the rod on which the platform hangs.
+HOLDER = BODIES.index("rod 4")
 
 
 def simulation_joints(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Return the joint values of the model in a pose (MuJoCo's `qpos`), shape (..., 19).
+    """Return the joint values of the model in a pose (MuJoCo's `qpos`), shape (..., 16).
 
-    The values are the joints of the four chains, with lengths in metres, then the position of
-    the platform and its quaternion (w, x, y, z).
+    The values are the joints of the four chains, in the order of `SIMULATION_JOINTS`: actuated
+    ones are lengths in metres, the others angles from home. Then comes the quaternion (w, x, y, z)
+    of the platform's ball joint, its rotation from home.
 
     Args:
         design: The manipulator.
@@ -72,18 +94,15 @@ def simulation_joints(design: Design, position: FloatArray, rotation: FloatArray
     Raises:
         InputError: The position is not finite, or the rotation is not one.
     """
-    return _qpos(design, Chains.of(design).joints(position, rotation), position, rotation)
-
-
-def _qpos(
-    design: Design, joints: FloatArray, position: FloatArray, rotation: FloatArray
-) -> FloatArray:
-    """Return `qpos`, shape (..., 19), of chain joints (..., 12) in design units."""
-    metres, values = 1e-3 * design.unit_mm, joints
-    values = np.where(np.isin(CHAIN_JOINTS, JOINTS), values * metres, values)
-    platform_position = np.broadcast_to(position * metres, (*values.shape[:-1], 3))
-    quaternion = np.broadcast_to(quaternion_from_rotation(rotation), (*values.shape[:-1], 4))
-    return np.concatenate([values, platform_position, quaternion], axis=-1)
+    chains, home = Chains.of(design), home_pose(design)
+    at_home = chains.joints(home.position, home.rotation)
+    joints = chains.joints(position, rotation)
+    is_actuated = np.isin(CHAIN_JOINTS, JOINTS)
+    values = np.where(is_actuated, 1e-3 * design.unit_mm * joints, joints - at_home)
+    start = chains.places(at_home, home.position, home.rotation).rotation[HOLDER]
+    rod = chains.places(joints, position, rotation).rotation[..., HOLDER, :, :]
+    ball = home.rotation.T @ start @ np.swapaxes(rod, -1, -2) @ rotation
+    return np.concatenate([values, quaternion_from_rotation(ball)], axis=-1)
 
 
 def simulation_mjcf(
@@ -91,15 +110,24 @@ def simulation_mjcf(
     density: float = DENSITY,
     masses: Mapping[str, Mass] | None = None,
 ) -> str:
-    """Return the model as XML.
+    """Return the model as XML; arguments and errors are those of `SimulationModel`."""
+    return SimulationModel(design, density, masses).text()
+
+
+class SimulationModel:
+    """The model of a design in its home pose, or of an imperfect machine of it.
+
+    Attributes:
+        servos: The six servos.
+        strokes: The ranges of the actuated joints.
 
     Args:
-        design: The manipulator, or an imperfect machine of it, such as
+        given: The manipulator, or an imperfect machine of it, such as
             `explorer.ImperfectMachine.draw(design, seed)`.
         density: Density of the bodies, in kg/m³.
         masses: Masses of the bodies in their own frames, in metres and kilograms, such as
             `explorer.prototype.assembly.Prototype.masses`; those of bars with the legs' radii
-            if None.
+            if None. The design's payload comes in addition.
 
     Raises:
         InputError: The density is not positive, a leg has zero length in the home pose, or bodies
@@ -107,58 +135,63 @@ def simulation_mjcf(
         NoAnswerError: The legs of the imperfect machine do not close near home, or its home is
             singular.
     """
-    if not (math.isfinite(density) and density > 0.0):
-        raise InputError(f"the density must be positive; got {density:g}")
-    return _Model(design, density, masses).text()
-
-
-class _Model:
-    """The elements of the model, from a design in its home pose."""
 
     def __init__(
         self,
         given: Design | ImperfectMachine,
-        density: float,
-        masses: Mapping[str, Mass] | None,
+        density: float = DENSITY,
+        masses: Mapping[str, Mass] | None = None,
     ) -> None:
+        if not (math.isfinite(density) and density > 0.0):
+            raise InputError(f"the density must be positive; got {density:g}")
         self.machine = given if isinstance(given, ImperfectMachine) else None
         self.design = design = given.design if isinstance(given, ImperfectMachine) else given
         self.metres = 1e-3 * design.unit_mm
-        self.home = home_pose(design)
-        self.chains = Chains.of(design)
-        position, rotation = np.array(self.home.position), self.home.rotation
-        joints = self.chains.joints(position, rotation)
+        home, chains = home_pose(design), Chains.of(design)
+        joints = chains.joints(home.position, home.rotation)
         for leg in LEGS:
             if not joints[3 * leg - 1] > 0.0:
                 raise InputError(
                     f"leg {leg} has no length in the home pose, so that a model that starts "
                     "there has no direction for it; choose another home"
                 )
-        self.places: Places = self.chains.places(joints, position, rotation)
-        self.nominal = self.values = simulation_joints(design, position, rotation).tolist()
-        self.masses = masses or {
-            name: mass.scaled(self.metres, density * self.metres**3)
-            for name, mass in sketch_masses(self.chains, joints, 1.0).items()
-        }
+        self.masses = masses or bar_masses(design, density)
         self._check_masses()
         self.radii = [radius * self.metres for radius in leg_radii(design)]
+        self.places = chains.places(joints, home.position, home.rotation)
+        # Joint values at home: those of the design, and those of the machine that has them.
+        self.nominal = self.joints = self.readings = joints
         self.points = platform_points(design)
-        self.servos: Servos | None = None
-        self.timestep = TIMESTEP
         if self.machine is not None:
-            self._deviate(self.machine)
+            true = self.machine.home
+            self.points = self.machine.points
+            self.joints = self.machine.chain_joints(true.position, true.rotation)
+            self.places = self.machine.places(self.joints, true.position, true.rotation)
+            self.readings = self.joints.copy()
+            self.readings[list(ACTUATED)] -= self.machine.encoder_offsets
+        self.servos = servos_of(design, self.masses, elastic=self.machine is not None)
+        self.masses = with_payload(design, self.masses)
+        self.strokes = strokes_of(design, joints[list(ACTUATED)])
 
-    def _deviate(self, machine: ImperfectMachine) -> None:
-        """Replace what differs in an imperfect machine."""
-        position, rotation = np.array(machine.home.position), machine.home.rotation
-        joints = machine.chain_joints(position, rotation)
-        self.places = machine.places(joints, position, rotation)
-        joints[list(ACTUATED)] -= machine.encoder_offsets
-        self.values = _qpos(self.design, joints, position, rotation).tolist()
-        self.points = machine.points
-        self.servos = spring_servos(self.design, self.masses)
-        if self.servos is not None:
-            self.timestep = min(TIMESTEP, float(f"{self.servos.timestep:.2g}"))
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What the design has that the model has not, in words."""
+        limits, design = self.design.limits, self.design
+        is_imprecise = bool(source_errors(design).any()) or is_elastic(design)
+        words = {
+            **dict.fromkeys(("friction", "contacts", "the mass of the base"), True),
+            f"the force of the payload, {design.payload.force_n:g} N": design.payload.force_n > 0.0,
+            "limits of struts": math.isfinite(design.struts.largest_moment),
+            "limits of the guide": design.guide != Guide(),
+            "swing limits of the ball joints": any(
+                angle is not None for angle in msgspec.structs.astuple(limits.swing)[2:]
+            ),
+            "the box of positions": limits.box is not None,
+            "the least margins": bool(limits.margin),
+            "limits that the home pose exceeds": self.strokes.exceeded,
+            "errors and stiffness": is_imprecise and self.machine is None,
+        }
+        return tuple(each for each, is_left_out in words.items() if is_left_out)
 
     def _check_masses(self) -> None:
         def inertia(mass: Mass) -> float:
@@ -179,73 +212,77 @@ class _Model:
         """Return the model as XML."""
         root = ET.Element("mujoco", model=self.design.name)
         root.append(
-            ET.Comment(
-                f" flagged-explorer {__version__}; metres, kilograms, radians; "
-                f"one design unit is {self.design.unit_mm:g} mm "
+            _comment(
+                f"flagged-explorer {__version__}; metres, kilograms, radians",
+                f"one design unit is {self.design.unit_mm:g} mm",
+                f"left out: {'; '.join(self.left_out)}",
             )
         )
         if self.machine is not None:
-            root.append(ET.Comment(self._remarks(self.machine)))
-        ET.SubElement(root, "compiler", angle="radian", autolimits="true")
-        option = ET.SubElement(
-            root,
-            "option",
-            timestep=repr(self.timestep),
-            integrator="implicitfast",
-            solver="Newton",
-            iterations="100",
-            tolerance="1e-12",
-        )
-        if self.design.gravity != DOWN:
-            option.set("gravity", _row([STANDARD_GRAVITY * part for part in self.design.gravity]))
-        default = ET.SubElement(root, "default")
-        # Bodies overlap in their joints, so contacts are off; the explorer checks collisions.
-        ET.SubElement(default, "geom", contype="0", conaffinity="0")
-        stiff = {"solref": f"{2 * self.timestep!r} 1", "solimp": "0.9999 0.99999 1e-5"}
-        ET.SubElement(default, "equality", stiff)
+            root.append(_comment(*self.machine.remarks()))
+        default = ET.SubElement(ET.SubElement(root, "default"), "default", {"class": CLASS})
+        for element, settings in DEFAULTS.items():
+            ET.SubElement(default, element, dict(settings))
         self._bodies(ET.SubElement(root, "worldbody"))
         equality = ET.SubElement(root, "equality")
-        for leg in LEGS:
-            ends = {"site1": f"rod {leg} b{leg}", "site2": f"platform b{leg}"}
-            ET.SubElement(equality, "connect", {"name": f"ball {leg}", **ends})
-        self._gap(root)
-        self._actuators(ET.SubElement(root, "actuator"))
+        for leg, point in zip(LEGS[:3], self.points * self.metres, strict=False):
+            ends = {"body1": "platform", "body2": f"socket_{leg}"}
+            _named(equality, "connect", f"ball_{leg}", **ends, anchor=_row(point))
+        self._limits(root)
+        self._servos(ET.SubElement(root, "actuator"))
         key = ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="home")
-        key.set("qpos", _row(self.values))
-        key.set("ctrl", _row(self.nominal[index] for index in ACTUATED))
+        values = np.where(np.isin(CHAIN_JOINTS, JOINTS), self.metres * self.readings, 0.0)
+        key.set("qpos", _row([*values, 1.0, 0.0, 0.0, 0.0]))
+        key.set("ctrl", _row(self.metres * self.nominal[list(ACTUATED)]))
         ET.indent(root)
         return ET.tostring(root, encoding="unicode") + "\n"
 
     def _bodies(self, world: ET.Element) -> None:
         design, metres = self.design, self.metres
+        if design.gravity != DOWN:
+            # The rotation that turns the direction of gravity downwards.
+            x, y, z = design.gravity
+            turn = [1.0 - z, -y, x, 0.0] if (x, y) != (0.0, 0.0) else [0.0, 1.0, 0.0, 0.0]
+            world = ET.SubElement(world, "frame", quat=_row(turn))
+        base = ET.SubElement(world, "body", name="base", childclass=CLASS)
         low, high = design.limits.guide or (0.0, design.a2x)
         thin = min(self.radii[1:3])
         if high > low:
             ends = [self._base_point(2, (x, 0.0)) for x in (low, high)]
-            _geom(world, "capsule", thin, "guide", fromto=_row(np.concatenate(ends)))
-        for name, leg, place in (("a1", 1, (0.0, 0.0)), ("a3", 4, design.a3)):
-            _geom(world, "sphere", thin, name, pos=_row(self._base_point(leg, place)))
+            _geom(base, "capsule", thin, fromto=_row([*ends[0], *ends[1]]))
+        for leg, place in ((1, (0.0, 0.0)), (4, design.a3)):
+            _geom(base, "sphere", thin, pos=_row(self._base_point(leg, place)))
+        rod = base
         for leg in LEGS:
             radius = self.radii[leg - 1]
             names = BODIES[3 * leg - 2 : 3 * leg + 1]
-            length = self.values[3 * leg - 1]
-            first = self._body(world, names[0], "base")
+            length = self.metres * self.joints[3 * leg - 1]
+            first = self._body(base, names[0], "base")
             _geom(first, "sphere", BALL * radius)
             cylinder = self._body(first, names[1], names[0])
             # Half of the leg at home, whatever the stroke, so that no gap shows.
             _geom(cylinder, "capsule", radius, fromto=_row([0, 0, 0, 0, 0, 0.5 * length]))
             rod = self._body(cylinder, names[2], names[1])
             _geom(rod, "capsule", ROD * radius, fromto=_row([0, 0, -length, 0, 0, 0]))
-            ET.SubElement(rod, "site", name=f"rod {leg} b{leg}", size=repr(radius))
-        platform = self._body(world, "platform", "base")
+            if leg < LEGS[-1]:
+                socket = ET.SubElement(rod, "body", name=f"socket_{leg}")
+                base_joint = _row([0, 0, -length])
+                ET.SubElement(socket, "inertial", pos=base_joint, mass="0", diaginertia="0 0 0")
+        platform = self._body(rod, "platform", "rod 4")
         points = self.points * metres
         hub = points.mean(axis=0)
-        for leg, radius, point in zip(LEGS, self.radii, points, strict=True):
-            size, where = repr(radius), _row(point)
-            ET.SubElement(platform, "site", name=f"platform b{leg}", size=size, pos=where)
-            _geom(platform, "sphere", BALL * radius, pos=where)
+        for radius, point in zip(self.radii, points, strict=True):
+            _geom(platform, "sphere", BALL * radius, pos=_row(point))
             if (point != hub).any():
                 _geom(platform, "capsule", radius, fromto=_row([*hub, *point]))
+        ET.SubElement(
+            platform,
+            "site",
+            name="tool",
+            size=repr(self.radii[3]),
+            pos=_row(metres * np.array(design.tool.position)),
+            quat=_row(design.tool.quaternion),
+        )
 
     def _base_point(self, leg: int, place: tuple[float, float]) -> FloatArray:
         """Return where a point (x, y) of the base at a leg lies, shape (3,), in metres."""
@@ -260,9 +297,13 @@ class _Model:
         origin, turn = self.places.origin, self.places.rotation
         offset = turn[outer].T @ (origin[index] - origin[outer]) * self.metres
         quaternion = quaternion_from_rotation(turn[outer].T @ turn[index])
-        body = ET.SubElement(parent, "body", name=name, pos=_row(offset), quat=_row(quaternion))
+        file_name = SIMULATION_BODIES[index]
+        body = ET.SubElement(
+            parent, "body", name=file_name, pos=_row(offset), quat=_row(quaternion)
+        )
         if name == "platform":
-            ET.SubElement(body, "freejoint", name="platform")
+            at_b4 = _row(self.points[3] * self.metres)
+            ET.SubElement(body, "joint", name=SIMULATION_JOINTS[-1], type="ball", pos=at_b4)
         else:
             self._joint(body, index - 1)
         mass = self.masses[name]
@@ -281,84 +322,72 @@ class _Model:
         leg, place = divmod(index, 3)
         on_guide = leg + 1 in ON_GUIDE
         slides = place == 2 or (place == 0 and on_guide)
-        axis = Z if place == 2 else Y if place == 1 and not on_guide else X
-        joint = ET.SubElement(
-            body,
-            "joint",
-            name=name,
-            type="slide" if slides else "hinge",
-            axis=_row(axis),
-            ref=repr(self.values[index]),
-        )
-        limits = self._range(name, self.nominal[index])
-        if limits is not None:
-            joint.set("range", _row(limits))
+        axis = "0 0 1" if place == 2 else "0 1 0" if place == 1 and not on_guide else "1 0 0"
+        kind = "slide" if slides else "hinge"
+        joint = ET.SubElement(body, "joint", name=SIMULATION_JOINTS[index], type=kind, axis=axis)
+        if name in JOINTS:
+            joint.set("ref", repr(float(self.metres * self.readings[index])))
+            joint.set("armature", repr(float(self.servos.rotors[JOINTS.index(name)])))
+            _limit(joint, "range", self.strokes.ranges.get(name))
 
-    def _range(self, name: str, at_home: float) -> tuple[float, float] | None:
-        limits = self.design.limits
-        if name in ("d1", "d3"):
-            low, high = limits.guide or (0.0, 0.0)
-        elif name in JOINTS:
-            low, high = self.design.length_range(name)
-        else:
-            degrees = {"a1": limits.swing.a1, "a3": limits.swing.a3}.get(name[:2])
+    def _limits(self, root: ET.Element) -> None:
+        """Limit the gap of the carriages, in the order that they have at home, and swings.
+
+        The swing limit of a universal joint is a cone; its two hinges have the box around it.
+        Ranges of hinges have the unit of the scene's angles, but those of tendons are in radians.
+        """
+        limits, tendon = self.design.limits, ET.Element("tendon")
+        if self.strokes.gap > 0.0 or demanded_order(self.design):
+            d1, d3 = (self.nominal[CHAIN_JOINTS.index(name)] for name in ("d1", "d3"))
+            order = 1 if d1 > d3 else -1
+            ends = _row([self.strokes.gap, 1e3 * self.design.reach * self.metres])
+            gap = _named(tendon, "fixed", "gap", range=ends)
+            for joint, sign in (("d1", order), ("d3", -order)):
+                ET.SubElement(gap, "joint", joint=joint, coef=str(sign))
+        for leg, degrees in ((1, limits.swing.a1), (4, limits.swing.a3)):
             # A cone of 90° or more does not limit the joint's first angle.
             if degrees is None or degrees >= 90.0:
-                return None
-            swing = math.radians(degrees)
-            return at_home - swing, at_home + swing
-        # MuJoCo refuses a range of zero width.
-        return (low * self.metres, high * self.metres) if high > low else None
+                continue
+            for index in (3 * leg - 3, 3 * leg - 2):
+                middle, half = (self.nominal - self.joints)[index], math.radians(degrees)
+                joint = SIMULATION_JOINTS[index]
+                swing = _named(tendon, "fixed", joint, range=_row([middle - half, middle + half]))
+                ET.SubElement(swing, "joint", joint=joint, coef="1")
+        if len(tendon):
+            root.append(tendon)
 
-    def _gap(self, root: ET.Element) -> None:
-        """Keep the carriages apart, in the order that they have at home."""
-        gap = self.design.limits.gap
-        if gap <= 0.0 and not demanded_order(self.design):
-            return
-        d1, d3 = (self.nominal[CHAIN_JOINTS.index(name)] for name in ("d1", "d3"))
-        order = 1 if d1 > d3 else -1
-        limits = _row([gap * self.metres, 1e3 * self.design.reach * self.metres])
-        tendon = ET.SubElement(ET.SubElement(root, "tendon"), "fixed", name="gap", range=limits)
-        for joint, sign in (("d1", order), ("d3", -order)):
-            ET.SubElement(tendon, "joint", joint=joint, coef=str(sign))
-
-    def _actuators(self, parent: ET.Element) -> None:
-        moving = sum(mass.mass for mass in self.masses.values())
+    def _servos(self, parent: ET.Element) -> None:
+        """Add the servos: forces k (ctrl − q) − c q̇ + f with the forces f that hold at home."""
+        push, pull = self.design.actuators.limits
+        forces = np.clip(np.stack([-pull, push], axis=1), -NO_LIMIT, NO_LIMIT)
         for index, name in enumerate(JOINTS):
-            limits = self._range(name, 0.0)
-            kp, kv = moving * SERVO**2, 2.0 * moving * SERVO
-            if self.servos is not None:
-                kp, kv = float(self.servos.stiffness[index]), float(self.servos.damping[index])
-            servo = ET.SubElement(
-                parent, "position", name=name, joint=name, kp=repr(kp), kv=repr(kv)
-            )
-            if limits is not None:
-                servo.set("ctrlrange", _row(limits))
-
-    def _remarks(self, machine: ImperfectMachine) -> str:
-        """Return what differs from the perfect machine, as lines of a comment."""
-        seed = "" if machine.seed is None else f", drawn with seed {machine.seed}"
-        lines = [
-            f"An imperfect machine{seed}.",
-            "Values of the six actuated joints are what their encoders read: the true ones less",
-            "the deviation of the zero. The keyframe commands the joints of the perfect machine.",
-        ]
-        values = drawing_values(machine.design, machine.deviations)
-        rows = zip(SOURCES, values.tolist(), UNITS, strict=True)
-        lines += [f"{name}: {value:+.6g} {unit}" for name, value, unit in rows if value]
-        if self.servos is not None:
-            lines += [
-                "The servos have the stiffness of the actuators; those of d1 and d3 are in series",
-                "with struts 2 and 3 of the lengths at home. What the design leaves rigid has a",
-                "servo ten times as stiff as the stiffest spring.",
-            ]
-        return "\n    ".join(["", *lines]) + "\n  "
+            stiffness, damping, _, _, force = (float(each[index]) for each in self.servos)
+            law = {"gainprm": repr(stiffness), "biasprm": _row([force, -stiffness, -damping])}
+            servo = _named(parent, "general", name, joint=name, **law)
+            _limit(servo, "ctrlrange", self.strokes.ranges.get(name))
+            limited = (np.abs(forces[index]) < NO_LIMIT).any()
+            _limit(servo, "forcerange", tuple(forces[index]) if limited else None)
 
 
-def _geom(parent: ET.Element, kind: str, radius: float, name: str = "", **where: str) -> None:
-    named = {"name": name} if name else {}
-    ET.SubElement(parent, "geom", {**named, "type": kind, "size": repr(radius), **where})
+def _comment(*lines: str) -> ET.Element:
+    return cast("ET.Element", ET.Comment("\n    ".join(["", *lines]) + "\n  "))
 
 
-def _row(values: Iterator[float] | FloatArray | list[float] | tuple[float, ...]) -> str:
+def _named(parent: ET.Element, element: str, name: str, **settings: str) -> ET.Element:
+    """Add an element outside the bodies, which takes no class from them."""
+    return ET.SubElement(parent, element, {"name": name, "class": CLASS, **settings})
+
+
+def _limit(element: ET.Element, name: str, ends: tuple[float, float] | None) -> None:
+    """Set a range or its absence, whatever the scene holds for limited."""
+    element.set(name.replace("range", "") + "limited", "false" if ends is None else "true")
+    if ends is not None:
+        element.set(name, _row(ends))
+
+
+def _geom(parent: ET.Element, kind: str, radius: float, **where: str) -> None:
+    ET.SubElement(parent, "geom", {"type": kind, "size": repr(float(radius)), **where})
+
+
+def _row(values: Iterable[float]) -> str:
     return " ".join(repr(float(value)) for value in values)

@@ -135,7 +135,7 @@ def test_export_missing_object_or_file_is_named(cli: CommandLine) -> None:
 
 
 def test_export_simulation_is_an_mjcf_model(cli: CommandLine, tmp_path: Path) -> None:
-    from explorer.export.simulation import simulation_mjcf
+    from explorer.export.simulation import SimulationModel, simulation_mjcf
     from explorer.prototype.assembly import make_prototype
 
     out = tmp_path / "model.xml"
@@ -143,8 +143,27 @@ def test_export_simulation_is_an_mjcf_model(cli: CommandLine, tmp_path: Path) ->
     assert (answer["file"], answer["format"]) == (str(out), "mjcf")
     assert (len(answer["bodies"]), len(answer["joints"])) == (13, 13)
     assert out.read_text(encoding="utf-8") == simulation_mjcf(OPTIMAL)
+    servos = SimulationModel(OPTIMAL).servos
+    assert answer["servo_stiffness_n_mm"] == pytest.approx((1e-3 * servos.stiffness).tolist())
+    assert answer["servo_forces_n"] == pytest.approx(servos.weights.tolist())
+    assert answer["servo_rotors_kg"] == pytest.approx(servos.rotors.tolist())
+    assert not any(answer["droop"]["displacement_mm"] + answer["droop"]["turn_degrees"])
+    assert answer["left_out"] == [
+        "friction",
+        "contacts",
+        "the mass of the base",
+        "the box of positions",
+    ]
     words = ["--format", "mjcf", "--density", "2700"]
-    assert cli.text("simulation", "--out", out, *words) == f"{out}\n"
+    path, head, *lines = cli.text("simulation", "--out", out, *words).splitlines()
+    assert path == str(out)
+    assert head.split("  ") == ["servo", "stiffness, N/mm", "force at home, N", " rotor, kg"]
+    assert [line.split()[0] for line in lines[:6]] == list(explorer.JOINTS)
+    bare = answer["droop_without_forces"]
+    moved, turned = (math.hypot(*bare[key]) for key in ("displacement_mm", "turn_degrees"))
+    words = "at home the weights move the tool by 0 mm and 0°; without the forces at home by"
+    assert lines[6] == f"{words} {moved:.3g} mm and {turned:.3g}°"
+    assert lines[7] == f"left out: {', '.join(answer['left_out'])}"
     assert out.read_text(encoding="utf-8") == simulation_mjcf(OPTIMAL, 2700.0)
     cli.text("simulation", "--out", out, "--masses", "parts")
     masses = make_prototype(OPTIMAL).masses(1240.0)
@@ -198,8 +217,12 @@ def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is
     assert lines[5].startswith("tool at home off by")
     size = math.hypot(*answer["tool_error"]["displacement_mm"])
     assert lines[6].split()[:2] == ["displacement", f"{size:.6g}"]
-    names = [line.split()[0] for line in lines[6:]]
+    names = [line.split()[0] for line in lines[6:10]]
     assert names == ["displacement", "displacement,", "turn", "turn,"]
+    assert answer["servo_forces_n"] == [0.0] * 6
+    moved = math.hypot(*answer["droop"]["displacement_mm"])
+    assert moved > 0.0
+    assert lines[-2].startswith(f"at home the weights move the tool by {moved:.3g} mm and ")
 
 
 def test_export_simulation_with_errors_assumes_typical_values_only_if_asked(
@@ -224,10 +247,8 @@ def test_export_simulation_of_springs_alone_says_that_nothing_deviates(
     springs = Actuators(stiffness_n_mm=STIFFNESSES)
     file.write_bytes(encode_design(msgspec.structs.replace(OPTIMAL, actuators=springs)))
     lines = cli.text("simulation", "--design", file, "--out", out, "--errors", 0).splitlines()
-    assert lines[1:] == [
-        "the design states neither errors nor tolerances: only its servos give way"
-    ]
-    assert 'kp="1000000.0"' in out.read_text(encoding="utf-8")
+    assert lines[1] == "the design states neither errors nor tolerances: only its servos give way"
+    assert 'gainprm="1000000.0"' in out.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

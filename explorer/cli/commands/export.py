@@ -31,9 +31,10 @@ class Export(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
     specification requires. The mechanism consists of its parts, assembled in the home pose; in
-    `stl-zip` a part is a file of its own. The simulation is an MJCF model in metres: every joint,
-    closed loops, six servos; with `--errors` the machine deviates from its design. The scene is one
-    HTML file for any browser, in the home pose unless a pose is given. With `--at tool` the
+    `stl-zip` a part is a file of its own. The simulation is an MJCF model in metres, to include in
+    a scene: every joint, closed loops, payload, tool, six servos within the limits of their forces;
+    with `--errors` the machine deviates from its design. The scene is one HTML file for any
+    browser, in the home pose unless a pose is given. With `--at tool` the
     workspace and the hull are those of the tool point, with `--load` those of the positions that
     hold the load.
     """
@@ -113,14 +114,14 @@ Facts = dict[str, Any]
 
 
 def _as_lines(facts: Facts) -> list[str]:
-    """Return remarks on the file: a mesh that is off, deviations, strokes below the limits."""
+    """Return remarks on the file: a mesh that is off, a model, strokes below the limits."""
     from explorer.cli.output import DISAGREES
 
     remarks: list[str] = []
-    if "deviations" in facts:
-        from explorer.cli.answers.imperfect import imperfect_lines
+    if "left_out" in facts:
+        from explorer.cli.answers.simulation import simulation_lines
 
-        remarks += imperfect_lines(facts)
+        remarks += simulation_lines(facts)
     if facts.get("agrees") is False:
         remarks.append(f"This differs from the workspace: {DISAGREES}.")
     return remarks + [
@@ -235,8 +236,7 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
 
 def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    from explorer.export.simulation import DENSITY, simulation_mjcf
-    from explorer.prototype.chains import BODIES, CHAIN_JOINTS
+    from explorer.export.simulation import DENSITY, SimulationModel
 
     command.refuse(
         *("tolerance", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion", "at", "load")
@@ -249,22 +249,20 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
         from explorer.prototype.assembly import make_prototype
 
         masses = make_prototype(design).masses(density)
-    facts: Facts = {
-        "format": "mjcf",
-        "bodies": BODIES[1:],
-        "joints": [*CHAIN_JOINTS, "platform"],
-    }
+    from explorer.cli.answers.simulation import imperfect_json, simulation_json
+
     if command.errors is None:
         if command.typical:
             raise InputError("--typical is for the errors of a machine: give --errors SEED")
-        return simulation_mjcf(design, density, masses).encode(), facts
-    from explorer.cli.answers.imperfect import imperfect_json
+        model = SimulationModel(design, density, masses)
+        return model.text().encode(), simulation_json(model)
     from explorer.export.imperfect import ImperfectMachine
 
     design, assumed = command.with_typical(design)
     machine = ImperfectMachine.draw(design, command.errors)
-    data = simulation_mjcf(machine, density, masses).encode()
-    return data, {**facts, "assumed": assumed, **imperfect_json(machine)}
+    model = SimulationModel(machine, density, masses)
+    facts = {**simulation_json(model), "assumed": assumed, **imperfect_json(machine)}
+    return model.text().encode(), facts
 
 
 def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:

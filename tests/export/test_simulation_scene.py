@@ -1,0 +1,443 @@
+"""The simulation model as a part of scenes, and its servos at rest, judged by MuJoCo."""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import msgspec
+import mujoco  # pyright: ignore[reportMissingTypeStubs]
+import numpy as np
+import pytest
+from limited_designs import limited
+from machines import FULL, OPTIMAL, PRESS
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+from statics_cases import random_poses
+
+from explorer import (
+    JOINTS,
+    PRESETS,
+    Actuators,
+    Design,
+    ImperfectMachine,
+    NoAnswerError,
+    Payload,
+    Pose,
+    Tool,
+    actuator_forces,
+    home_pose,
+    tool_position,
+)
+from explorer.export.simulation import (
+    DENSITY,
+    SimulationModel,
+    simulation_joints,
+    simulation_mjcf,
+)
+from explorer.mechanism.design import DOWN, LENGTHS, Swing
+from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.mechanism.typical import typical_machine
+from explorer.numerics.arrays import FloatArray
+from explorer.prototype.assembly import make_prototype
+from explorer.prototype.chains import ACTUATED
+from explorer.prototype.weights import bar_masses, machine_weights
+from explorer.statics.error_sources import SOURCES
+from explorer.statics.weights import carry
+
+engine: Any = mujoco
+UNLIMITED = msgspec.structs.replace(
+    PRESS, actuators=Actuators(), tool=Tool((1, 0, 2), (1, 1, 0, 1))
+)
+FILE = "machine.xml"
+# Scenes of bodies that touch, with options, units of angles and defaults of their own.
+OPTIONS = '<option timestep="0.003" integrator="implicit" gravity="0.5 0 -3" iterations="7"/>'
+THINGS = """
+<worldbody>
+  <geom name="floor" type="plane" size="5 5 .1"/>
+  <body name="crate" pos="0.7 0.7 0.1"><freejoint/><geom name="crate" type="box" size=".1 .1 .1"/>
+    <body><joint name="lid" type="hinge" axis="1 0 0" range="-1 1" ref="0.1"
+      limited="true"/>
+      <geom type="box" size=".1 .1 .01" pos="0 0 .3"/></body></body>
+</worldbody>
+<actuator><motor name="lid" joint="lid"/></actuator>
+"""
+DEFAULTS = """
+<default>
+  <geom mass="3" contype="1" conaffinity="1" friction="2 .1 .1"/>
+  <joint damping="5" armature="1" frictionloss="2" stiffness="3" limited="true" range="-1 1"
+    pos="0.1 0 0" margin="0.01" actuatorfrclimited="true" actuatorfrcrange="-1 1"/>
+  <equality solref="0.05 1" solimp="0.5 0.6 0.01"/>
+  <tendon stiffness="9" damping="3" frictionloss="1" limited="false"/>
+  <general dyntype="filter" dynprm="0.2" ctrllimited="true" ctrlrange="-1 1" gear="7"
+    forcelimited="true" forcerange="-0.1 0.1" biastype="none"/>
+</default>
+"""
+HOSTS = [
+    ("", '<compiler angle="radian"/>' + OPTIONS),
+    ('<compiler angle="radian" autolimits="false"/>' + OPTIONS, ""),
+    (OPTIONS + '<compiler angle="degree"/>', ""),
+]
+
+
+def model_of(text: str, machine: str = "") -> Any:
+    return engine.MjModel.from_xml_string(text, {FILE: machine.encode()})
+
+
+def scene_of(ahead: str, behind: str, guest: str = f'<include file="{FILE}"/>') -> str:
+    return f"<mujoco>{ahead}{guest}{THINGS}{behind}</mujoco>"
+
+
+def at_home(model: Any, key: str = "home") -> Any:
+    data = engine.MjData(model)
+    engine.mj_resetDataKeyframe(model, data, model.key(key).id)
+    engine.mj_forward(model, data)
+    return data
+
+
+def openings(data: Any) -> FloatArray:
+    """Return the residuals (9,) of the loops, in metres."""
+    own = np.array(data.efc_type) == int(engine.mjtConstraint.mjCNSTR_EQUALITY)
+    assert own.sum() == 9
+    return np.array(data.efc_pos)[own]
+
+
+def rest(model: Any, data: Any, seconds: float = 1.5, still: float = 1e-4) -> None:
+    """Step a model until it is at rest."""
+    engine.mj_step(model, data, nstep=int(seconds / model.opt.timestep))
+    assert data.time > 0.9 * seconds
+    assert np.abs(data.qvel).max() < still
+
+
+def loaded(seed: int) -> Design:
+    """Return a random design, with a payload, a tool, a direction of gravity and a home."""
+    rng = np.random.default_rng(seed)
+    design = PRESETS["paper-optimal"]
+    design = design.with_variables([v * rng.uniform(0.8, 1.2) for v in design.variables])
+    ranges = dict.fromkeys(LENGTHS, (0.0, 4.0 * design.reach))
+    radii = tuple(rng.uniform(0.1, 0.6, 4))
+    limits = msgspec.structs.replace(design.limits, leg_radii=radii, **ranges)
+    positions, rotations = random_poses(design, 1, seed, margin=0.2)
+    return msgspec.structs.replace(
+        design,
+        limits=limits,
+        unit_mm=float(rng.choice([3.0, 10.0, 40.0])),
+        payload=Payload(rng.uniform(0.1, 5.0), tuple(rng.normal(size=3) * 2.0)),
+        tool=Tool(tuple(rng.normal(size=3)), tuple(rng.normal(size=4))),
+        gravity=tuple(rng.normal(size=3)) if seed % 2 else DOWN,
+        home=Pose.of(positions[0], rotations[0]),
+    )
+
+
+LOADED = [UNLIMITED, OPTIMAL, *map(loaded, range(10))]
+
+
+@pytest.mark.parametrize(("ahead", "behind"), HOSTS)
+def test_scene_with_the_model_keeps_its_options_contacts_and_units(ahead: str, behind: str) -> None:
+    alone = model_of(scene_of(ahead, behind, ""))
+    both = model_of(scene_of(ahead, behind), simulation_mjcf(PRESS))
+    for name in dir(alone.opt):
+        if not name.startswith("_"):
+            assert np.array_equal(getattr(alone.opt, name), getattr(both.opt, name)), name
+    for kind in ("geom", "joint", "body", "actuator"):
+        for index in range(
+            getattr(alone, {"joint": "njnt", "actuator": "nu"}.get(kind, f"n{kind}"))
+        ):
+            name = getattr(alone, kind)(index).name
+            if not name:
+                continue
+            one, other = (getattr(each, kind)(name) for each in (alone, both))
+            for field in ("contype", "conaffinity", "mass", "range", "friction", "limited", "gear"):
+                if hasattr(one, field):
+                    assert np.array_equal(getattr(one, field), getattr(other, field)), field
+    # The scene's own bodies still touch each other.
+    data = at_home(both)
+    engine.mj_step(both, data, nstep=400)
+    assert data.time > 1.0
+    assert data.ncon > 0
+    assert data.body("crate").xpos[2] > 0.05
+
+
+@pytest.mark.parametrize("design", [PRESS, limited(OPTIMAL, swing=Swing(a1=30.0, a3=50.0))])
+@pytest.mark.parametrize(("ahead", "behind"), HOSTS)
+def test_model_in_a_scene_is_the_model_alone(design: Design, ahead: str, behind: str) -> None:
+    machine = simulation_mjcf(design)
+    alone = model_of(machine)
+    both = model_of(scene_of(ahead.replace("false", "true") + DEFAULTS, behind), machine)
+    joints = [alone.joint(k).name for k in range(alone.njnt)]
+    fields = {
+        "joint": ("armature", "damping", "frictionloss", "stiffness", "limited", "range", "pos"),
+        "actuator": ("gainprm", "biasprm", "dyntype", "gear", "ctrllimited", "forcelimited"),
+        "body": ("mass", "inertia", "ipos"),
+    }
+    names = {"joint": joints, "actuator": JOINTS, "body": ["base", "platform", "rod_4", "cross_1"]}
+    for kind, listed in names.items():
+        for name in listed:
+            one, other = (getattr(each, kind)(name) for each in (alone, both))
+            for field in fields[kind]:
+                if field != "range" or one.limited[0]:
+                    expected = getattr(one, field)
+                    assert np.array_equal(expected, getattr(other, field)), (name, field)
+    for field in ("eq_solref", "eq_solimp", "tendon_stiffness", "tendon_limited", "tendon_range"):
+        assert np.array_equal(getattr(alone, field), getattr(both, field)), field
+    assert not both.geom_contype[both.geom_bodyid == both.body("platform").id].any()
+    data = at_home(both)
+    for k, name in enumerate(joints):
+        start, width = alone.joint(name).qposadr[0], len(alone.joint(name).qpos0)
+        assert_allclose(
+            data.joint(name).qpos, alone.key_qpos[0][start : start + width], err_msg=str(k)
+        )
+    # The scene's keyframes are shorter by its own joints, which come first or last.
+    assert np.abs(openings(data)).max() < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("way", ["body", "model", "element", "carried"])
+def test_model_attached_anywhere_starts_closed_with_its_tool_in_place(seed: int, way: str) -> None:
+    rng = np.random.default_rng(seed)
+    design = [PRESS, FULL, *map(loaded, (0, 2, 4))][seed] if seed < 5 else OPTIMAL
+    given = design if seed < 4 else ImperfectMachine.draw(typical_machine(design)[0], seed)
+    position = rng.normal(size=3) * 10.0 ** rng.uniform(-1.0, 2.0)
+    turn = Rotation.random(random_state=rng)
+    quaternion = turn.as_quat(scalar_first=True)
+    machine = simulation_mjcf(given)
+    rows = (" ".join(map(repr, each.tolist())) for each in (position, quaternion))
+    place = " ".join(f'{key}="{row}"' for key, row in zip(("pos", "quat"), rows, strict=True))
+    if way == "element":
+        model = model_of(
+            f'<mujoco><asset><model name="m" file="{FILE}"/></asset><worldbody><frame {place}>'
+            f'<attach model="m" body="base" prefix="m-"/></frame></worldbody></mujoco>',
+            machine,
+        )
+    else:
+        host = engine.MjSpec()
+        parent = host.worldbody
+        if way == "carried":
+            # A flange that hangs on a joint.
+            parent = parent.add_body(mass=50.0, inertia=[1.0, 1.0, 1.0], pos=[0.0, 0.0, 0.0])
+            parent.add_joint(type=engine.mjtJoint.mjJNT_HINGE, axis=[0.0, 1.0, 0.0], damping=1.0)
+        frame = parent.add_frame(pos=position, quat=quaternion)
+        child = engine.MjSpec.from_string(machine)
+        if way == "model":
+            host.attach(child, prefix="m-", frame=frame)
+        else:
+            frame.attach_body(child.body("base"), "m-", "")
+        model = host.compile()
+    data = at_home(model, "m-home")
+    size = float(np.linalg.norm(position)) + 1e-3 * design.unit_mm * design.reach
+    assert np.abs(openings(data)).max() < min(1e-9, 1e-14 * size)
+    pose = given.home if isinstance(given, ImperfectMachine) else home_pose(design)
+    tool = 1e-3 * design.unit_mm * np.array(tool_position(pose, design.tool.position))
+    site = data.site("m-tool")
+    base = data.body("m-base")
+    assert_allclose(base.xpos, position, atol=1e-12 * size)
+    base_turn = base.xmat.reshape(3, 3)
+    if design.gravity == DOWN or way != "model":
+        assert_allclose(base_turn, turn.as_matrix(), atol=1e-12)
+    assert_allclose(site.xpos, position + base_turn @ tool, atol=1e-12 * size)
+    axes = Rotation.from_quat(design.tool.quaternion, scalar_first=True).as_matrix()
+    assert_allclose(site.xmat.reshape(3, 3), base_turn @ pose.rotation @ axes, atol=1e-12)
+
+
+@pytest.mark.parametrize("masses", ["bars", "parts"])
+@pytest.mark.parametrize("design", LOADED, ids=range(len(LOADED)))
+def test_servos_at_rest_give_the_forces_of_statics_at_home(design: Design, masses: str) -> None:
+    found = bar_masses(design, DENSITY)
+    if masses == "parts":
+        if design not in (UNLIMITED, OPTIMAL):
+            pytest.skip("parts of random designs need not fit")
+        found = make_prototype(design).masses(2700.0)
+    model = model_of(simulation_mjcf(design, masses=found))
+    data = at_home(model)
+    start = data.site("tool").xpos.copy(), data.site("tool").xmat.reshape(3, 3).copy()
+    home = home_pose(design)
+    given = design, home.position, home.rotation
+    forces = actuator_forces(*given, carry(*given, machine_weights(design, found)).wrench)
+    rest(model, data)
+    assert_allclose(data.actuator_force, forces, atol=1e-3 * np.abs(forces).max())
+    # Nothing droops, but for what the loops give way in steps of 2 ms.
+    reach = 1e-3 * design.unit_mm * design.reach
+    assert np.linalg.norm(data.site("tool").xpos - start[0]) < 1e-4 * reach
+    turn = Rotation.from_matrix(data.site("tool").xmat.reshape(3, 3) @ start[1].T)
+    assert turn.magnitude() < 1e-4
+
+
+@pytest.mark.parametrize("integrator", ["EULER", "IMPLICITFAST", "IMPLICIT", "RK4"])
+@pytest.mark.parametrize("timestep", [5e-4, 4e-3])
+def test_servos_are_stable_for_time_steps_and_integrators(integrator: str, timestep: float) -> None:
+    for design in (UNLIMITED, OPTIMAL, loaded(3)):
+        model = model_of(simulation_mjcf(design))
+        model.opt.timestep = timestep
+        model.opt.integrator = getattr(engine.mjtIntegrator, f"mjINT_{integrator}")
+        data = at_home(model)
+        data.ctrl[:] += 0.02 * 1e-3 * design.unit_mm * design.reach * np.array([1, 1, -1, 1, 1, -1])
+        # Implicit integrators leave a tremor of the loops.
+        rest(model, data, still=2e-2)
+        reach = 1e-3 * design.unit_mm * design.reach
+        assert np.abs(openings(data)).max() < 1e-3 * reach
+        assert_allclose(data.qpos[list(ACTUATED)], data.ctrl, atol=1e-2 * reach)
+
+
+def test_servos_upside_down_bear_the_weights_of_a_ceiling() -> None:
+    design = UNLIMITED
+    host = engine.MjSpec()
+    frame = host.worldbody.add_frame(pos=[0.0, 0.0, 3.0], quat=[0.0, 1.0, 0.0, 0.0])
+    frame.attach_body(engine.MjSpec.from_string(simulation_mjcf(design)).body("base"), "m-", "")
+    model = host.compile()
+    model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
+    data = at_home(model, "m-home")
+    rest(model, data)
+    turn = np.diag([1.0, -1.0, -1.0])
+    platform = data.body("m-platform")
+    position = turn @ (platform.xpos - [0.0, 0.0, 3.0]) * 1e3 / design.unit_mm
+    rotation = turn @ platform.xmat.reshape(3, 3)
+    hung = msgspec.structs.replace(design, gravity=(0.0, 0.0, 1.0))
+    weights = machine_weights(hung, bar_masses(design, DENSITY))
+    wrench = carry(hung, position, rotation, weights).wrench
+    forces = actuator_forces(hung, position, rotation, wrench)
+    assert_allclose(data.actuator_force, forces, atol=1e-3 * np.abs(forces).max())
+
+
+def test_commands_with_the_change_of_forces_do_not_droop_elsewhere() -> None:
+    design = UNLIMITED
+    model_of_home = SimulationModel(design)
+    model = model_of(model_of_home.text())
+    model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
+    data = engine.MjData(model)
+    weights = machine_weights(design, bar_masses(design, DENSITY))
+    positions, rotations = random_poses(design, 5, seed=1, margin=0.2)
+    for position, rotation in zip(positions, rotations, strict=True):
+        wrench = carry(design, position, rotation, weights).wrench
+        forces = actuator_forces(design, position, rotation, wrench)
+        data = engine.MjData(model)
+        data.qpos[:] = simulation_joints(design, position, rotation)
+        servos = model_of_home.servos
+        data.ctrl[:] = data.qpos[list(ACTUATED)] + (forces - servos.forces) / servos.stiffness
+        model.opt.disableflags |= int(engine.mjtDisableBit.mjDSBL_LIMIT)
+        model.opt.disableflags |= int(engine.mjtDisableBit.mjDSBL_CLAMPCTRL)
+        engine.mj_forward(model, data)
+        start = data.site("tool").xpos.copy()
+        rest(model, data)
+        moved = np.linalg.norm(data.site("tool").xpos - start)
+        assert moved < 1e-4 * 1e-3 * design.unit_mm * design.reach
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_droop_is_that_of_the_model(seed: int) -> None:
+    design = loaded(seed)
+    design = msgspec.structs.replace(
+        design, actuators=Actuators(stiffness_n_mm=(9e4, 8e4, 7e4, 6e4, 8e4, 5e4))
+    )
+    given = SimulationModel(ImperfectMachine(design, np.zeros(len(SOURCES))))
+    model = model_of(given.text())
+    model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
+    model.opt.timestep = 2e-4
+    data = at_home(model)
+    start = data.site("tool").xpos.copy(), data.site("tool").xmat.reshape(3, 3).copy()
+    rest(model, data, 0.5, still=1e-2)
+    base = data.body("base").xmat.reshape(3, 3)
+    moved = base.T @ (data.site("tool").xpos - start[0]) * 1e3 / design.unit_mm
+    turned = Rotation.from_matrix(data.site("tool").xmat.reshape(3, 3) @ start[1].T).as_rotvec()
+    expected = given.servos.droop(design, given.servos.forces)
+    for found, meant in ((moved, expected[:3]), (base.T @ turned, expected[3:])):
+        assert_allclose(found, meant, atol=0.01 * np.abs(meant).max())
+
+
+def test_servos_push_and_pull_up_to_their_limits() -> None:
+    design = msgspec.structs.replace(
+        PRESS, actuators=Actuators(push_n=(5, 5, 5, 5, 5, 5), pull_n=(3, 2, 3, 2, 3, 3))
+    )
+    model = model_of(simulation_mjcf(design))
+    assert model.actuator_forcelimited.all()
+    ranges = np.stack([-np.array(design.actuators.pull_n or ()), [5.0] * 6], axis=1)
+    assert_allclose(model.actuator_forcerange, ranges)
+    assert not model_of(simulation_mjcf(UNLIMITED)).actuator_forcelimited.any()
+    # Statics ask for 6.4 N of d1, which has 5 N: the platform sinks.
+    data = at_home(model)
+    start = data.site("tool").xpos.copy()
+    engine.mj_step(model, data, nstep=100)
+    assert data.actuator("d1").force == 5.0
+    assert np.linalg.norm(data.site("tool").xpos - start) > 1e-4
+    pulls_only = Actuators(pull_n=(3, 2, 3, 2, 3, 3))
+    model = model_of(simulation_mjcf(msgspec.structs.replace(PRESS, actuators=pulls_only)))
+    assert (model.actuator_forcerange[:, 0] == [-3, -2, -3, -2, -3, -3]).all()
+    assert (model.actuator_forcerange[:, 1] >= 1e9).all()
+
+
+def test_payload_and_tool_are_those_of_the_design() -> None:
+    for design in LOADED:
+        model = model_of(simulation_mjcf(design))
+        data = at_home(model)
+        masses = bar_masses(design, DENSITY)
+        payload, metres = design.payload, 1e-3 * design.unit_mm
+        platform = data.body("platform")
+        bare = masses["platform"]
+        total = bare.mass + payload.mass_kg
+        centre = (
+            bare.mass * bare.centre + payload.mass_kg * metres * np.array(payload.centre)
+        ) / total
+        assert model.body("platform").mass[0] == pytest.approx(total)
+        assert_allclose(model.body("platform").ipos, centre, atol=1e-12 * metres * design.reach)
+        moving = sum(each.mass for each in masses.values()) + payload.mass_kg
+        assert float(model.body_mass.sum()) == pytest.approx(moving)
+        tool = platform.xpos + platform.xmat.reshape(3, 3) @ (
+            metres * np.array(design.tool.position)
+        )
+        assert_allclose(data.site("tool").xpos, tool, atol=1e-12 * metres * design.reach)
+
+
+def test_limits_that_home_exceeds_end_at_home() -> None:
+    design = limited(UNLIMITED, l1=(0.0, 5.0), d2=(12.0, None), guide=(0.0, 5.0), gap=4.0)
+    model = model_of(simulation_mjcf(design))
+    data = at_home(model)
+    for name in ("l1", "d2", "d1", "d3"):
+        low, high = model.joint(name).range
+        assert low <= data.joint(name).qpos[0] <= high
+    rest(model, data)
+    tool = 1e-3 * design.unit_mm * np.array(tool_position(home_pose(design), design.tool.position))
+    assert_allclose(data.site("tool").xpos, tool, atol=1e-5)
+
+
+def test_model_tells_what_it_leaves_out() -> None:
+    always = ("friction", "contacts", "the mass of the base")
+    free = limited(msgspec.structs.replace(OPTIMAL, payload=Payload(1.0)), box=None)
+    assert SimulationModel(free).left_out == always
+    told = SimulationModel(limited(FULL, margin=0.1, swing=Swing(b4=30.0))).left_out
+    assert told == (
+        *always,
+        "the force of the payload, 4 N",
+        "limits of struts",
+        "limits of the guide",
+        "swing limits of the ball joints",
+        "the box of positions",
+        "the least margins",
+    )
+    assert "; ".join(told) in simulation_mjcf(limited(FULL, margin=0.1, swing=Swing(b4=30.0)))
+    typical, _ = typical_machine(free)
+    assert SimulationModel(typical).left_out == (*always, "errors and stiffness")
+    assert SimulationModel(ImperfectMachine.draw(typical, 0)).left_out == always
+    exceeded = limited(free, gap=9.0)
+    assert SimulationModel(exceeded).left_out == (*always, "limits that the home pose exceeds")
+
+
+def test_model_has_no_setting_of_the_whole_scene() -> None:
+    for given in (PRESS, loaded(1), ImperfectMachine.draw(typical_machine(PRESS)[0], 1)):
+        root = ET.fromstring(simulation_mjcf(given))
+        found = {element.tag for element in root}
+        assert found <= {"default", "worldbody", "equality", "tendon", "actuator", "keyframe"}
+        (default,) = root.findall("default")
+        assert [child.tag for child in default] == ["default"]
+        assert default[0].get("class")
+        (world,) = root.findall("worldbody")
+        (base,) = world.findall(".//body[@name='base']")
+        assert base in [*world, *world.findall("frame/body")]
+        for connect in root.findall("equality/connect"):
+            assert {"body1", "body2", "anchor"} <= set(connect.keys())
+        names = [element.get("name", "") for element in root.iter()]
+        assert not any(" " in name for name in names)
+
+
+def test_model_of_a_singular_home_is_refused() -> None:
+    singular = Pose(home_pose(OPTIMAL).position, (1.0, 0.0, 0.0, 0.0))
+    with pytest.raises(NoAnswerError, match="home pose is singular, so that no servos hold it"):
+        simulation_mjcf(msgspec.structs.replace(OPTIMAL, home=singular))
