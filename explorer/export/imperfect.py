@@ -40,9 +40,10 @@ CLOSED = 1e-12
 def draw_deviations(design: Design, seed: int) -> FloatArray:
     """Return random deviations of a design's 29 sources of errors, shape (29,).
 
-    Each is drawn uniformly within ± its largest error, by NumPy's `default_rng(seed)`. The order is
-    that of `explorer.statics.error_sources.SOURCES`: the offsets of the encoders of the six
-    actuators, then the 23 dimensions. Lengths are in design units, tilts in radians.
+    Each is drawn uniformly within ± its largest error, by NumPy's `default_rng(seed)`, as the RMS
+    errors of `explorer.statics.accuracy` take them. The order is that of
+    `explorer.statics.error_sources.SOURCES`: the offsets of the encoders of the six actuators, then
+    the 23 dimensions. Lengths are in design units, tilts in radians.
 
     Args:
         design: The manipulator, with the errors of its actuators and its tolerances.

@@ -2,6 +2,9 @@
 
 The model is linear: the tool moves by J⁻¹ times the errors of the joints, and by −J⁻¹ ∂q/∂g times
 the errors of the dimensions g while the actuators hold their values.
+
+Errors are independent, and each is uniform within ± its bound, as those of the machines that
+`explorer.export.imperfect` draws. Root-mean-square errors are those of this model.
 """
 
 from __future__ import annotations
@@ -22,6 +25,12 @@ from explorer.statics.equilibrium import A3X, A3Y, B1X, B1Y, B2, B3, Poses
 
 # First columns of the dimensions, in the order of `DIMENSIONS`.
 A1_COLUMN, A3_COLUMN, GUIDE_COLUMN, TILT_COLUMN, B_COLUMN = 0, 3, 6, 9, 11
+
+UNIFORM = 1.0 / math.sqrt(3.0)
+"""Standard deviation of an error that is uniform within ± its bound, over the bound."""
+
+RMS_ERRORS = "independent errors, each uniform within its bounds"
+"""The errors of which root-mean-square errors are told, in words."""
 
 # Corners of the cube of the actuators' errors, up to a common sign.
 CORNERS = 32
@@ -45,7 +54,7 @@ class Precision(NamedTuple):
     Attributes:
         compliance: C at the tool, shape (..., 6, 6), see `explorer.compliance`.
         worst: Largest errors for actuator errors within their bounds.
-        rms: Root-mean-square errors, with the bounds as standard deviations.
+        rms: Root-mean-square errors for errors that are uniform within their bounds.
         by_actuator: Errors of each actuator alone, with axes of six in the order of `JOINTS`.
         by_geometry: Error of the tool per error of each dimension, shape (..., 6, 23).
         by_joint: Error of the tool per error of each actuator, J⁻¹, shape (..., 6, 6).
@@ -194,25 +203,25 @@ def rms_error(
     design: Design,
     position: ArrayLike,
     rotation: ArrayLike,
-    deviations: ArrayLike,
+    errors: ArrayLike,
     tool: ArrayLike | None = None,
 ) -> ToolError:
-    """Return the root-mean-square errors for independent actuator errors.
+    """Return the root-mean-square errors for actuator errors that are uniform within ±errors.
 
-    Both are infinite in a singular pose.
+    The errors are independent. Both are infinite in a singular pose.
 
     Args:
         design: The manipulator.
         position: b4 in the base frame, shape (..., 3), in design units.
         rotation: Platform to base, shape (..., 3, 3).
-        deviations: Standard deviations of the errors, shape (..., 6), in design units.
+        errors: Bounds of the errors, shape (..., 6), in design units, not negative.
         tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
 
     Raises:
-        InputError: A deviation is negative, a value is not finite, the rotation is not one, or
-            batch axes do not broadcast.
+        InputError: An error is negative, a value is not finite, the rotation is not one, or batch
+            axes do not broadcast.
     """
-    return _errors(design, position, rotation, deviations, tool)[1]
+    return _errors(design, position, rotation, errors, tool)[1]
 
 
 def error_by_actuator(
@@ -329,8 +338,9 @@ def _errors_of(
     out = np.empty((poses.count, 2, 8))
     error_rows(poses.count, twists, poses.rows_or_one(errors), out)
     halves = out.reshape(*poses.batch, 2, 8)
+    # The root mean squares of the rows are those of errors as standard deviations.
     return (
         ToolError(halves[..., 0, 0], halves[..., 1, 0]),
-        ToolError(halves[..., 0, 1], halves[..., 1, 1]),
+        ToolError(UNIFORM * halves[..., 0, 1], UNIFORM * halves[..., 1, 1]),
         ToolError(halves[..., 0, 2:], halves[..., 1, 2:]),
     )

@@ -18,7 +18,13 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import DIMENSIONS
 from explorer.numerics.arrays import FloatArray, for_kernel, lengths_of
 from explorer.numerics.compiled import helper, kernel
-from explorer.statics.accuracy import Precision, ToolError, actuator_errors, pose_precision
+from explorer.statics.accuracy import (
+    UNIFORM,
+    Precision,
+    ToolError,
+    actuator_errors,
+    pose_precision,
+)
 from explorer.statics.equilibrium import along
 
 SOURCES = (*JOINTS, *DIMENSIONS)
@@ -255,17 +261,19 @@ def errors_alone(by_source: FloatArray, bounds: ArrayLike) -> ToolError:
     return ToolError(sizes[..., 0, :], sizes[..., 1, :])
 
 
-def rms_of_sources(by_source: FloatArray, deviations: ArrayLike) -> ToolError:
-    """Return the root-mean-square errors of the tool for independent errors of the sources.
+def rms_of_sources(by_source: FloatArray, bounds: ArrayLike) -> ToolError:
+    """Return the root-mean-square errors of the tool for errors that are uniform within ±bounds.
+
+    The errors of the sources are independent.
 
     Args:
         by_source: Errors of the tool per error of each source, shape (..., 6, n).
-        deviations: Standard deviations of the sources' errors, shape (..., n), not negative.
+        bounds: Bounds of the sources' errors, shape (..., n), not negative.
 
     Raises:
-        InputError: A deviation is negative or not finite.
+        InputError: A bound is negative or not finite.
     """
-    limits = _checked(deviations)
+    limits = UNIFORM * _checked(bounds)
     with np.errstate(over="ignore", invalid="ignore"):
         moved = by_source * limits[..., None, :]
         halves = moved.reshape(*moved.shape[:-2], 2, -1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.accuracy import Precision, ToolError, pose_precision
+from explorer.statics.accuracy import UNIFORM, Precision, ToolError, pose_precision
 from explorer.statics.compliance import (
     ComplianceShares,
     PrincipalCompliances,
@@ -93,7 +93,7 @@ class ToolPrecision:
         return largest_error(self.by_source[:, sources], self.bounds[sources])
 
     def rms(self, sources: slice = BY_ALL) -> ToolError:
-        """Return the root-mean-square errors by some of the sources."""
+        """Return the root-mean-square errors by some of the sources, uniform within bounds."""
         return rms_of_sources(self.by_source[:, sources], self.bounds[sources])
 
     @cached_property
@@ -109,7 +109,7 @@ class ToolPrecision:
 
     @property
     def _covariance(self) -> FloatArray:
-        moved = self.by_source[:3] * self.bounds
+        moved = self.by_source[:3] * (UNIFORM * self.bounds)
         return moved @ moved.T
 
     @cached_property

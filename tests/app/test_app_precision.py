@@ -159,7 +159,8 @@ def test_ellipsoid_is_that_of_the_covariance(services: Services) -> None:
     body, label = drawn["/precision/ellipsoid/body"], drawn["/precision/ellipsoid/label"]["text"]
     times = float(re.search(r"× ([\d.,]+)$", label)[1].replace(",", ""))  # type: ignore[index]
     moved = precision.by_source[:3] * precision.bounds
-    sizes = np.sqrt(np.linalg.eigvalsh(moved @ moved.T))[::-1]
+    # Errors that are uniform within ± e have the standard deviation e / √3.
+    sizes = np.sqrt(np.linalg.eigvalsh(moved @ moved.T / 3.0))[::-1]
     np.testing.assert_allclose(np.array(body["scale"]) / (times * placed.scale), sizes, rtol=1e-9)
     # The RMS displacement is that of its three semi-axes.
     assert np.linalg.norm(sizes) == pytest.approx(float(precision.rms().displacement))

@@ -30,7 +30,11 @@ from explorer import (
     draw_deviations,
     home_pose,
     inverse,
+    pose_error_by_source,
     pose_precision,
+    rms_error,
+    rms_of_sources,
+    source_costs,
 )
 from explorer.export.servos import joint_inertia
 from explorer.export.simulation import DENSITY, simulation_joints, simulation_mjcf
@@ -40,7 +44,10 @@ from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED
 from explorer.prototype.weights import bar_masses
 from explorer.statics.compliance import stiffness_of
+from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.error_sources import SOURCES, source_errors
+from explorer.statics.loaded import LoadedPose
+from explorer.statics.tool_precision import ToolPrecision
 
 engine: Any = mujoco
 TOOL = (0.5, 1.0, -2.0)
@@ -134,6 +141,34 @@ def test_deviations_are_drawn_within_the_errors_of_the_design() -> None:
     covariance = shares.T @ shares / 500.0
     assert np.abs(covariance - np.eye(28) / 3.0).max() < 6.0 / (3.0 * np.sqrt(500.0))
     assert (draw_deviations(OFF, 3) == drawn[3]).all()
+
+
+@pytest.mark.parametrize("design", [OFF, typical_machine(IDEAL)[0]])
+def test_rms_errors_told_are_those_of_machines_that_are_drawn(design: Design) -> None:
+    home = home_pose(design)
+    precision = ToolPrecision(LoadedPose(design, home, (0, 0, 0, 0, 0, 0), point=TOOL))
+    costs = source_costs(design, home.position, home.rotation, TOOL)
+    drawn = np.array([draw_deviations(design, seed) for seed in range(4000)])
+    by_source = pose_error_by_source(design, home.position, home.rotation, TOOL)
+    moved = drawn @ by_source.T
+    displacement, turn = (
+        float(np.sqrt((moved[:, half] ** 2).sum(axis=1).mean())) for half in (slice(3), slice(3, 6))
+    )
+    for told in (precision.rms(), rms_of_sources(by_source, source_errors(design))):
+        assert float(told.displacement) == pytest.approx(displacement, rel=0.03)
+        assert float(told.turn) == pytest.approx(turn, rel=0.03)
+    assert costs.rms_displacement == pytest.approx(design.unit_mm * displacement, rel=0.03)
+    assert costs.rms_turn == pytest.approx(np.degrees(turn), rel=0.03)
+    semi_axes = precision.ellipsoid.semi_axes
+    expected = np.sqrt(np.linalg.eigvalsh(moved[:, :3].T @ moved[:, :3] / len(moved))[::-1])
+    assert_allclose(semi_axes, expected, rtol=0.05)
+    # Those of the actuators alone, by their own functions.
+    joints = drawn[:, :6] @ twists_of_actuators(design, home.position, home.rotation, TOOL).T
+    given = design, home.position, home.rotation
+    alone = rms_error(*given, source_errors(design)[:6], TOOL)
+    assert_allclose(pose_precision(*given, TOOL).rms, alone, rtol=1e-12)
+    found = float(np.sqrt((joints[:, :3] ** 2).sum(axis=1).mean()))
+    assert float(alone.displacement) == pytest.approx(found, rel=0.03)
 
 
 def model_of(machine: ImperfectMachine) -> Any:

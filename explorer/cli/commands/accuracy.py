@@ -16,6 +16,7 @@ from explorer.cli.values import hint, numbers
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import DIMENSIONS, Six
 from explorer.mechanism.pose import Triple
+from explorer.statics.accuracy import RMS_ERRORS
 from explorer.statics.compliance import is_elastic
 from explorer.statics.error_sources import SOURCES
 from explorer.statics.loaded import LoadedPose
@@ -46,7 +47,8 @@ class Accuracy(TypicalOptions, LoadOptions):
     """Compute the errors and the deflection of the tool in a pose.
 
     Errors, stiffness, struts and tolerances are those of the design; a design without them is
-    exact and rigid. The model is linear, without preload.
+    exact and rigid. The model is linear, without preload. RMS errors are those of independent
+    errors, each uniform within its bounds.
     """
 
     errors: Annotated[
@@ -140,7 +142,7 @@ def _as_lines(answer: Answer) -> Iterator[str]:
     dimensions = sorted(by_source[BY_DIMENSIONS], key=lambda row: -row[1])
     for name, *error in (*by_source[BY_ACTUATORS], *(each for each in dimensions if any(each[1:]))):
         rows.append((name, *_error(design, *error)))
-    yield from (table(rows, "<>>>"), "")
+    yield from (table(rows, "<>>>"), f"RMS errors are those of {RMS_ERRORS}", "")
     if not is_elastic(design):
         yield "rigid: the design states no stiffness of its actuators and no struts"
         return

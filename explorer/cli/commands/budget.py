@@ -34,6 +34,7 @@ from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
+from explorer.statics.accuracy import RMS_ERRORS
 from explorer.statics.budget.allocation import ToleranceBudget, costs_or_budget
 from explorer.statics.budget.costs import (
     PARTS,
@@ -77,8 +78,9 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
     """Rank what tolerances cost in precision; find those of a wanted precision.
 
     The sources of errors are the six actuators and the 23 dimensions. The worst error is exact for
-    the linear model, over all combinations of signs, at the worst of the positions. The tolerances
-    that are found have the least sum of their reciprocals.
+    the linear model, over all combinations of signs, at the worst of the positions; the RMS error
+    is that of independent errors, each uniform within its bounds. The tolerances that are found
+    have the least sum of their reciprocals.
     """
 
     over: Annotated[
@@ -187,7 +189,7 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
         if answer.found is not None:
             effort = f"{100.0 * answer.found.excess:.1f} % above the least"
             rows.append(("sum of 1/tolerance", f"{figure(answer.found.effort)} /mm", effort))
-        yield table(rows, "<<<")
+        yield from (table(rows, "<<<"), f"RMS errors are those of {RMS_ERRORS}")
         if answer.found is not None:
             far = float(costs.lengths[IS_TILT].max() / np.radians(1.0))
             yield f"a tilt counts as what it moves the guide by at {figure(far)} mm from a1"

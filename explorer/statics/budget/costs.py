@@ -47,7 +47,7 @@ class SourceCosts:
         tolerances: Largest errors to either side, shape (29,); infinite for any.
         worst_displacement: Largest displacement within the tolerances, exact over all signs, in mm.
         worst_turn: Largest turn within them, in degrees.
-        rms_displacement: Largest RMS displacement, with the tolerances as standard deviations.
+        rms_displacement: Largest RMS displacement, for errors uniform within the tolerances.
         rms_turn: Largest RMS turn, likewise.
         shares: Parts of the worst displacement that each source causes where it is largest, shape
             (29,); they add up to 1, or are all 0.

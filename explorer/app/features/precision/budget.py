@@ -10,7 +10,7 @@ import viser
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise.problem import requested_box
 from explorer.app.features.precision.actions import SetTolerances
-from explorer.app.features.precision.figures import ACTUATOR, DIGITS, DIMENSION
+from explorer.app.features.precision.figures import ACTUATOR, DIGITS, DIMENSION, KINDS
 from explorer.app.features.precision.tasks import (
     BudgetDrawing,
     BudgetRequest,
@@ -187,7 +187,7 @@ def budget_rows(drawing: BudgetDrawing) -> Iterator[str]:
     else:
         yield f'<div class="ex-status">±{moved} mm, ±{turned}°{dim(where)}</div>'
         rms = format_number(costs.rms_displacement, DIGITS)
-        yield f"<div>{dim('RMS displacement')} {rms} mm</div>"
+        yield f'<div title="{KINDS["RMS"]}">{dim("RMS displacement")} {rms} mm</div>'
     if found is not None:
         above = format_number(100.0 * found.excess, 2)
         button = press_button(SET, "", "Set these tolerances", hint=SET_HINT, class_name="ex-link")

@@ -13,6 +13,7 @@ from explorer.app.widgets.markup import caption, dim, meter, row, swatch, table
 from explorer.mechanism.design import JOINTS
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_column, format_decimals, format_number
+from explorer.statics.accuracy import RMS_ERRORS
 from explorer.statics.compliance import is_elastic
 from explorer.statics.error_sources import SOURCES
 from explorer.statics.tool_precision import GROUPS, ToolPrecision
@@ -25,7 +26,7 @@ ACTUATOR, DIMENSION = BLUE, ORANGE
 PARTS: tuple[tuple[str, Rgb], ...] = (("guide", TEAL), ("struts", VIOLET), ("actuators", BLUE))
 KINDS = {
     "worst": "The largest for all combinations of signs of the errors, each at its largest",
-    "RMS": "Root mean square, with the largest errors as standard deviations",
+    "RMS": f"Root mean square of {RMS_ERRORS}",
 }
 SHARES_HINT = (
     "Parts of the work that the load does: on the actuators d1 and d3 along the guide, on the "

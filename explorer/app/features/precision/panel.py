@@ -40,7 +40,8 @@ class PrecisionPanel:
         self._top = gui.add_html("")
         controls.checkbox(
             "Error ellipsoid in the scene",
-            "Draw the ellipsoid of the tool's RMS displacement, magnified as its label says.",
+            "Draw the ellipsoid of the tool's RMS displacement, for errors uniform within their "
+            "bounds, magnified as its label says.",
             "view.precision.ellipsoid",
         )
         self._deflection = gui.add_html("")

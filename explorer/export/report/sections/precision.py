@@ -22,6 +22,7 @@ from explorer.export.report.markup import (
     vector,
 )
 from explorer.numerics.arrays import FloatArray
+from explorer.statics.accuracy import RMS_ERRORS
 from explorer.statics.error_sources import IS_TILT, SOURCES
 from explorer.statics.tool_precision import GROUPS, ToolPrecision
 
@@ -65,7 +66,7 @@ def _errors(data: ReportData, precision: ToolPrecision) -> Element:
     heads = ("by the errors of", "at most, mm", "RMS, mm", "turn at most, °", "RMS, °")
     caption = (
         f"Errors of the tool in {data.pose_words}: the largest of all that the bounds allow, and "
-        "the root mean square with the bounds as standard deviations"
+        f"the root mean square of {RMS_ERRORS}"
     )
     return table(heads, rows, align="<>>>>", caption=caption)
 
