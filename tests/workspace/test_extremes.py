@@ -217,7 +217,7 @@ def test_least_margins_are_reached_and_none_is_less(name: str, seed: int) -> Non
 
 @pytest.mark.parametrize("factor", [1e-3, 0.1, 0.7, 10.0, 1e3])
 def test_extents_and_least_margins_scale_with_the_design(factor: float) -> None:
-    for name, seed in ((name, seed) for name in CASES for seed in range(6)):
+    for name, seed in ((name, seed) for name in CASES for seed in range(8, 12)):
         one, rotation = at_home(*CASES[name](seed))
         other = scaled_design(one, factor)
         ends, large = extent_of(one, rotation), extent_of(other, rotation)
