@@ -6,14 +6,14 @@ The page, the command line and reports all read these values.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
 from explorer.legs.clearance import LegClearances, leg_clearances
 from explorer.mechanism.design import Design
 from explorer.mechanism.feasible_intervals import Interval, feasible_intervals
-from explorer.mechanism.home import home_pose
+from explorer.mechanism.home import home_signs
 from explorer.mechanism.kinematics import (
     AttachmentPoints,
     ForwardKinematics,
@@ -197,8 +197,8 @@ class Snapshot:
         self, position: FloatArray, rotation: FloatArray, margin: FloatArray
     ) -> tuple[Violation, ...]:
         """Return the limits that the joints break in a pose in which they are assembled."""
-        home_signs = _home_signs(home_pose(self.design))
-        return violations(self.design, position, rotation, self.joints, margin, home_signs)
+        signs = home_signs(self.design)
+        return violations(self.design, position, rotation, self.joints, margin, signs)
 
     @cached_property
     def clearances(self) -> LegClearances:
@@ -239,8 +239,3 @@ def evaluate(design: Design, pose: Pose) -> Snapshot:
         pose: The pose of the platform, in design units.
     """
     return Snapshot(design, pose)
-
-
-@lru_cache(64)
-def _home_signs(home: Pose) -> tuple[int, int, int]:
-    return signs_of(int(mode_of(margins(home.position, home.rotation))))

@@ -14,7 +14,7 @@ import numpy as np
 
 from explorer.mechanism.design import JOINTS, LENGTHS, Design
 from explorer.mechanism.kinematics import inverse
-from explorer.mechanism.margins import margins
+from explorer.mechanism.margins import margins, mode_of, signs_of
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
 
@@ -32,6 +32,16 @@ def home_pose(design: Design) -> Pose:
     none is, it is the pose that exceeds these limits the least.
     """
     return design.home or _search_grid(design)
+
+
+def home_signs(design: Design) -> tuple[int, int, int]:
+    """Return the sign triple of the design's home pose, in its own orientation."""
+    return _signs_at(home_pose(design))
+
+
+@lru_cache(64)
+def _signs_at(pose: Pose) -> tuple[int, int, int]:
+    return signs_of(int(mode_of(margins(pose.position, pose.rotation))))
 
 
 @lru_cache(64)

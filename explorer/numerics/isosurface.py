@@ -42,11 +42,25 @@ def _triangles(negative: tuple[int, ...]) -> list[tuple[Edge, Edge, Edge]]:
     return [(x, z, y) if odd else (x, y, z) for x, y, z in triangles]
 
 
-_CASES = [
-    (negative, _triangles(negative))
-    for count in (1, 2, 3)
-    for negative in itertools.combinations(range(4), count)
-]
+def _table() -> IntArray:
+    """Return the triangles of each case of each of two orientations, shape (2, 16, 2, 3, 2).
+
+    Bit k of a case is set if corner k is negative. Absent triangles are −1.
+    """
+    table = np.full((2, 16, 2, 3, 2), -1)
+    for count in (1, 2, 3):
+        for negative in itertools.combinations(range(4), count):
+            triangles = np.array(_triangles(negative))
+            case = sum(1 << k for k in negative)
+            table[0, case, : len(triangles)] = triangles
+            table[1, case, : len(triangles)] = triangles[:, ::-1]
+    return table
+
+
+_TABLE = _table()
+# The axes along which the tetrahedra of a cell follow its edges, and which of these are odd.
+_ORDERS = np.array(list(itertools.permutations(range(3))))
+_IS_ODD = np.array([sum(a > b for a, b in itertools.combinations(x, 2)) % 2 for x in _ORDERS])
 
 
 def surface_below_zero(values: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -67,18 +81,14 @@ def surface_below_zero(values: FloatArray) -> tuple[FloatArray, IntArray]:
     corner_below = np.stack([below[tuple(map(slice, c, c + last))] for c in corners], axis=-1)
     cells = np.argwhere(corner_below.any(axis=-1) & ~corner_below.all(axis=-1)) @ strides
     flat, level = below.ravel(), values.ravel()
-    edges: list[IntArray] = []
-    for axes in itertools.permutations(range(3)):
-        steps = np.cumsum([0, *(strides[axis] for axis in axes)])
-        nodes = cells[:, None] + steps
-        odd = sum(a > b for a, b in itertools.combinations(axes, 2)) % 2 == 1
-        signs = flat[nodes] @ np.array([1, 2, 4, 8])
-        for negative, triangles in _CASES:
-            rows = nodes[signs == sum(1 << k for k in negative)]
-            for triangle in triangles:
-                ends = np.stack([rows[:, edge] for edge in triangle], axis=1)
-                edges.append(ends[:, ::-1] if odd else ends)
-    corner = np.sort(np.concatenate(edges), axis=-1).reshape(-1, 2)
+    steps = np.concatenate([np.zeros((6, 1), dtype=np.int64), strides[_ORDERS]], axis=1)
+    nodes = cells[:, None, None] + np.cumsum(steps, axis=1)
+    cases = flat[nodes] @ np.array([1, 2, 4, 8])
+    corners_of = _TABLE[_IS_ODD, cases]
+    cell, tetrahedron, triangle = np.nonzero(corners_of[..., 0, 0] >= 0)
+    own = corners_of[cell, tetrahedron, triangle].reshape(-1, 6)
+    edges = np.take_along_axis(nodes[cell, tetrahedron], own, axis=1)
+    corner = np.sort(edges.reshape(-1, 2), axis=-1)
     keys, faces = np.unique(corner @ np.array([values.size, 1]), return_inverse=True)
     first, second = np.divmod(keys, values.size)
     share = level[first] / (level[first] - level[second])

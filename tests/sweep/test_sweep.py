@@ -33,6 +33,7 @@ from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import VARIABLES
+from explorer.mechanism.home import home_signs
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.pose import Pose
 from explorer.singularity.jacobian import inverse_condition, jacobian
@@ -65,7 +66,6 @@ from explorer.sweep.study import (
 )
 from explorer.workspace.held import held_workspace
 from explorer.workspace.limits.broken import violations
-from explorer.workspace.limits.constraints import home_signs
 from explorer.workspace.node_measures import node_measures
 
 MEASURES = measures_in("studies")

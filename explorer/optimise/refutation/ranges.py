@@ -10,10 +10,9 @@ import math
 from functools import cached_property
 
 from explorer.mechanism.design import LENGTHS, VARIABLES, Pair
-from explorer.mechanism.home import home_pose
+from explorer.mechanism.home import home_pose, home_signs
 from explorer.optimise.demands import Box
 from explorer.optimise.problem import REACH, SHIFTS, YAW, Problem
-from explorer.workspace.limits.constraints import home_signs
 
 
 def smallest(interval: Pair) -> float:

@@ -7,13 +7,14 @@ import numpy as np
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_signs
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.descent import descend
 from explorer.workspace.accessible.nodes import make_cell_grid
 from explorer.workspace.limits.broken import violations
-from explorer.workspace.limits.constraints import Never, constraints, home_signs, slacks
+from explorer.workspace.limits.constraints import Never, constraints, slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.volume import bounds
 

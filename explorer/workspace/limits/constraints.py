@@ -18,8 +18,7 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.design import TOLERANCE, Design
-from explorer.mechanism.home import home_pose
-from explorer.mechanism.margins import margins, mode_of, signs_of
+from explorer.mechanism.home import home_pose, home_signs
 from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, finite_array
@@ -164,12 +163,15 @@ class Never:
 Constraint: TypeAlias = BallOrCylinder | HalfSpace | Cone | Never
 
 
-def constraints(design: Design, rotation: ArrayLike) -> tuple[Constraint, ...]:
+def constraints(
+    design: Design, rotation: ArrayLike, signs: tuple[int, int, int] | None = None
+) -> tuple[Constraint, ...]:
     """Return the limits of a design at an orientation, in the order of the design file.
 
     Args:
         design: The manipulator.
         rotation: Platform to base, shape (3, 3).
+        signs: Sign triple to demand instead of the home's, even if no margin is demanded.
 
     Raises:
         InputError: not a rotation.
@@ -179,7 +181,7 @@ def constraints(design: Design, rotation: ArrayLike) -> tuple[Constraint, ...]:
         *_lengths(design, r),
         *_guide(design, r),
         *_box(design),
-        *_margins(design, r),
+        *_margins(design, r, signs),
         *_swings(design, r),
     )
 
@@ -301,10 +303,13 @@ def _box(design: Design) -> Iterator[Constraint]:
         yield HalfSpace(maximum, axis, high, {maximum: _scalar_rate(1.0)})
 
 
-def _margins(design: Design, r: FloatArray) -> Iterator[Constraint]:
+def _margins(
+    design: Design, r: FloatArray, signs: tuple[int, int, int] | None
+) -> Iterator[Constraint]:
     least = design.limits.margin
-    if least is None:
+    if least is None and signs is None:
         return
+    least = least or 0.0
     u, n = r[:, 0], r[:, 2]
     # δ = k·p, on the side of zero that the home's sign triple demands.
     gradients = (
@@ -312,7 +317,7 @@ def _margins(design: Design, r: FloatArray) -> Iterator[Constraint]:
         ("margin δ2", np.cross(X, u), np.cross(X, _turning(u))),
         ("margin δ3", Z, np.zeros(3)),
     )
-    for (name, k, turning), sign in zip(gradients, home_signs(design), strict=True):
+    for (name, k, turning), sign in zip(gradients, signs or home_signs(design), strict=True):
         # The lines are parallel, and the margin is zero at every position.
         if float(np.linalg.norm(k)) <= PARALLEL:
             yield Never(name)
@@ -337,12 +342,6 @@ def _swings(design: Design, r: FloatArray) -> Iterator[Constraint]:
             continue
         axis = r @ cone.axis if cone.in_platform else cone.axis
         yield Cone(name, apexes[cone.leg - 1], axis, cone.half_angle, cone.leg in (2, 3))
-
-
-def home_signs(design: Design) -> tuple[int, int, int]:
-    """Return the sign triple of the design's home pose."""
-    home = home_pose(design)
-    return signs_of(int(mode_of(margins(home.position, home.rotation))))
 
 
 def demanded_order(design: Design) -> int:

@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 from explorer.legs.clearance import joined_pairs, radii_of_pairs
 from explorer.legs.segments import Vector, closest_shares, minus, square_at
 from explorer.mechanism.design import LENGTHS, TOLERANCE, Design
+from explorer.mechanism.home import home_signs
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
 from explorer.numerics.compiled import helper, kernel
-from explorer.workspace.limits.constraints import demanded_order, home_signs
+from explorer.workspace.limits.constraints import demanded_order
 from explorer.workspace.limits.joint_cones import joint_cones
 
 # Columns of the row of rules; see `Rules.of`.
