@@ -1,9 +1,11 @@
-"""The largest share of a limit that a load uses at positions of one orientation.
+"""The shares of their limits that a load asks of the parts of the machine, at one orientation.
 
-Where the load is held, this share s is at most 1. A function that is zero at this limit tells it:
-1 / s − 1. Towards a singular plane s grows beyond all bounds, and the function falls linearly to
-−1; beyond the plane it goes on falling, so that it has no fold there. It is bounded above, where
-nothing loads a part.
+A part has two limits: its value must not exceed the largest and not fall below the least one. The
+load is held where the share s of every limit is at most 1. Each limit has a function of position
+that is zero there, 1 where the share is far below zero and −1 where it is beyond all numbers:
+(1 − s) / √(1 + s²). It is smooth, also towards a singular plane of the home mode, whether the share
+grows there or not. Beyond the plane it goes on along the line through its values on the plane and a
+little before it. The plane itself is a limit of the workspace.
 """
 
 from __future__ import annotations
@@ -13,35 +15,40 @@ import math
 import numpy as np
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
+from explorer.mechanism.home import home_signs
 from explorer.numerics.arrays import FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import helper, kernel
+from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.equilibrium import B2, B3, holding_forces, is_singular
 from explorer.statics.reactions import part_limits
 from explorer.statics.weights import payload_wrench
 
-# Largest value of the function, where shares are below 1 / (1 + HIGHEST).
-HIGHEST = 2.0
+# Least and largest value of the functions.
+LOWEST, HIGHEST = -4.0, 2.0
+# A share whose square is near the end of the range of numbers counts as infinite.
+INFINITE = 1e150
+# Distance from a singular plane of a position on it, over |p|: what is below rounding at this
+# distance does not grow towards the plane. Step of the line beyond, over the way to the plane.
+BESIDE, AHEAD = 1e-9, 1e-3
 # Newton steps onto the limit, halvings where they fail, and the step of differences over |p|.
 STEPS, HALVINGS, DIFFERENCE = 8, 40, 1e-6
-# Largest step and largest move, in cells, and the size of the function on the limit.
-STEP_OF_CELL, MOST_OF_CELL, ON_LIMIT = 0.5, 1.0, 1e-9
+# Largest step in cells, and size of the function on the limit.
+STEP_OF_CELL, ON_LIMIT = 0.5, 1e-9
 # Number of parts, see `explorer.statics.reactions.part_limits`.
 PARTS = 10
 
+# Places in the row of numbers that the kernels take, see `load_case`.
+TOOL, WRENCH, FORCE, LIMITS, INWARD = 6, 9, 15, 16, 36
 
-# Places in the row of numbers that the kernels take, see `held_load`.
-TOOL, WRENCH, FORCE, LIMITS, SIGNS, END = 6, 9, 15, 16, 36, 39
 
-
-def held_load(
+def load_case(
     design: Design, rotation: FloatArray, load: FloatArray, limits: FloatArray | None = None
 ) -> FloatArray:
-    """Return what the kernels need of a design, an orientation and a load, shape (39,).
+    """Return what the kernels need of a design, an orientation and a load, shape (45,).
 
     It is the design variables, the tool from b4 along the axes of the base, the load
-    about b4, the force of any direction, the limits of the parts, and the signs of z_R · p, δ2 and
-    δ3 at home.
+    about b4, the force of any direction, the limits of the parts, and the unit normals of the
+    singular planes towards the home mode.
 
     Args:
         design: The manipulator, with its payload and limits.
@@ -52,22 +59,26 @@ def held_load(
     tool = rotation @ np.array(design.tool.position)
     wrench = payload_wrench(design, rotation) + load
     wrench[3:] += np.cross(tool, wrench[:3])
-    home = np.array(home_pose(design).position)
-    delta2 = rotation[1, 0] * home[2] - rotation[2, 0] * home[1]
-    signs = np.sign([rotation[:, 2] @ home, delta2, home[2]])
+    planes = planes_of_singularity(rotation)
+    lengths = np.linalg.norm(planes, axis=1)
+    # Of parallel lines every position is singular, and δ2 has no plane.
+    scale = np.array(home_signs(design)) / np.where(lengths > 0.0, lengths, 1.0)
+    inward = scale[:, None] * planes
     bounds = part_limits(design) if limits is None else limits
-    parts = (design.variables, tool, wrench, design.payload.force_n, bounds, signs)
+    parts = (design.variables, tool, wrench, design.payload.force_n, bounds, inward)
     return np.concatenate([np.ravel(part) for part in parts])
 
 
 @helper
-def share_at(held: FloatArray, r: FloatArray, p: FloatArray) -> tuple[float, int]:
-    """Return the largest share of a limit at a position, infinite if singular, and its part."""
-    x = held[:TOOL]
+def write_shares(case: FloatArray, r: FloatArray, p: FloatArray, out: FloatArray) -> None:
+    """Write the shares of all limits at a position, shape (20,), infinite if it is singular."""
+    x = case[:TOOL]
     if is_singular(x, p, r):
-        return math.inf, 0
-    t, w = held[TOOL:WRENCH], held[WRENCH:FORCE]
-    force, limits = held[FORCE], held[LIMITS:SIGNS]
+        for i in range(2 * PARTS):
+            out[i] = math.inf
+        return
+    t, w = case[TOOL:WRENCH], case[WRENCH:FORCE]
+    force, limits = case[FORCE], case[LIMITS:INWARD]
     f = holding_forces(x, p, r, (w[0], w[1], w[2]), (w[3], w[4], w[5]))
     e = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if force > 0.0:
@@ -86,25 +97,97 @@ def share_at(held: FloatArray, r: FloatArray, p: FloatArray) -> tuple[float, int
     d4 = length(0.0, p[1] + x[B3] * r[1, 0], p[2] + x[B3] * r[2, 0])
     values = (f[0], f[1], f[2], f[3], f[4], f[5], f[1] * d2, f[3] * d4, f[2], f[4])
     spreads = (e[0], e[1], e[2], e[3], e[4], e[5], e[1] * d2, e[3] * d4, e[2], e[4])
-    share, part = 0.0, 0
     for i in range(PARTS):
-        up = (values[i] + spreads[i]) / limits[i]
-        down = (spreads[i] - values[i]) / limits[PARTS + i]
-        if max(up, down) > share:
-            share, part = max(up, down), i
-    return share, part
+        out[i] = (spreads[i] + values[i]) / limits[i]
+        out[PARTS + i] = (spreads[i] - values[i]) / limits[PARTS + i]
 
 
 @helper
-def held_at(held: FloatArray, r: FloatArray, p: FloatArray) -> tuple[float, int]:
-    """Return the function at a position, and the part with the largest share of its limit."""
-    signs = held[SIGNS:END]
-    delta1 = r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2]
-    delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
-    is_beyond = signs[0] * delta1 < 0.0 or signs[1] * delta2 < 0.0 or signs[2] * p[2] < 0.0
-    share, part = share_at(held, r, p)
-    reciprocal = min(1.0 / share if share > 0.0 else math.inf, 1.0 + HIGHEST)
-    return (-reciprocal if is_beyond else reciprocal) - 1.0, part
+def room_of(share: float) -> float:
+    """Return the function of a limit for a share of it."""
+    if abs(share) > INFINITE:
+        return -1.0 if share > 0.0 else 1.0
+    return (1.0 - share) / math.sqrt(1.0 + share * share)
+
+
+@helper
+def lacking(case: FloatArray, plane: int, p: FloatArray, least: float) -> float:
+    """Return what the distance of a position from a singular plane lacks of the least one."""
+    at = INWARD + 3 * plane
+    return least - (case[at] * p[0] + case[at + 1] * p[1] + case[at + 2] * p[2])
+
+
+@helper
+def move_into_mode(case: FloatArray, p: FloatArray, near: FloatArray) -> bool:
+    """Write the nearest position of the home mode; return whether there is one but a1.
+
+    It is `p` itself, or on one singular plane, or where two of them meet.
+    """
+    least = BESIDE * length(p[0], p[1], p[2])
+    lacks = (
+        lacking(case, 0, p, least),
+        lacking(case, 1, p, least),
+        lacking(case, 2, p, least),
+    )
+    for i in range(3):
+        near[i] = p[i]
+    if max(lacks[0], lacks[1], lacks[2]) <= 0.0:
+        return True
+    for a in range(3):
+        for b in range(a, 3):
+            m, n = INWARD + 3 * a, INWARD + 3 * b
+            first, second = lacks[a], 0.0
+            if b > a:
+                cosine = case[m] * case[n] + case[m + 1] * case[n + 1] + case[m + 2] * case[n + 2]
+                square = 1.0 - cosine * cosine
+                if square <= BESIDE:
+                    continue
+                first = (lacks[a] - cosine * lacks[b]) / square
+                second = (lacks[b] - cosine * lacks[a]) / square
+            if first < 0.0 or second < 0.0:
+                continue
+            for i in range(3):
+                near[i] = p[i] + first * case[m + i] + second * case[n + i]
+            if (
+                lacking(case, 0, near, 0.5 * least) <= 0.0
+                and lacking(case, 1, near, 0.5 * least) <= 0.0
+                and lacking(case, 2, near, 0.5 * least) <= 0.0
+            ):
+                return True
+    return False
+
+
+@helper
+def move_ahead(p: FloatArray, near: FloatArray) -> bool:
+    """Move on from the nearest position of the mode; return whether that is another one."""
+    is_beyond = near[0] != p[0] or near[1] != p[1] or near[2] != p[2]
+    for i in range(3):
+        near[i] += AHEAD * (near[i] - p[i])
+    return is_beyond
+
+
+@helper
+def beyond_plane(on_plane: float, ahead: float) -> float:
+    """Return the function beyond a singular plane, by its values on it and ahead of it."""
+    return min(max(on_plane - (ahead - on_plane) / AHEAD, LOWEST), HIGHEST)
+
+
+@helper
+def value_at(
+    case: FloatArray, r: FloatArray, limit: int, p: FloatArray, near: FloatArray, shares: FloatArray
+) -> float:
+    """Return the function of a limit at a position.
+
+    `near`, shape (3,), and `shares`, shape (20,), are places to work in.
+    """
+    if not move_into_mode(case, p, near):
+        return -1.0
+    write_shares(case, r, near, shares)
+    value = room_of(shares[limit])
+    if move_ahead(p, near):
+        write_shares(case, r, near, shares)
+        value = beyond_plane(value, room_of(shares[limit]))
+    return value
 
 
 @helper
@@ -115,33 +198,46 @@ def length(x: float, y: float, z: float) -> float:
 
 @helper
 def rate_along(
-    held: FloatArray, r: FloatArray, at: FloatArray, near: FloatArray, axis: int, h: float
+    case: FloatArray,
+    r: FloatArray,
+    limit: int,
+    at: FloatArray,
+    axis: int,
+    h: float,
+    work: FloatArray,
+    shares: FloatArray,
 ) -> float:
-    """Return the derivative along an axis by a central difference; `near` is a place to work in."""
+    """Return the derivative along an axis by a central difference.
+
+    `work`, shape (2, 3), and `shares`, shape (20,), are places to work in, here and below.
+    """
     for i in range(3):
-        near[i] = at[i]
-    near[axis] = at[axis] + h
-    ahead = held_at(held, r, near)[0]
-    near[axis] = at[axis] - h
-    return (ahead - held_at(held, r, near)[0]) / (2.0 * h)
+        work[0, i] = at[i]
+    work[0, axis] = at[axis] + h
+    ahead = value_at(case, r, limit, work[0], work[1], shares)
+    work[0, axis] = at[axis] - h
+    return (ahead - value_at(case, r, limit, work[0], work[1], shares)) / (2.0 * h)
 
 
 @helper
 def follow_slope(
-    held: FloatArray, r: FloatArray, at: FloatArray, near: FloatArray, cell: float
+    case: FloatArray,
+    r: FloatArray,
+    limit: int,
+    at: FloatArray,
+    cell: float,
+    work: FloatArray,
+    shares: FloatArray,
 ) -> bool:
-    """Move a point onto the limit by Newton's method; return whether it gets there.
-
-    `near` is a place to work in, shape (3,).
-    """
+    """Move a point onto a limit by Newton's method; return whether it gets there."""
     h = DIFFERENCE * max(abs(at[0]), abs(at[1]), abs(at[2]), cell)
     for _ in range(STEPS):
-        value = held_at(held, r, at)[0]
+        value = value_at(case, r, limit, at, work[1], shares)
         if abs(value) <= ON_LIMIT:
             return True
-        x = rate_along(held, r, at, near, 0, h)
-        y = rate_along(held, r, at, near, 1, h)
-        z = rate_along(held, r, at, near, 2, h)
+        x = rate_along(case, r, limit, at, 0, h, work, shares)
+        y = rate_along(case, r, limit, at, 1, h, work, shares)
+        z = rate_along(case, r, limit, at, 2, h, work, shares)
         steepness = length(x, y, z)
         if steepness == 0.0:
             return False
@@ -154,110 +250,152 @@ def follow_slope(
 
 @helper
 def halve(
-    held: FloatArray, r: FloatArray, at: FloatArray, point: FloatArray, beside: FloatArray
+    case: FloatArray,
+    r: FloatArray,
+    limit: int,
+    at: FloatArray,
+    point: FloatArray,
+    beside: FloatArray,
+    step: FloatArray,
+    work: FloatArray,
+    shares: FloatArray,
 ) -> None:
-    """Move a point onto the limit along the line from a position beside it that holds the load."""
+    """Move a point onto a limit along the edge from the node beside it, which keeps the limit.
+
+    If the other end keeps it too, the point stays.
+    """
+    low, high = 0.0, math.inf
     for i in range(3):
-        at[i] = 2.0 * point[i] - beside[i]
-    low, high = 0.0, 2.0
-    if held_at(held, r, at)[0] > 0.0:
+        if point[i] != beside[i]:
+            high = min(high, step[i] / abs(point[i] - beside[i]))
+    for i in range(3):
+        at[i] = beside[i] + high * (point[i] - beside[i])
+    if value_at(case, r, limit, at, work[1], shares) > 0.0:
         low, high = 1.0, 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         for i in range(3):
             at[i] = beside[i] + middle * (point[i] - beside[i])
-        if held_at(held, r, at)[0] > 0.0:
+        if value_at(case, r, limit, at, work[1], shares) > 0.0:
             low = middle
         else:
             high = middle
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1])")
-def share_rows(held: FloatArray, r: FloatArray, positions: FloatArray, out: FloatArray) -> None:
-    """Write the largest shares of a limit at n positions."""
-    for k in range(positions.shape[0]):
-        out[k] = share_at(held, r, positions[k])[0]
-
-
 @kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], i8[::1])")
-def held_rows(
-    held: FloatArray, r: FloatArray, positions: FloatArray, out: FloatArray, parts: IntArray
+def share_rows(
+    case: FloatArray, r: FloatArray, positions: FloatArray, out: FloatArray, parts: IntArray
 ) -> None:
-    """Write the function at n positions, and the indices of the parts that decide."""
+    """Write the largest shares of a limit at n positions, and the indices of the parts."""
+    shares = np.empty(2 * PARTS)
     for k in range(positions.shape[0]):
-        out[k], parts[k] = held_at(held, r, positions[k])
+        write_shares(case, r, positions[k], shares)
+        out[k], parts[k] = 0.0, 0
+        for i in range(2 * PARTS):
+            if shares[i] > out[k]:
+                out[k], parts[k] = shares[i], i % PARTS
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1])")
+@kernel("void(f8[::1], f8[:,::1], i8[::1], f8[:,::1], f8[:,::1])")
+def value_rows(
+    case: FloatArray, r: FloatArray, limits: IntArray, positions: FloatArray, out: FloatArray
+) -> None:
+    """Write the functions of m limits at n positions, shape (m, n)."""
+    near, shares, ahead = np.empty(3), np.empty(2 * PARTS), np.empty(2 * PARTS)
+    for k in range(positions.shape[0]):
+        if not move_into_mode(case, positions[k], near):
+            for i in range(limits.shape[0]):
+                out[i, k] = -1.0
+            continue
+        write_shares(case, r, near, shares)
+        is_beyond = move_ahead(positions[k], near)
+        if is_beyond:
+            write_shares(case, r, near, ahead)
+        for i in range(limits.shape[0]):
+            limit = int(limits[i])
+            out[i, k] = room_of(shares[limit])
+            if is_beyond:
+                out[i, k] = beyond_plane(room_of(shares[limit]), room_of(ahead[limit]))
+
+
+@kernel("void(f8[::1], f8[:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1])")
 def settle_rows(
-    held: FloatArray,
+    case: FloatArray,
     r: FloatArray,
+    limits: IntArray,
     points: FloatArray,
     beside: FloatArray,
     step: FloatArray,
-    near: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Write points on the limit near n points; one beside which no load is held stays.
+    """Write points on a limit near n points; one beside which it is not kept stays.
 
-    Where Newton's method fails, the segment from the position beside through the point and as far
-    beyond is halved. `near` is a place to work in, shape (3,).
+    Where Newton's method fails, the edge from the node beside through the point is halved.
     """
-    cell = min(step[0], step[1], step[2])
+    limit, cell = limits[0], min(step[0], step[1], step[2])
+    work, shares = np.empty((2, 3)), np.empty(2 * PARTS)
     for k in range(points.shape[0]):
         at = out[k]
         for i in range(3):
             at[i] = points[k, i]
-        if held_at(held, r, beside[k])[0] > 0.0:
-            is_there = follow_slope(held, r, at, near, cell)
+        if value_at(case, r, limit, beside[k], work[1], shares) > 0.0:
+            is_there = follow_slope(case, r, limit, at, cell, work, shares)
             for i in range(3):
-                is_there = is_there and abs(at[i] - points[k, i]) <= MOST_OF_CELL * step[i]
+                is_there = is_there and abs(at[i] - points[k, i]) <= step[i]
             if not is_there:
-                halve(held, r, at, points[k], beside[k])
+                halve(case, r, limit, at, points[k], beside[k], step, work, shares)
 
 
-def largest_shares(held: FloatArray, rotation: FloatArray, positions: FloatArray) -> FloatArray:
-    """Return the largest shares of a limit at positions (n, 3), shape (n,); infinite if singular.
+def largest_shares(
+    case: FloatArray, rotation: FloatArray, positions: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Return the largest shares of a limit at positions (n, 3), and the parts, shape (n,) each.
+
+    Shares are infinite if singular. The parts are indices of those of
+    `explorer.statics.reactions.part_limits`.
 
     Args:
-        held: What `held_load` returns; with a limit of 1 a share is the value itself.
+        case: What `load_case` returns; with a limit of 1 a share is the value itself.
         rotation: Platform to base, shape (3, 3).
         positions: b4 in the base frame, in design units.
     """
-    out = np.empty(len(positions))
-    share_rows(len(positions), held, for_kernel(rotation), for_kernel(positions), out)
-    return out
-
-
-def held_values(
-    held: FloatArray, rotation: FloatArray, positions: FloatArray
-) -> tuple[FloatArray, IntArray]:
-    """Return the function at positions (n, 3), shape (n,), and the parts that decide, (n,).
-
-    The parts are indices of those of `explorer.statics.reactions.part_limits`.
-    """
     out, parts = np.empty(len(positions)), np.empty(len(positions), dtype=np.int64)
-    held_rows(len(positions), held, for_kernel(rotation), for_kernel(positions), out, parts)
+    share_rows(len(positions), case, for_kernel(rotation), for_kernel(positions), out, parts)
     return out, parts
 
 
+def limit_values(
+    case: FloatArray, rotation: FloatArray, limits: IntArray, positions: FloatArray
+) -> FloatArray:
+    """Return the functions of m limits at positions (n, 3), shape (m, n).
+
+    A limit is the index of its part, plus 10 for the least value.
+    """
+    out = np.empty((len(limits), len(positions)))
+    rows = for_kernel(rotation), limits, for_kernel(positions), out
+    value_rows(len(positions), case, *rows)
+    return out
+
+
 def settle_on_limit(
-    held: FloatArray,
+    case: FloatArray,
     rotation: FloatArray,
+    limit: int,
     points: FloatArray,
     beside: FloatArray,
     step: FloatArray,
 ) -> FloatArray:
-    """Return points on the limit near points (n, 3), shape (n, 3).
+    """Return points on a limit near points (n, 3), shape (n, 3).
 
     Args:
-        held: What `held_load` returns.
+        case: What `load_case` returns.
         rotation: Platform to base, shape (3, 3).
+        limit: The limit, as of `limit_values`.
         points: Points near the limit.
-        beside: A position near each of them, shape (n, 3).
+        beside: The node at the end of its edge that keeps the limit, for each, shape (n, 3).
         step: Size of a cell on each axis, shape (3,); points move by no more than one.
     """
-    out = np.empty(points.shape)
-    rows = for_kernel(rotation), for_kernel(points), for_kernel(beside), for_kernel(step)
-    settle_rows(len(points), held, *rows, np.empty(3), out)
+    out, limits = np.empty(points.shape), np.array([limit], dtype=np.int64)
+    rows = limits, for_kernel(points), for_kernel(beside), for_kernel(step), out
+    settle_rows(len(points), case, for_kernel(rotation), *rows)
     return out

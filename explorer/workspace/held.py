@@ -1,14 +1,18 @@
 """The part of a workspace where a load is held within the limits of the machine, as a solid.
 
-Its new faces lie on the surface where one part takes its limit. A grid of positions finds them,
-and each of their vertices is moved onto the true surface, so that only the flatness of the faces
-between vertices is approximate.
+Each limit of a part of the machine is a surface of its own, which is smooth where it bounds the
+workspace. A grid of positions finds it, and each of its vertices is moved onto the true surface, so
+that only the flatness of the faces between vertices is approximate. Booleans cut one surface after
+the other out of the workspace, so that creases between limits and parts that are thinner than a
+cell of the grid are kept.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import msgspec
@@ -19,28 +23,40 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, finite_array
-from explorer.statics.held import HIGHEST, held_load, held_values, settle_on_limit
+from explorer.statics.held import (
+    INWARD,
+    LIMITS,
+    PARTS,
+    largest_shares,
+    limit_values,
+    load_case,
+    settle_on_limit,
+)
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.nodes import Grid, make_grid
-from explorer.workspace.limits.constraints import Constraint, HalfSpace, constraints, slacks
+from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, constraints, slacks
 from explorer.workspace.slices.volume import home_rotation, workspace_volume
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import Surface, carved_solid, cut_solid, workspace_solid
 
 # Numbers of nodes on each axis of the box about the part, and beyond it on either side.
-DEFAULT_NODES = 28
+DEFAULT_NODES = 20
 FEWEST_NODES, MOST_NODES = 8, 160
 BEYOND = 2
-# Nodes on each axis of the grid that finds the box of the part.
-COARSE = 20
+# Nodes on each axis of the grid that finds the box of the part, and steps of that about them.
+COARSE, AROUND = 20, 2.0
 # To find the best position: numbers of starts, of steps of that grid between them, of nodes on each
 # axis of the grids about one, and of these grids.
 STARTS, APART, FOLLOWING, ROUNDS = 12, 2.5, 5, 30
+# Least share of a limit of which the factor of a load that it allows is told.
+LEAST_SHARE = 1e-3
 # Growth of the box of the part on a side on which the part goes on, over its size.
 GROWTH = 0.25
-# Volume that a grid may miss, over that of the part; factor of the number of nodes on an axis of
-# the next grid, and the largest number.
-MISSED, FINER, FINEST = 2e-3, 1.6, 100
+# Digits of its values by which the function of a limit is that of another.
+SAME_DIGITS = 12
+# Factor of the number of nodes on an axis of the next grid, the largest number, and the change of
+# the volume, over the volume, after which there is none.
+FINER, FINEST, SETTLED = 1.6, 72, 3e-3
 
 
 @dataclass(frozen=True)
@@ -84,19 +100,18 @@ def held_workspace(
 ) -> HeldWorkspace:
     """Return the positions at which a load is held within the limits of actuators and machine.
 
-    Beyond a singular plane no load is held on the way, so that only positions with home's signs of
-    the margins count. The payload's weight and its force of any direction act besides the load;
-    the legs count as weightless. The volume is off by about half a percent at most, that of a part
-    below a thousandth of the workspace by a few percent. Pieces apart from the others are missed
-    if they contain no node of a grid of 20 nodes on each axis of the workspace's extent and lie
-    beyond the box about the others, and so are pieces or tips that contain neither nodes nor
-    centres of cells of the last grid within the box.
+    Beyond a singular plane no load is held on the way, so that only positions with the signs of
+    the margins count that the home pose has in its own orientation. The payload's weight and its
+    force of any direction act besides the load; the legs count as weightless. The volume is off by
+    about half a percent at most, that of a part below a thousandth of the workspace by a few
+    percent. Pieces apart from the others are missed if they contain no node of a grid of 20 nodes
+    on each axis of the workspace's extent and lie beyond the box about the others.
 
     Args:
         design: The manipulator, with its payload and its limits.
         rotation: Platform to base, shape (3, 3); that of the home pose if None.
         load: (F; M) on the platform at the tool point, base axes, shape (6,), in N and N × unit.
-        nodes: Number of nodes on each axis of the first grid within the box about the part.
+        nodes: Least number of nodes on each axis of the last grid within the box about the part.
         tolerance: Tolerance of the solid where other limits bound it, as in
             `explorer.workspace_solid`.
 
@@ -117,11 +132,11 @@ def held_workspace(
     whole = workspace_solid(design, r, tolerance, volume=exact)
     if whole.is_empty:
         return HeldWorkspace(exact.volume, 0.0, whole)
-    load_here = _LoadHere(held_load(design, r, w), r, constraints(design, r), part_names(design))
+    load_here = _LoadHere(load_case(design, r, w), r, constraints(design, r), part_names(design))
     solid = _held_part(whole, load_here, nodes)
     if solid.is_empty:
         best = _best_within(whole, load_here)
-        factor = max(0.0, 1.0 + best.value)
+        factor = 1.0 / max(best.share, LEAST_SHARE)
         empty = replace(solid, empty_because=(load_here.part_names[best.part],))
         return HeldWorkspace(exact.volume, 0.0, empty, best.position, factor)
     # The mesh of the whole lacks a share of the exact volume, and so does its part.
@@ -133,41 +148,43 @@ class _LoadHere:
     """A load at one orientation, with the limits of the workspace there.
 
     Attributes:
-        held: What `explorer.statics.held.held_load` returns.
+        case: What `explorer.statics.held.load_case` returns.
         rotation: Platform to base, shape (3, 3).
         limits: Limits of positions.
         part_names: Names of the parts that may give way.
     """
 
-    held: FloatArray
+    case: FloatArray
     rotation: FloatArray
     limits: tuple[Constraint, ...]
     part_names: tuple[str, ...]
 
-    def values(self, positions: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Return what `explorer.statics.held.held_values` does at positions (n, 3)."""
-        return held_values(self.held, self.rotation, positions)
-
     def holds(self, positions: FloatArray) -> BoolArray:
         """Return at which positions (n, 3) the parts hold the load, shape (n,)."""
-        return self.values(positions)[0] >= 0.0
+        return largest_shares(self.case, self.rotation, positions)[0] <= 1.0
 
     def allows(self, positions: FloatArray) -> BoolArray:
         """Return which positions (n, 3) keep the limits of the workspace, shape (n,)."""
         return np.asarray((slacks(self.limits, positions) >= 0.0).all(axis=-1))
 
+    def is_near(self, positions: FloatArray, distance: float) -> BoolArray:
+        """Return which positions (n, 3) may be nearer to the workspace than a distance, (n,)."""
+        # The slack of a cone is an angle.
+        limits = tuple(limit for limit in self.limits if not isinstance(limit, Cone))
+        return np.asarray((slacks(limits, positions) >= -distance).all(axis=-1))
 
-class _Best(NamedTuple):
-    """The position where the largest share of a limit is least, of those that were tried.
+
+class Best(NamedTuple):
+    """A position where the largest share of a limit is least, of those that were tried.
 
     Attributes:
         position: b4 in the base frame, shape (3,).
-        value: Value there of the function of `explorer.statics.held`.
+        share: The share.
         part: Index of the part of the machine with that share.
     """
 
     position: FloatArray
-    value: float
+    share: float
     part: int
 
 
@@ -175,24 +192,26 @@ def _held_part(whole: Solid, load: _LoadHere, nodes: int) -> Solid:
     """Return the part of a workspace that holds a load.
 
     It is carved out of a box about the nodes of a coarse grid that hold the load, which grows on
-    each side on which the part goes on beyond it. The grid within the box becomes finer while it
-    misses too much of the part. If no node holds the load, the best position
-    within the limits counts; the part is empty if that does not hold it either.
+    each side on which the part goes on beyond it. The grid within the box becomes finer until the
+    volume hardly changes. If no node holds the load, the best position within the limits counts;
+    the part is empty if that does not hold it either.
     """
     grid = _coarse_grid(whole)
-    positions = np.vstack([grid.positions.reshape(-1, 3), whole.vertices])
-    kept = positions[load.holds(positions)]
+    positions = grid.positions.reshape(-1, 3)
+    kept = positions[load.holds(positions) & load.allows(positions)]
     if not len(kept):
         best = _best_within(whole, load)
-        if best.value < 0.0:
+        if best.share > 1.0:
             return replace(whole, vertices=kept, faces=whole.faces[:0])
         kept = best.position[None]
-    box = np.array([kept.min(axis=0) - grid.step, kept.max(axis=0) + grid.step])
+    around = AROUND * grid.step
+    box = np.array([kept.min(axis=0) - around, kept.max(axis=0) + around])
+    count, most, volume = math.ceil(nodes / FINER), max(nodes, FINEST), -math.inf
     while True:
         near, side_of_limit = _crop(whole, box)
         if near.is_empty:
             return _without_limits(near, set(side_of_limit))
-        part, missed = _carve(near, load, nodes)
+        part, step = _carve(near, load, count)
         bounding = {side_of_limit.get(limit) for limit in np.unique(part.limit_of_face).tolist()}
         open_sides = [side for side in bounding if side is not None]
         if open_sides:
@@ -200,12 +219,13 @@ def _held_part(whole: Solid, load: _LoadHere, nodes: int) -> Solid:
             for end, axis in open_sides:
                 box[end, axis] += (-GROWTH, GROWTH)[end] * size[axis]
             continue
-        if missed.volume <= MISSED * part.volume or nodes >= FINEST:
+        before, volume = volume, part.volume
+        if 0.0 < abs(volume - before) <= SETTLED * volume or count >= most:
             return _without_limits(part, set(side_of_limit))
-        nodes = min(FINEST, math.ceil(FINER * nodes))
-        seen = np.vstack([part.vertices, missed.positions])
-        box[0] = np.maximum(box[0], seen.min(axis=0) - missed.step)
-        box[1] = np.minimum(box[1], seen.max(axis=0) + missed.step)
+        count = min(most, math.ceil(FINER * count))
+        seen = np.vstack([part.vertices, kept])
+        box[0] = np.maximum(box[0], seen.min(axis=0) - step)
+        box[1] = np.minimum(box[1], seen.max(axis=0) + step)
 
 
 def _crop(whole: Solid, box: FloatArray) -> tuple[Solid, dict[int, tuple[int, int]]]:
@@ -232,79 +252,121 @@ def _without_limits(solid: Solid, dropped: set[int]) -> Solid:
     return replace(solid, limit_of_face=new, limits=tuple(solid.limits[index] for index in kept))
 
 
-class _Missed(NamedTuple):
-    """What a grid misses of a part: centres of cells that hold the load though no corner does.
-
-    Attributes:
-        positions: The centres, shape (n, 3).
-        step: Size of a cell on each axis, shape (3,).
-    """
-
-    positions: FloatArray
-    step: FloatArray
-
-    @property
-    def volume(self) -> float:
-        """Volume of these cells."""
-        return len(self.positions) * float(np.prod(self.step))
-
-
-def _carve(near: Solid, load: _LoadHere, nodes: int) -> tuple[Solid, _Missed]:
-    """Return the positions of a solid that hold a load, by a grid, and what that misses."""
+def _carve(near: Solid, load: _LoadHere, nodes: int) -> tuple[Solid, FloatArray]:
+    """Return the positions of a solid that hold a load, by a grid, and the step of that."""
     lows, highs = near.vertices.min(axis=0), near.vertices.max(axis=0)
     grid = make_grid(lows, highs, nodes, BEYOND)
-    values = load.values(grid.positions.reshape(-1, 3))[0].reshape(grid.counts)
-    highest = values
+    positions = grid.positions.reshape(-1, 3)
+    limits = np.flatnonzero(np.isfinite(load.case[LIMITS:INWARD]))
+    values = limit_values(load.case, load.rotation, limits, positions)
+    # Two limits may have the same surface, such as those of a part without a load of one direction.
+    distinct = np.sort(np.unique(np.round(values, SAME_DIGITS), axis=0, return_index=True)[1])
+    limits, values = limits[distinct], values[distinct].reshape(-1, *grid.counts)
+    left = load.is_near(positions, float(np.linalg.norm(grid.step))).reshape(grid.counts)
+
+    def settle(limit: int, left: BoolArray, points: FloatArray, beside: FloatArray) -> FloatArray:
+        """Move the points onto the limit that other limits have not yet removed."""
+        nodes = np.rint((beside - grid.lows) / grid.step).astype(np.int64)
+        chosen, settled = left[tuple(nodes.T)], points.copy()
+        rows = points[chosen], beside[chosen], grid.step
+        settled[chosen] = settle_on_limit(load.case, load.rotation, limit, *rows)
+        return settled
+
+    def surfaces() -> Iterator[Surface]:
+        remaining, waiting = left, set(range(len(limits)))
+        while waiting:
+            # What most nodes exceed comes first: less remains for the others.
+            counts = {k: int(np.count_nonzero((values[k] < 0.0) & remaining)) for k in waiting}
+            index = max(waiting, key=lambda k: counts[k])
+            if not counts[index]:
+                return
+            waiting.remove(index)
+            limit = int(limits[index])
+            name = load.part_names[limit % PARTS]
+            own = partial(settle, limit, remaining)
+            yield Surface(values[index], grid.lows, grid.step, own, (name,))
+            remaining = remaining & (_highest_around(values[index]) >= 0.0)
+
+    return carved_solid(near, surfaces()), grid.step
+
+
+def _highest_around(values: FloatArray) -> FloatArray:
+    """Return the highest of the values at each node of a grid and at its neighbours."""
     for axis in range(3):
-        beside = np.moveaxis(highest, axis, 0)
-        highest = np.moveaxis(np.maximum(beside[1:], beside[:-1]), 0, axis)
-    centres = grid.positions[:-1, :-1, :-1][highest < 0.0] + 0.5 * grid.step
-    centres = centres[load.holds(centres)]
-    centres = centres[load.allows(centres)]
-    # The surface of what is cut out is closed beyond the workspace.
-    for axis in range(3):
-        np.moveaxis(values, axis, 0)[[0, -1]] = HIGHEST
-
-    def settle(points: FloatArray, beside: FloatArray) -> FloatArray:
-        return settle_on_limit(load.held, load.rotation, points, beside, grid.step)
-
-    def part_at(points: FloatArray) -> IntArray:
-        return load.values(points)[1]
-
-    surface = Surface(values, grid.lows, grid.step, settle, load.part_names, part_at)
-    return carved_solid(near, surface), _Missed(centres, grid.step)
+        padded = np.pad(values, [(int(k == axis),) * 2 for k in range(3)], mode="edge")
+        rows = np.moveaxis(padded, axis, 0)
+        values = np.moveaxis(np.maximum(np.maximum(rows[:-2], rows[1:-1]), rows[2:]), 0, axis)
+    return values
 
 
-def _best_within(whole: Solid, load: _LoadHere) -> _Best:
-    """Return the best position found within the limits.
-
-    Grids about the best nodes of the coarse grid that lie apart follow the largest values, and
-    shrink where none is larger.
-    """
+def _best_within(whole: Solid, load: _LoadHere) -> Best:
+    """Return the best position found within the limits."""
     grid = _coarse_grid(whole)
-    nodes = grid.positions.reshape(-1, 3)
-    at = np.vstack([whole.vertices, nodes[load.allows(nodes)]])
-    values, parts = load.values(at)
+    tried = np.vstack([whole.vertices, positions_within(whole, grid, load.allows)])
+    shares = partial(largest_shares, load.case, load.rotation)
+    return min(best_positions(tried, grid.step, shares, load.allows), key=lambda best: best.share)
+
+
+def positions_within(
+    whole: Solid, grid: Grid, allows: Callable[[FloatArray], BoolArray]
+) -> FloatArray:
+    """Return allowed positions all over a workspace, shape (n, 3).
+
+    They are nodes of a grid, and middles between vertices, which a thin workspace also has.
+
+    Args:
+        whole: The workspace.
+        grid: Grid over its extent.
+        allows: Function of positions (n, 3) to whether they are allowed, (n,).
+    """
+    vertices = whole.vertices
+    others = np.random.default_rng(0).permutation(len(vertices))
+    middles = 0.5 * (vertices + vertices[others])
+    tried = np.vstack([grid.positions.reshape(-1, 3), middles])
+    return tried[allows(tried)]
+
+
+def best_positions(
+    tried: FloatArray,
+    step: FloatArray,
+    shares: Callable[[FloatArray], tuple[FloatArray, IntArray]],
+    allows: Callable[[FloatArray], BoolArray],
+    enough: float = 0.0,
+) -> list[Best]:
+    """Return positions where the largest share of a limit has a local minimum.
+
+    Grids about the best of the positions given that lie apart follow the least shares, and
+    shrink where none is less.
+
+    Args:
+        tried: Positions that are allowed, shape (n, 3), n > 0.
+        step: Distance of these on each axis, shape (3,).
+        shares: Function of positions (n, 3) to the largest shares and the parts, (n,) each.
+        allows: Function of positions (n, 3) to whether they are allowed, (n,).
+        enough: Share at which a search for a lesser one ends.
+    """
+    values, parts = shares(tried)
     cube = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, FOLLOWING)] * 3), axis=-1).reshape(-1, 3)
-    best, left = _Best(at[0], -np.inf, 0), np.argsort(values)[::-1]
-    for _ in range(STARTS):
-        if not len(left):
-            break
+    found: list[Best] = []
+    left = np.argsort(values)
+    while len(left) and len(found) < STARTS:
         first = int(left[0])
-        here = _Best(at[first], float(values[first]), int(parts[first]))
-        left = left[(np.abs(at[left] - here.position) > APART * grid.step).any(axis=1)]
+        best = Best(tried[first], float(values[first]), int(parts[first]))
+        left = left[(np.abs(tried[left] - best.position) > APART * step).any(axis=1)]
         size = 1.0
         for _ in range(ROUNDS):
-            near = here.position + size * grid.step * cube
-            near = near[load.allows(near)]
-            found, of = load.values(near)
-            if len(near) and found.max() > here.value:
-                index = int(found.argmax())
-                here = _Best(near[index], float(found[index]), int(of[index]))
+            if best.share <= enough:
+                break
+            near = best.position + size * step * cube
+            near = near[allows(near)]
+            around, of = shares(near)
+            if len(near) and around.min() < best.share:
+                index = int(around.argmin())
+                best = Best(near[index], float(around[index]), int(of[index]))
             else:
                 size *= 0.5
-        best = max(best, here, key=lambda each: each.value)
-    return best
+        found.append(best)
+    return found
 
 
 def _coarse_grid(whole: Solid) -> Grid:

@@ -1,30 +1,37 @@
 """The nearest position at which a load is held, at one orientation and without a singular plane.
 
-Nodes of a grid over all positions that the limits allow are tried first. From the nearest ones that
-hold the load, descents of the distance follow, along the limits of the machine and of the design. A
-region of such positions that contains no node of the grid may be missed.
+Positions all over the workspace of the pose's mode are tried first. From the nearest ones that hold
+the load, descents of the distance follow, along the limits of the machine and of the design. Finer
+grids between the pose and what is found, and descents of the largest share there, find nearer
+regions; one that is small beside the cells of all these grids may be missed.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_signs
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.descent import descend
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, reactions
-from explorer.workspace.limits.constraints import constraints, home_signs, slacks
+from explorer.workspace.accessible.nodes import make_grid
+from explorer.workspace.held import best_positions, positions_within
+from explorer.workspace.limits.constraints import Constraint, constraints, slacks
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
+from explorer.workspace.solids.solids import workspace_solid
 
 NODES = 25
-"""Number of nodes of the grid on each axis."""
-# Number of nodes from which descents begin.
-BEGINNINGS = 6
-# Share of a limit that is kept free, and the largest share that a descent sees.
-KEPT, FAR = 1e-6, 100.0
+"""Number of nodes of each grid on each axis."""
+# Number of positions from which descents begin, and of grids between the pose and what is found.
+BEGINNINGS, ROUNDS = 6, 4
+# Share of a limit that is kept free, the largest share that a descent sees, and the share of its
+# distance by which a position must be nearer.
+KEPT, FAR, NEARER = 1e-6, 100.0, 1e-6
 
 
 def nearest_held(loaded: LoadedPose) -> Pose | None:
@@ -36,71 +43,121 @@ def nearest_held(loaded: LoadedPose) -> Pose | None:
     Args:
         loaded: A pose under a load and weights.
     """
-    design, here = loaded.design, np.array(loaded.pose.position)
-    lows, highs = _bounds(design, loaded.pose.rotation)
-    if (lows > highs).any():
+    signs = _signs_of(loaded)
+    whole = workspace_solid(loaded.design, loaded.pose.rotation, signs=signs)
+    if whole.is_empty:
         return None
-    steps = np.linspace(0.0, 1.0, NODES)
-    axes = [low + steps * (high - low) for low, high in zip(lows, highs, strict=True)]
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    nodes = np.vstack([here[None], nodes])
-    found = nodes[_holds(loaded, nodes)]
-    if not len(found):
+    limits = constraints(loaded.design, loaded.pose.rotation, signs)
+    search = _Search(loaded, Rules.of(loaded.design, signs), limits)
+    ends = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
+    grid = make_grid(*ends, NODES, 0)
+    tried = np.vstack([search.here, positions_within(whole, grid, search.allows)])
+    found = search.nearest(tried, grid.step)
+    for _ in range(ROUNDS):
+        if found is None or not search.distance(found[None]).all():
+            break
+        distance = float(search.distance(found[None])[0])
+        lows = np.maximum(ends[0], search.here - distance)
+        highs = np.minimum(ends[1], search.here + distance)
+        grid = make_grid(lows, highs, NODES, 0)
+        tried = grid.positions.reshape(-1, 3)
+        tried = tried[search.distance(tried) < (1.0 - NEARER) * distance]
+        nearer = search.nearest(tried[search.allows(tried)], grid.step)
+        if nearer is None or search.distance(nearer[None])[0] >= (1.0 - NEARER) * distance:
+            break
+        found = nearer
+    if found is None:
         return None
-    near = np.linalg.norm(found - here, axis=1).argsort()[:BEGINNINGS]
-    settled = [_settled(loaded, start) for start in found[near]]
-    # Clearances are no constraints of the descent, so that it may end where legs collide.
-    tried = np.vstack([found[near], *settled])
-    held = tried[_holds(loaded, tried)]
-    x, y, z = held[np.linalg.norm(held - here, axis=1).argmin()].tolist()
+    x, y, z = found.tolist()
     return Pose((x, y, z), loaded.pose.quaternion)
 
 
-def _settled(loaded: LoadedPose, start: FloatArray) -> FloatArray:
-    """Return the position to which a descent of the distance leads along the limits, shape (3,)."""
-    reach, here = loaded.design.reach, np.array(loaded.pose.position)
-    limits = constraints(loaded.design, loaded.pose.rotation)
-
-    def distance(at: FloatArray) -> tuple[float, FloatArray]:
-        apart = at - here / reach
-        return float(apart @ apart), 2.0 * apart
-
-    def spare(at: FloatArray) -> FloatArray:
-        # Near a singular plane shares are infinite, and the descent turns back.
-        shares = np.minimum(_shares(loaded, reach * at), FAR)
-        return np.concatenate([1.0 - KEPT - shares, slacks(limits, reach * at) / reach])
-
-    found = descend(distance, spare, start / reach)
-    return start if found is None else reach * found
-
-
-def _holds(loaded: LoadedPose, positions: FloatArray) -> BoolArray:
-    """Return at which positions (n, 3) the load is held within all limits and signs, shape (n,)."""
-    design, pose = loaded.design, loaded.pose
-    here = np.sign(margins(pose.position, pose.rotation)).tolist()
-    # A margin of zero has no sign of its own.
+def _signs_of(loaded: LoadedPose) -> tuple[int, int, int]:
+    """Return the signs of the margins of a pose; those of home for margins of zero."""
+    pose = loaded.pose
+    own = np.sign(margins(pose.position, pose.rotation)).astype(np.int64).tolist()
     first, second, third = (
-        int(own) or home for own, home in zip(here, home_signs(design), strict=True)
+        sign or home for sign, home in zip(own, home_signs(loaded.design), strict=True)
     )
-    rules = Rules.of(design, (first, second, third))
-    valid = poses_are_valid(design, positions, pose.rotation, rules=rules)
-    valid[valid] = (_shares(loaded, positions[valid]) <= 1.0).all(axis=-1)
-    return valid
+    return first, second, third
 
 
-def _shares(loaded: LoadedPose, positions: FloatArray) -> FloatArray:
-    """Return the shares of the limits at positions (..., 3), shape (..., 12)."""
-    design, rotation = loaded.design, loaded.pose.rotation
-    held = reactions(design, positions, rotation, loaded.load, loaded.tool, loaded.weights)
-    return limit_shares(design, held)
+@dataclass(frozen=True)
+class _Search:
+    """A search for positions that hold a load.
 
+    Attributes:
+        loaded: The pose under the load.
+        rules: All demands on a pose, in the mode of the given one.
+        limits: The same limits of positions, without clearances.
+    """
 
-def _bounds(design: Design, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return lows and highs of the positions that the lengths of legs 1 and 4 and the box allow."""
-    b1, a3 = rotation @ np.array([*design.b1, 0.0]), np.array([*design.a3, 0.0])
-    l1, l4 = (design.length_range(name)[1] for name in ("l1", "l4"))
-    lows, highs = np.maximum(a3 - l4, -b1 - l1), np.minimum(a3 + l4, l1 - b1)
-    if design.limits.box is not None:
-        lows = np.maximum(lows, design.limits.box[0])
-        highs = np.minimum(highs, design.limits.box[1])
-    return lows, highs
+    loaded: LoadedPose
+    rules: Rules
+    limits: tuple[Constraint, ...]
+
+    @property
+    def here(self) -> FloatArray:
+        """Position of the pose, shape (3,)."""
+        return np.array(self.loaded.pose.position)
+
+    def distance(self, positions: FloatArray) -> FloatArray:
+        """Return the distances of positions (n, 3) from the pose, shape (n,)."""
+        return np.asarray(np.linalg.norm(positions - self.here, axis=1))
+
+    def allows(self, positions: FloatArray) -> BoolArray:
+        """Return which positions (n, 3) keep all limits and clearances, shape (n,)."""
+        design, rotation = self.loaded.design, self.loaded.pose.rotation
+        return poses_are_valid(design, positions, rotation, rules=self.rules)
+
+    def largest(self, positions: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Return the largest shares of a limit at positions (n, 3), and the parts, (n,) each."""
+        shares = self._shares(positions)
+        return shares.max(axis=-1), shares.argmax(axis=-1)
+
+    def nearest(self, tried: FloatArray, step: FloatArray) -> FloatArray | None:
+        """Return the nearest position that is found from allowed ones on a grid, shape (3,)."""
+        if not len(tried):
+            return None
+        holds = self.largest(tried)[0] <= 1.0
+        starts, others = tried[holds], tried[~holds]
+        if len(others):
+            better = best_positions(others, step, self.largest, self.allows, 1.0 - KEPT)
+            starts = np.vstack([starts, *(best.position for best in better if best.share <= 1.0)])
+        if not len(starts):
+            return None
+        starts = starts[self.distance(starts).argsort()[:BEGINNINGS]]
+        # Clearances are no constraints of the descent, so that it may end where legs collide.
+        ends = np.vstack([starts, *map(self._settle, starts)])
+        ends = ends[self.allows(ends)]
+        ends = ends[self.largest(ends)[0] <= 1.0]
+        return ends[self.distance(ends).argmin()] if len(ends) else None
+
+    def _settle(self, start: FloatArray) -> FloatArray:
+        """Return where a descent of the distance leads along the limits, shape (3,)."""
+        reach, here = self.loaded.design.reach, self.here
+
+        def distance(at: FloatArray) -> tuple[float, FloatArray]:
+            apart = at - here / reach
+            return float(apart @ apart), 2.0 * apart
+
+        def spare(at: FloatArray) -> FloatArray:
+            # Near a singular plane shares are infinite, and the descent turns back.
+            shares = np.minimum(self._shares(reach * at), FAR)
+            return np.concatenate([1.0 - KEPT - shares, slacks(self.limits, reach * at) / reach])
+
+        found = descend(distance, spare, start / reach)
+        return start if found is None else reach * found
+
+    def _shares(self, positions: FloatArray) -> FloatArray:
+        """Return the shares of the limits at positions (..., 3), shape (..., 12)."""
+        loaded = self.loaded
+        held = reactions(
+            loaded.design,
+            positions,
+            loaded.pose.rotation,
+            loaded.load,
+            loaded.tool,
+            loaded.weights,
+        )
+        return limit_shares(loaded.design, held)

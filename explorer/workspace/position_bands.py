@@ -33,7 +33,7 @@ from explorer.singularity.colours import (
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.accuracy import actuator_errors, worst_error
 from explorer.statics.compliance import compliance, deflection, is_elastic, stiffness_of
-from explorer.statics.held import held_load, largest_shares
+from explorer.statics.held import largest_shares, load_case
 from explorer.statics.reactions import has_limits
 from explorer.statics.weights import payload_wrench
 from explorer.workspace.limits.constraints import constraints, slacks
@@ -83,7 +83,7 @@ class PositionBands:
         levels: The measure at each edge, in units for a margin; infinite at the first for the
             measures of `MEASURE_WORDS`.
         values: Function from positions (n, 3) to values (n,), which are zero in singular ones.
-        held: Row of numbers of a load, see `explorer.statics.held.held_load`; None for a measure
+        case: Row of numbers of a load, see `explorer.statics.held.load_case`; None for a measure
             that no part of the machine has.
     """
 
@@ -92,7 +92,7 @@ class PositionBands:
     colours: tuple[Rgb, ...]
     levels: tuple[float, ...]
     values: Callable[[FloatArray], FloatArray]
-    held: FloatArray | None = None
+    case: FloatArray | None = None
 
 
 def position_bands(
@@ -145,12 +145,12 @@ def position_bands(
             return np.linalg.norm(deflection(soft, wrench)[:, :3], axis=-1) * design.unit_mm
 
         return _unbounded(design, rotation, measure, deflected)
-    held = held_load(design, rotation, w, measured_limits(design, measure))
+    case = load_case(design, rotation, w, measured_limits(design, measure))
 
     def asked(points: FloatArray) -> FloatArray:
-        return largest_shares(held, rotation, points)
+        return largest_shares(case, rotation, points)[0]
 
-    return _unbounded(design, rotation, measure, asked, held)
+    return _unbounded(design, rotation, measure, asked, case)
 
 
 def is_unstated(design: Design, measure: PositionMeasure) -> bool:
@@ -199,7 +199,7 @@ def _unbounded(
     rotation: FloatArray,
     measure: PositionMeasure,
     measured: Callable[[FloatArray], FloatArray],
-    held: FloatArray | None = None,
+    case: FloatArray | None = None,
 ) -> PositionBands:
     """Return the bands of what is infinite in singular positions.
 
@@ -216,7 +216,7 @@ def _unbounded(
         return highest / np.maximum(measured(points), highest / (FARTHEST * edges[-1]))
 
     ends = (math.inf, *reversed(levels))
-    return PositionBands(measure, edges, colours[::-1], ends, values, held)
+    return PositionBands(measure, edges, colours[::-1], ends, values, case)
 
 
 def _round_levels(

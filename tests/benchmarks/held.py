@@ -16,7 +16,7 @@ from benchmarks.timing import best_of
 from explorer import Actuators, Payload, Struts
 from explorer.mechanism.home import home_pose
 from explorer.numerics.compiled import warm
-from explorer.statics.held import held_load, held_values
+from explorer.statics.held import largest_shares, load_case
 from explorer.workspace.held import held_workspace
 from explorer.workspace.limits.constraints import constraints, slacks
 
@@ -51,7 +51,7 @@ def _marching_cubes(true: float) -> tuple[int, float, float]:
     measure: Any = importlib.import_module("skimage.measure")
     rotation = home_pose(LOADED).rotation
     limits = constraints(LOADED, rotation)
-    held = held_load(LOADED, rotation, np.zeros(6))
+    case = load_case(LOADED, rotation, np.zeros(6))
     box = LOADED.limits.box or ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     count, taken, error = 10, 0.0, 1.0
     while error > ERROR:
@@ -60,7 +60,7 @@ def _marching_cubes(true: float) -> tuple[int, float, float]:
         axes = [np.linspace(low - 0.5, high + 0.5, count) for low, high in zip(*box, strict=True)]
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         values = slacks(limits, nodes).min(axis=-1)
-        values = np.minimum(values, held_values(held, rotation, nodes)[0])
+        values = np.minimum(values, 1.0 / largest_shares(case, rotation, nodes)[0] - 1.0)
         step = tuple(float(axis[1] - axis[0]) for axis in axes)
         mesh = measure.marching_cubes(values.reshape((count,) * 3), 0.0, spacing=step)
         vertices, faces = np.asarray(mesh[0], dtype=np.float64), np.asarray(mesh[1])

@@ -28,7 +28,7 @@ from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection, stiffness_of
-from explorer.statics.held import held_load, held_values, largest_shares
+from explorer.statics.held import largest_shares, load_case
 from explorer.statics.reactions import PART_NAMES
 from explorer.statics.weights import payload_wrench
 from explorer.workspace.held import part_names
@@ -174,12 +174,12 @@ def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
             position[2] = (0.0, 1e-6, 1e-3)[trial % 3]
         measure: PartMeasure = ("share", "force", "bending")[trial % 3]
         colouring = Colouring(FULL, rotation, measure, 1.0, load)
-        held = colouring.bands.held
-        assert held is not None
-        share = float(largest_shares(held, rotation, position[None])[0])
+        case = colouring.bands.case
+        assert case is not None
+        of_load, of_part = largest_shares(case, rotation, position[None])
+        share, part = float(of_load[0]), int(of_part[0])
         names = part_names(FULL) if measure == "share" else PART_NAMES
-        part = names[int(held_values(held, rotation, position[None])[1][0])]
-        expected.append((share, part))
+        expected.append((share, names[part]))
         cases.append({"facts": map_facts(colouring), "p": position.tolist()})
     tab.wait_for(lambda: bool(tab.page.evaluate("!!window.explorer?.map")), "the script")
     found = tab.page.evaluate(
@@ -295,8 +295,8 @@ def test_map_of_shares_is_read_under_the_pointer(tab: Tab) -> None:
     assert drawing.request.load is not None
     at = np.array([number(where[1]), drawing.level, number(where[2])])
     rotation = np.array(drawing.request.rotation)
-    held = held_load(FULL, rotation, np.array(drawing.request.load))
-    share = float(largest_shares(held, rotation, at[None])[0])
+    case = load_case(FULL, rotation, np.array(drawing.request.load))
+    share = float(largest_shares(case, rotation, at[None])[0][0])
     assert 0.01 * float(found[1].replace(",", "")) == pytest.approx(share, rel=0.02)
     assert found[2] in part_names(FULL)
 

@@ -13,7 +13,7 @@ from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import all_kernels, warm
 from explorer.statics.forces import actuator_forces
-from explorer.statics.held import held_load, held_values, settle_on_limit
+from explorer.statics.held import largest_shares, limit_values, load_case, settle_on_limit
 from explorer.statics.slopes import twist_slopes
 from explorer.workspace.orientations.share import orientation_share
 from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map
@@ -41,12 +41,14 @@ def tilts() -> FloatArray:
 
 
 def regions() -> FloatArray:
-    held = held_load(LOADED, ROTATION, np.zeros(6))
-    at = positions()
-    values, parts = held_values(held, ROTATION, at)
-    beside = np.where(values[:, None] > 0.0, at, np.array(POSITION))
-    settled = settle_on_limit(held, ROTATION, at, beside, np.full(3, 2.0))
-    return np.concatenate([values, parts.astype(np.float64), settled.ravel()])
+    case = load_case(LOADED, ROTATION, np.zeros(6))
+    # The last positions are beyond a singular plane.
+    at = np.vstack([positions(), positions()[:3] * [1.0, 1.0, -0.1]])
+    shares, parts = largest_shares(case, ROTATION, at)
+    values = limit_values(case, ROTATION, np.arange(20), at)
+    low, high = np.floor(at / 2.0) * 2.0, np.ceil(at / 2.0) * 2.0
+    settled = settle_on_limit(case, ROTATION, 2, 0.7 * low + 0.3 * high, low, np.full(3, 2.0))
+    return np.concatenate([shares, parts.astype(np.float64), values.ravel(), settled.ravel()])
 
 
 def dips() -> FloatArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from explorer import (
     PRESETS,
@@ -14,15 +14,19 @@ from explorer import (
     DesignError,
     Guide,
     Payload,
+    Pose,
     Struts,
     Tool,
     largest_payload,
     limit_shares,
     reactions,
+    rotation_from_yaw_pitch_roll,
 )
-from explorer.mechanism.home import home_pose
+from explorer.mechanism.home import home_pose, home_signs
+from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.held import HIGHEST, held_load, held_values
+from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.statics.held import largest_shares, limit_values, load_case
 from explorer.statics.reactions import part_limits
 from explorer.statics.weights import design_weights
 
@@ -83,19 +87,46 @@ def test_kernel_of_regions_has_the_same_shares(force: float) -> None:
     design, at = loaded(force), positions(300)
     load = np.array([3.0, -2.0, 5.0, 10.0, -20.0, 5.0])
     expected = shares(design, at, load).max(axis=1)
-    values, parts = held_values(held_load(design, ROTATION, load), ROTATION, at)
-    assert_allclose(values + 1.0, np.minimum(1.0 / expected, 1.0 + HIGHEST), rtol=1e-9)
+    case = load_case(design, ROTATION, load)
+    found, parts = largest_shares(case, ROTATION, at)
+    assert_allclose(found, expected, rtol=1e-9)
     assert set(parts.tolist()) <= set(range(part_limits(design).shape[1]))
+    least = limit_values(case, ROTATION, np.arange(20), at).min(axis=0)
+    assert (np.abs(found - 1.0) > 1e-9).all()
+    assert_array_equal(least > 0.0, found < 1.0)
 
 
-def test_function_of_regions_falls_through_singular_planes() -> None:
-    design = loaded(5.0)
-    held = held_load(design, ROTATION, np.zeros(6))
-    heights = np.linspace(0.2, -0.2, 41)
-    at = np.array([10.0, 5.0, 0.0]) + heights[:, None] * [0.0, 0.0, 1.0]
-    values = held_values(held, ROTATION, at)[0]
-    assert values[20] == -1.0
-    assert (np.diff(values) < 1e-12).all()
+def test_functions_of_limits_cross_a_singular_plane_without_fold_or_jump() -> None:
+    """f(l4) grows towards δ3 = 0; without a moment about b4 f(l1) does not."""
+    design = msgspec.structs.replace(
+        loaded(0.0),
+        tool=Tool(),
+        payload=Payload(),
+        actuators=Actuators(push_n=(15, 15, 15, 15, 15, 15)),
+    )
+    rotation = rotation_from_yaw_pitch_roll((-73.1, 40.0, 30.0))
+    design = msgspec.structs.replace(design, home=Pose.of((10.0, 5.0, 9.0), rotation))
+    case = load_case(design, rotation, np.array([3.0, -2.0, -10.0, 0.0, 0.0, 0.0]))
+    heights = np.linspace(0.01, -0.01, 41)[:, None]
+
+    def across(plane: int) -> FloatArray:
+        """Return the functions along a line across a face of the home mode."""
+        inward = planes_of_singularity(rotation)[plane] * home_signs(design)[plane]
+        at = np.random.default_rng(2).uniform(-20.0, 20.0, (500, 3))
+        at -= (at @ inward)[:, None] * inward
+        depths = margins(at, rotation) * home_signs(design)
+        depths[:, plane] = np.inf
+        inner = at[depths.min(axis=1).argmax()]
+        return limit_values(case, rotation, np.arange(20), inner + heights * inward)
+
+    values = across(2)[[5, 15]]
+    grows = values[values[:, 20].argmin()]
+    assert grows[20] == pytest.approx(-1.0, abs=1e-6)
+    assert (np.diff(grows) < 1e-12).all()
+    values = across(0)
+    assert values[[0, 10]] == pytest.approx(1.0, abs=1e-6)
+    assert values.min() > -1.0
+    assert np.abs(np.diff(values, n=2)).max() < 1e-4
 
 
 def test_force_below_zero_is_refused() -> None:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import json
+
 import msgspec
 import numpy as np
 import pytest
+from reference import read_reference
 
 from explorer import PRESETS, Actuators, Design, Limits, Payload, Struts, Tool
+from explorer.mechanism.design_file import decode_design
 from explorer.mechanism.home import home_pose
-from explorer.mechanism.margins import margins
+from explorer.mechanism.margins import margins, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, reactions
-from explorer.workspace.limits.valid_poses import poses_are_valid
+from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 from explorer.workspace.nearest_held import nearest_held
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -31,31 +35,52 @@ LOAD = (0.0, 0.0, -10.0, 0.0, 0.0, 0.0)
 def distances_held(loaded: LoadedPose, positions: FloatArray) -> FloatArray:
     """Return the distances of those positions that hold the load in the mode of the pose."""
     design, pose = loaded.design, loaded.pose
-    signs = np.sign(margins(positions, pose.rotation)) == np.sign(
-        margins(pose.position, pose.rotation)
-    )
-    kept = positions[signs.all(axis=1) & poses_are_valid(design, positions, pose.rotation)]
+    rules = Rules.of(design, signs_of(int(mode_of(margins(pose.position, pose.rotation)))))
+    kept = positions[poses_are_valid(design, positions, pose.rotation, rules=rules)]
     tool, weights = design.tool.position, loaded.weights
     held = reactions(design, kept, pose.rotation, loaded.load, tool, weights)
     kept = kept[(limit_shares(design, held) <= 1.0).all(axis=1)]
     return np.linalg.norm(kept - np.array(pose.position), axis=1)
 
 
-@pytest.mark.parametrize("at", [(10.0, 5.0, 9.0), (10.0, 5.0, 2.0), (4.0, 2.0, 3.0), (12, -3, 5)])
-def test_no_random_position_that_holds_the_load_is_nearer(at: tuple[float, float, float]) -> None:
-    loaded = LoadedPose(LIMITED, Pose(at, HOME.quaternion), LOAD)
+def check_none_is_nearer(loaded: LoadedPose) -> None:
+    """Check that a position is found and that no random position that holds is nearer."""
     assert loaded.share > 1.0
     found = nearest_held(loaded)
     assert found is not None
-    assert found.quaternion == HOME.quaternion
-    distance = float(np.linalg.norm(np.subtract(found.position, at)))
+    assert found.quaternion == loaded.pose.quaternion
+    distance = float(np.linalg.norm(np.subtract(found.position, loaded.pose.position)))
     assert len(distances_held(loaded, np.array([found.position]))) == 1
     rng = np.random.default_rng(5)
     ball = rng.normal(size=(80_000, 3))
     radii = distance * rng.uniform(size=len(ball)) ** (1 / 3)
     ball *= (radii / np.linalg.norm(ball, axis=1))[:, None]
-    nearer = distances_held(loaded, np.array(at) + ball)
-    assert (nearer >= distance - 1e-5 * LIMITED.reach).all()
+    nearer = distances_held(loaded, np.array(loaded.pose.position) + ball)
+    assert (nearer >= distance - 1e-5 * loaded.design.reach).all()
+
+
+@pytest.mark.parametrize("at", [(10.0, 5.0, 9.0), (10.0, 5.0, 2.0), (4.0, 2.0, 3.0), (12, -3, 5)])
+def test_no_random_position_that_holds_the_load_is_nearer(at: tuple[float, float, float]) -> None:
+    check_none_is_nearer(LoadedPose(LIMITED, Pose(at, HOME.quaternion), LOAD))
+
+
+def test_small_part_far_from_the_pose_is_found() -> None:
+    case = read_reference("held")["nearest"]
+    design = decode_design(json.dumps(case["design"]).encode(), "the reference")
+    pose = Pose.of(case["start"], np.array(case["rotation"]))
+    loaded = LoadedPose(design, pose, tuple(case["load"]))
+    check_none_is_nearer(loaded)
+    found = nearest_held(loaded)
+    assert found is not None
+    far = np.linalg.norm(np.subtract(case["holds_at"], case["start"]))
+    assert np.linalg.norm(np.subtract(found.position, case["start"])) <= far
+
+
+@pytest.mark.parametrize("margin", [None, 0.0, 0.5])
+def test_mode_of_the_pose_counts_in_another_mode_than_home(margin: float | None) -> None:
+    design = msgspec.structs.replace(LIMITED, limits=Limits(margin=margin))
+    pose = Pose((10.0, 5.0, -2.0), HOME.quaternion)
+    check_none_is_nearer(LoadedPose(design, pose, LOAD))
 
 
 def test_a_position_that_holds_the_load_is_its_own_nearest() -> None:

@@ -142,7 +142,7 @@ def test_solid_not_refined_disagrees_and_so_do_its_parts(
     up = np.array([0.0, 0.0, 1.0])
     assert convex_hull(solid).agrees is False
     assert cut_solid(solid, HalfSpace("cut", up, float(middle[2]))).agrees is False
-    assert carved_solid(solid, None, middle).agrees is False
+    assert carved_solid(solid, [], middle).agrees is False
 
 
 def test_solid_with_a_known_volume_computes_none(

@@ -257,8 +257,8 @@ class _Carver:
 
     def carve(self, pairs: Sequence[int]) -> tuple[Solid, float]:
         """Cut out collisions of some pairs; return the part with the start, and its volume."""
-        surface = self._surface(pairs) if pairs else None
-        solid = carved_solid(self.whole, surface, self.start)
+        surfaces = [self._surface(pairs)] if pairs else []
+        solid = carved_solid(self.whole, surfaces, self.start)
         # Both meshes lack the same volume at the limits, so it cancels in their difference.
         return solid, max(0.0, self.volume - max(0.0, self.whole.volume - solid.volume))
 

@@ -5,8 +5,7 @@ Each face of a mesh has the limit that it comes from.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -40,14 +39,17 @@ from explorer.workspace.solids.solid import Solid
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
-
 # Divisor of the tolerance in each round of refining a mesh that does not agree, the most rounds,
 # and the most faces of all primitives together.
 FINER = 4.0
 MOST_ROUNDS = 10
 MOST_REFINED = 60_000
 
+# Cells beyond the bounding box of a body at which what a surface removes from it is closed.
+AROUND = 2
+
+# Digits of coordinates, in the frame of a mesh, to which the corners of a hull are told apart.
+HULL_DIGITS = 12
 HULL = "convex hull"
 """The name in `Solid.limits` for the faces of a convex hull."""
 
@@ -58,6 +60,7 @@ def workspace_solid(
     tolerance: float | None = None,
     *,
     volume: Volume | None = None,
+    signs: tuple[int, int, int] | None = None,
 ) -> Solid:
     """Return the constant-orientation workspace as a mesh.
 
@@ -70,13 +73,14 @@ def workspace_solid(
         tolerance: Largest distance of a face from the true surface, in design units; a 500th of
             the reach or of the workspace's extent, whichever is smaller, if None.
         volume: The exact volume, if it has been computed before.
+        signs: Sign triple to demand instead of the home's, even if no margin is demanded.
 
     Raises:
         InputError: not a rotation, or a tolerance that is not positive or too small.
         ExplorerError: a boolean fails.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
-    limits = constraints(design, r)
+    limits = constraints(design, r, signs)
     solid = _make_agreeing_solid(
         limits, frame_of([limits], design.reach, tolerance), exact_volume(limits, volume)
     )
@@ -91,10 +95,11 @@ class Surface:
         values: Values at the nodes, shape (nx, ny, nz); the set below zero is removed.
         lows: Position of the first node, in design units, shape (3,).
         step: Distance of nodes on each axis, in design units, shape (3,).
-        settle: Function of points on the interpolated surface and of a remaining node beside each,
-            both of shape (n, 3), that returns points on the true surface.
+        settle: Function of points on the interpolated surface and of the remaining end of the edge
+            of each, both of shape (n, 3), that returns points on the true surface.
         names: Names in `Solid.limits` for faces of the surface.
-        name_of: Function of points (n, 3) that returns the indices of their names, shape (n,).
+        name_of: Function of points (n, 3) that returns the indices of their names, shape (n,);
+            None if there is one name.
     """
 
     values: FloatArray
@@ -102,15 +107,17 @@ class Surface:
     step: FloatArray
     settle: Callable[[FloatArray, FloatArray], FloatArray]
     names: tuple[str, ...]
-    name_of: Callable[[FloatArray], IntArray]
+    name_of: Callable[[FloatArray], IntArray] | None = None
 
 
-def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray | None = None) -> Solid:
-    """Return a workspace less what a surface removes.
+def carved_solid(
+    whole: Solid, surfaces: Iterable[Surface], seed: FloatArray | None = None
+) -> Solid:
+    """Return a workspace less what surfaces remove.
 
     Args:
         whole: The workspace.
-        surface: The surface, or None to remove nothing.
+        surfaces: The surfaces.
         seed: Position in the part to return, shape (3,); None for all parts.
 
     Raises:
@@ -120,12 +127,14 @@ def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray | None 
 
     if whole.is_empty:
         return whole
-    names = whole.limits
     body, frame, origins = _body_of(whole)
-    if surface is not None:
+    carved: list[Surface] = []
+    for surface in surfaces:
         face_id = Manifold.reserve_ids(1)
-        origins[face_id] = len(names)
-        body = body - _below_zero(surface, frame, face_id)
+        origins[face_id] = len(whole.limits) + len(carved)
+        carved.append(surface)
+        body = body - _below_zero(surface, frame, face_id, body)
+    names = tuple(dict.fromkeys((*whole.limits, *(n for s in carved for n in s.names))))
     pieces = [body] if seed is None else body.decompose() or [body]
     parts = [
         replace(_solid_of(part, origins, frame, names), agrees=whole.agrees) for part in pieces
@@ -139,31 +148,48 @@ def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray | None 
         return round(part.winding(seed), 1), -distance
 
     solid = parts[0] if seed is None else max(parts, key=nearness)
-    if surface is None:
-        return solid
     limit_of_face = solid.limit_of_face.copy()
-    carved = np.flatnonzero(limit_of_face == len(names))
-    centres = solid.vertices[solid.faces[carved]].mean(axis=1)
-    limit_of_face[carved] = len(names) + surface.name_of(centres)
-    return replace(solid, limit_of_face=limit_of_face, limits=(*names, *surface.names))
+    for index, surface in enumerate(carved, len(whole.limits)):
+        faces = np.flatnonzero(solid.limit_of_face == index)
+        centres = solid.vertices[solid.faces[faces]].mean(axis=1)
+        own = surface.name_of(centres) if surface.name_of else np.zeros(len(faces), dtype=np.int64)
+        limit_of_face[faces] = np.array([names.index(name) for name in surface.names])[own]
+    return replace(solid, limit_of_face=limit_of_face)
 
 
-def _below_zero(surface: Surface, frame: Frame, face_id: int) -> Manifold:
-    """Return the set below zero of a surface as a body in a frame, with one id for its faces."""
+def _below_zero(surface: Surface, frame: Frame, face_id: int, near: Manifold) -> Manifold:
+    """Return the set below zero of a surface as a body in a frame, with one id for its faces.
+
+    It is closed a little beyond the bounding box of the body that it is removed from.
+    """
     from manifold3d import Manifold
 
-    negative = np.argwhere(surface.values < 0.0)
+    if near.is_empty():
+        return Manifold()
+    untyped: Any = near
+    box = np.array(untyped.bounding_box(), dtype=np.float64)
+    ends = frame.to_design(box.reshape(2, 3))
+    nodes = (ends - surface.lows) / surface.step
+    first = np.maximum(np.floor(nodes[0]).astype(np.int64) - AROUND, 0)
+    end = np.ceil(nodes[1]).astype(np.int64) + AROUND + 1
+    values = surface.values[tuple(map(slice, first, end))].copy()
+    negative = np.argwhere(values < 0.0)
     if not len(negative):
         return Manifold()
-    first = np.maximum(negative.min(axis=0) - 1, 0)
-    end = np.minimum(negative.max(axis=0) + 2, surface.values.shape)
-    x, y, z = (slice(int(a), int(b)) for a, b in zip(first, end, strict=True))
-    values, lows = surface.values[x, y, z], surface.lows + first * surface.step
+    highest = -float(values.min())
+    for axis in range(3):
+        of_ends = np.moveaxis(values, axis, 0)[[0, -1]]
+        np.moveaxis(values, axis, 0)[[0, -1]] = np.where(of_ends < 0.0, highest, of_ends)
+    start = np.maximum(negative.min(axis=0) - 1, 0)
+    values = values[tuple(map(slice, start, negative.max(axis=0) + 2))]
+    if not (values < 0.0).any():
+        return Manifold()
+    lows = surface.lows + (first + start) * surface.step
     grid_points, faces = surface_below_zero(values)
-    last_cell = np.array(values.shape) - 2
-    corners = np.clip(np.floor(grid_points), 0, last_cell).astype(np.int64)[:, None, :] + CORNERS
-    highest = values[corners[..., 0], corners[..., 1], corners[..., 2]].argmax(axis=1)
-    beside = corners[np.arange(len(grid_points)), highest]
+    # Each point lies on an edge of the grid, one end of which remains.
+    one, other = np.floor(grid_points).astype(np.int64), np.ceil(grid_points).astype(np.int64)
+    remains = values[one[:, 0], one[:, 1], one[:, 2]] >= 0.0
+    beside = np.where(remains[:, None], one, other)
     points = surface.settle(lows + grid_points * surface.step, lows + beside * surface.step)
     return manifold_of((frame.to_frame(points), faces), (face_id,), (len(faces),))
 
@@ -239,7 +265,9 @@ def convex_hull(solid: Solid) -> Solid:
         return solid
     frame = _frame_of(solid)
     untyped: Any = Manifold
-    vertices, faces, _ = mesh_of(untyped.hull_points(frame.to_frame(solid.vertices)))
+    # Of vertices that all but coincide the hull may have a fold.
+    corners = np.unique(np.round(frame.to_frame(solid.vertices), HULL_DIGITS), axis=0)
+    vertices, faces, _ = mesh_of(untyped.hull_points(corners))
     limit_of_face, points = np.zeros(len(faces), dtype=np.int64), frame.to_design(vertices)
     faces = _in_order(faces)
     return Solid(points, faces, limit_of_face, (HULL,), solid.tolerance, agrees=solid.agrees)

@@ -24,7 +24,7 @@ from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.compliance import stiffness_of
-from explorer.statics.held import FORCE, LIMITS, SIGNS, WRENCH, held_load
+from explorer.statics.held import FORCE, INWARD, LIMITS, WRENCH, load_case
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.held import part_names
 from explorer.workspace.position_bands import MEASURE_WORDS
@@ -158,12 +158,12 @@ def map_facts(colouring: Colouring) -> dict[str, Any]:
         facts["errors"] = design.actuators.error_mm
     elif bands.measure == "deflection":
         facts["giving"] = _giving_facts(colouring)
-    elif bands.held is not None:
+    elif bands.case is not None:
         facts["load"] = {
-            "wrench": bands.held[WRENCH:FORCE].tolist(),
-            "anyForce": float(bands.held[FORCE]),
+            "wrench": bands.case[WRENCH:FORCE].tolist(),
+            "anyForce": float(bands.case[FORCE]),
             # Over limits that are infinite shares are zero.
-            "overLimits": (1.0 / bands.held[LIMITS:SIGNS]).reshape(2, -1).tolist(),
+            "overLimits": (1.0 / bands.case[LIMITS:INWARD]).reshape(2, -1).tolist(),
             "parts": part_names(design) if bands.measure == "share" else PART_NAMES[:10],
         }
     return facts
@@ -175,7 +175,7 @@ def _giving_facts(colouring: Colouring) -> dict[str, Any]:
     load = np.zeros(6) if colouring.load is None else colouring.load
     stiffness, bending = stiffness_of(design)
     return {
-        "wrench": held_load(design, rotation, load)[WRENCH:FORCE].tolist(),
+        "wrench": load_case(design, rotation, load)[WRENCH:FORCE].tolist(),
         "actuators": (design.unit_mm / stiffness).tolist(),
         "struts": (design.unit_mm / (3.0 * bending)).tolist(),
     }
