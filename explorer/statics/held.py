@@ -124,11 +124,7 @@ def move_into_mode(case: FloatArray, p: FloatArray, near: FloatArray) -> bool:
     It is `p` itself, or on one singular plane, or where two of them meet.
     """
     least = BESIDE * length(p[0], p[1], p[2])
-    lacks = (
-        lacking(case, 0, p, least),
-        lacking(case, 1, p, least),
-        lacking(case, 2, p, least),
-    )
+    lacks = (lacking(case, 0, p, least), lacking(case, 1, p, least), lacking(case, 2, p, least))
     for i in range(3):
         near[i] = p[i]
     if max(lacks[0], lacks[1], lacks[2]) <= 0.0:
