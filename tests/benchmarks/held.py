@@ -20,7 +20,7 @@ from explorer.statics.held import largest_shares, load_case
 from explorer.workspace.held import held_workspace
 from explorer.workspace.limits.constraints import constraints, slacks
 
-ROUNDS, FINE = 5, 100
+ROUNDS, FINE = 5, 50
 ERROR = 5e-3
 LOADED = msgspec.structs.replace(
     DESIGN,
