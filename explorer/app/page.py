@@ -59,7 +59,7 @@ REFUSAL = "That is not possible"
 NOTICE_SECONDS = 6.0
 NOTICE_COLOUR = "orange"
 # Largest number of notices that wait for a browser; the newest are kept.
-MOST_UNTOLD = 10
+MOST_PENDING = 10
 # Seconds between two updates of all panels, while events come faster than frames.
 PANELS_SECONDS = 0.1
 # Seconds without a frame after which cameras follow what was drawn.
@@ -97,9 +97,9 @@ class Page:
     ) -> None:
         self._server = server
         self._notified: dict[str, float] = {}
-        # Notices for the next browser, since none was there; held while one is told.
-        self._untold: list[tuple[str, str]] = []
-        self._untold_lock = threading.Lock()
+        # Notices without a browser, kept for the next one; the lock guards them.
+        self._pending: list[tuple[str, str]] = []
+        self._pending_lock = threading.Lock()
         self._panels_updated = 0.0
         self._redraw_timer: threading.Timer | None = None
         # Looks after the cameras once nothing has been drawn for a while.
@@ -171,7 +171,7 @@ class Page:
         self.palette = self._add_palette(layout)
         for message in () if user_data is None else user_data.messages:
             self._announce(sentence(message))
-        server.on_client_connect(self._tell_untold)
+        server.on_client_connect(self._show_pending)
         server.on_client_connect(self.services.cameras.connected)
         server.on_client_disconnect(self.services.cameras.disconnected)
         server.on_client_connect(lambda client: listen(client, presses))
@@ -349,19 +349,19 @@ class Page:
             return
         self._notified = {m: t for m, t in self._notified.items() if now - t < NOTICE_SECONDS}
         self._notified[message] = now
-        with self._untold_lock:
+        with self._pending_lock:
             clients = self._server.get_clients()
             if who is None and not clients:
-                self._untold = [*self._untold, (title, message)][-MOST_UNTOLD:]
+                self._pending = [*self._pending, (title, message)][-MOST_PENDING:]
         for client_id, client in clients.items():
             if who is None or client_id == who:
                 client.add_notification(
                     title, message, auto_close_seconds=NOTICE_SECONDS, color=NOTICE_COLOUR
                 )
 
-    def _tell_untold(self, client: viser.ClientHandle) -> None:
+    def _show_pending(self, client: viser.ClientHandle) -> None:
         """Show a new browser the notices that came while there was none, until it closes them."""
-        with self._untold_lock:
-            untold, self._untold = self._untold, []
-        for title, message in untold:
+        with self._pending_lock:
+            pending, self._pending = self._pending, []
+        for title, message in pending:
             client.add_notification(title, message, color=NOTICE_COLOUR)

@@ -64,11 +64,11 @@ class PartialAnswerError(ExplorerError):
     exit_status: ClassVar[int] = 1
 
 
-def write_beside(files: Mapping[Path, bytes]) -> tuple[list[Path], list[StorageError]]:
-    """Write files besides the answer; return those written, and the errors of the others.
+def write_files(files: Mapping[Path, bytes]) -> tuple[list[Path], list[StorageError]]:
+    """Write the files of an answer; return those written, and the errors of the others.
 
-    An error is for the end of the command, after its answer: work of hours shall not be lost
-    because a disk is full.
+    The command prints its answer before it raises the errors, so that a full disk does not lose
+    the work of hours.
     """
     from explorer.files.writing import write_whole
 

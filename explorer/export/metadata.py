@@ -53,7 +53,7 @@ def ascii_name(name: str) -> str:
 
 
 def comments(mark: str, text: str) -> list[str]:
-    """Return a text in ASCII as comments of a few hundred characters, each after the same mark.
+    """Return a text in ASCII as comments of at most 160 characters, each after the same mark.
 
     Args:
         mark: Start of a comment, such as "comment design".

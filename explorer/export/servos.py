@@ -55,16 +55,16 @@ class Servos(NamedTuple):
     forces: FloatArray
 
     def droop(self, design: Design, forces: FloatArray) -> FloatArray:
-        """Return displacement and turn of the tool at home by the weights, shape (6,).
+        """Return displacement (design units) and turn of the tool at home under the weights, (6,).
 
         Args:
             design: The manipulator.
             forces: Forces at the commanded joint values, shape (6,), in N.
         """
         home = home_pose(design)
-        given = (self.weights - forces) / (1e-3 * design.unit_mm * self.stiffness)
+        lag = (self.weights - forces) / (1e-3 * design.unit_mm * self.stiffness)
         twists = twists_of_actuators(design, home.position, home.rotation, design.tool.position)
-        return twists @ -given
+        return twists @ -lag
 
 
 class Strokes(NamedTuple):
@@ -126,7 +126,8 @@ def servos_of(design: Design, masses: Mapping[str, Mass], *, elastic: bool) -> S
         masses: Masses of the bodies without the payload, in their own frames, in metres and
             kilograms.
         elastic: Whether they have the stiffness that the design states. Others, and those of a
-            design that states none, are stiff for what they move, and hold the weights at home.
+            design that states none, have the frequency `FREQUENCY` with the inertia that they
+            move, and hold the weights at home.
 
     Raises:
         NoAnswerError: The home pose is singular.

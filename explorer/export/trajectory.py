@@ -13,7 +13,7 @@ COLUMNS = ("time_s", *JOINTS, "x", "y", "z", "qw", "qx", "qy", "qz")
 TOOL_COLUMNS = ("tool_x", "tool_y", "tool_z")
 """The names of the columns that follow if the tool point moves straight."""
 
-LENGTHS = (*JOINTS, "x", "y", "z", *TOOL_COLUMNS)
+LENGTH_COLUMNS = (*JOINTS, "x", "y", "z", *TOOL_COLUMNS)
 """The names of the columns in design units."""
 
 
@@ -30,6 +30,6 @@ def trajectory_csv(trajectory: Trajectory) -> str:
         names += TOOL_COLUMNS
     rows = np.column_stack(columns)
     unit = repr(trajectory.unit_mm).removesuffix(".0")
-    head = [f"{name} [{unit} mm]" if name in LENGTHS else name for name in names]
+    head = [f"{name} [{unit} mm]" if name in LENGTH_COLUMNS else name for name in names]
     lines = [",".join(head), *(",".join(map(repr, row)) for row in rows.tolist())]
     return "\n".join(lines) + "\n"

@@ -15,7 +15,7 @@ warning value of its own, and the pose is near a singularity if any is below:
   a transmission angle: its sine is the share of a leg's force that acts, so that at 10° the legs
   push six times as hard as where lines and planes are at right angles. Textbooks keep such angles
   above 30° to 45° in continuous service; this value only warns of a singularity. A small platform
-  is displaced little by such a turn, a large one much, so that the distance alone does not tell;
+  is displaced little by such a turn, a large one much, so that the distance alone is no measure;
 - the inverse condition number of J, below 0.01 (`WARN_CONDITION` in `explorer.singularity.colours`,
   which the maps read too): a change of J by this share makes it singular (Eckart and Young). It
   does not say how much forces and errors grow: that is one over the smallest singular value
@@ -85,9 +85,9 @@ class Verdict:
             of these incidences, in design units; 0 in a singular pose.
         turn: Least turn to the first of these incidences, in radians.
         condition: The inverse condition number of J, 0 to 1.
-        cause: Which of these is told: if the pose is near, the first of them that is below its
-            warning value for the incidence of the lowest level; otherwise the distance. A margin
-            is told by the distance.
+        cause: The measure that the reason quotes: in a near pose the first one below its warning
+            value, for the incidence of the lowest level; otherwise the distance. It stands for a
+            margin too.
     """
 
     kind: Kind
@@ -176,12 +176,12 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
             levels["condition"] = snapshot.inverse_condition / warn.condition
         return levels
 
-    def made(kind: Kind, told: tuple[int, ...], cause: Cause = "distance") -> Verdict:
-        index = told[0] - 1
+    def verdict_of(kind: Kind, named: tuple[int, ...], cause: Cause = "distance") -> Verdict:
+        index = named[0] - 1
         distance, turn = snapshot.nearest_distances[index], snapshot.least_turns[index]
         if kind == "singular":
             distance = turn = 0.0
-        return Verdict(kind, levels, told, distance, turn, snapshot.inverse_condition, cause)
+        return Verdict(kind, levels, named, distance, turn, snapshot.inverse_condition, cause)
 
     each = {incidence: measures(incidence) for incidence in (1, 2, 3)}
     level_1, level_2, level_3 = (
@@ -189,15 +189,15 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
     )
     levels = level_1, level_2, level_3
     if holding:
-        return made("singular", holding)
+        return verdict_of("singular", holding)
     by_distance = sorted(each, key=lambda incidence: snapshot.nearest_distances[incidence - 1])
     near = [incidence for incidence in by_distance if levels[incidence - 1] < 1.0]
     if not near:
-        return made("clear", (by_distance[0],))
+        return verdict_of("clear", (by_distance[0],))
     cause = _cause(each[min(near, key=lambda incidence: levels[incidence - 1])])
     # The nearest of those with the cause first; sorting keeps the order of the others.
     near.sort(key=lambda incidence: _cause(each[incidence]) != cause)
-    return made("near", tuple(near), cause)
+    return verdict_of("near", tuple(near), cause)
 
 
 def _cause(levels: dict[Cause, float]) -> Cause:

@@ -94,7 +94,7 @@ def judge_risk(
     Args:
         ours: The 4-4.
         twins: The 6-4 with a2 within the reach.
-        beyond: The 6-4 with a2 beyond it, which is told but not judged.
+        beyond: The 6-4 with a2 beyond it, which is reported but not judged.
         apart: Distance of legs 2 and 3 of the 4-4, in design units.
     """
     thin = [k for k, radius in enumerate(RADII) if 2.0 * radius < apart]

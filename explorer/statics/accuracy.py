@@ -30,7 +30,7 @@ UNIFORM = 1.0 / math.sqrt(3.0)
 """Standard deviation of an error that is uniform within ± its bound, over the bound."""
 
 RMS_ERRORS = "independent errors, each uniform within its bounds"
-"""The errors of which root-mean-square errors are told, in words."""
+"""The errors behind each root-mean-square error, in words."""
 
 # Corners of the cube of the actuators' errors, up to a common sign.
 CORNERS = 32

@@ -27,7 +27,7 @@ from explorer.app.features.legs.radius_plot import (
     volume_at,
 )
 from explorer.app.features.legs.tasks import draw_radius_curve
-from explorer.app.features.workspace import reached
+from explorer.app.features.workspace import regions
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.files import FORMATS
 from explorer.app.features.workspace.panel import WorkspacePanel
@@ -144,13 +144,13 @@ THICK = shown(thick(opened(OPTIMAL), RADIUS))
 def test_the_drawing_holds_what_the_library_finds() -> None:
     drawing = drawing_of(THICK)
     expected = accessible_workspace(THICK.design, tolerance=REACHED_TOLERANCE * OPTIMAL.reach)
-    assert drawing.reached is not None
+    assert drawing.accessible is not None
     assert drawing.trouble is None
     assert drawing.volume == expected.volume
-    assert drawing.reached.volume == expected.accessible_volume
-    assert drawing.reached.node_count == expected.accessible_node_count
-    assert drawing.reached.pairs == expected.pairs
-    assert drawing.reached.harmless_radius == expected.harmless_radius
+    assert drawing.accessible.volume == expected.accessible_volume
+    assert drawing.accessible.node_count == expected.accessible_node_count
+    assert drawing.accessible.pairs == expected.pairs
+    assert drawing.accessible.harmless_radius == expected.harmless_radius
     assert drawing.nodes is not None
     assert drawing.nodes.count == expected.node_count
     assert drawing.mesh_volume == pytest.approx(expected.accessible_volume, rel=1e-3)
@@ -267,7 +267,7 @@ def test_cutting_and_colouring_reach_for_nothing_anew(monkeypatch: pytest.Monkey
         calls.append(0.0)
         return accessible_workspace(*args, **kwargs)
 
-    monkeypatch.setattr(reached, "accessible_workspace", counted)
+    monkeypatch.setattr(regions, "accessible_workspace", counted)
     state = shown(thick(opened(OPTIMAL), 0.15))
     for changes in (
         {},
@@ -276,7 +276,7 @@ def test_cutting_and_colouring_reach_for_nothing_anew(monkeypatch: pytest.Monkey
         {"colour": "margin"},
         {"hull": True},
     ):
-        assert drawing_of(shown(state, **changes)).reached is not None
+        assert drawing_of(shown(state, **changes)).accessible is not None
     assert len(calls) == 1
     drawing_of(thick(state, 0.16))
     assert len(calls) == 2
@@ -348,19 +348,19 @@ def summary(state: State, *, drawn: State | None = None) -> str:
 
 def test_the_numbers_are_those_of_the_library() -> None:
     expected = drawing_of(THICK)
-    reached = expected.reached
-    assert reached is not None
+    accessible = expected.accessible
+    assert accessible is not None
     html = summary(THICK)
-    percent = 100.0 * reached.volume / expected.volume
+    percent = 100.0 * accessible.volume / expected.volume
     assert (
-        f"{format_number(reached.volume, 6)} units³ accessible, {format_number(percent, 4)} %"
+        f"{format_number(accessible.volume, 6)} units³ accessible, {format_number(percent, 4)} %"
         in html
     )
-    assert f"{reached.node_count} of 999" in html
+    assert f"{accessible.node_count} of 999" in html
     assert "Legs 1 – 4, 2 – 4, 3 – 4 collide" in html
     rows = [row for row in rows_of(html) if len(row) == 3]
     assert [row[0] for row in rows] == ["legs"] + [f"{i} – {j}" for i, j in PAIRS]
-    for (_, clearance, blocked), pair in zip(rows[1:], reached.pairs, strict=True):
+    for (_, clearance, blocked), pair in zip(rows[1:], accessible.pairs, strict=True):
         assert number(clearance) == pytest.approx(pair.clearance, rel=5e-3)
         assert (blocked == "–") is (pair.blocked_volume == 0.0)
         if blocked != "–":
@@ -396,7 +396,7 @@ def test_a_home_in_trouble_leaves_the_solid_and_says_what_would_do() -> None:
     home = np.array(state.pose.position)
     drawing, whole = drawing_of(state), drawing_of(shown(state, region="limits"))
     trouble = drawing.trouble
-    assert drawing.reached is None
+    assert drawing.accessible is None
     assert trouble is not None
     with pytest.raises(StartError) as refused:
         check_start(state.design, state.pose.rotation, home)
@@ -456,7 +456,7 @@ def test_the_button_goes_where_ways_can_start(services: Services, desk: Desk) ->
     worker.work()
     assert feed.drawing is not None
     assert feed.drawing.trouble is None
-    assert feed.drawing.reached is not None
+    assert feed.drawing.accessible is not None
     updates = list(panel.updates(Frame(after)))
     assert (button, "visible", False) in updates
     # Home again, the present position is the one in trouble.

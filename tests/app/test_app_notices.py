@@ -45,7 +45,7 @@ def notices_of(client: Client, messages: list[dict[str, Any]]) -> list[dict[str,
     return [m["props"] for m in messages if m["type"] == "NotificationShowMessage"]
 
 
-def has_sign(running: Running) -> bool:
+def has_warning(running: Running) -> bool:
     return (UNSAVED, "") in presses_in(running)
 
 
@@ -70,7 +70,7 @@ def test_data_folder_unwritable_from_the_start_stands_in_the_bar_until_it_can_be
         # The save fails while no browser is there.
         assert not page.autosaver.flush()
         assert page.session.wait_until_idle()
-        wait_for(lambda: has_sign(running))
+        wait_for(lambda: has_warning(running))
         with client_of(running) as client:
             client.read_until_quiet(0.5)
             (bar,) = (
@@ -80,21 +80,21 @@ def test_data_folder_unwritable_from_the_start_stands_in_the_bar_until_it_can_be
             )
             assert "Session not saved" in bar
             assert "EXPLORER_DATA" in bar
-            # A press tells the whole reason.
+            # A press shows the whole reason.
             client.update(*press_update(running, UNSAVED))
             (notice,) = notices_of(client, [])
             assert "a file lies where a folder is meant" in notice["body"]
         folder.unlink()
         assert page.autosaver.flush()
-        wait_for(lambda: not has_sign(running))
+        wait_for(lambda: not has_warning(running))
 
 
-def test_session_that_is_saved_has_no_sign(tmp_path: Path) -> None:
+def test_session_that_is_saved_has_no_warning(tmp_path: Path) -> None:
     with explorer_with(data_in(tmp_path)) as running:
         assert running.page.autosaver is not None
         assert running.page.autosaver.flush()
         assert running.page.session.wait_until_idle()
-        assert not has_sign(running)
+        assert not has_warning(running)
 
 
 def test_notice_before_any_browser_is_shown_to_the_first_one_alone(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_notices_without_a_browser_keep_the_newest(tmp_path: Path) -> None:
         assert bodies == [f"notice {number}" for number in range(100 - len(bodies), 100)]
 
 
-def test_damaged_session_is_told_to_the_first_browser(
+def test_damaged_session_is_shown_to_the_first_browser(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))

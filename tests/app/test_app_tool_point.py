@@ -47,7 +47,7 @@ from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_reques
 from explorer.app.features.workspace.files import WorkspaceFiles
 from explorer.app.features.workspace.orientation import workspace_pose, workspace_start
 from explorer.app.features.workspace.panel import WorkspacePanel
-from explorer.app.features.workspace.reached import rows_of as matrix_rows
+from explorer.app.features.workspace.regions import rows_of as matrix_rows
 from explorer.app.features.workspace.scene import WorkspaceScene
 from explorer.app.features.workspace.tasks import (
     STEP,

@@ -14,7 +14,7 @@ from services import StubWorker, services_for
 
 from explorer.app.features.legs.tasks import RadiusRequest, draw_radius_curve
 from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.reached import MOST_LIVE_NODES, reach_workspace
+from explorer.app.features.workspace.regions import MOST_LIVE_NODES, find_accessible
 from explorer.app.features.workspace.tasks import (
     WorkspaceRequest,
     WorkspaceSurface,
@@ -79,8 +79,8 @@ class Watched:
 def test_an_accessible_workspace_tells_each_pair_of_legs_that_it_carves() -> None:
     watched = Watched()
     drawing = draw_workspace(accessible_request(THICK, level=1.0), watched.line)
-    assert drawing.reached is not None
-    blocking = [pair.legs for pair in drawing.reached.pairs if pair.blocked_volume > 0.0]
+    assert drawing.accessible is not None
+    blocking = [pair.legs for pair in drawing.accessible.pairs if pair.blocked_volume > 0.0]
     assert len(blocking) > 1
     words = " ".join(stage.words for stage in watched.stages)
     assert all(f"legs {first}–{second}" in words for first, second in blocking)
@@ -110,19 +110,19 @@ def test_a_grid_too_fine_to_look_at_each_step_leaves_the_rest_of_the_drawing() -
     assert workspace_nodes(design).count > MOST_LIVE_NODES
     drawing = draw_workspace(accessible_request(design))
     assert drawing.trouble is None
-    assert drawing.reached is not None
-    assert drawing.reached.node_count is None
-    same = draw_workspace(accessible_request(PRESETS["paper-optimal"])).reached
+    assert drawing.accessible is not None
+    assert drawing.accessible.node_count is None
+    same = draw_workspace(accessible_request(PRESETS["paper-optimal"])).accessible
     assert same is not None
     assert same.node_count is not None
-    assert drawing.reached.volume == same.volume
+    assert drawing.accessible.volume == same.volume
 
 
 def test_only_the_newest_accessible_workspaces_are_kept() -> None:
     asked: list[str] = []
 
     def reach(tolerance: float) -> None:
-        reach_workspace(
+        find_accessible(
             THICK, rows_of(THICK), None, tolerance, lambda words, _: asked.append(words)
         )
 

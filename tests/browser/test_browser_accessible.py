@@ -77,8 +77,8 @@ def test_the_accessible_solid_takes_the_place_of_the_other_and_the_page_stays_al
     expect(tab.page.get_by_text("computing …")).to_be_hidden()
     drawing = page.services.get(WorkspaceFeed).drawing
     assert drawing is not None
-    assert drawing.reached is not None
-    expect(accessible).to_contain_text(f"{format_number(drawing.reached.volume, 6)} units³")
+    assert drawing.accessible is not None
+    expect(accessible).to_contain_text(f"{format_number(drawing.accessible.volume, 6)} units³")
     tab.wait_for(lambda: red_pixels(tab) > MANY, "the collisions")
 
     download = tab.export("Workspace", "3MF")

@@ -1,7 +1,7 @@
 // Shows why the page may not connect. It comes inside the page, since all other scripts come
 // through the connection.
 (() => {
-  // Number of failures in a row after which one is shown that the explorer does not refuse.
+  // Failures in a row, none of them a refusal of the explorer, after which the page shows why.
   const MANY = 4;
   let failures = 0,
     card = null;
@@ -37,7 +37,7 @@
       hide();
     }
   };
-  // The websocket lives in a worker of viser's page, which tells the page how it fares.
+  // The websocket lives in a worker of viser's page, which reports its state to the page.
   window.Worker = class extends window.Worker {
     constructor(...given) {
       super(...given);

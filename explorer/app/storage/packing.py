@@ -131,7 +131,7 @@ class Unpacker:
                 read = {n: self._read(v, types[n], f"{where}.{n}") for n, v in fields.items()}
                 value = cast("Callable[..., Any]", part)(**read)
                 if isinstance(value, State):
-                    value = _checked(value)
+                    value = _restore(value)
             self._values[key] = value, fields
         return self._values[key][0]
 
@@ -217,11 +217,11 @@ def present_words(fields: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _checked(state: State) -> State:
-    """Return a state with the reason why its joints do not close computed again.
+def _restore(state: State) -> State:
+    """Return a saved state after checks; compute anew why its joints do not close.
 
     Raises:
-        InputError: no page draws it, or its joints are not those of its pose.
+        InputError: It cannot be drawn, or its joints are not those of its pose.
     """
     check_drawable(state)
     if state.unclosed is not None:

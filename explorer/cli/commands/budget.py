@@ -14,7 +14,7 @@ from explorer.cli.options import (
     JsonOptions,
     PoseOptions,
     TypicalOptions,
-    write_beside,
+    write_files,
 )
 from explorer.cli.output import (
     assumed_lines,
@@ -138,7 +138,7 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
         files: dict[Path, bytes] = {}
         if found is not None and self.out is not None:
             files[self.out] = encode_design(with_tolerances(design, found.tolerances))
-        written, errors = write_beside(files)
+        written, errors = write_files(files)
         answer = Answer(design, assumed, pose, tool, over, costs, found, next(iter(written), None))
         self.write(lambda: _as_json(answer), lambda: self._as_lines(answer), errors)
 

@@ -15,7 +15,7 @@ from explorer.cli.answers.optimisation import (
     outcome_json,
     outcome_lines,
 )
-from explorer.cli.options import DesignOptions, JsonOptions, write_beside
+from explorer.cli.options import DesignOptions, JsonOptions, write_files
 from explorer.cli.output import heading, write_json
 from explorer.cli.progress import SearchMeter
 from explorer.cli.usage import UsageError
@@ -182,7 +182,7 @@ class Optimise(JsonOptions, DesignOptions):
         problem, settings = self._problem()
         self._check_possible(problem)
         outcome = _search(problem, settings)
-        written, unwritten = write_beside(self._files(outcome, settings, record))
+        written, unwritten = write_files(self._files(outcome, settings, record))
         unsolved = [] if outcome.converged else [NoAnswerError(outcome.run.message)]
         self.write(
             lambda: outcome_json(outcome, written),

@@ -17,7 +17,7 @@ from explorer.cli.options import (
     PointOptions,
     RadiiOptions,
     make_pose,
-    write_beside,
+    write_files,
 )
 from explorer.cli.output import (
     attributes,
@@ -177,7 +177,7 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
         if self.load is not None:
             largest = path_loads(design, path.poses, self.load, tool=tool).largest
         files = {} if self.out is None else {self.out: trajectory_csv(timed).encode()}
-        written, errors = write_beside(files)
+        written, errors = write_files(files)
         out = next(iter(written), None)
         self.write(
             lambda: _as_json(path, timed, largest, out),

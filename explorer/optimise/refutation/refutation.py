@@ -174,7 +174,7 @@ def _box_on_plane(ranges: Ranges, required: Box) -> Iterator[Refutation]:
     because = " and ".join(words for words, is_counted in counts.items() if is_counted)
     if not because:
         return
-    size = math.hypot(*_away(ranges, required, ((0.0, 0.0),) * 3))
+    size = math.hypot(*_farther_sides(ranges, required, ((0.0, 0.0),) * 3))
     can_move = ranges.is_turning or any(low < high for low, high in map(ranges.of, SHIFTS))
     always = "always " if can_move else ""
     for index, where in PLANES.items():
@@ -213,12 +213,12 @@ def _farthest_corner(ranges: Ranges, name: str, axes: tuple[int, ...], required:
         "d4": largest(ranges.of("b3")),
         "l4": 0.0,
     }[name]
-    away = _away(ranges, required, centre)
+    away = _farther_sides(ranges, required, centre)
     return math.hypot(*(away[axis] for axis in axes)) - within
 
 
-def _away(ranges: Ranges, required: Box, centre: tuple[Pair, ...]) -> list[float]:
-    """Return how far the farther side of a box is from a centre along each axis, at the nearest."""
+def _farther_sides(ranges: Ranges, required: Box, centre: tuple[Pair, ...]) -> list[float]:
+    """Return the least distance along each axis from a centre to the farther side of a box."""
     return [
         max(smallest(total(total((end, end), shift), negative(middle))) for end in ends)
         for ends, shift, middle in zip(

@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from explorer.app.features.workspace.reached import Rows
+from explorer.app.features.workspace.regions import Rows
 from explorer.app.scene.bands import Shell
 from explorer.app.scene.outline import outline
 from explorer.errors import ExplorerError

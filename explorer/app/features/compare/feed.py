@@ -10,7 +10,7 @@ from functools import partial
 
 from explorer.app.features.compare.drawing import ComparedDrawing, ComparedRequest, compared_drawing
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.reached import rows_of
+from explorer.app.features.workspace.regions import rows_of
 from explorer.app.session.feed import Feed
 from explorer.app.state.compared import SLOTS, unnamed
 from explorer.app.state.frame import Frame

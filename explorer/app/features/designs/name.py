@@ -13,17 +13,17 @@ from explorer.app.widgets.buttons import open_button, press_button
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 
-# Name of the button that tells why the session is not saved, and the words on it.
-UNSAVED, SIGN = "session.unsaved", "Session not saved"
+# Name of the button that shows why the session is not saved, and its label.
+UNSAVED, UNSAVED_LABEL = "session.unsaved", "Session not saved"
 
 
 class DesignName:
-    """The name, a button that opens the dialog Designs, and a sign while saving fails."""
+    """The name, a button that opens the dialog Designs, and a warning while saving fails."""
 
     def __init__(self, services: Services) -> None:
         self._saved = None if services.user_data is None else services.get(SavedDesigns)
         self._autosaver = services.autosaver
-        services.buttons.on(UNSAVED, lambda _, client: self._tell_problem(client))
+        services.buttons.on(UNSAVED, lambda _, client: self._show_problem(client))
 
     def __call__(self, frame: Frame) -> str:
         """Return the name for a frame, as HTML."""
@@ -34,20 +34,20 @@ class DesignName:
         mark, words = saved_words(live, self._saved.find(live.name))
         content = f'{name}<span class="ex-dim">{mark}</span>'
         hint = f"{words} Save, rename, open or upload designs."
-        return open_button("Designs", content, hint=hint, class_name="ex-name") + self._sign()
+        return open_button("Designs", content, hint=hint, class_name="ex-name") + self._warning()
 
-    def _sign(self) -> str:
-        """Return the sign that the session is not saved, as HTML; "" while it is saved."""
+    def _warning(self) -> str:
+        """Return the button that warns of an unsaved session, as HTML; "" while it is saved."""
         problem = self._problem
         if problem is None:
             return ""
         look = "ex-tool ex-outlined ex-beyond"
-        return press_button(UNSAVED, "", SIGN, hint=problem, class_name=look)
+        return press_button(UNSAVED, "", UNSAVED_LABEL, hint=problem, class_name=look)
 
-    def _tell_problem(self, client: viser.ClientHandle) -> None:
+    def _show_problem(self, client: viser.ClientHandle) -> None:
         problem = self._problem
         if problem is not None:
-            client.add_notification(SIGN, problem, color="orange")
+            client.add_notification(UNSAVED_LABEL, problem, color="orange")
 
     @property
     def _problem(self) -> str | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from explorer.app.features.workspace.reached import (
+from explorer.app.features.workspace.regions import (
     Rows,
     Trouble,
     trouble_of,

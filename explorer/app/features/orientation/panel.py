@@ -95,8 +95,8 @@ class OrientationPanel:
             self._tilts_under_way = UnderWay(gui, "tilts", self._tilts)
             controls.dropdown(
                 "Solid over tilts",
-                "Draw the inclusive orientation workspace, positions that have at least one of the "
-                "orientations to which a tilt and a turn from home lead, or the total one (all).",
+                "Draw the positions that allow at least one (inclusive workspace) or all (total "
+                "workspace) of the orientations within a tilt and a turn from that of home.",
                 OVER,
                 "view.orientation.over",
             )

@@ -8,7 +8,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import load_of
 from explorer.app.features.workspace.load import loaded_design
 from explorer.app.features.workspace.orientation import workspace_rows, workspace_start
-from explorer.app.features.workspace.reached import Rows, rows_of
+from explorer.app.features.workspace.regions import Rows, rows_of
 from explorer.app.features.workspace.tasks import (
     LIVE_TOLERANCE,
     STEP,

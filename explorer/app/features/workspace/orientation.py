@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from explorer.app.features.workspace.reached import Rows, rows_of
+from explorer.app.features.workspace.regions import Rows, rows_of
 from explorer.app.state.frame import Frame
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose

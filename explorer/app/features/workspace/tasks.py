@@ -8,13 +8,13 @@ from typing import Literal
 import numpy as np
 
 from explorer.app.features.workspace.load import map_measure
-from explorer.app.features.workspace.reached import (
-    Reached,
+from explorer.app.features.workspace.regions import (
+    AccessiblePart,
     Rows,
     Trouble,
+    accessible_part,
+    find_accessible,
     hold_load,
-    reach_workspace,
-    reached_of,
     trouble_holding,
 )
 from explorer.app.features.workspace.slice_map import (
@@ -118,7 +118,7 @@ class WorkspaceDrawing:
         level: Coordinate of the cut, if the solid is cut.
         volume: Exact volume within the limits, see `explorer.workspace.slices.volume`.
         error: Bound of the error of that volume.
-        reached: Numbers of the accessible part, if requested and there is no trouble.
+        accessible: Numbers of the accessible part, if requested and there is no trouble.
         held_volume: Volume of the part that holds the load, likewise.
         trouble: Why nothing is accessible or holds the load, if all within the limits is drawn
             instead.
@@ -139,7 +139,7 @@ class WorkspaceDrawing:
     level: float | None
     volume: float
     error: float
-    reached: Reached | None
+    accessible: AccessiblePart | None
     held_volume: float | None
     trouble: Trouble | None
     mesh_volume: float
@@ -153,7 +153,7 @@ class WorkspaceDrawing:
     @property
     def part_volume(self) -> float | None:
         """Volume of the part that is drawn; None for all within the limits."""
-        return self.held_volume if self.reached is None else self.reached.volume
+        return self.held_volume if self.accessible is None else self.accessible.volume
 
 
 def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) -> WorkspaceDrawing:
@@ -187,11 +187,11 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         # It is waited for; it needs none of what follows.
         surface = draw(workspace_faces(limits))
     whole = workspace_solid(design, rotation, tolerance, volume=measured)
-    reached = trouble = held_volume = part = None
+    accessible = trouble = held_volume = part = None
     if request.region == "accessible":
-        result = reach_workspace(design, request.rotation, request.start, tolerance, watch)
-        reached, trouble = (None, result) if isinstance(result, Trouble) else (result, None)
-        part = None if reached is None else reached.solid
+        result = find_accessible(design, request.rotation, request.start, tolerance, watch)
+        accessible, trouble = (None, result) if isinstance(result, Trouble) else (result, None)
+        part = None if accessible is None else accessible.solid
     elif request.region == "held":
         held = hold_load(design, request.rotation, load, tolerance)
         trouble = trouble_holding(held)
@@ -228,7 +228,7 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         level=level,
         volume=measured.volume,
         error=measured.error,
-        reached=None if reached is None else reached_of(reached),
+        accessible=None if accessible is None else accessible_part(accessible),
         held_volume=held_volume,
         trouble=trouble,
         mesh_volume=solid.volume,
@@ -282,10 +282,10 @@ def export_mesh(
             raise InputError(f"nothing holds the load: {trouble.reason}")
         solid = held.solid
     else:
-        reached = reach_workspace(design, rotation, start, tolerance, unwatched)
-        if isinstance(reached, Trouble):
-            raise InputError(reached.reason)
-        solid = reached.solid
+        accessible = find_accessible(design, rotation, start, tolerance, unwatched)
+        if isinstance(accessible, Trouble):
+            raise InputError(accessible.reason)
+        solid = accessible.solid
     name = f"{design.name} {exported_name(region, what, offset)}"
     made = convex_hull(solid) if what == "hull" else solid
     if offset is not None:

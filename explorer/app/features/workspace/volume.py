@@ -9,7 +9,7 @@ import numpy as np
 
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.orientation import workspace_rows
-from explorer.app.features.workspace.reached import Rows
+from explorer.app.features.workspace.regions import Rows
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.mechanism.design import Design

@@ -9,7 +9,7 @@ import numpy as np
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.orientation import orientation_word, turned_suffix
-from explorer.app.features.workspace.reached import Reached
+from explorer.app.features.workspace.regions import AccessiblePart
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.features.workspace.volume import MeasuredVolume, VolumeFeed, volume_text
 from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Measure
@@ -171,8 +171,8 @@ def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
             )
         )
     parts.append(_numbers(drawing, frame.state))
-    if drawing.reached is not None and drawing.volume > 0.0:
-        parts.append(_pairs(drawing.reached, is_coloured=view.colour == "plain"))
+    if drawing.accessible is not None and drawing.volume > 0.0:
+        parts.append(_pairs(drawing.accessible, is_coloured=view.colour == "plain"))
     coarse_edge = drawing.surface.coarse_edge
     if coarse_edge is not None:
         parts.append(
@@ -186,19 +186,19 @@ def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
 def _numbers(drawing: WorkspaceDrawing, state: State) -> str:
     """Return the table of nodes, extent and volumes."""
     rows: list[tuple[str, str, str]] = []
-    nodes, reached, request = drawing.nodes, drawing.reached, drawing.request
+    nodes, accessible, request = drawing.nodes, drawing.accessible, drawing.request
     if nodes is not None:
         count, volume = format_number(nodes.count), nodes.volume
         hint = "The paper's measure: grid nodes within the limits"
         volume_hint = "Nodes times step³; it overstates the volume"
         names = "Nodes", "Node volume"
-        if reached is not None and reached.node_count is not None:
-            count = f"{format_number(reached.node_count)} of {count}"
-            volume = reached.node_count * nodes.step**3
+        if accessible is not None and accessible.node_count is not None:
+            count = f"{format_number(accessible.node_count)} of {count}"
+            volume = accessible.node_count * nodes.step**3
             hint = "Nodes that collision-free steps of the grid lead to, of all within the limits"
             volume_hint = "Accessible nodes times step³, the paper's measure"
             names = "Accessible nodes", "Accessible node volume"
-        elif reached is not None:
+        elif accessible is not None:
             hint += "; too many to check each step between them"
         rows += [
             (names[0], count, hint),
@@ -240,11 +240,11 @@ def deviation_text(deviation: float) -> str:
     )
 
 
-def _pairs(reached: Reached, *, is_coloured: bool) -> str:
+def _pairs(accessible: AccessiblePart, *, is_coloured: bool) -> str:
     """Return the clearance of each pair of legs, and the volume that it blocks."""
-    blocking = [pair for pair in reached.pairs if pair.blocked_volume > 0.0]
+    blocking = [pair for pair in accessible.pairs if pair.blocked_volume > 0.0]
     words, look = "Legs touch, but block nothing", "within"
-    if min(pair.clearance for pair in reached.pairs) > 0.0:
+    if min(pair.clearance for pair in accessible.pairs) > 0.0:
         words = "No pair collides"
     elif blocking:
         words, look = (
@@ -253,12 +253,12 @@ def _pairs(reached: Reached, *, is_coloured: bool) -> str:
         )
     mark = swatch(COLLIDING) if is_coloured and blocking else ""
     radius = ""
-    if reached.harmless_radius > 0.0:
+    if accessible.harmless_radius > 0.0:
         radius = (
             '<div class="ex-dim ex-after">No two legs collide if all radii grow by up to '
-            f"{format_number(reached.harmless_radius)}</div>"
+            f"{format_number(accessible.harmless_radius)}</div>"
         )
-    rows = table(map(_pair, reached.pairs), ("legs", "least clearance", "blocked, units³"))
+    rows = table(map(_pair, accessible.pairs), ("legs", "least clearance", "blocked, units³"))
     return f'<div class="ex-strong ex-after ex-{look}">{mark}{words}</div>{rows}{radius}'
 
 

@@ -115,7 +115,7 @@ class LoadDemand:
         """Return what the largest shares of each part leave, see `spare_of`."""
         box, counts = state.statics, self.side.keeps(state, state.statics.positions)
         if not counts.any():
-            return _beyond(state, self.side, len(self.names))
+            return _miss_beyond_plane(state, self.side, len(self.names))
         twists = np.where(counts[:, None, None], _twists(box), 0.0)
         shares = self._shares(state, twists, box)
         parts = np.flatnonzero(self.counts)
@@ -154,7 +154,7 @@ class DisplacementDemand:
     def __init__(self, start: State, cause: Cause, most: float | None = None) -> None:
         self.side = MarginDemand(start, is_open=True)
         self.cause: Cause = cause
-        self.most = most or _size_of(start, cause)
+        self.most = most or _scale_of(start, cause)
         self.names = (f"{cause} over the required box",) * EIGHTHS
 
     def measure(self, state: State) -> Measured:
@@ -162,7 +162,7 @@ class DisplacementDemand:
         box, design = state.statics, state.design
         counts = self.side.keeps(state, box.positions)
         if not counts.any():
-            return _beyond(state, self.side, len(self.names))
+            return _miss_beyond_plane(state, self.side, len(self.names))
         worst = _worst_nodes(box, _displacements(box, self.cause)[:, None], counts)[:, 0]
         slopes = twist_slopes(design, box.positions[worst], state.rotation)
         if self.cause == "error":
@@ -174,18 +174,26 @@ class DisplacementDemand:
         return Measured(spare_of(share), _spare_slope(share)[:, None] * gradient)
 
 
-def _beyond(state: State, side: MarginDemand, count: int) -> Measured:
-    """Return what each of some demands misses of a box without a node on its side of all planes."""
+def _miss_beyond_plane(state: State, side: MarginDemand, count: int) -> Measured:
+    """Return the values of demands on a box without a node on its side of all planes.
+
+    They are equal and negative, the more so the deeper the box is beyond a plane.
+
+    Args:
+        state: The problem where the search is.
+        side: The demand that the box is on its side of all planes.
+        count: Number of demands.
+    """
     value, gradient = side.measure(state)
     worst = int(value.argmin())
     slope = gradient[worst] / BEYOND
     return Measured(np.full(count, value[worst] / BEYOND - 1.0), np.tile(slope, (count, 1)))
 
 
-def _size_of(start: State, cause: Cause) -> float:
-    """Return the largest displacement over the required box, in design units.
+def _scale_of(start: State, cause: Cause) -> float:
+    """Return the scale of displacements: the largest over the required box, in design units.
 
-    If it is infinite, the result is that at the node, or at home, farthest from singular planes.
+    If that is infinite, it is that at the node, or at home, farthest from singular planes.
     """
     box = start.statics
     if not box.is_regular:

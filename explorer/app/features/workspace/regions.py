@@ -1,4 +1,4 @@
-"""The accessible part of a workspace, and the part that holds a load: computed and cached."""
+"""Regions of a workspace: its accessible part, and the part that holds a load, each cached."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Trouble:
 
 
 @dataclass(frozen=True)
-class Reached:
+class AccessiblePart:
     """The numbers of the accessible part of a workspace.
 
     Attributes:
@@ -70,7 +70,7 @@ class Reached:
 _cache: dict[tuple[Design, Rows, Triple | None, float], AccessibleWorkspace | Trouble] = {}
 
 
-def reach_workspace(
+def find_accessible(
     design: Design, rotation: Rows, start: Triple | None, tolerance: float, watch: Watch
 ) -> AccessibleWorkspace | Trouble:
     """Return the accessible workspace, or why there is none; cache the newest few."""
@@ -103,9 +103,9 @@ def trouble_of(error: ExplorerError) -> Trouble:
     return Trouble(str(error), (x, y, z))
 
 
-def reached_of(workspace: AccessibleWorkspace) -> Reached:
+def accessible_part(workspace: AccessibleWorkspace) -> AccessiblePart:
     """Return the numbers of an accessible workspace."""
-    return Reached(
+    return AccessiblePart(
         workspace.accessible_volume,
         workspace.accessible_node_count,
         workspace.pairs,
