@@ -6,7 +6,7 @@ import itertools
 import re
 import socket
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import closing, contextmanager
 from html import unescape
 from typing import Any
@@ -21,6 +21,7 @@ from explorer.app.browser.viser_gaps import element_id
 from explorer.app.server import Running
 
 _COUNT = itertools.count()
+PATIENCE_SECONDS = 60.0
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 CAMERA: dict[str, Any] = {
     "type": "ViewerCameraMessage",
@@ -61,6 +62,14 @@ def opened(
         max_size=None,
         proxy=None,
     )
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    """Wait until a condition holds."""
+    deadline = time.monotonic() + PATIENCE_SECONDS
+    while not condition():
+        assert time.monotonic() < deadline, "it never came about"
+        time.sleep(0.01)
 
 
 def presses_in(running: Running) -> list[tuple[str, str]]:

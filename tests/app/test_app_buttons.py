@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import closing
 
 import pytest
 import viser
-from client import press_update, presses_in
+from client import press_update, presses_in, wait_for
 from desk import CLIENT
 from socket_tab import SocketTab
 
@@ -18,10 +18,8 @@ from explorer.app.server import Running, start
 from explorer.app.session.session import UNDO
 from explorer.app.state.compared import SLOTS
 from explorer.app.widgets.buttons import LONGEST_VALUE, Buttons, press_button
-from explorer.files.packaged import SOURCES, packaged_files
+from explorer.files.packaged import SOURCES
 from explorer.mechanism.design_file import PRESETS
-
-PATIENCE = 30.0
 
 
 @pytest.fixture(scope="module")
@@ -36,13 +34,6 @@ def tab(running: Running) -> Generator[SocketTab]:
     with closing(SocketTab(running.url)) as made:
         wait_for(lambda: bool(running.viser.get_clients()))
         yield made
-
-
-def wait_for(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, "never came about"
-        time.sleep(0.01)
 
 
 def test_press_sent_by_a_client_does_what_is_registered_and_is_one_step(
@@ -151,7 +142,7 @@ def test_button_of_markup_is_escaped_and_says_what_it_is() -> None:
 def test_every_class_of_the_markup_has_a_rule() -> None:
     sources = "".join(path.read_text("utf-8") for path in (SOURCES / "explorer/app").rglob("*.py"))
     used = set(re.findall(r"\bex-[a-z]+\b", sources))
-    (sheet,) = packaged_files(look.FOLDER, ".css")
-    ruled = set(re.findall(r"\.(ex-[a-z]+)", sheet.read_text("utf-8")))
-    variables = set(re.findall(r"--(ex-[a-z]+)", sheet.read_text("utf-8")))
+    sheet = look.read_file("page.css")
+    ruled = set(re.findall(r"\.(ex-[a-z]+)", sheet))
+    variables = set(re.findall(r"--(ex-[a-z]+)", sheet))
     assert used <= ruled | variables

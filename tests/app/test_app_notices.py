@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from client import Client, client_of, press_update, presses_in
+from client import Client, client_of, press_update, presses_in, wait_for
 
 from explorer.app.features.designs.name import UNSAVED
 from explorer.app.server import Running, start
@@ -20,8 +19,6 @@ from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData, open_user_data
 from explorer.mechanism.design_file import PRESETS
 
-PATIENCE_SECONDS = 60.0
-
 
 @contextmanager
 def explorer_with(data: UserData) -> Generator[Running]:
@@ -30,13 +27,6 @@ def explorer_with(data: UserData) -> Generator[Running]:
         yield running
     finally:
         running.stop()
-
-
-def wait_for(condition: Callable[[], object]) -> None:
-    deadline = time.monotonic() + PATIENCE_SECONDS
-    while not condition():
-        assert time.monotonic() < deadline, "it never came about"
-        time.sleep(0.01)
 
 
 def notices_of(client: Client, messages: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -32,7 +32,7 @@ def behind() -> Iterator[Running]:
     made.stop()
 
 
-def asked(running: Running, target: str, **headers: str) -> tuple[HTTPResponse, str]:
+def get(running: Running, target: str, **headers: str) -> tuple[HTTPResponse, str]:
     """Return the response to a request and its body, unpacked."""
     connection = HTTPConnection("127.0.0.1", running.viser.get_port(), timeout=30)
     connection.request("GET", target, headers=headers)
@@ -45,9 +45,9 @@ def asked(running: Running, target: str, **headers: str) -> tuple[HTTPResponse, 
     return response, body.decode()
 
 
-def why(running: Running, origin: str, **headers: str) -> tuple[int, str]:
+def ask_reason(running: Running, origin: str, **headers: str) -> tuple[int, str]:
     """Return status and reason that a page of an origin gets when it asks why."""
-    response, reason = asked(running, f"/connection?origin={quote(origin, safe='')}", **headers)
+    response, reason = get(running, f"/connection?origin={quote(origin, safe='')}", **headers)
     assert response.headers["Content-Type"].startswith("text/plain")
     assert len(reason.splitlines()) == 1
     assert TOKEN not in reason
@@ -86,12 +86,12 @@ def test_websocket_through_a_proxy_needs_its_origin_and_the_token(behind: Runnin
 
 
 def test_page_through_a_proxy_lets_itself_connect_there(behind: Running) -> None:
-    response, page = asked(behind, f"/?token={TOKEN}", Host=PROXY, **BROWSER)
+    response, page = get(behind, f"/?token={TOKEN}", Host=PROXY, **BROWSER)
     assert response.status == 200
     assert f"wss://{PROXY}" in response.headers["Content-Security-Policy"]
     assert "connection?origin=" in page
     # The same with and without packing, but for the added part as viser serves it.
-    assert asked(behind, f"/?token={TOKEN}", Host=PROXY)[1] == page
+    assert get(behind, f"/?token={TOKEN}", Host=PROXY)[1] == page
 
 
 @pytest.mark.parametrize("host", [f"other.{PROXY}", "evil.example:9", f"{PROXY}.evil.example"])
@@ -99,26 +99,26 @@ def test_wrong_host_is_answered_with_a_page_that_names_it_and_the_option(
     behind: Running, running: Running, host: str
 ) -> None:
     for each in (behind, running):
-        response, page = asked(each, "/", Host=host, **BROWSER)
+        response, page = get(each, "/", Host=host, **BROWSER)
         assert response.status == 403
         assert response.headers["Content-Type"].startswith("text/html")
         assert "script" not in page
         assert f"--allow-host {host.partition(':')[0]}" in page
         assert TOKEN not in page
         # A program gets one line.
-        response, line = asked(each, "/", Host=host)
+        response, line = get(each, "/", Host=host)
         assert response.status == 403
         assert line.count("\n") == 1
         assert f"--allow-host {host.partition(':')[0]}" in line
 
 
 def test_markup_in_a_host_stays_text(behind: Running) -> None:
-    _, page = asked(behind, "/", Host="<script>alert(1)</script>", **BROWSER)
+    _, page = get(behind, "/", Host="<script>alert(1)</script>", **BROWSER)
     assert "<script" not in page
 
 
 def test_missing_token_is_answered_with_a_page(behind: Running) -> None:
-    response, page = asked(behind, "/", **BROWSER)
+    response, page = get(behind, "/", **BROWSER)
     assert response.status == 401
     assert "?token=" in page
 
@@ -127,34 +127,34 @@ def test_page_learns_why_its_websocket_is_refused(behind: Running, running: Runn
     port = running.viser.get_port()
     own = f"http://127.0.0.1:{port}"
     # A proxy that does not pass on the host: the page loads, its websocket is refused.
-    assert asked(running, "/", **BROWSER)[0].status == 200
+    assert get(running, "/", **BROWSER)[0].status == 200
     with pytest.raises(InvalidStatus):
         opened(own, origin=f"https://{PROXY}")
-    status, reason = why(running, f"https://{PROXY}")
+    status, reason = ask_reason(running, f"https://{PROXY}")
     assert status == 403
     assert f"--allow-host {PROXY}" in reason
     # A token that is missing, or of the explorer before.
     name = f"explorer-token-{behind.viser.get_port()}"
     for cookie in ("", f"{name}={TOKEN[:-1]}"):
-        status, reason = why(behind, f"https://{PROXY}", Host=PROXY, Cookie=cookie)
+        status, reason = ask_reason(behind, f"https://{PROXY}", Host=PROXY, Cookie=cookie)
         assert status == 401
         assert "?token=" in reason
     # Where nothing is refused, it is the proxy that passes on no websocket.
-    status, reason = why(behind, f"https://{PROXY}", Host=PROXY, Cookie=f"{name}={TOKEN}")
+    status, reason = ask_reason(behind, f"https://{PROXY}", Host=PROXY, Cookie=f"{name}={TOKEN}")
     assert status == 200
     assert "Upgrade" in reason
-    assert why(running, own)[0] == 200
+    assert ask_reason(running, own)[0] == 200
 
 
 def test_page_learns_that_too_many_tabs_are_open(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(guard, "MOST_TABS", 0)
-    status, reason = why(running, f"http://127.0.0.1:{running.viser.get_port()}")
+    status, reason = ask_reason(running, f"http://127.0.0.1:{running.viser.get_port()}")
     assert status == 503
     assert "close one" in reason
 
 
 @pytest.mark.parametrize("origin", ["", "null", "<b>", "\n", "https://x\r\ny", "%", "é" * 50])
 def test_any_origin_is_answered_in_one_line(running: Running, origin: str) -> None:
-    assert why(running, origin)[0] == 403
+    assert ask_reason(running, origin)[0] == 403

@@ -21,7 +21,7 @@ import msgspec
 import numpy as np
 import pytest
 import viser
-from client import PROTOCOL, client_of, opened
+from client import PROTOCOL, client_of, opened, wait_for
 from playwright.sync_api import Browser, expect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -707,10 +707,3 @@ def read_until_closed(connection: ClientConnection) -> None:
     with quietly():
         while True:
             connection.recv()
-
-
-def wait_for(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE_SECONDS
-    while not condition():
-        assert time.monotonic() < deadline, "it never came about"
-        time.sleep(0.01)
