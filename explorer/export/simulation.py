@@ -227,7 +227,7 @@ class SimulationModel:
         equality = ET.SubElement(root, "equality")
         for leg, point in zip(LEGS[:3], self.points * self.metres, strict=False):
             ends = {"body1": "platform", "body2": f"socket_{leg}"}
-            _named(equality, "connect", f"ball_{leg}", **ends, anchor=_row(point))
+            _add_named(equality, "connect", f"ball_{leg}", **ends, anchor=_row(point))
         self._limits(root)
         self._servos(ET.SubElement(root, "actuator"))
         key = ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="home")
@@ -341,7 +341,7 @@ class SimulationModel:
             d1, d3 = (self.nominal[CHAIN_JOINTS.index(name)] for name in ("d1", "d3"))
             order = 1 if d1 > d3 else -1
             ends = _row([self.strokes.gap, 1e3 * self.design.reach * self.metres])
-            gap = _named(tendon, "fixed", "gap", range=ends)
+            gap = _add_named(tendon, "fixed", "gap", range=ends)
             for joint, sign in (("d1", order), ("d3", -order)):
                 ET.SubElement(gap, "joint", joint=joint, coef=str(sign))
         for leg, degrees in ((1, limits.swing.a1), (4, limits.swing.a3)):
@@ -351,7 +351,9 @@ class SimulationModel:
             for index in (3 * leg - 3, 3 * leg - 2):
                 middle, half = (self.nominal - self.joints)[index], math.radians(degrees)
                 joint = SIMULATION_JOINTS[index]
-                swing = _named(tendon, "fixed", joint, range=_row([middle - half, middle + half]))
+                swing = _add_named(
+                    tendon, "fixed", joint, range=_row([middle - half, middle + half])
+                )
                 ET.SubElement(swing, "joint", joint=joint, coef="1")
         if len(tendon):
             root.append(tendon)
@@ -363,7 +365,7 @@ class SimulationModel:
         for index, name in enumerate(JOINTS):
             stiffness, damping, _, _, force = (float(each[index]) for each in self.servos)
             law = {"gainprm": repr(stiffness), "biasprm": _row([force, -stiffness, -damping])}
-            servo = _named(parent, "general", name, joint=name, **law)
+            servo = _add_named(parent, "general", name, joint=name, **law)
             _limit(servo, "ctrlrange", self.strokes.ranges.get(name))
             limited = (np.abs(forces[index]) < NO_LIMIT).any()
             _limit(servo, "forcerange", tuple(forces[index]) if limited else None)
@@ -373,7 +375,7 @@ def _comment(*lines: str) -> ET.Element:
     return cast("ET.Element", ET.Comment("\n    ".join(["", *lines]) + "\n  "))
 
 
-def _named(parent: ET.Element, element: str, name: str, **settings: str) -> ET.Element:
+def _add_named(parent: ET.Element, element: str, name: str, **settings: str) -> ET.Element:
     """Add an element outside the bodies, which takes no class from them."""
     return ET.SubElement(parent, element, {"name": name, "class": CLASS, **settings})
 

@@ -213,7 +213,7 @@ def _words_of_refusal(fault: msgspec.ValidationError, text: str, kind: Any) -> s
         allowed = _allowed_at(kind, path) if words.startswith("Invalid enum value") else []
         words = re.sub(r"`([a-z]+(?: \| [a-z]+)*)`", _types_in_words, words)
         words = words.replace("Expected", "expected")
-        words = f"{_written(path)}: {words}" if path else words
+        words = f"{_path_text(path)}: {words}" if path else words
         words += f"; there are {', '.join(allowed)}" if allowed else ""
     return _at_line(words, path, places, text)
 
@@ -229,7 +229,7 @@ def _types_in_words(match: re.Match[str]) -> str:
 
 
 def _of(path: _Path) -> str:
-    return f" of {_written(path)}" if path else ""
+    return f" of {_path_text(path)}" if path else ""
 
 
 def _path_of(written: str) -> _Path:
@@ -251,7 +251,7 @@ def _path_in_words(error: InputError, places: Mapping[_Path, _Place], outer: _Pa
     return outer
 
 
-def _written(path: _Path) -> str:
+def _path_text(path: _Path) -> str:
     """Return a path as its user writes it, such as limits.box[0][2]."""
     steps = (f".{step}" if isinstance(step, str) else f"[{step}]" for step in path)
     return "".join(steps).removeprefix(".")

@@ -58,10 +58,10 @@ class Warnings:
     """The values below which a pose counts as near a singularity.
 
     Attributes:
-        margin: Of a margin, in design units.
-        distance: Of the distance to a singular pose, in design units.
-        turn: Of the least turn to an incidence, in radians.
-        condition: Of the inverse condition number of J.
+        margin: Warning length of a margin, in design units.
+        distance: Warning length of the distance to a singular pose, in design units.
+        turn: Warning angle of the least turn to an incidence, in radians.
+        condition: Warning value of the inverse condition number of J.
     """
 
     margin: float

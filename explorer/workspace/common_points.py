@@ -111,7 +111,7 @@ class Surfaces:
         return rows
 
     def poles(self, directions: FloatArray) -> FloatArray:
-        """Return apexes, and the points of spheres whose normals are directions, shape (n, 3)."""
+        """Return apexes, centres, and the points of spheres with directions as normals, (m, 3)."""
         ways = np.vstack([np.zeros(3), directions, -directions])
         chosen = (self.kind == SPHERE) | (self.kind == CONE)
         poles = self.centre[chosen, None] + self.level[chosen, None, None] * ways

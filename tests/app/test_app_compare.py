@@ -288,7 +288,7 @@ LIGHT = msgspec.structs.replace(
 HEAVY = msgspec.structs.replace(LIGHT, name="heavy", payload=Payload(2.0, force_n=10.0))
 
 
-def test_the_table_tells_infinite_loads_and_errors_of_a_singular_home() -> None:
+def test_table_of_a_singular_home_shows_infinite_loads_and_errors() -> None:
     home = Pose((10.0, 5.0, 0.0), home_pose(OPTIMAL).quaternion)
     found = columns(compared(msgspec.structs.replace(HEAVY, home=home), live=LIGHT))
     rows = cells(table(found, millimetres=True))

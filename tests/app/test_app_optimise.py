@@ -672,7 +672,7 @@ def test_a_design_changed_since_is_told_of() -> None:
     assert "by hand" in verdict_words(changed, now, now.verdict)
 
 
-def test_an_unaccessible_volume_is_told_with_the_largest_found(bench: Bench) -> None:
+def test_unattainable_volume_is_shown_with_the_largest_found(bench: Bench) -> None:
     run = bench.find(replace(SMALL, volume=1400.0, free=("b2", "b3")))
     assert run.verdict is not None
     assert run.verdict.status == "infeasible"
@@ -852,7 +852,7 @@ def test_the_chart_of_a_load_or_an_error_has_its_unit() -> None:
         assert value_text(last.problem, last.iterates[-1]).endswith(" infinite")
 
 
-def test_the_table_tells_infinite_loads_beside_finite_ones() -> None:
+def test_table_shows_infinite_loads_beside_finite_ones() -> None:
     design = msgspec.structs.replace(
         OPTIMAL,
         payload=Payload(force_n=1.0),

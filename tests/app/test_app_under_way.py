@@ -76,7 +76,7 @@ class Watched:
             self.surfaces.append(value)
 
 
-def test_an_accessible_workspace_tells_each_pair_of_legs_that_it_carves() -> None:
+def test_accessible_workspace_reports_each_pair_of_legs_that_it_carves() -> None:
     watched = Watched()
     drawing = draw_workspace(accessible_request(THICK, level=1.0), watched.line)
     assert drawing.accessible is not None

@@ -173,7 +173,7 @@ def test_optimise_refuses_a_box_where_no_load_is_held(
     )
 
 
-def test_optimise_tells_infinite_loads_beside_finite_ones(
+def test_optimise_shows_infinite_loads_beside_finite_ones(
     cli: CommandLine, tmp_path: Path, recwarn: pytest.WarningsRecorder
 ) -> None:
     limits = msgspec.structs.replace(

@@ -88,7 +88,7 @@ def test_optimise_writes_each_file_that_it_can(
     assert {left.name, failing} == {"design.json", "run.json"}
 
 
-def test_optimise_without_convergence_and_disk_tells_both_in_a_line(
+def test_optimise_without_convergence_and_disk_reports_both_in_a_line(
     cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(_: int) -> None:

@@ -150,7 +150,7 @@ def test_invalid_design_file_gives_reason(
     assert word in cli.refusal("inverse", "--design", file)
 
 
-def test_design_file_of_another_editor_opens_and_its_fault_is_told_with_line_and_field(
+def test_design_file_of_another_editor_opens_and_its_fault_is_reported_with_line_and_field(
     cli: CommandLine, tmp_path: Path
 ) -> None:
     text = '{\r\n"a3": [1, 2],\r\n"b1": [1, 2],\r\n"b2": 1,\r\n"b3": 2,\r\n"unit_mm": 5}'

@@ -144,7 +144,7 @@ def test_deviations_are_drawn_within_the_errors_of_the_design() -> None:
 
 
 @pytest.mark.parametrize("design", [OFF, typical_machine(IDEAL)[0]])
-def test_rms_errors_told_are_those_of_machines_that_are_drawn(design: Design) -> None:
+def test_rms_errors_are_those_of_drawn_machines(design: Design) -> None:
     home = home_pose(design)
     precision = ToolPrecision(LoadedPose(design, home, (0, 0, 0, 0, 0, 0), point=TOOL))
     costs = source_costs(design, home.position, home.rotation, TOOL)
@@ -154,9 +154,9 @@ def test_rms_errors_told_are_those_of_machines_that_are_drawn(design: Design) ->
     displacement, turn = (
         float(np.sqrt((moved[:, half] ** 2).sum(axis=1).mean())) for half in (slice(3), slice(3, 6))
     )
-    for told in (precision.rms(), rms_of_sources(by_source, source_errors(design))):
-        assert float(told.displacement) == pytest.approx(displacement, rel=0.03)
-        assert float(told.turn) == pytest.approx(turn, rel=0.03)
+    for computed in (precision.rms(), rms_of_sources(by_source, source_errors(design))):
+        assert float(computed.displacement) == pytest.approx(displacement, rel=0.03)
+        assert float(computed.turn) == pytest.approx(turn, rel=0.03)
     assert costs.rms_displacement == pytest.approx(design.unit_mm * displacement, rel=0.03)
     assert costs.rms_turn == pytest.approx(np.degrees(turn), rel=0.03)
     semi_axes = precision.ellipsoid.semi_axes

@@ -398,7 +398,7 @@ def test_limits_that_home_exceeds_end_at_home() -> None:
     assert_allclose(data.site("tool").xpos, tool, atol=1e-5)
 
 
-def test_model_tells_what_it_leaves_out() -> None:
+def test_model_lists_what_it_leaves_out() -> None:
     always = ("friction", "contacts", "the mass of the base")
     free = limited(msgspec.structs.replace(OPTIMAL, payload=Payload(1.0)), box=None)
     assert SimulationModel(free).left_out == always

@@ -194,13 +194,13 @@ def test_misspelt_field_is_named_with_its_line_and_the_nearest_name(
 
 
 @pytest.mark.parametrize("decode", [decode_design, decode_study, decode_record])
-def test_field_without_a_similar_name_is_told_with_all_names(decode: Decode) -> None:
+def test_field_without_a_similar_name_is_reported_with_all_names(decode: Decode) -> None:
     message = refusal(decode, b'{\n\n"xyzzy": 1}', "it")
     assert message.startswith("it: line 3: unknown field `xyzzy`; there are schema, ")
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_text_that_is_no_json_is_told_with_line_and_text(seed: int) -> None:
+def test_text_that_is_no_json_is_reported_with_line_and_text(seed: int) -> None:
     rng = random.Random(seed)
     text = laid_out(FIELDS, rng)
     tokens = [match.start() for match in re.finditer(r'"[^"]*"|[\w.-]+|[^\s"]', text)]
@@ -225,7 +225,7 @@ def test_text_that_is_no_json_is_told_with_line_and_text(seed: int) -> None:
         ('"schema": 1,\n"tool": {}', "unknown field `tool` of schema 1"),
     ],
 )
-def test_unusable_value_is_told_with_its_line(field: str, words: str) -> None:
+def test_unusable_value_is_reported_with_its_line(field: str, words: str) -> None:
     rest = {"schema": 2, "a3": [9, 4], "b1": [4, -1], "b2": 1, "b3": 3}
     own = {name for name in rest if re.search(rf'(^|\n)"{name}"', field)}
     others = json.dumps({name: value for name, value in rest.items() if name not in own})
@@ -234,7 +234,7 @@ def test_unusable_value_is_told_with_its_line(field: str, words: str) -> None:
     assert message.startswith(f"mine.json: line {3 + field.count(chr(10))}: {words}")
 
 
-def test_unusable_range_of_a_study_is_told_with_its_line() -> None:
+def test_unusable_range_of_a_study_is_reported_with_its_line() -> None:
     for path, value in (
         (("variables", "a3y"), [7, 6]),
         (("polish", "variables", "b2"), [7, 6]),

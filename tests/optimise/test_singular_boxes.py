@@ -172,7 +172,7 @@ def test_box_on_or_across_a_plane_is_refuted_where_forces_or_errors_count(
             assert bool(found) == is_singular, (problem.objective, problem.demands, place)
 
 
-def test_refutation_of_a_box_on_the_base_tells_what_fails_where() -> None:
+def test_refutation_of_a_box_on_the_base_says_what_fails_where() -> None:
     box = ((8.0, 3.0, 0.0), (12.0, 7.0, 8.0))
     words = words_of(refutations(problem_of(machine(), box, "smallest-reach", **DEMANDS[0])))
     assert "no load is held at z = 0" in words

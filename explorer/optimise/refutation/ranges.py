@@ -92,7 +92,7 @@ class Ranges:
         ]
 
     def best_margin(self, index: int, side: int, box: Box) -> float:
-        """Return a bound of the margin that all of a box can have on one side, shifted or not.
+        """Return an upper bound of the least margin over a box on one side, over all its shifts.
 
         It is exact unless the yaw may change.
 
