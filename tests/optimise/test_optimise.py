@@ -34,6 +34,7 @@ from explorer import (
 from explorer.measures.case import Case
 from explorer.measures.size import corners_of, longest_leg
 from explorer.measures.statics import BoxStatics
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.optimise.demands import AZIMUTHS
 from explorer.optimise.paper import paper_problem, paper_start, reach_problem
@@ -58,6 +59,11 @@ OPTIMAL = PRESETS["paper-optimal"]
 
 def started_at(problem: Problem, values: tuple[float, ...]) -> Problem:
     return msgspec.structs.replace(problem, start=problem.design_at(values))
+
+
+def same_for_all(value: float) -> Six:
+    """Return one value for each actuator."""
+    return value, value, value, value, value, value
 
 
 def least_clearance_by_sampling(design: Design, margin: float, count: int) -> float:
@@ -686,6 +692,53 @@ def test_demand_of_a_tilt_is_kept_in_its_azimuths() -> None:
     for corner in corners_of(box):
         assert tilt_map(found, corner, yaw, azimuths).tilts.min() >= 25.0 - 1e-3
     assert longest_leg(found) < longest_leg(start)
+
+
+@pytest.mark.parametrize(
+    ("objective", "field", "others", "factor"),
+    [
+        ("smallest-error", "error", {}, 0.9),
+        ("smallest-deflection", "deflection", {}, 0.9),
+        ("smallest-reach", "reach", {"volume": 5000.0}, 0.98),
+        ("largest-volume", "volume", {"reach": 20.0}, 1.02),
+    ],
+)
+def test_demand_about_what_the_objective_improves_is_kept_too(
+    objective: ObjectiveName, field: str, others: dict[str, Any], factor: float
+) -> None:
+    start = msgspec.structs.replace(
+        limited(OPTIMAL, box=None),
+        payload=Payload(force_n=10.0),
+        actuators=Actuators(error_mm=same_for_all(0.02), stiffness_n_mm=same_for_all(900.0)),
+    )
+    box = ((8.0, 3.0, 7.0), (12.0, 7.0, 11.0))
+
+    def search(**demands: Any) -> Outcome:
+        return optimise_design(make_problem(start, objective, required_box=box, **demands))
+
+    free = search(**others)
+    assert free.converged
+    # A demand that the optimum keeps changes nothing; one that it misses is missed.
+    kept = search(**others, **{field: free.best.value / factor})
+    assert kept.converged
+    assert kept.best.value == pytest.approx(free.best.value, rel=1e-5)
+    missed = search(**others, **{field: free.best.value * factor})
+    assert not missed.converged
+    assert missed.best.spare < 0.0
+
+
+@pytest.mark.parametrize("most", [5.0, 40.0])
+def test_smallest_load_that_must_be_held_converges_only_where_it_is(most: float) -> None:
+    start = msgspec.structs.replace(
+        limited(OPTIMAL, box=None),
+        payload=Payload(force_n=10.0),
+        actuators=Actuators(push_n=same_for_all(most)),
+    )
+    problem = make_problem(
+        start, "smallest-load", required_box=((8.0, 3.0, 7.0), (12.0, 7.0, 11.0)), held=True
+    )
+    outcome = optimise_design(problem)
+    assert outcome.converged == (outcome.best.value <= 1.0) == (most > 10.0)
 
 
 @pytest.mark.parametrize(

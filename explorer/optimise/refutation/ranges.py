@@ -167,9 +167,7 @@ class Ranges:
     def most_reach(self) -> float:
         """The largest reach that both bounds and demands allow."""
         demanded = self.problem.demands.reach
-        if demanded is None or self.problem.objective == "smallest-reach":
-            return self.reach[1]
-        return min(demanded, self.reach[1])
+        return self.reach[1] if demanded is None else min(demanded, self.reach[1])
 
     def is_tied(self, name: str) -> bool:
         """Whether the maximum of a length is the reach."""

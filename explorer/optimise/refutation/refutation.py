@@ -94,9 +94,7 @@ def paper_box(problem: Problem) -> Box | None:
 def _volume(ranges: Ranges) -> Iterator[Refutation]:
     problem = ranges.problem
     wanted = problem.demands.volume or 0.0
-    if problem.objective == "largest-volume":
-        wanted = 0.0
-    elif wanted == 0.0:
+    if wanted == 0.0 and problem.objective != "largest-volume":
         return
     for ceiling in ceilings(ranges):
         # A workspace without any volume is of no use.
@@ -229,7 +227,7 @@ def _farther_sides(ranges: Ranges, required: Box, centre: tuple[Pair, ...]) -> l
 
 def _reach(ranges: Ranges) -> Iterator[Refutation]:
     demanded = ranges.problem.demands.reach
-    if demanded is None or ranges.problem.objective == "smallest-reach":
+    if demanded is None:
         return
     least = ranges.least_longest_leg
     if least > demanded * (1.0 + SPARE):
@@ -255,7 +253,7 @@ def _clearance(ranges: Ranges) -> Iterator[Refutation]:
     problem = ranges.problem
     demanded, volume = problem.demands.clearance, problem.demands.volume
     # All of a smaller workspace may lie where no clearance is demanded.
-    if demanded is None or problem.objective == "largest-volume" or volume is None:
+    if demanded is None or volume is None:
         return
     if volume * (1.0 - SPARE) <= near_singular_volume(ranges, problem.demands.clearance_margin):
         return

@@ -257,10 +257,10 @@ def reported_objective(problem: Problem, state: State) -> float:
 def _demands(problem: Problem, start: State) -> list[Demand]:
     demands = problem.demands
     listed: list[Demand] = []
-    if demands.volume is not None and problem.objective != "largest-volume":
+    if demands.volume is not None:
         exact = problem.objective == "match-volume"
         listed.append(VolumeDemand(demands.volume, is_equality=exact))
-    if demands.reach is not None and problem.objective != "smallest-reach":
+    if demands.reach is not None:
         listed.append(ReachDemand(demands.reach))
     if demands.least > 0.0:
         listed.append(DegenerateDemand(demands.least, start))
@@ -271,11 +271,11 @@ def _demands(problem: Problem, start: State) -> list[Demand]:
     if demands.tilt is not None:
         listed += tilt_demands(start, demands.tilt)
     machine: list[Demand] = []
-    if demands.held and problem.objective != "smallest-load":
+    if demands.held:
         machine.append(LoadDemand(start))
-    if demands.error is not None and problem.objective != "smallest-error":
+    if demands.error is not None:
         machine.append(DisplacementDemand(start, "error", demands.error))
-    if demands.deflection is not None and problem.objective != "smallest-deflection":
+    if demands.deflection is not None:
         machine.append(DisplacementDemand(start, "deflection", demands.deflection))
     listed += machine
     if machine or problem.objective in OF_THE_MACHINE:

@@ -127,7 +127,6 @@ class OptimisePanel:
             "Demand that the payload's weight and force are held within the limits of actuators, "
             "struts and guide, wherever in the required box.",
             At("optimisation.request.held", action=SetRequest),
-            disabled=lambda state: state.optimisation.request.objective == "smallest-load",
         )
         controls.number(
             _label("worst_error"),
