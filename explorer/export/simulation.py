@@ -11,7 +11,7 @@ downwards; a base that stands otherwise is turned by a frame around it.
 
 MuJoCo's loops give way: by a ten-thousandth of what the bodies at their ends would do apart from
 each other, each as far as its centre of mass moves. A `connect` ends at a socket on the rod, a body
-without mass whose centre is the base joint, so that light legs do not let a heavy platform droop.
+of no noticeable mass whose centre is the base joint, so that light legs do not let a heavy platform droop.
 
 The model of an imperfect machine has its dimensions, and starts where its loops close. A joint has
 the value that its encoder reads, which is off by the zero of the encoder: commands, ranges and
@@ -65,13 +65,25 @@ DEFAULTS: Mapping[str, Mapping[str, str]] = {
         **dict.fromkeys(("armature", "damping", "frictionloss", "stiffness", "ref", "margin"), "0"),
         **dict.fromkeys(("limited", "actuatorfrclimited", "actuatorgravcomp"), "false"),
         "pos": "0 0 0",
+        "springdamper": "0 0",
     },
-    "equality": {"solref": "1e-5 1", "solimp": "0.9999 0.9999 1e-5"},
-    "tendon": {"limited": "true", "damping": "0", "frictionloss": "0", "stiffness": "0"},
-    "general": {"dyntype": "none", "gaintype": "fixed", "biastype": "affine", "gear": "1"},
+    "equality": {"active": "true", "solref": "1e-5 1", "solimp": "0.9999 0.9999 1e-5"},
+    "tendon": {
+        "limited": "true",
+        **dict.fromkeys(("damping", "frictionloss", "stiffness", "margin"), "0"),
+    },
+    "general": {
+        "dyntype": "none",
+        "gaintype": "fixed",
+        "biastype": "affine",
+        "gear": "1",
+        "actlimited": "false",
+    },
 }
 # MuJoCo treats lighter moving bodies as massless, in kg and kg m².
 LEAST_MASS = LEAST_INERTIA = 1e-14
+# Share of a rod's mass and inertia that its socket has: none to notice, but Drake takes no zeros.
+SPECK = 1e-12
 # A force that no servo has, in N; MuJoCo takes no infinite limits.
 NO_LIMIT = 1e10
 
@@ -266,8 +278,14 @@ class SimulationModel:
             _geom(rod, "capsule", ROD * radius, fromto=_row([0, 0, -length, 0, 0, 0]))
             if leg < LEGS[-1]:
                 socket = ET.SubElement(rod, "body", name=f"socket_{leg}")
-                base_joint = _row([0, 0, -length])
-                ET.SubElement(socket, "inertial", pos=base_joint, mass="0", diaginertia="0 0 0")
+                mass = self.masses[names[2]]
+                ET.SubElement(
+                    socket,
+                    "inertial",
+                    pos=_row([0, 0, -length]),
+                    mass=repr(SPECK * mass.mass),
+                    diaginertia=_row([SPECK * np.trace(mass.inertia)] * 3),
+                )
         platform = self._body(rod, "platform", "rod 4")
         points = self.points * metres
         hub = points.mean(axis=0)

@@ -106,8 +106,11 @@ def test_model_has_every_joint_and_six_servos() -> None:
     for name in SIMULATION_BODIES[1:]:
         assert model.body(name).mass[0] > 0.0
         assert (model.body(name).inertia > 0.0).all()
-    for name in ("base", *sockets):
-        assert model.body(name).mass[0] == 0.0
+    assert model.body("base").mass[0] == 0.0
+    for leg in (1, 2, 3):
+        socket, rod = model.body(f"socket_{leg}"), model.body(f"rod_{leg}")
+        assert 0.0 < socket.mass[0] < 1e-9 * rod.mass[0]
+        assert (socket.inertia < 1e-9 * rod.inertia.max()).all()
 
 
 @pytest.mark.parametrize("design", DESIGNS)

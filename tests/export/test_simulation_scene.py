@@ -60,17 +60,18 @@ THINGS = """
       limited="true"/>
       <geom type="box" size=".1 .1 .01" pos="0 0 .3"/></body></body>
 </worldbody>
-<actuator><motor name="lid" joint="lid"/></actuator>
+<actuator><general name="lid" joint="lid" dyntype="integrator"/></actuator>
 """
 DEFAULTS = """
 <default>
   <geom mass="3" contype="1" conaffinity="1" friction="2 .1 .1"/>
   <joint damping="5" armature="1" frictionloss="2" stiffness="3" limited="true" range="-1 1"
-    pos="0.1 0 0" margin="0.01" actuatorfrclimited="true" actuatorfrcrange="-1 1"/>
-  <equality solref="0.05 1" solimp="0.5 0.6 0.01"/>
-  <tendon stiffness="9" damping="3" frictionloss="1" limited="false"/>
+    pos="0.1 0 0" margin="0.01" springdamper="0.1 1" actuatorfrclimited="true" actuatorfrcrange="-1 1"/>
+  <equality active="false" solref="0.05 1" solimp="0.5 0.6 0.01"/>
+  <tendon stiffness="9" damping="3" frictionloss="1" limited="false" margin="1"/>
   <general dyntype="filter" dynprm="0.2" ctrllimited="true" ctrlrange="-1 1" gear="7"
-    forcelimited="true" forcerange="-0.1 0.1" biastype="none"/>
+    forcelimited="true" forcerange="-0.1 0.1" biastype="none"
+    actlimited="true" actrange="0 1"/>
 </default>
 """
 HOSTS = [
@@ -178,7 +179,11 @@ def test_model_in_a_scene_is_the_model_alone(design: Design, ahead: str, behind:
                 if field != "range" or one.limited[0]:
                     expected = getattr(one, field)
                     assert np.array_equal(expected, getattr(other, field)), (name, field)
-    for field in ("eq_solref", "eq_solimp", "tendon_stiffness", "tendon_limited", "tendon_range"):
+    fields_of_model = (
+        *("eq_active0", "eq_solref", "eq_solimp"),
+        *("tendon_stiffness", "tendon_limited", "tendon_range", "tendon_margin"),
+    )
+    for field in fields_of_model:
         assert np.array_equal(getattr(alone, field), getattr(both, field)), field
     assert not both.geom_contype[both.geom_bodyid == both.body("platform").id].any()
     data = at_home(both)
@@ -433,6 +438,8 @@ def test_model_has_no_setting_of_the_whole_scene() -> None:
         assert base in [*world, *world.findall("frame/body")]
         for connect in root.findall("equality/connect"):
             assert {"body1", "body2", "anchor"} <= set(connect.keys())
+        # Drake refuses bodies without mass.
+        assert all(float(each.get("mass", "0")) > 0.0 for each in root.iter("inertial"))
         names = [element.get("name", "") for element in root.iter()]
         assert not any(" " in name for name in names)
 
