@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import os
+import re
 import sys
 import unicodedata
 from contextvars import ContextVar
@@ -16,9 +17,13 @@ from io import TextIOWrapper
 from explorer.errors import ExplorerError
 
 # Characters of ASCII in place of those that a terminal cannot show.
-_PLAIN = {"±": "+-", "≤": "<=", "≥": ">=", "°": " deg"} | dict(
-    zip("−–—×·⁄›′‘’“”", "---x./>'''\"\"", strict=True)
-)
+_PLAIN = {
+    **{"±": "+-", "∓": "-+", "≤": "<=", "≥": ">=", "≠": "!=", "°": " deg"},
+    **{"→": "->", "←": "<-", "∞": "inf", "√": "sqrt", "ß": "ss", "µ": "u"},
+    **dict(zip("−–—×·⁄›′‘’“”≈∂•", "---x./>'''\"\"~d*", strict=True)),
+}
+# Letters that Unicode does not decompose, by their names: ø becomes o, and δ is written out.
+_LETTER = re.compile(r"(?:LATIN|GREEK) (SMALL|CAPITAL) (?:LETTER|LIGATURE) ([A-Z]+)\b.*")
 
 answered: ContextVar[bool] = ContextVar("answered", default=False)
 """Whether anything was written to standard output since `prepare`."""
@@ -44,14 +49,25 @@ def prepare() -> None:
 def _write_plainly(error: UnicodeError) -> tuple[str | bytes, int]:
     """Return ASCII in place of what cannot be encoded, and where to go on.
 
-    A minus sign becomes a hyphen, ä becomes a, ² becomes 2, and what has no like becomes ?.
+    A minus sign becomes a hyphen, ä becomes a, ² becomes 2, δ becomes delta, and what has no like
+    becomes ?.
     """
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    text = unicodedata.normalize("NFKD", error.object[error.start : error.end])
-    letters = (each for each in text if not unicodedata.combining(each))
-    plain = (each if each.isascii() else _PLAIN.get(each, "?") for each in letters)
-    return "".join(plain), error.end
+    return "".join(map(_plain, error.object[error.start : error.end])), error.end
+
+
+def _plain(letter: str) -> str:
+    """Return the ASCII most like a letter."""
+    if letter.isascii() or letter in _PLAIN:
+        return _PLAIN.get(letter, letter)
+    parts = unicodedata.normalize("NFKD", letter)
+    if parts != letter:
+        return "".join(map(_plain, parts))
+    named = _LETTER.fullmatch(unicodedata.name(letter, ""))
+    if named is not None:
+        return named[2].lower() if named[1] == "SMALL" else named[2].title()
+    return "" if unicodedata.combining(letter) else "?"
 
 
 def write(text: str) -> None:
