@@ -295,3 +295,28 @@ def test_url_is_one_that_a_browser_on_this_machine_opens(host: str, url: str) ->
 def test_loopback_hosts_are_known() -> None:
     assert all(map(is_loopback, ["127.0.0.1", "localhost", "::1", "127.1.2.3"]))
     assert not any(map(is_loopback, ["0.0.0.0", "::", "10.0.0.1", "lab.example", "", "127.1"]))
+
+
+@pytest.mark.parametrize(
+    ("allowed", "host", "origin", "passes"),
+    [
+        # Browsers leave the usual port of their scheme out; proxies may add it.
+        ("lab.example:443", "lab.example", "https://lab.example", True),
+        ("lab.example:80", "lab.example", "http://lab.example", True),
+        ("lab.example", "lab.example:443", "https://lab.example", True),
+        ("lab.example:443", "lab.example:443", "https://lab.example", True),
+        ("lab.example", "lab.example:80", "http://lab.example", True),
+        ("lab.example:8443", "lab.example", "https://lab.example", False),
+        ("lab.example:443", "lab.example:8443", "https://lab.example:8443", False),
+        ("lab.example", "lab.example:443", "http://lab.example", False),
+        ("lab.example", "lab.example", "https://lab.example:8443", False),
+        ("lab.example", "lab.example:443", "https://evil.example", False),
+        ("lab.example", "lab.example.evil", "https://lab.example.evil", False),
+        ("[2001:db8::80]", "[2001:db8::80]", "http://[2001:db8::80]", True),
+    ],
+)
+def test_allowed_name_passes_with_usual_ports(
+    allowed: str, host: str, origin: str, *, passes: bool
+) -> None:
+    access = Access.to("127.0.0.1", TOKEN, [allowed])
+    assert (access.judge(websocket(host, origin, cookie=COOKIE), PORT) is None) == passes

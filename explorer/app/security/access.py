@@ -31,6 +31,8 @@ PLAIN_QUERY = re.compile(r"[A-Za-z0-9_.~,=&-]*")
 HOST = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:(?P<port>[0-9]{1,5}))?")
 ORIGIN = re.compile(rf"https?://(?P<host>{HOST.pattern})")
 HTTP_PORT = 80
+# Ports that browsers leave out, by the scheme of the address.
+USUAL_PORTS = {"http": "80", "https": "443"}
 # Permissions of the page. Its program, its styles and its workers are all inside one file; it
 # connects to no other server than its own, so that no link can make it connect elsewhere.
 # Plots of studies come as text that viser's page runs, and compile their shaders from text.
@@ -177,7 +179,8 @@ class Access:
         if parts is None:
             return False
         name = parts["name"]
-        if name in self.names or host in self.names:
+        ports = (parts["port"],) if parts["port"] else USUAL_PORTS.values()
+        if not {name, *(f"{name}:{each}" for each in ports)}.isdisjoint(self.names):
             return True
         if self.token is None:
             return name in {*LOOPBACK_NAMES, _in_address(self.host).lower()} and port == int(
@@ -203,7 +206,10 @@ class Access:
         if len(origins) != 1:
             return False
         scheme, _, rest = origins[0].lower().partition("://")
-        return scheme in ("http", "https") and rest == host
+        if scheme not in USUAL_PORTS:
+            return False
+        usual = f":{USUAL_PORTS[scheme]}"
+        return rest.removesuffix(usual) == host.removesuffix(usual)
 
     def _has_token(self, query: str, cookies: Sequence[str], port: int) -> bool:
         given = [
