@@ -139,18 +139,19 @@ def located_errors(
         text = decode_text(data)
         yield text
     except RecursionError:
-        raise error(_one_line(f"{source}: the lists or fields are nested too deeply")) from None
+        raise error(one_line(f"{source}: the lists or fields are nested too deeply")) from None
     except msgspec.ValidationError as fault:
-        raise error(_one_line(f"{source}: {_words_of_refusal(fault, text, kind)}")) from None
+        raise error(one_line(f"{source}: {_words_of_refusal(fault, text, kind)}")) from None
     except msgspec.DecodeError as fault:
-        raise error(_one_line(f"{source}: {_words_of_syntax(fault, text)}")) from None
+        raise error(one_line(f"{source}: {_words_of_syntax(fault, text)}")) from None
     except InputError as fault:
         field = _path_of(fault.field) if isinstance(fault, DesignError) else ()
         words = _at_line(str(fault), field, _first_places(text), text)
-        raise error(_one_line(f"{source}: {words}")) from None
+        raise error(one_line(f"{source}: {words}")) from None
 
 
-def _one_line(message: str) -> str:
+def one_line(message: str) -> str:
+    """Return a message as one printable line of limited length."""
     words = " ".join(message.split())
     line = "".join(letter if letter.isprintable() else "\ufffd" for letter in words[:LONGEST_LINE])
     return line if len(words) <= LONGEST_LINE else f"{line}…"

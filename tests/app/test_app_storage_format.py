@@ -316,6 +316,15 @@ def test_state_that_no_page_shows_is_refused_wherever_it_is(nonsense: str, place
     assert str(refusal.value).isprintable()
 
 
+def test_long_nonsense_is_refused_in_a_short_line() -> None:
+    body = body_of(WHOLE)
+    next(each for each in body["objects"] if "objective" in each)["objective"] = "a\u202e" * 50_000
+    with pytest.raises(StorageError, match="file cannot be used") as refusal:
+        decode_session(signed(json.dumps(body).encode()), "file")
+    assert str(refusal.value).isprintable()
+    assert len(str(refusal.value)) < 400
+
+
 @pytest.mark.parametrize("words", [[], ["Open"], ["Open"] * 3])
 def test_words_for_more_or_fewer_steps_are_refused(words: list[str]) -> None:
     body = body_of(WHOLE)

@@ -16,6 +16,7 @@ from explorer.app.session.history import History, Step, start_history
 from explorer.app.storage import earlier
 from explorer.app.storage.packing import Packer, Unpacker, resolve
 from explorer.errors import ExplorerError, InputError, StorageError
+from explorer.files.json_text import one_line
 
 SCHEMA = 3
 """The schema of the files that are written; files of an older one are read too."""
@@ -137,8 +138,7 @@ def decode_session(data: bytes, source: str) -> History:
         TypeError,
         AttributeError,
     ) as error:
-        reason = " ".join(f"{error}".split())
-        raise StorageError(f"{source} cannot be used: {reason}") from None
+        raise StorageError(one_line(f"{source} cannot be used: {error}")) from None
 
 
 def shorten(history: History, most: int) -> History:
