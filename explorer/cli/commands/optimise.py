@@ -174,11 +174,12 @@ class Optimise(JsonOptions, DesignOptions):
         from explorer.files.writing import check_writable
 
         record = self.record
-        if record is None and self.out is not None:
-            record = self.out.with_suffix(".record.json")
-        for path in (self.out, record):
-            if path is not None:
-                check_writable(path)
+        if self.out is not None:
+            # A folder has no name to which a suffix could be added.
+            check_writable(self.out)
+            record = record or self.out.with_suffix(".record.json")
+        if record is not None:
+            check_writable(record)
         problem, settings = self._problem()
         self._check_possible(problem)
         outcome = _search(problem, settings)
