@@ -11,7 +11,18 @@ import pytest
 from drawn_designs import complete_designs, poses
 from hypothesis import given, strategies as st
 
-from explorer import PRESETS, Demands, Design, Pose, Problem, Study, Variable, Weights, home_pose
+from explorer import (
+    PRESETS,
+    Demands,
+    Design,
+    InputError,
+    Pose,
+    Problem,
+    Study,
+    Variable,
+    Weights,
+    home_pose,
+)
 from explorer.mechanism.design import Swing
 from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.optimise.problem import OBJECTIVES
@@ -120,3 +131,9 @@ def test_weights_of_numpy_numbers_compare_with_those_of_plain_ones() -> None:
     made = Weights(carriages=cast("Any", np.array(plain.carriages)), rods=cast("Any", [1, 2, 3, 4]))
     assert made == plain
     assert hash(made) == hash(plain)
+
+
+def test_pose_of_whole_numbers_beyond_floats_is_refused() -> None:
+    for position in ((10**400, 5, 9), (0, -(10**309), 0)):
+        with pytest.raises(InputError, match="position must be"):
+            Pose(position, (1, 0, 0, 0))

@@ -31,7 +31,7 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatAr
     """
     try:
         array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name} must be numbers of shape {_shape_text(shape)}: {error}") from None
     if array.ndim < len(shape) or array.shape[array.ndim - len(shape) :] != shape:
         raise InputError(
