@@ -18,8 +18,8 @@ from explorer.errors import ExplorerError
 
 # Characters of ASCII in place of those that a terminal cannot show.
 _PLAIN = {
-    **{"±": "+-", "∓": "-+", "≤": "<=", "≥": ">=", "≠": "!=", "°": " deg"},
-    **{"→": "->", "←": "<-", "∞": "inf", "√": "sqrt", "ß": "ss", "µ": "u"},
+    **dict(zip("±∓≤≥≠→←", ["+-", "-+", "<=", ">=", "!=", "->", "<-"], strict=True)),
+    **dict(zip("°∞√ßµ", [" deg", "inf", "sqrt", "ss", "u"], strict=True)),
     **dict(zip("−–—×·⁄›′‘’“”≈∂•", "---x./>'''\"\"~d*", strict=True)),
 }
 # Letters that Unicode does not decompose, by their names: ø becomes o, and δ is written out.

@@ -11,7 +11,8 @@ downwards; a base that stands otherwise is turned by a frame around it.
 
 MuJoCo's loops give way: by a ten-thousandth of what the bodies at their ends would do apart from
 each other, each as far as its centre of mass moves. A `connect` ends at a socket on the rod, a body
-of no noticeable mass whose centre is the base joint, so that light legs do not let a heavy platform droop.
+of hardly any mass whose centre is the base joint, so that light legs do not let a heavy platform
+droop.
 
 The model of an imperfect machine has its dimensions, and starts where its loops close. A joint has
 the value that its encoder reads, which is off by the zero of the encoder: commands, ranges and

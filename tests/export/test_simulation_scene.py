@@ -66,7 +66,8 @@ DEFAULTS = """
 <default>
   <geom mass="3" contype="1" conaffinity="1" friction="2 .1 .1"/>
   <joint damping="5" armature="1" frictionloss="2" stiffness="3" limited="true" range="-1 1"
-    pos="0.1 0 0" margin="0.01" springdamper="0.1 1" actuatorfrclimited="true" actuatorfrcrange="-1 1"/>
+    pos="0.1 0 0" margin="0.01" springdamper="0.1 1"
+    actuatorfrclimited="true" actuatorfrcrange="-1 1"/>
   <equality active="false" solref="0.05 1" solimp="0.5 0.6 0.01"/>
   <tendon stiffness="9" damping="3" frictionloss="1" limited="false" margin="1"/>
   <general dyntype="filter" dynprm="0.2" ctrllimited="true" ctrlrange="-1 1" gear="7"
