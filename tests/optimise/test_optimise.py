@@ -727,6 +727,25 @@ def test_demand_about_what_the_objective_improves_is_kept_too(
     assert missed.best.spare < 0.0
 
 
+@pytest.mark.parametrize("factor", [1e-10, 1e-6, 1e-3, 1e5])
+def test_optimum_of_the_smallest_load_is_the_same_for_any_size_of_the_load(factor: float) -> None:
+    box = ((8.0, 3.0, 7.0), (12.0, 7.0, 11.0))
+
+    def share(force: float) -> float:
+        start = msgspec.structs.replace(
+            limited(OPTIMAL, box=None),
+            payload=Payload(force_n=force),
+            actuators=Actuators(push_n=same_for_all(150.0)),
+        )
+        outcome = optimise_design(
+            make_problem(start, "smallest-load", volume=5000.0, required_box=box)
+        )
+        assert outcome.converged
+        return outcome.best.value / force
+
+    assert share(10.0 * factor) == pytest.approx(share(10.0), rel=1e-6)
+
+
 @pytest.mark.parametrize("most", [5.0, 40.0])
 def test_smallest_load_that_must_be_held_converges_only_where_it_is(most: float) -> None:
     start = msgspec.structs.replace(

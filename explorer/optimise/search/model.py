@@ -272,7 +272,7 @@ def _demands(problem: Problem, start: State) -> list[Demand]:
         listed += tilt_demands(start, demands.tilt)
     machine: list[Demand] = []
     if demands.held:
-        machine.append(LoadDemand(start))
+        machine.append(LoadDemand(start, 1.0))
     if demands.error is not None:
         machine.append(DisplacementDemand(start, "error", demands.error))
     if demands.deflection is not None:

@@ -11,7 +11,7 @@ of its own, an open `MarginDemand`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 import numpy as np
@@ -95,14 +95,20 @@ class LoadDemand:
 
     The load is the payload's weight and its force of any direction. The limits are those of the
     design at the start of a run, which no variable changes.
+
+    Args:
+        start: The problem where a run starts.
+        most: Largest share of a limit allowed; None for that at the start, so that the values are
+            of unit size whatever the load.
     """
 
     is_equality = False
     is_limit = False
 
-    def __init__(self, start: State) -> None:
+    def __init__(self, start: State, most: float | None = None) -> None:
         self.side = MarginDemand(start, is_open=True)
-        self.limits = part_limits(start.design)
+        share = _scale_of(start, lambda box: box.shares) or 1.0 if most is None else most
+        self.limits = share * part_limits(start.design)
         self.counts: BoolArray = np.asarray(np.isfinite(self.limits).any(axis=0))
         self.names = tuple(
             f"load of {part} over the required box"
@@ -154,7 +160,7 @@ class DisplacementDemand:
     def __init__(self, start: State, cause: Cause, most: float | None = None) -> None:
         self.side = MarginDemand(start, is_open=True)
         self.cause: Cause = cause
-        self.most = most or _scale_of(start, cause)
+        self.most = most or _scale_of(start, lambda box: _displacements(box, cause))
         self.names = (f"{cause} over the required box",) * EIGHTHS
 
     def measure(self, state: State) -> Measured:
@@ -190,10 +196,10 @@ def _miss_beyond_plane(state: State, side: MarginDemand, count: int) -> Measured
     return Measured(np.full(count, value[worst] / BEYOND - 1.0), np.tile(slope, (count, 1)))
 
 
-def _scale_of(start: State, cause: Cause) -> float:
-    """Return the scale of displacements: the largest over the required box, in design units.
+def _scale_of(start: State, values: Callable[[BoxStatics], FloatArray]) -> float:
+    """Return the scale of a demand: the largest of values over the required box.
 
-    If that is infinite, it is that at the node, or at home, farthest from singular planes.
+    If that is infinite, it is the value at the node, or at home, farthest from singular planes.
     """
     box = start.statics
     if not box.is_regular:
@@ -201,7 +207,7 @@ def _scale_of(start: State, cause: Cause) -> float:
         least = np.abs(margins(places, start.rotation)).min(axis=1)
         x, y, z = places[least.argmax()].tolist()
         box = BoxStatics(start.design, ((x, y, z), (x, y, z)), start.rotation)
-    return float(_displacements(box, cause).max()) if box.is_regular else start.problem.size
+    return float(values(box).max()) if box.is_regular else start.problem.size
 
 
 def _displacements(box: BoxStatics, cause: Cause) -> FloatArray:
