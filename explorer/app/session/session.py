@@ -158,7 +158,7 @@ class Session:
         """Number of changes that wait."""
         return self._jobs.waiting
 
-    def wait_until_idle(self, timeout: float = 10.0) -> bool:
+    def wait_until_idle(self, timeout: float = 60.0) -> bool:
         """Wait until all changes are made and drawn; return whether they are."""
         return self._jobs.wait_until_idle(timeout)
 
