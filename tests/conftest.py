@@ -6,6 +6,7 @@ import importlib
 import pkgutil
 import signal
 from collections.abc import Generator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -13,15 +14,62 @@ from hypothesis import HealthCheck, settings
 import explorer
 from explorer.numerics.compiled import warm
 
-settings.register_profile(
-    "laws",
-    derandomize=True,
-    deadline=None,
-    max_examples=60,
-    database=None,
-    suppress_health_check=[HealthCheck.too_slow],
-)
-settings.load_profile("laws")
+TESTS = Path(__file__).parent
+
+# The folders of each ring of tests, which is a marker too: `pytest -m laws`.
+RINGS = {
+    "laws": (
+        "mechanism",
+        "singularity",
+        "legs",
+        "statics",
+        "workspace",
+        "measures",
+        "paths",
+        "optimise",
+        "prototype",
+        "numerics",
+    ),
+    "answers": ("house", "files", "sweep", "reproduce", "export", "cli", "manual"),
+    "page": ("app",),
+    "browser": ("browser",),
+}
+RING_OF = {folder: ring for ring, folders in RINGS.items() for folder in folders}
+
+EXAMPLES, EXAMPLES_OF_ALL = 25, 300
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--all", action="store_true", help="run the tests marked long too, with 300 examples"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    for ring in RINGS:
+        config.addinivalue_line("markers", f"{ring}: a ring of tests, see CONTRIBUTING.md")
+    config.addinivalue_line("markers", "long: searches long or repeats by design; runs with --all")
+    settings.register_profile(
+        "laws",
+        derandomize=True,
+        deadline=None,
+        max_examples=EXAMPLES_OF_ALL if config.getoption("--all") else EXAMPLES,
+        database=None,
+        suppress_health_check=[HealthCheck.too_slow],
+    )
+    settings.load_profile("laws")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark each test with its ring, and leave out the long ones unless all are asked for."""
+    for item in items:
+        item.add_marker(RING_OF[item.path.relative_to(TESTS).parts[0]])
+    if config.getoption("--all"):
+        return
+    long = [item for item in items if item.get_closest_marker("long")]
+    config.hook.pytest_deselected(items=long)
+    items[:] = [item for item in items if not item.get_closest_marker("long")]
+
 
 # A shell that runs tests in its background has them ignore Ctrl-C, and what they start too.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

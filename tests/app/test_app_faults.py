@@ -157,7 +157,7 @@ def test_saved_request_is_run_again_by_one_command(tmp_path: Path) -> None:
     Faults(tmp_path).save(a_fault(arguments=(7.0, ("x",))))
     Faults(tmp_path).save(a_fault(task="say", arguments=("hello",), is_sending=False))
     fail, say = sorted(tmp_path.iterdir())
-    command = [sys.executable, str(ROOT / "tests" / "again.py")]
+    command = [sys.executable, str(ROOT / "tests" / "tools" / "again.py")]
     done = subprocess.run(
         [*command, str(fail)], capture_output=True, text=True, check=False, timeout=PATIENCE
     )

@@ -8,7 +8,8 @@ import time
 from pathlib import Path
 
 # Run as a folder, so the package and the project are made importable by their names.
-sys.path[:1] = [str(parent) for parent in Path(__file__).resolve().parents[1:3]]
+TESTS = Path(__file__).resolve().parents[1]
+sys.path[:1] = [str(folder) for folder in (TESTS, TESTS / "support", TESTS.parent)]
 
 
 def main() -> None:

@@ -35,7 +35,7 @@ SIZES = (1_000, 50_000, MILLION)
 # A run whose workers hand in rows without computing them, as a process of its own.
 ALONE = f"""
 import json, resource, sys, tempfile
-sys.path[:1] = [{str(ROOT / "tests")!r}, {str(ROOT)!r}]
+sys.path[:1] = [{str(ROOT / "tests")!r}, {str(ROOT / "tests" / "support")!r}, {str(ROOT)!r}]
 from benchmarks.studies_scale import idle_run
 progress = idle_run(int(sys.argv[1]))
 most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

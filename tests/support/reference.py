@@ -9,5 +9,5 @@ from typing import Any
 
 def read_reference(name: str) -> Any:
     """Return the contents of a file in tests/data, named without its suffix."""
-    path = Path(__file__).parent / "data" / f"{name}.json"
+    path = Path(__file__).parents[1] / "data" / f"{name}.json"
     return json.loads(path.read_text(encoding="utf-8"))

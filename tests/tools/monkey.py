@@ -1,6 +1,6 @@
 """Random hands on a running explorer: through websockets, as many tabs, with no mercy.
 
-From the checkout, for as long as one likes: python tests/monkey.py [actions] [seed]
+From the checkout, for as long as one likes: python tests/tools/monkey.py [actions] [seed]
 With --memory it looks at memory alone: the pages that it compares with take some too.
 """
 
@@ -23,6 +23,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+
 import psutil
 import viser
 from client import press_update, presses_in
@@ -43,7 +45,7 @@ from explorer.app.storage.user_data import UserData
 from explorer.mechanism.design_file import PRESETS, encode_design
 from explorer.numerics.compiled import warm
 
-# Where requests are kept that failed in a worker; `python tests/again.py` runs one again.
+# Where requests are kept that failed in a worker; `python tests/tools/again.py` runs one again.
 FAULTS = Path(tempfile.gettempdir()) / "flagged-explorer-faults-of-the-monkey"
 TABS = 3
 # Between two looks at whether the page shows its state.

@@ -1,4 +1,4 @@
-"""Run a request again that failed in the worker: `python tests/again.py FILE [--warm]`.
+"""Run a request again that failed in the worker: `python tests/tools/again.py FILE [--warm]`.
 
 FILE is one that the explorer kept in the folder `faults` of the user's data. It is unpickled, which
 can run code: only files that one's own explorer wrote may be given. The request runs in this
@@ -17,9 +17,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 from explorer.app.session.faults import read_fault
 from explorer.app.session.worker import Channel
 from explorer.numerics.compiled import warm
@@ -27,7 +24,7 @@ from explorer.numerics.compiled import warm
 
 def main() -> None:
     """Run a request again."""
-    parser = argparse.ArgumentParser(prog="python tests/again.py", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python tests/tools/again.py", description=__doc__)
     parser.add_argument("file", type=Path, help="a file of the folder of faults")
     parser.add_argument("--warm", action="store_true", help="with compiled kernels")
     asked = parser.parse_args()

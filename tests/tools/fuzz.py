@@ -1,4 +1,4 @@
-"""Fuzzed design files, which are opened or refused: `python tests/fuzz.py [COUNT [SEED]]`.
+"""Fuzzed design files, which are opened or refused: `python tests/tools/fuzz.py [COUNT [SEED]]`.
 
 Valid files are mutated: bytes flipped and cut, tokens swapped, numbers, types, names, nesting
 and text changed. Each file is opened as on the page, and the only error allowed is an
@@ -21,9 +21,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from explorer.app.session.drawable import check_drawable
 from explorer.app.session.gestures import UserAction
@@ -248,7 +245,7 @@ MUTATIONS: tuple[Mutation, ...] = (
 
 def main() -> int:
     """Try fuzzed files; print the failures and how many files were opened and refused."""
-    parser = argparse.ArgumentParser(prog="python tests/fuzz.py", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python tests/tools/fuzz.py", description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=COUNT)
     parser.add_argument("seed", nargs="?", type=int, default=SEED)
     parser.add_argument("--only", type=int, help="number of the only file to try")

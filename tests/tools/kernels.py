@@ -1,6 +1,6 @@
 """Writes the object code of all kernels that comes with the explorer, for this kind of processor.
 
-To be run after a change of a kernel: python tests/kernels.py
+To be run after a change of a kernel: python tests/tools/kernels.py
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Random hands in a real browser: clicks, drags, keys, files and reloads, wherever they land.
 
-From the checkout, for as long as one likes: python tests/browser/browser_monkey.py [actions] [seed]
+From the checkout, for as long as one likes: python tests/tools/browser_monkey.py [actions] [seed]
 """
 
 from __future__ import annotations
@@ -9,21 +9,20 @@ import random
 import re
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+
 from graphics import quick_browser
+from monkey import BROKEN, explorer_with_data
+from playwright.sync_api import Browser
 from tab import Tab
 
 from explorer.app.screenshot import SCENE_CANVAS
 from explorer.mechanism.design_file import PRESETS, encode_design
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from collections.abc import Callable
-
-from monkey import BROKEN, explorer_with_data
-from playwright.sync_api import Browser
 
 from explorer.app.server import Running
 

@@ -27,7 +27,7 @@ from explorer.errors import InputError
 from explorer.files.manual import list_pages, read_page
 from explorer.optimise.problem import OBJECTIVES
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 MANUAL = Path(explorer.__file__).parents[1] / "assets" / "manual"
 DOCUMENTS = {"README.md": ROOT / "README.md", **{p.name: p for p in sorted(MANUAL.iterdir())}}
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

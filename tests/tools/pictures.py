@@ -1,6 +1,6 @@
 """The named scenes that the README shows, and the script that makes their pictures again.
 
-From the checkout, all of them or only some: python tests/pictures.py [names]
+From the checkout, all of them or only some: python tests/tools/pictures.py [names]
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 
 import msgspec
 import numpy as np
@@ -55,7 +57,7 @@ from explorer.sweep.study import STUDIES, Sampling
 from explorer.sweep.workers import LocalWorkers
 from explorer.workspace.accessible.radii import with_radius
 
-FOLDER = Path(__file__).resolve().parents[1] / "assets" / "pictures"
+FOLDER = Path(__file__).resolve().parents[2] / "assets" / "pictures"
 DESIGN = PRESETS["paper-optimal"]
 
 REPORT_DATE = dt.date(2026, 1, 1)
