@@ -22,9 +22,8 @@ from playwright.sync_api import Browser
 from tab import Tab
 
 from explorer.app.screenshot import SCENE_CANVAS
-from explorer.mechanism.design_file import PRESETS, encode_design
-
 from explorer.app.server import Running
+from explorer.mechanism.design_file import PRESETS, encode_design
 
 # Between two looks at whether the browser shows what the server has.
 BETWEEN_LOOKS = 50
