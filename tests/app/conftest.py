@@ -49,6 +49,18 @@ def worker() -> Generator[StubWorker]:
 
 
 @pytest.fixture(scope="module")
+def idle_workers() -> Generator[None]:
+    """Give pages a worker that starts no process and computes nothing."""
+
+    def make_worker(*_: object, **__: object) -> StubWorker:
+        return StubWorker()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("explorer.app.page.Worker", make_worker)
+        yield
+
+
+@pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
     """An explorer with every feature: its page offers saved designs and studies."""
     studies = StudyFolders(tmp_path_factory.mktemp("studies"))

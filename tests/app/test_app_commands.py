@@ -10,13 +10,14 @@ import pkgutil
 import re
 import threading
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Any
 
 import msgspec
 import pytest
 import viser
+from desk import CLIENT
 from page_props import shown_by
 
 import explorer.app
@@ -55,7 +56,7 @@ from explorer.app.state.actions import (
     SetVariable,
     StartThere,
 )
-from explorer.app.state.state import State
+from explorer.app.state.values import value_at
 from explorer.app.widgets.commands import (
     CAMERA_KEYS,
     PALETTE_KEY,
@@ -64,10 +65,12 @@ from explorer.app.widgets.commands import (
     with_keys,
 )
 from explorer.app.widgets.palette import Command, Palette
-from explorer.app.widgets.pieces import Widget, widgets
+from explorer.app.widgets.pieces import widgets
 from explorer.errors import ExplorerError
 from explorer.files.manual import read_page
 from explorer.mechanism.design_file import PRESETS
+
+pytestmark = pytest.mark.usefixtures("idle_workers")
 
 OF_VALUES = {
     SetJoint: "sliders of the legs",
@@ -122,15 +125,6 @@ BROWSER_KEYS = {f"Ctrl+{key}" for key in "ACDEFGHIJLNOPQRSTUVWX0123456789"} | {
 }
 
 
-class Browser:
-    """A browser, as far as commands know one."""
-
-    client_id = 7
-
-
-CLIENT: Any = Browser()
-
-
 @pytest.fixture(scope="module")
 def palette(running: Running) -> Palette:
     return running.page.palette
@@ -138,9 +132,9 @@ def palette(running: Running) -> Palette:
 
 @pytest.fixture
 def bare() -> Generator[viser.ViserServer]:
-    made = start_viser("127.0.0.1", 0)
-    yield made
-    stop_viser(made)
+    server = start_viser("127.0.0.1", 0)
+    yield server
+    stop_viser(server)
 
 
 def labelled(palette: Palette) -> dict[str, Command]:
@@ -159,28 +153,28 @@ def actions() -> set[type]:
 
 
 @contextmanager
-def heard(session: Session) -> Generator[list[object]]:
-    """Keep what this thread asks for; neither that is done, nor what others tell of it later."""
-    asked: list[object] = []
-    asks = threading.current_thread()
+def record_requests(session: Session) -> Generator[list[object]]:
+    """Keep what this thread requests without doing it, and ignore other threads' requests."""
+    requests: list[object] = []
+    this_thread = threading.current_thread()
 
     def post(_key: object, change: Any, **_: object) -> None:
-        if threading.current_thread() is not asks:
+        if threading.current_thread() is not this_thread:
             return
-        # What a state refuses is refused to whoever asks.
+        # What a state refuses is refused to whoever requests it.
         with contextlib.suppress(ExplorerError):
-            asked.append(change(session.state) if callable(change) else change)
+            requests.append(change(session.state) if callable(change) else change)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(session, "post", post)
-        yield asked
-    # The controls that were used go back to what is.
+        yield requests
+    # The controls that were used go back to the present values.
     session.redraw()
     assert session.wait_until_idle()
 
 
-def test_every_action_is_a_command_or_asks_for_a_value(running: Running, palette: Palette) -> None:
-    with heard(running.page.session) as asked:
+def test_every_action_is_a_command_or_takes_a_value(running: Running, palette: Palette) -> None:
+    with record_requests(running.page.session) as requests:
         for label, command in labelled(palette).items():
             # The others do something to one browser, or send it a file.
             if label in OF_BROWSERS or label.startswith(("Page › ", "Export › ")):
@@ -188,11 +182,11 @@ def test_every_action_is_a_command_or_asks_for_a_value(running: Running, palette
             command.run(CLIENT)
         saved = running.page.services.get(SavedDesigns)
         assert saved.wait_until_idle()
-        reached = {type(each) for each in asked}
-    shown = {action for action, label in WHERE_IT_IS_SHOWN.items() if label in labelled(palette)}
-    told = set(OF_VALUES) | set(OF_NOBODY)
-    assert actions() - reached - shown - told == set(), "no command, and no word on why"
-    assert reached & told == set(), "a command after all"
+        commands = {type(each) for each in requests}
+    conditional = {each for each, label in WHERE_IT_IS_SHOWN.items() if label in labelled(palette)}
+    others = set(OF_VALUES) | set(OF_NOBODY)
+    assert actions() - commands - conditional - others == set(), "no command, and no reason why"
+    assert commands & others == set(), "a command after all"
 
 
 def commands_on(server: viser.ViserServer) -> dict[str, Any]:
@@ -201,7 +195,7 @@ def commands_on(server: viser.ViserServer) -> dict[str, Any]:
     return {each.label: each for each in gui._command_handle_from_uuid.values()}
 
 
-def test_saved_designs_are_opened_by_name(running: Running) -> None:
+def test_saved_design_is_opened_by_a_command_of_its_name(running: Running) -> None:
     session, saved = running.page.session, running.page.services.get(SavedDesigns)
 
     def offered() -> dict[str, Any]:
@@ -221,34 +215,14 @@ def test_saved_designs_are_opened_by_name(running: Running) -> None:
     assert "Designs › Open mine" not in offered()
 
 
-def test_commands_that_stay_the_same_object_are_not_looked_at_again(
-    bare: viser.ViserServer,
-) -> None:
-    class Watched(tuple[Command, ...]):
-        looks = 0
-
-        def __iter__(self) -> Iterator[Command]:
-            self.looks += 1
-            return super().__iter__()
-
-    palette = Palette(bare)
-    ours = Watched([Command("Ours", "Open this.", lambda _: None)])
-    theirs = Watched([Command("Theirs", "Open that.", lambda _: None)])
-    for _ in range(3):
-        palette.offer("ours", ours)
-        palette.offer("theirs", theirs)
-        assert commands_on(bare).keys() == {"Ours", "Theirs"}
-    assert (ours.looks, theirs.looks) == (1, 1)
-    palette.offer("ours", ())
-    assert commands_on(bare).keys() == {"Theirs"}
-
-
-def test_names_and_keys_are_told_apart(palette: Palette) -> None:
+def test_names_and_keys_of_commands_are_unique(palette: Palette) -> None:
     labels = [command.label for command in palette.commands]
     assert len(labels) > 100
     assert len(set(labels)) == len(labels)
     keys = [str(key) for command in palette.commands for key in command.keys]
     assert len(set(keys)) == len(keys)
+    with pytest.raises(ValueError, match="two commands"):
+        palette.add(Command(labels[0], "Nothing.", lambda _: None))
 
 
 def keys_of(palette: Palette) -> dict[str, tuple[Key, ...]]:
@@ -256,14 +230,14 @@ def keys_of(palette: Palette) -> dict[str, tuple[Key, ...]]:
     return {command.label: command.keys for command in palette.commands if command.keys}
 
 
-def test_every_key_belongs_to_a_command_and_to_one_owner(palette: Palette) -> None:
+def test_every_key_belongs_to_a_command_and_not_to_browser_camera_or_palette(
+    palette: Palette,
+) -> None:
+    owned = keys_of(palette)
     assert len(CONTROL_KEYS) == sum(len(feature.keys) for feature in FEATURES)
-    assert CONTROL_KEYS.items() <= keys_of(palette).items()
-    assert set(CHIP_KEYS) <= set(keys_of(palette))
-
-
-def test_no_key_is_taken_from_the_browser_the_camera_or_the_palette(palette: Palette) -> None:
-    for key in itertools.chain.from_iterable(keys_of(palette).values()):
+    assert CONTROL_KEYS.items() <= owned.items()
+    assert set(CHIP_KEYS) <= set(owned)
+    for key in itertools.chain.from_iterable(owned.values()):
         assert str(key) not in BROWSER_KEYS
         # viser's camera looks at the letter, whatever else is held down.
         assert key.key not in CAMERA_KEYS
@@ -273,16 +247,10 @@ def test_no_key_is_taken_from_the_browser_the_camera_or_the_palette(palette: Pal
 def test_manual_lists_every_key_and_no_other(palette: Palette) -> None:
     section = read_page("page.md").partition("## Keys")[2].partition("\n## ")[0]
     _, *rows = re.findall(r"^\|.*\| (.+) \|$", section, flags=re.MULTILINE)
-    told = {key for row in rows for key in re.split(r", | or ", row)}
+    listed = {key for row in rows for key in re.split(r", | or ", row)}
     keys = keys_of(palette)
     card = {str(key) for key in keys["Page › Keys"]}
-    assert told | card == {str(key) for key in itertools.chain.from_iterable(keys.values())}
-
-
-def test_two_commands_of_one_name_are_refused(palette: Palette) -> None:
-    twin = Command(palette.commands[0].label, "Nothing.", lambda _: None)
-    with pytest.raises(ValueError, match="two commands"):
-        palette.add(twin)
+    assert listed | card == {str(key) for key in itertools.chain.from_iterable(keys.values())}
 
 
 def test_every_list_is_offered_or_chosen_in_its_panel(running: Running) -> None:
@@ -290,38 +258,38 @@ def test_every_list_is_offered_or_chosen_in_its_panel(running: Running) -> None:
     assert lists - OPEN_LISTS - CHOSEN_IN_THE_PANEL == set()
 
 
-def test_a_hint_tells_the_keys_that_do_the_same(running: Running, palette: Palette) -> None:
-    told = 0
+def test_hint_names_the_keys_that_do_the_same(running: Running, palette: Palette) -> None:
+    found = 0
     for widget in widgets(running.viser):
         for label in offers(widget, OPEN_LISTS):
             for key in CONTROL_KEYS.get(label, ()):
                 assert f" {key}" in widget.hint
-                told += 1
+                found += 1
     # The keys of buttons in markup stand in hints there.
     markup = " ".join(
         str(value) for name, value in shown_by(running).items() if name.endswith(" content")
     )
     for label, keys in keys_of(palette).items():
         if label.startswith(("View ›", "Edit ›", "Optimise ›", "Show › Dr")) or label in CHIP_KEYS:
-            told += sum(f" {key}" in markup for key in keys)
-    assert told > 20
+            found += sum(f" {key}" in markup for key in keys)
+    assert found > 20
 
 
-def test_keys_are_told_behind_the_hint() -> None:
+def test_hint_with_keys_ends_with_them() -> None:
     assert with_keys("Go.", ()) == "Go."
     assert with_keys("Go.", (Key("Z", "cmd/ctrl"),)) == "Go. Key: Ctrl+Z."
     redo = (Key("Z", "cmd/ctrl+shift"), Key("Y", "cmd/ctrl"))
     assert with_keys("Go.", redo) == "Go. Keys: Ctrl+Shift+Z, Ctrl+Y."
 
 
-def test_only_what_can_be_done_can_be_chosen(running: Running, palette: Palette) -> None:
-    commands = labelled(palette)
-    session = running.page.session
-    assert not commands["Workspace › Cut open › other side"].is_ready()
+def test_command_is_ready_only_if_it_can_be_done(running: Running, palette: Palette) -> None:
+    commands, session = labelled(palette), running.page.session
+    other_side = commands["Workspace › Cut open › other side"]
+    assert not other_side.is_ready()
     commands["Workspace › Cut open › across x"].run(CLIENT)
-    assert running.page.wait_until_drawn()
+    assert session.wait_until_idle()
     assert session.state.view.workspace.cut == "x"
-    assert commands["Workspace › Cut open › other side"].is_ready()
+    assert other_side.is_ready()
     disabled = {label: each.disabled for label, each in commands_on(running.viser).items()}
     assert disabled["Workspace › Cut open › other side"] is False
     assert disabled["Optimise › Cancel"] is True
@@ -331,93 +299,71 @@ def test_only_what_can_be_done_can_be_chosen(running: Running, palette: Palette)
     assert all(commands[label].is_ready() for label in strata)
 
 
-SWITCHES: dict[str, Callable[[State], bool]] = {
-    "Show › Grid": lambda state: state.view.grid,
-    "Prototype › Show the parts": lambda state: state.view.drawn_as == "prototype",
-    "Show › All tetrahedra": lambda state: state.view.tetrahedra == (True, True, True),
-    "Workspace › Convex hull": lambda state: state.view.workspace.hull,
+SWITCHES = {
+    "Show › Grid": "view.grid",
+    "Show › All tetrahedra": "view.tetrahedra",
+    "Workspace › Convex hull": "view.workspace.hull",
 }
 
 
-@pytest.mark.parametrize("label", SWITCHES)
-def test_a_switch_switches_and_switches_back(
-    running: Running, palette: Palette, label: str
+@pytest.mark.parametrize(("label", "path"), SWITCHES.items())
+def test_switch_used_twice_is_where_it_was(
+    running: Running, palette: Palette, label: str, path: str
 ) -> None:
     session = running.page.session
-    command, read = labelled(palette)[label], SWITCHES[label]
-    was = read(session.state)
-    for expected in (not was, was):
-        command.run(CLIENT)
+    values = [value_at(session.state, path)]
+    for _ in range(2):
+        labelled(palette)[label].run(CLIENT)
         assert session.wait_until_idle()
-        assert read(session.state) == expected
+        values.append(value_at(session.state, path))
+    assert values[0] == values[2] != values[1]
 
 
-def test_modes_follow_one_another_in_both_ways(running: Running, palette: Palette) -> None:
+def test_assembly_modes_follow_one_another_in_both_ways(running: Running, palette: Palette) -> None:
     session, commands = running.page.session, labelled(palette)
-    first = session.state.mode
-    seen = [first]
-    for _ in range(8):
-        commands["Pose › Next assembly mode"].run(CLIENT)
+    modes = [session.state.mode]
+    for way in (*["Next"] * 8, "Previous"):
+        commands[f"Pose › {way} assembly mode"].run(CLIENT)
         assert session.wait_until_idle()
-        seen.append(session.state.mode)
-    assert sorted(seen[:8]) == list(range(8))
-    assert seen[8] == first
-    commands["Pose › Previous assembly mode"].run(CLIENT)
-    assert session.wait_until_idle()
-    assert session.state.mode == seen[7]
+        modes.append(session.state.mode)
+    assert sorted(modes[:8]) == list(range(8))
+    assert modes[8] == modes[0]
+    assert modes[9] == modes[7]
 
 
-def test_undo_and_redo_are_the_session_s(running: Running, palette: Palette) -> None:
+def test_undo_and_redo_are_those_of_the_session(running: Running, palette: Palette) -> None:
     session, commands = running.page.session, labelled(palette)
-    commands["Design › Preset › paper-initial"].run(CLIENT)
-    assert session.wait_until_idle()
-    moves = (("Undo", "paper-optimal"), ("Redo", "paper-initial"), ("Undo", "paper-optimal"))
-    for label, expected in moves:
-        commands[f"Edit › {label}"].run(CLIENT)
+    for label, expected in (
+        ("Design › Preset › paper-initial", "paper-initial"),
+        ("Edit › Undo", "paper-optimal"),
+        ("Edit › Redo", "paper-initial"),
+        ("Edit › Undo", "paper-optimal"),
+    ):
+        commands[label].run(CLIENT)
         assert session.wait_until_idle()
         assert session.state.design.name == expected
 
 
-def test_a_control_used_from_the_palette_shows_its_new_value_everywhere(
-    bare: viser.ViserServer,
-) -> None:
-    heard_of: list[tuple[object, object]] = []
-    with bare.gui.add_folder("Around"):
+def test_control_used_from_the_palette_has_its_new_value(bare: viser.ViserServer) -> None:
+    events: list[tuple[object, object]] = []
+    folder = bare.gui.add_folder("Around")
+    with folder:
         box = bare.gui.add_checkbox("On", initial_value=False)
-    box.on_update(lambda event: heard_of.append((event.client_id, event.target.value)))
+    box.on_update(lambda event: events.append((event.client_id, event.target.value)))
     (widget,) = widgets(bare)
     before = time.time()
     widget.use(CLIENT, True)
-    assert heard_of == [(7, True)]
+    assert events == [(CLIENT.client_id, True)]
     assert box.value is True
     assert box.update_timestamp >= before
-    # Late browsers get it too.
-    sent = [m for m in _kept(bare) if getattr(m, "updates", None) == {"value": True}]
-    assert len(sent) == 1
-
-
-def _kept(server: viser.ViserServer) -> list[Any]:
-    internals: Any = server
-    return list(internals._websock_server._broadcast_buffer.message_from_id.values())
-
-
-def test_what_lies_hidden_in_a_folder_is_not_in_use(bare: viser.ViserServer) -> None:
-    folder = bare.gui.add_folder("Around")
-    with folder:
-        bare.gui.add_button("Push")
-    (widget,) = widgets(bare)
+    # What lies hidden in a folder is not in use.
     assert widget.path == ("Around",)
     assert widget.is_in_use
     folder.visible = False
     assert not widget.is_in_use
 
 
-def test_nothing_is_offered_of_what_holds_a_value() -> None:
-    server = start_viser("127.0.0.1", 0)
-    try:
-        server.gui.add_slider("Long", 0.0, 1.0, 0.1, 0.5)
-        server.gui.add_upload_button("File")
-        assert [offers(widget) for widget in widgets(server)] == [{}, {}]
-        assert isinstance(next(widgets(server)), Widget)
-    finally:
-        stop_viser(server)
+def test_control_of_a_value_or_a_file_is_no_command(bare: viser.ViserServer) -> None:
+    bare.gui.add_slider("Long", 0.0, 1.0, 0.1, 0.5)
+    bare.gui.add_upload_button("File")
+    assert [offers(widget) for widget in widgets(bare)] == [{}, {}]

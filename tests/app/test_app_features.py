@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -33,6 +34,8 @@ from explorer.app.widgets.commands import Key
 from explorer.app.widgets.pieces import Widget, widgets
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
+
+pytestmark = pytest.mark.usefixtures("idle_workers")
 
 OPTIMAL = PRESETS["paper-optimal"]
 
@@ -69,14 +72,24 @@ class BoundByPath:
         return self.at.convert(value) if self.options is None else self.options[value]
 
 
+@contextmanager
+def start_with(features: tuple[Feature, ...]) -> Generator[Running]:
+    """Start an explorer with some features."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("explorer.app.page.FEATURES", features)
+        running = start(OPTIMAL, port=0)
+    yield running
+    running.stop()
+
+
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
     studies = StudyFolders(tmp_path_factory.mktemp("studies"))
     with pytest.MonkeyPatch.context() as patch:
         record_controls(patch)
-        made = start(OPTIMAL, port=0, user_data=open_user_data(resume=False), studies=studies)
-    yield made
-    made.stop()
+        running = start(OPTIMAL, port=0, user_data=open_user_data(resume=False), studies=studies)
+    yield running
+    running.stop()
 
 
 # Controls by the time of their making, as long as the page is made.
@@ -87,20 +100,22 @@ def record_controls(patch: pytest.MonkeyPatch) -> None:
     """Record each control that is made with a path from here on."""
     sources: dict[int, tuple[At, Mapping[str, object] | None]] = {}
     control_type: Any = Control
-    bind, make = At.bound, control_type.__init__
+    bind, initialise = At.bound, control_type.__init__
 
-    def bound(at: At, name: str, options: Mapping[str, object] | None = None) -> Bound[Any]:
-        found = bind(at, name, options)
-        sources[id(found.write)] = at, options
-        return found
+    def bind_and_record(
+        at: At, name: str, options: Mapping[str, object] | None = None
+    ) -> Bound[Any]:
+        bound = bind(at, name, options)
+        sources[id(bound.write)] = at, options
+        return bound
 
-    def made(control: Any, session: Any, handle: Any, bound: Any, **more: Any) -> None:
-        make(control, session, handle, bound, **more)
+    def record(control: Any, session: Any, handle: Any, bound: Any, **more: Any) -> None:
+        initialise(control, session, handle, bound, **more)
         if id(bound.write) in sources:
             MADE.append((handle, *sources[id(bound.write)]))
 
-    patch.setattr(At, "bound", bound)
-    patch.setattr(Control, "__init__", made)
+    patch.setattr(At, "bound", bind_and_record)
+    patch.setattr(Control, "__init__", record)
 
 
 @pytest.fixture
@@ -135,23 +150,17 @@ def test_control_with_a_path_sets_the_value_there_and_no_other(
         assert handle.value == shown, name
 
 
-# Without the mechanism there is nothing to look at.
-@pytest.mark.parametrize("name", [each.name for each in FEATURES if each.name != "mechanism"])
-def test_page_without_a_feature_starts_and_draws(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    left = tuple(each for each in FEATURES if each.name != name)
-    monkeypatch.setattr("explorer.app.page.FEATURES", left)
-    running = start(OPTIMAL, port=0)
-    try:
+@pytest.mark.parametrize("feature", FEATURES, ids=lambda feature: feature.name)
+def test_page_with_the_mechanism_and_one_feature_starts_and_draws(feature: Feature) -> None:
+    """Without the mechanism there is nothing to look at; no feature needs another one."""
+    features = tuple(each for each in FEATURES if each.name in ("mechanism", feature.name))
+    with start_with(features) as running:
         page = running.page
         page.session.do(Set("view.labels", False))
         assert page.wait_until_drawn()
         assert np.isfinite(page.corners()).all()
-        titles = {tab.title for each in left for tab in each.tabs}
+        titles = {tab.title for each in features for tab in each.tabs}
         assert {each.path[0] for each in widgets(running.viser) if each.path} <= titles
-    finally:
-        running.stop()
 
 
 class MarkerPanel:
@@ -198,12 +207,8 @@ MARKER = Feature(
 )
 
 
-def test_new_feature_appears_on_the_page_in_the_palette_and_in_the_scene(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("explorer.app.page.FEATURES", (*FEATURES, MARKER))
-    running = start(OPTIMAL, port=0)
-    try:
+def test_new_feature_appears_on_the_page_in_the_palette_and_in_the_scene() -> None:
+    with start_with((*FEATURES, MARKER)) as running:
         page = running.page
         (widget,) = (each for each in widgets(running.viser) if each.path == ("Marker",))
         assert widget.label == "Ghost platforms"
@@ -220,20 +225,16 @@ def test_new_feature_appears_on_the_page_in_the_palette_and_in_the_scene(
         top = Placed(Frame(page.session.state)).points["b4"] + [0.0, 0.0, 70.0]
         assert tuple(ball.position) == pytest.approx(top.tolist())
         assert page.corners().max(axis=0)[2] == pytest.approx(top[2])
-    finally:
-        running.stop()
 
 
-def test_without_panels_the_scene_has_the_feeds_that_it_draws_of() -> None:
+def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
     running = start(OPTIMAL, port=0, panels=False)
     try:
         page = running.page
         page.session.do(Set("view.orientation", OrientationView(tilts=True, over="inclusive")))
         page.session.do(Set("view.forces.weighed", "payload and legs"))
-        page.session.wait_until_idle()
-        feeds: list[Feed[Any, Any]] = [
-            page.services.get(kind) for kind in (TiltsFeed, RangeFeed, WeightsFeed)
-        ]
-        assert all(feed.request is not None for feed in feeds)
+        assert page.session.wait_until_idle()
+        kinds: tuple[type[Feed[Any, Any]], ...] = (TiltsFeed, RangeFeed, WeightsFeed)
+        assert all(page.services.get(kind).request is not None for kind in kinds)
     finally:
         running.stop()
