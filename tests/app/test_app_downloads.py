@@ -32,15 +32,13 @@ def test_only_a_file_of_the_same_name_and_browser_is_replaced(
     assert len({workspace, hull, of_another}) == 3
 
 
-def test_a_file_that_a_notice_announces_is_never_replaced(
-    files: Downloads, worker: StubWorker
-) -> None:
+def test_file_announced_by_a_notice_is_never_replaced(files: Downloads, worker: StubWorker) -> None:
     for _ in range(2):
         files.compute(1, "report.pdf", encoded, ("report",), ("Report", "A moment."))
     first, second = (order.key for order in worker.orders)
     assert first != second
 
 
-def test_nothing_is_made_for_a_browser_that_is_gone(files: Downloads, worker: StubWorker) -> None:
+def test_file_for_a_browser_that_is_gone_is_not_made(files: Downloads, worker: StubWorker) -> None:
     files.compute(7, "hull.3mf", encoded, ("hull",))
     assert worker.orders == []
