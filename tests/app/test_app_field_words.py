@@ -17,7 +17,7 @@ from explorer.app.features.mechanism.pose_panel import MovePanel
 from explorer.app.session.field_words import FIELD_WORDS, message_of
 from explorer.app.session.session import UNDO
 from explorer.errors import DesignError, InputError
-from explorer.mechanism.design import Design, Limits, Swing
+from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import decode_design
 
 # What no text for people holds: names with an underscore or a point within, and JSON's.
@@ -25,39 +25,32 @@ CODE = re.compile(r"[a-z]_[a-z]|[a-z]\.[a-z]|\bnull\b|\bNone\b")
 BAD = (-1.0, 0.0, 181.0, 1e9, 1e45)
 
 
-def impossible(value: object) -> list[Any]:
-    """Return impossible values of a control, at either end of a range."""
-    match value:
-        case float():
-            return list(BAD)
-        case (float(low), float(high)):
-            return [pair for bad in BAD for pair in ((bad, high), (low, bad))]
-        case _:
-            return []
-
-
 def test_refusals_of_the_page_hold_no_names_of_the_code(
     server: viser.ViserServer, desk: Desk, services: Services
 ) -> None:
     gui: Any = server.gui
     before = set(gui._gui_input_handle_from_uuid)
-    DesignPanel(services)
-    MovePanel(services)
-    MachinePanel(services)
+    for panel in (DesignPanel, MovePanel, MachinePanel):
+        panel(services)
     handles = [h for u, h in gui._gui_input_handle_from_uuid.items() if u not in before]
-    start, said = desk.state, list[str]()
+    start = desk.state
     for handle in handles:
-        for value in impossible(handle.value):
+        values: list[object] = []
+        match handle.value:
+            case float():
+                values += BAD
+            case (float(low), float(high)):
+                values += [pair for bad in BAD for pair in ((bad, high), (low, bad))]
+            case _:
+                continue
+        for value in values:
             desk.use(handle, value)
             if desk.state != start:
                 desk.session.travel(UNDO)
                 start = desk.state
-        said += desk.complaints
-        desk.complaints.clear()
-    assert (
-        len({words for words in FIELD_WORDS.values() if any(words in each for each in said)}) > 20
-    )
-    assert [message for message in said if CODE.search(message)] == []
+    words = {each for each in FIELD_WORDS.values() if any(each in said for said in desk.complaints)}
+    assert len(words) > 20
+    assert [message for message in desk.complaints if CODE.search(message)] == []
 
 
 @pytest.mark.parametrize(
@@ -65,34 +58,22 @@ def test_refusals_of_the_page_hold_no_names_of_the_code(
     [
         ('"unit_mm": 0', "The unit must be positive; got 0"),
         ('"node_step": -1', "The step of the nodes must be positive; got -1"),
-        (
-            '"limits": {"l1": [3, 2]}',
-            "The length l1: the minimum 3 exceeds the maximum 2",
-        ),
-        ('"limits": {"swing": {"b2": 200}}', "The swing of the b2 ball is a half-angle of at most"),
+        ('"limits": {"l1": [3, 2]}', "The length l1: the minimum 3 exceeds the maximum 2"),
     ],
 )
 def test_refusal_of_a_file_names_its_field_and_the_page_says_it_in_words(
     field: str, message: str
 ) -> None:
     data = f'{{"schema": 2, "a3": [9, 4], "b1": [4, -1], "b2": 3, "b3": 1.5, {field}}}'
-    name = field.strip('"').partition('"')[0]
-    with pytest.raises(DesignError, match=name):
+    with pytest.raises(DesignError, match=field.strip('"').partition('"')[0]):
         decode_design(data.encode(), "mine.json")
+    fields: dict[str, Any] = msgspec.json.decode(data)
+    limits = fields.pop("limits", {})
     with pytest.raises(DesignError) as refusal:
-        made(data)
+        Design(**fields, limits=Limits(**limits))
     assert message_of(refusal.value).startswith(message)
 
 
-def made(data: str) -> Design:
-    """Return the design of a file's fields, not read from a file."""
-    fields: dict[str, Any] = msgspec.json.decode(data)
-    limits = fields.pop("limits", {})
-    swing = Swing(**limits.pop("swing", {}))
-    fields["limits"] = Limits(**limits, swing=swing)
-    return Design(**fields)
-
-
-def test_messages_without_a_field_stay_as_they_are() -> None:
+def test_message_without_a_field_stays_as_it_is() -> None:
     assert message_of(InputError("unit_mm")) == "unit_mm"
     assert message_of(DesignError("degenerate design")) == "degenerate design"
