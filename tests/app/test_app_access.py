@@ -202,14 +202,6 @@ def test_name_that_no_host_has_is_refused_in_one_line(name: str) -> None:
         Access.to("127.0.0.1", TOKEN, [name])
 
 
-def test_reason_for_an_origin_that_a_proxy_hides_names_both_hosts() -> None:
-    refusal = OPEN.judge(websocket(origin=f"https://{PROXY}:8443"), PORT)
-    assert refusal is not None
-    assert f"{PROXY}:8443" in refusal.reason
-    assert HERE in refusal.reason
-    assert f"--allow-host {PROXY}" in refusal.reason
-
-
 @pytest.mark.parametrize(
     "query",
     ["websocket=ws://evil.example", "playbackPath=//evil.example/x",
@@ -218,6 +210,13 @@ def test_reason_for_an_origin_that_a_proxy_hides_names_both_hosts() -> None:
 def test_query_with_another_address_is_refused(query: str) -> None:
     assert is_forbidden(OPEN.judge(page(target=f"/?{query}"), PORT))
     assert is_forbidden(CLOSED.judge(page(target=f"/?token={TOKEN}&{query}"), PORT))
+
+
+def test_reason_for_an_origin_that_a_proxy_hides_names_both_hosts() -> None:
+    refusal = OPEN.judge(websocket(origin=f"https://{PROXY}:8443"), PORT)
+    assert refusal is not None
+    for words in (f"{PROXY}:8443", HERE, f"--allow-host {PROXY}"):
+        assert words in refusal.reason
 
 
 def test_policy_lets_the_page_connect_only_to_its_server() -> None:

@@ -26,18 +26,9 @@ from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.forces.actions import SetForce
 from explorer.app.features.listed import FEATURES
 from explorer.app.features.machine.actions import SetToolAngle
-from explorer.app.features.optimise.actions import (
-    Advance as ShowIterates,
-    Compare,
-    EndRun,
-    GiveUp,
-)
+from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun, GiveUp
 from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
-from explorer.app.features.paths.actions import (
-    Advance as PlayOn,
-    SetPathTime,
-    TakePlan,
-)
+from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
 from explorer.app.features.precision.actions import SetTolerances
 from explorer.app.features.singularity.actions import Jog
 from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
@@ -56,14 +47,7 @@ from explorer.app.state.actions import (
     SetVariable,
     StartThere,
 )
-from explorer.app.state.values import value_at
-from explorer.app.widgets.commands import (
-    CAMERA_KEYS,
-    PALETTE_KEY,
-    Key,
-    offers,
-    with_keys,
-)
+from explorer.app.widgets.commands import CAMERA_KEYS, PALETTE_KEY, Key, offers
 from explorer.app.widgets.palette import Command, Palette
 from explorer.app.widgets.pieces import widgets
 from explorer.errors import ExplorerError
@@ -72,24 +56,11 @@ from explorer.mechanism.design_file import PRESETS
 
 pytestmark = pytest.mark.usefixtures("idle_workers")
 
-OF_VALUES = {
-    SetJoint: "sliders of the legs",
-    SetPosition: "sliders of the pose",
-    SetAngle: "sliders of the pose",
-    SetPose: "the handle at b4",
-    Jog: "sliders of one margin",
-    SetTiltTorsion: "sliders of tilt and torsion",
-    SetToolAngle: "sliders of the tool",
-    GoToTilt: "the map of tilts",
-    SetForce: "fields and arrow of the load",
-    SetVariable: "sliders of the design",
-    SetName: "the name of a design",
-    SetPathTime: "slider of the time",
-    PickDesign: "points of a study's plots",
-    BrushAxis: "brushes of a study's plots",
-    BrushBox: "brushes of a study's plots",
-}
-"""Actions that ask for a value, each with the control that gives it."""
+OF_VALUES = (
+    SetJoint, SetPosition, SetAngle, SetPose, Jog, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
+    SetVariable, SetName, SetPathTime, PickDesign, BrushAxis, BrushBox,
+)  # fmt: skip
+"""Actions that take a value, which a slider, a field, a map or a handle gives."""
 
 OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, GiveUp, Compare, TakePlan)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
@@ -104,16 +75,9 @@ WHERE_IT_IS_SHOWN = {
 """Actions of commands that do nothing unless something is shown."""
 
 CHOSEN_IN_THE_PANEL = {
-    "Start",
-    "Goal",
-    "Format",
-    "Size (px)",
-    "Pin another design",
-    "Study",
-    "Across",
-    "Up",
+    "Start", "Goal", "Format", "Size (px)", "Pin another design", "Study", "Across", "Up",
     "Coloured by",
-}
+}  # fmt: skip
 """Lists of which an option alone does nothing, or whose options come and go."""
 
 CONTROL_KEYS = {label: keys for feature in FEATURES for label, keys in feature.keys.items()}
@@ -275,13 +239,6 @@ def test_hint_names_the_keys_that_do_the_same(running: Running, palette: Palette
     assert found > 20
 
 
-def test_hint_with_keys_ends_with_them() -> None:
-    assert with_keys("Go.", ()) == "Go."
-    assert with_keys("Go.", (Key("Z", "cmd/ctrl"),)) == "Go. Key: Ctrl+Z."
-    redo = (Key("Z", "cmd/ctrl+shift"), Key("Y", "cmd/ctrl"))
-    assert with_keys("Go.", redo) == "Go. Keys: Ctrl+Shift+Z, Ctrl+Y."
-
-
 def test_command_is_ready_only_if_it_can_be_done(running: Running, palette: Palette) -> None:
     commands, session = labelled(palette), running.page.session
     other_side = commands["Workspace › Cut open › other side"]
@@ -297,26 +254,6 @@ def test_command_is_ready_only_if_it_can_be_done(running: Running, palette: Pale
     strata = [label for label in commands if label.startswith("Singularity › Go to (")]
     assert len(strata) == 23
     assert all(commands[label].is_ready() for label in strata)
-
-
-SWITCHES = {
-    "Show › Grid": "view.grid",
-    "Show › All tetrahedra": "view.tetrahedra",
-    "Workspace › Convex hull": "view.workspace.hull",
-}
-
-
-@pytest.mark.parametrize(("label", "path"), SWITCHES.items())
-def test_switch_used_twice_is_where_it_was(
-    running: Running, palette: Palette, label: str, path: str
-) -> None:
-    session = running.page.session
-    values = [value_at(session.state, path)]
-    for _ in range(2):
-        labelled(palette)[label].run(CLIENT)
-        assert session.wait_until_idle()
-        values.append(value_at(session.state, path))
-    assert values[0] == values[2] != values[1]
 
 
 def test_assembly_modes_follow_one_another_in_both_ways(running: Running, palette: Palette) -> None:

@@ -89,11 +89,10 @@ def cells(html: str) -> dict[str, list[str]]:
     """Return the cells of a table by the first words of its rows, changes left out."""
     found: dict[str, list[str]] = {}
     for row in re.findall(r"<tr.*?</tr>", html)[1:]:
-        first, *rest = (
-            unescape(re.sub("<.*?>", "", cell)) for cell in re.findall(r"<td.*?</td>", row)
-        )
+        texts = [re.sub("<.*?>", "", cell) for cell in re.findall(r"<td.*?</td>", row)]
         # Behind each value but that of the live design stands its difference to that.
-        found[first] = [rest[0], *rest[1::2]]
+        first, live, *others = map(unescape, texts)
+        found[first] = [live, *others[::2]]
     return found
 
 

@@ -14,7 +14,6 @@ import pytest
 from explorer.app.session import faults as module
 from explorer.app.session.faults import Fault, Faults, read_fault
 from explorer.app.session.jobs import RESTARTED, Worker
-from explorer.errors import InputError
 from tests.app import telling
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -67,18 +66,6 @@ def test_newest_fault_of_each_kind_and_newest_kinds_are_kept(
         for age, path in enumerate(sorted(tmp_path.iterdir(), key=lambda p: p.stat().st_mtime_ns)):
             os.utime(path, ns=(count * 100 + age, count * 100 + age))
     assert sorted(read_fault(path).arguments[0] for path in tmp_path.iterdir()) == [2, 3, 99]
-
-
-def test_what_no_file_can_hold_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "in the way").write_text("[]")
-    assert "could not be kept" in Faults(tmp_path / "in the way").save(fault_of(1))
-    with pytest.raises(InputError):
-        read_fault(tmp_path / "in the way")
-    monkeypatch.setattr(module, "MOST_PACKED", 10)
-    Faults(tmp_path / "faults").save(fault_of(1))
-    (path,) = (tmp_path / "faults").iterdir()
-    with pytest.raises(InputError, match="too large"):
-        read_fault(path)
 
 
 def test_saved_request_is_run_again_by_one_command(

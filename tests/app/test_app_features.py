@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Control
 from explorer.app.inputs.controls import Controls
+from explorer.app.page import Page
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.server import Running, start
@@ -40,71 +40,64 @@ pytestmark = pytest.mark.usefixtures("idle_workers")
 OPTIMAL = PRESETS["paper-optimal"]
 
 
-@dataclass(frozen=True)
-class BoundByPath:
-    """A control of the page that is bound by a path.
+class BoundControl(NamedTuple):
+    """A control that shows and sets the value at a path; a list has values by its words."""
 
-    Attributes:
-        widget: The control.
-        at: The value that it shows and sets.
-        options: The values by the words of a list; None where the control holds the value.
-    """
-
-    widget: Widget
+    handle: Any
     at: At
     options: Mapping[str, object] | None
 
-    def another(self) -> Any:
-        """Return a value that a browser could send, another than the one that is shown."""
-        handle = self.widget.handle
-        if self.widget.kind == "switch":
-            return not handle.value
-        if self.widget.kind == "list":
-            return next(each for each in handle.options if each != handle.value)
-        step = handle.step
-        if self.widget.kind == "value" and isinstance(cast("object", handle.value), tuple):
-            values = cast("tuple[float, ...]", handle.value)
-            return tuple(value + step for value in values)
-        return handle.value + (step if handle.max is None or handle.value < handle.max else -step)
 
-    def meant(self, value: Any) -> object:
-        """Return the value of the state that a value of the control stands for."""
-        return self.at.convert(value) if self.options is None else self.options[value]
+def other_value(widget: Widget) -> Any:
+    """Return a value that a browser could send, another than the one that is shown."""
+    handle = widget.handle
+    if widget.kind == "switch":
+        return not handle.value
+    if widget.kind == "list":
+        return next(each for each in handle.options if each != handle.value)
+    if isinstance(cast("object", handle.value), tuple):
+        return tuple(value + handle.step for value in cast("tuple[float, ...]", handle.value))
+    is_below = handle.max is None or handle.value < handle.max
+    return handle.value + (handle.step if is_below else -handle.step)
 
 
 @contextmanager
-def start_with(features: tuple[Feature, ...]) -> Generator[Running]:
+def start_with(features: tuple[Feature, ...]) -> Generator[Page]:
     """Start an explorer with some features."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("explorer.app.page.FEATURES", features)
         running = start(OPTIMAL, port=0)
-    yield running
-    running.stop()
+    try:
+        yield running.page
+    finally:
+        running.stop()
 
 
 @pytest.fixture(scope="module")
-def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
+def controls() -> list[BoundControl]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def running(
+    tmp_path_factory: pytest.TempPathFactory, controls: list[BoundControl]
+) -> Generator[Running]:
     studies = StudyFolders(tmp_path_factory.mktemp("studies"))
     with pytest.MonkeyPatch.context() as patch:
-        record_controls(patch)
+        record_controls(patch, controls)
         running = start(OPTIMAL, port=0, user_data=open_user_data(resume=False), studies=studies)
     yield running
     running.stop()
 
 
 # Controls by the time of their making, as long as the page is made.
-MADE: list[tuple[Any, At, Mapping[str, object] | None]] = []
-
-
-def record_controls(patch: pytest.MonkeyPatch) -> None:
+def record_controls(patch: pytest.MonkeyPatch, controls: list[BoundControl]) -> None:
     """Record each control that is made with a path from here on."""
     sources: dict[int, tuple[At, Mapping[str, object] | None]] = {}
     control_type: Any = Control
     bind, initialise = At.bound, control_type.__init__
 
-    def bind_and_record(
-        at: At, name: str, options: Mapping[str, object] | None = None
-    ) -> Bound[Any]:
+    def bind_and_record(at: At, name: str, options: Any = None) -> Bound[Any]:
         bound = bind(at, name, options)
         sources[id(bound.write)] = at, options
         return bound
@@ -112,34 +105,30 @@ def record_controls(patch: pytest.MonkeyPatch) -> None:
     def record(control: Any, session: Any, handle: Any, bound: Any, **more: Any) -> None:
         initialise(control, session, handle, bound, **more)
         if id(bound.write) in sources:
-            MADE.append((handle, *sources[id(bound.write)]))
+            controls.append(BoundControl(handle, *sources[id(bound.write)]))
 
     patch.setattr(At, "bound", bind_and_record)
     patch.setattr(Control, "__init__", record)
 
 
-@pytest.fixture
-def bound_by_path(running: Running) -> list[BoundByPath]:
-    by_handle = {id(widget.handle): widget for widget in widgets(running.viser)}
-    return [BoundByPath(by_handle[id(handle)], at, options) for handle, at, options in MADE]
-
-
 def test_control_with_a_path_sets_the_value_there_and_no_other(
-    running: Running, bound_by_path: list[BoundByPath]
+    running: Running, controls: list[BoundControl]
 ) -> None:
     page, session = running.page, running.page.session
-    assert len(bound_by_path) > 35
-    for each in bound_by_path:
-        name, handle = f"{each.widget.label} at {each.at.path}", each.widget.handle
-        before, shown, given = session.state, handle.value, each.another()
-        each.widget.use(CLIENT, given)
+    by_handle = {id(widget.handle): widget for widget in widgets(running.viser)}
+    assert len(controls) > 35
+    for handle, at, options in controls:
+        widget = by_handle[id(handle)]
+        name = f"{widget.label} at {at.path}"
+        before, shown, given = session.state, handle.value, other_value(widget)
+        widget.use(CLIENT, given)
         assert session.wait_until_idle()
-        after, meant = session.state, each.meant(given)
-        assert value_at(after, each.at.path) == meant != value_at(before, each.at.path), name
-        if each.at.action is Set:
-            assert after == with_value(before, each.at.path, meant), name
+        after, meant = session.state, at.convert(given) if options is None else options[given]
+        assert value_at(after, at.path) == meant != value_at(before, at.path), name
+        if at.action is Set:
+            assert after == with_value(before, at.path, meant), name
         assert handle.value == given, name
-        if each.at.path.startswith("view."):
+        if at.path.startswith("view."):
             # What is shown is no step of the history.
             assert session.history.at == 0, name
             session.do(Set("view", before.view))
@@ -154,13 +143,13 @@ def test_control_with_a_path_sets_the_value_there_and_no_other(
 def test_page_with_the_mechanism_and_one_feature_starts_and_draws(feature: Feature) -> None:
     """Without the mechanism there is nothing to look at; no feature needs another one."""
     features = tuple(each for each in FEATURES if each.name in ("mechanism", feature.name))
-    with start_with(features) as running:
-        page = running.page
+    with start_with(features) as page:
         page.session.do(Set("view.labels", False))
         assert page.wait_until_drawn()
         assert np.isfinite(page.corners()).all()
         titles = {tab.title for each in features for tab in each.tabs}
-        assert {each.path[0] for each in widgets(running.viser) if each.path} <= titles
+        folders = {each.path[0] for each in widgets(page.services.server) if each.path}
+        assert folders <= titles
 
 
 class MarkerPanel:
@@ -208,9 +197,8 @@ MARKER = Feature(
 
 
 def test_new_feature_appears_on_the_page_in_the_palette_and_in_the_scene() -> None:
-    with start_with((*FEATURES, MARKER)) as running:
-        page = running.page
-        (widget,) = (each for each in widgets(running.viser) if each.path == ("Marker",))
+    with start_with((*FEATURES, MARKER)) as page:
+        (widget,) = (each for each in widgets(page.services.server) if each.path == ("Marker",))
         assert widget.label == "Ghost platforms"
         assert widget.hint.endswith("Key: 6.")
         commands = {each.label: each for each in page.palette.commands}
