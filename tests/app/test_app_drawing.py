@@ -14,7 +14,7 @@ from explorer.app.features.singularity.distance import distance_table
 from explorer.app.features.singularity.panel import measures_table, summary
 from explorer.app.inputs.tracks import decimals
 from explorer.app.scene.bands import COLLIDING, PLAIN
-from explorer.app.scene.camera import FIELD_OF_VIEW, VIEWS, ViewName, are_in_picture, framing
+from explorer.app.scene.camera import FIELD_OF_VIEW, VIEWS, ViewName, framing
 from explorer.app.scene.part import around
 from explorer.app.scene.placing import Placed, round_step
 from explorer.app.scene.shapes import cylinder, plate, sphere, turned_to
@@ -76,9 +76,18 @@ def test_view_holds_the_whole_mechanism_and_little_more(
 ) -> None:
     points = around(np.array(list(Placed(Frame(opened(design))).points.values())))
     eye, target = framing(points, view, aspect)
-    assert are_in_picture(points, eye, target, FIELD_OF_VIEW, aspect)
-    closer = target + 0.9 * (eye - target)
-    assert not are_in_picture(points, closer, target, FIELD_OF_VIEW, aspect)
+    distance = float(np.linalg.norm(target - eye))
+    forward = (target - eye) / distance
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    seen = points - eye
+    # Without perspective all is as large as at the target.
+    depth = seen @ forward if view == "isometric" else np.full(len(points), distance)
+    half = np.tan(0.5 * FIELD_OF_VIEW)
+    across = np.abs(seen @ right) / (half * aspect * depth)
+    upward = np.abs(seen @ np.cross(right, forward)) / (half * depth)
+    assert depth.min() > 0.0
+    assert 0.9 < max(across.max(), upward.max()) <= 1.0
 
 
 @given(st.floats(1e-20, 1e20))
