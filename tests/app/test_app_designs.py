@@ -67,7 +67,7 @@ def save_as(desk: Desk, saved: SavedDesigns, name: str) -> None:
     settle(desk, saved)
 
 
-def rows_shown(desk: Desk, saved: SavedDesigns, panel: DesignsPanel) -> str:
+def markup_of_rows(desk: Desk, saved: SavedDesigns, panel: DesignsPanel) -> str:
     """Return the markup of the list of designs."""
     settle(desk, saved)
     updates = panel.updates(Frame(desk.state))
@@ -188,7 +188,7 @@ def test_panel_lists_opens_copies_and_deletes_designs(
 ) -> None:
     panel = DesignsPanel(services)
     save_as(desk, saved, "mine <b>")
-    content = rows_shown(desk, saved, panel)
+    content = markup_of_rows(desk, saved, panel)
     for text in ("mine &lt;b&gt;", "20.42 units", "204.2 mm"):
         assert text in content
     assert "<b>" not in content
@@ -204,11 +204,11 @@ def test_panel_lists_opens_copies_and_deletes_designs(
         ("delete", "paper-initial", ["paper-initial copy", "mine <b>"]),
     ):
         desk.press(buttons, f"designs.{name}", value)
-        rows_shown(desk, saved, panel)
+        markup_of_rows(desk, saved, panel)
         assert [row.name for row in panel.rows] == [*expected, *PRESETS]
         assert desk.state.design == PRESETS["paper-initial"]
     desk.click(panel.restore)
-    rows_shown(desk, saved, panel)
+    markup_of_rows(desk, saved, panel)
     assert panel.rows[0].name == "mine <b> copy"
     assert desk.complaints == []
 
@@ -222,21 +222,21 @@ def test_every_saved_design_can_be_reached_however_many_there_are(
         # Another explorer may save here too.
         Library(library.folder).save(f"design {number}", OPTIMAL)
     saved.refresh()
-    assert f"1 to {ROWS} of {many + 2}" in rows_shown(desk, saved, panel)
+    assert f"1 to {ROWS} of {many + 2}" in markup_of_rows(desk, saved, panel)
     seen, content = [row.name for row in panel.rows], ""
     for _ in range(2):
         desk.press(buttons, "designs.turn", "older")
-        content = rows_shown(desk, saved, panel)
+        content = markup_of_rows(desk, saved, panel)
         seen += [row.name for row in panel.rows]
     assert f"{2 * ROWS + 1} to {many + 2} of {many + 2}" in content
     assert seen == [*(f"design {number}" for number in reversed(range(many))), *PRESETS]
     # The last part of the list goes with the designs that were on it.
     for number in range(3):
         saved.delete(f"design {number}")
-    rows_shown(desk, saved, panel)
+    markup_of_rows(desk, saved, panel)
     assert [row.name for row in panel.rows] == list(PRESETS)
     desk.press(buttons, "designs.turn", "newer")
-    rows_shown(desk, saved, panel)
+    markup_of_rows(desk, saved, panel)
     assert panel.rows[0].name == f"design {ROWS + many % ROWS - 1}"
 
 
