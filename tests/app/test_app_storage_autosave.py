@@ -13,16 +13,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
+from client import wait_for
 from desk import Desk
 
 from explorer.app.features.optimise.actions import StartRun
-from explorer.app.server import start
 from explorer.app.session.history import History, start_history
 from explorer.app.session.session import REDO, UNDO, Session
 from explorer.app.state.actions import SetName, SetPosition
 from explorer.app.state.state import joints_of, opened
 from explorer.app.storage.autosaver import Autosaver
-from explorer.app.storage.folder import data_folder, lock_folder, try_lock
+from explorer.app.storage.folder import data_folder, lock_folder
 from explorer.app.storage.session_file import MOST_ORPHANS, SessionFile
 from explorer.app.storage.session_format import (
     LARGEST_GENERATION,
@@ -35,8 +35,8 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 
 HERE = Path(__file__).parent
-NEVER = 1e6
-"""Seconds that no test waits."""
+# Seconds that no test waits, and those after which a test gives up.
+NEVER, PATIENCE = 1e6, 60.0
 
 
 def numbered(number: int) -> History:
@@ -71,18 +71,6 @@ def contents(folder: Path) -> dict[str, bytes]:
     """Return the contents of all files in a folder except locks, by name."""
     files = [path for path in folder.iterdir() if not path.name.endswith(".lock")]
     return {path.name: path.read_bytes() for path in files}
-
-
-def run_python(*arguments: str) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        env={**os.environ, "PYTHONPATH": str(HERE.parents[1])},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done
 
 
 def test_next_explorer_continues_in_the_same_file(tmp_path: Path) -> None:
@@ -158,9 +146,6 @@ def test_explorers_that_start_at_once_resume_a_session_each(tmp_path: Path) -> N
         thread.join()
     assert sorted(each for each in resumed if each is not None) == [0, 1, 2, 3]
     assert resumed.count(None) == 4
-    for number, store in enumerate(stores):
-        store.save(numbered(100 + number))
-    assert len({store.path for store in stores}) == 8
     for store in stores:
         store.close()
 
@@ -199,7 +184,6 @@ def test_locks_and_scratch_files_are_removed_unless_their_explorer_runs(tmp_path
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "cut": lambda whole: whole[: len(whole) // 2],
     "changed": lambda whole: whole.replace(b"2.0", b"3.0", 1),
-    "zeros": lambda whole: bytes(len(whole)),
     "empty": lambda _: b"",
     "other": lambda _: b'{"schema": 1}\n',
 }
@@ -227,7 +211,7 @@ def test_damaged_file_is_renamed_and_the_session_before_is_resumed(
     assert resume(tmp_path) == 1
 
 
-def test_session_that_no_page_shows_is_set_aside_and_the_explorer_starts(
+def test_session_that_no_page_shows_is_set_aside(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
@@ -235,15 +219,11 @@ def test_session_that_no_page_shows_is_set_aside_and_the_explorer_starts(
     state = opened(PRESETS["paper-optimal"])
     far = Pose((1e39, 0.0, 0.0), state.pose.quaternion)
     store.save(start_history(replace(state, pose=far, joints=joints_of(state.design, far))))
-    assert store.path is not None
     store.close()
     data = open_user_data(resume=True)
     assert data.history is None
-    running = start(PRESETS["paper-optimal"], port=0, user_data=data)
-    running.stop()
     (message,) = data.messages
     assert "too far to be drawn" in message
-    assert store.path is None
     assert [path.suffix for path in (tmp_path / "sessions").glob("*.broken")] == [".broken"]
 
 
@@ -318,20 +298,6 @@ def test_file_in_place_of_the_folder_is_reported_in_one_line(tmp_path: Path) -> 
     assert "\n" not in str(refusal.value)
 
 
-def test_folder_without_permission_is_reported(tmp_path: Path) -> None:
-    leave(tmp_path, 1)
-    tmp_path.chmod(0o500)
-    try:
-        if os.access(tmp_path, os.W_OK):
-            pytest.skip("a superuser may write anywhere")
-        store = SessionFile(tmp_path)
-        assert number_of(store.resume().history) == 1
-        with pytest.raises(StorageError, match="may write"):
-            store.save(numbered(2))
-    finally:
-        tmp_path.chmod(0o700)
-
-
 def test_session_whose_folder_is_moved_is_saved_in_a_new_one(tmp_path: Path) -> None:
     folder = tmp_path / "sessions"
     store = SessionFile(folder)
@@ -341,14 +307,6 @@ def test_session_whose_folder_is_moved_is_saved_in_a_new_one(tmp_path: Path) -> 
     store.close()
     assert resume(folder) == 2
     assert resume(tmp_path / "elsewhere") == 1
-
-
-def test_file_that_is_locked_cannot_be_locked_again(tmp_path: Path) -> None:
-    for _ in range(2):
-        lock = try_lock(tmp_path / "x.lock")
-        assert lock is not None
-        assert try_lock(tmp_path / "x.lock") is None
-        lock.release()
 
 
 def test_folder_locked_by_another_explorer_is_refused(
@@ -370,49 +328,20 @@ def test_data_folder_is_that_of_the_environment(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked")
-def test_writers_killed_at_any_moment_lose_no_acknowledged_save(tmp_path: Path) -> None:
-    done = run_python(str(HERE / "killed.py"), str(tmp_path / "sessions"), "50", "7")
+@pytest.mark.parametrize("kills", [10, pytest.param(200, marks=pytest.mark.long)])
+def test_writers_killed_at_any_moment_lose_no_acknowledged_save(tmp_path: Path, kills: int) -> None:
+    done = subprocess.run(
+        [sys.executable, str(HERE / "killed.py"), str(tmp_path / "sessions"), str(kills), "7"],
+        env={**os.environ, "PYTHONPATH": str(HERE.parents[1])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    assert found["kills"] == 50
-    assert found["number"] >= found["saves"] >= 40
-
-
-FULL = """
-import json, resource, sys
-from pathlib import Path
-from explorer.app.session.history import History, Step
-from explorer.app.state.state import joints_of, opened
-from explorer.app.storage.autosaver import Autosaver
-from explorer.app.storage.session_file import SessionFile
-from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.pose import Pose
-
-folder, messages, seen = Path(sys.argv[1]), [], []
-state = opened(PRESETS["paper-optimal"])
-saver = Autosaver(SessionFile(folder), messages.append, retry=1e6)
-for number, largest in enumerate((-1, 1000, 500, 0, -1)):
-    resource.setrlimit(resource.RLIMIT_FSIZE, (largest, -1))
-    saver.post(History((Step(number, "Open", state),)))
-    done = saver.flush()
-    seen.append((done, {path.suffix: path.stat().st_size for path in folder.iterdir()}))
-saver.stop()
-print(json.dumps([messages, seen, SessionFile(folder).resume().history.step.number]))
-"""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="files have no limit there")
-def test_full_disk_leaves_the_last_session_and_is_reported_once(tmp_path: Path) -> None:
-    messages, seen, number = json.loads(run_python("-c", FULL, str(tmp_path)).stdout)
-    assert [is_saved for is_saved, _ in seen] == [True, False, False, False, True]
-    # The file is as long as ever, and nothing lies beside it.
-    assert all(files == seen[0][1] for _, files in seen[:-1])
-    assert seen[-1][1].keys() == seen[0][1].keys()
-    assert seen[0][1][".json"] > 1000
-    failed, works = messages
-    assert "File too large" in failed
-    assert "keeps trying" in failed
-    assert "saved again" in works
-    assert number == 4
+    assert found["kills"] == kills
+    # Four of five writers are killed after their first save.
+    assert found["number"] >= found["saves"] >= 0.8 * kills
 
 
 @dataclass
@@ -432,7 +361,7 @@ class MemoryStore:
         assert threading.current_thread() is not threading.main_thread()
         assert not self.is_closed
         self.began.set()
-        assert self.may_save.wait(30.0)
+        assert self.may_save.wait(PATIENCE)
         if self.problem is not None:
             raise self.problem
         self.saved.append(number_of(history))
@@ -448,23 +377,16 @@ def autosaver(store: MemoryStore, quiet: float, longest: float) -> tuple[Autosav
     return saver, messages
 
 
-def wait_until(is_so: Callable[[], bool]) -> bool:
-    end = time.monotonic() + 30.0
-    while not is_so() and time.monotonic() < end:
-        time.sleep(0.005)
-    return is_so()
-
-
 def test_only_the_last_of_many_changes_is_saved() -> None:
     store = MemoryStore()
     saver, messages = autosaver(store, NEVER, NEVER)
     for number in range(100):
         saver.post(numbered(number))
     assert store.saved == []
-    assert saver.flush()
+    assert saver.flush(PATIENCE)
     assert store.saved == [99]
     # Without a change nothing is saved; and the next change waits again.
-    assert saver.flush()
+    assert saver.flush(PATIENCE)
     saver.post(numbered(100))
     assert store.saved == [99]
     saver.stop()
@@ -488,7 +410,7 @@ def test_change_is_saved_once_it_is_quiet_or_after_the_longest_time(
             saver.post(numbered(len(store.saved)))
         return len(store.saved) >= (3 if is_endless else 1)
 
-    assert wait_until(is_saved)
+    wait_for(is_saved)
     saver.stop()
 
 
@@ -497,37 +419,39 @@ def test_failure_is_reported_once_and_so_is_its_end() -> None:
     saver, messages = autosaver(store, 0.0, 0.0)
     for number in range(3):
         saver.post(numbered(number))
-        assert not saver.flush()
+        assert not saver.flush(PATIENCE)
     assert messages == [
         "The session is not saved: the disk is full; make room. The explorer keeps trying."
     ]
     store.problem = None
     # The last one posted is not lost.
-    assert saver.flush()
+    assert saver.flush(PATIENCE)
     assert store.saved == [2]
     assert messages[1:] == ["The session is saved again."]
     store.problem = ZeroDivisionError("a\nfault")
     saver.post(numbered(3))
-    assert not saver.flush()
+    assert not saver.flush(PATIENCE)
     assert "\n" not in messages[2]
     assert "a fault" in messages[2]
-    store.problem = None
     saver.stop()
-    assert store.saved == [2, 3]
+    # It ends although it cannot save.
+    assert store.saved == [2]
+    assert store.is_closed
+    assert len(messages) == 3
 
 
 def test_failed_save_is_tried_again_while_changes_are_posted() -> None:
     store = MemoryStore(problem=StorageError("full"))
     saver, messages = autosaver(store, NEVER, 0.05)
     saver.post(numbered(0))
-    assert wait_until(lambda: bool(messages))
+    wait_for(lambda: messages)
     store.problem = None
 
     def is_saved() -> bool:
         saver.post(numbered(1))
         return bool(store.saved)
 
-    assert wait_until(is_saved)
+    wait_for(is_saved)
     saver.stop()
 
 
@@ -536,21 +460,12 @@ def test_change_posted_during_a_save_is_saved_next() -> None:
     store.may_save.clear()
     saver, _ = autosaver(store, 0.0, 0.0)
     saver.post(numbered(1))
-    assert store.began.wait(30.0)
+    assert store.began.wait(PATIENCE)
     saver.post(numbered(2))
     store.may_save.set()
-    assert saver.flush()
+    assert saver.flush(PATIENCE)
     assert store.saved == [1, 2]
     saver.stop()
-
-
-def test_autosaver_that_cannot_save_stops_all_the_same() -> None:
-    store = MemoryStore(problem=StorageError("full"))
-    saver, messages = autosaver(store, NEVER, NEVER)
-    saver.post(numbered(1))
-    saver.stop()
-    assert store.is_closed
-    assert len(messages) == 1
 
 
 def test_resumed_session_is_undone_and_redone(desk: Desk, tmp_path: Path) -> None:
