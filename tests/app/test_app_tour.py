@@ -1,4 +1,4 @@
-"""The tour leads a user on by what is done, and is remembered with the theme, as told."""
+"""The tour advances by what the user does; preferences, the theme, and facts of a browser."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 import viser
@@ -17,11 +18,12 @@ from services import services_for
 
 from explorer.app.browser.browser_facts import BrowserFacts, decode_facts
 from explorer.app.features.feature import Services
-from explorer.app.features.help.tour import STEPS, Tour, start_tour
-from explorer.app.features.help.tour_panel import TourGuide, card_words
+from explorer.app.features.help.tour import STEPS, start_tour
+from explorer.app.features.help.tour_panel import PRESS, TourGuide
 from explorer.app.features.optimise.actions import Accept, EndRun, StartRun
 from explorer.app.layout import is_narrow
 from explorer.app.state.action import Action
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import State, opened
@@ -30,66 +32,53 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.theme import BRAND, BRAND_ON_DARK, Theme
 from explorer.errors import StorageError
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.machine import Tool
 from explorer.optimise.outcome import Iterate
 
 OPENED = opened(PRESETS["paper-optimal"])
+TOOL = Tool(position=(1.0, 0.0, 3.0))
+AT_TOOL = Set("view.at", "tool").apply(
+    opened(msgspec.structs.replace(PRESETS["paper-optimal"], tool=TOOL))
+)
 
 
-def after(tour: Tour, state: State) -> State:
-    """Return the state once the tour has shown its step."""
-    return tour.step.show(Frame(state)).apply(state)
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-def test_every_step_is_done_by_what_it_shows_and_not_before(preset: str) -> None:
-    state = opened(PRESETS[preset])
+@pytest.mark.parametrize("start", [*map(opened, PRESETS.values()), AT_TOOL])
+def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(start: State) -> None:
+    state = start
     tour = start_tour(Frame(state))
+    assert tour.step_by(-1, Frame(state)).at == 0
     for index, step in enumerate(STEPS):
         assert tour.at == index
         assert not tour.after_frame(Frame(state)).is_done
-        state = after(tour, state)
+        state = tour.step.show(Frame(state)).apply(state)
         tour = tour.after_frame(Frame(state))
         assert tour.is_done
         # Once done it stays so, whatever is done next.
-        assert tour.after_frame(Frame(opened(PRESETS[preset]))).is_done
+        assert tour.after_frame(Frame(start)).is_done
         if step.after is not None:
             state = step.after.apply(state)
         assert tour.is_last == (index == len(STEPS) - 1)
         tour = tour.step_by(1, Frame(state))
+    assert tour.at == len(STEPS) - 1
     assert state.optimisation.is_on
 
 
-def test_there_are_five_steps_each_in_few_words() -> None:
-    assert len(STEPS) == 5
-    for step in STEPS:
-        assert step.title
-        assert not step.title.endswith(".")
-        assert step.text.endswith(".")
-        assert len(step.text) <= 220
-
-
-def test_the_tour_comes_close_to_a_singularity_without_reaching_it() -> None:
+def test_tour_comes_close_to_a_singularity_without_reaching_it() -> None:
     tour = start_tour(Frame(OPENED)).step_by(1, Frame(OPENED))
-    found = Frame(after(tour, OPENED))
+    found = Frame(tour.step.show(Frame(OPENED)).apply(OPENED))
     least = float(np.abs(found.snapshot.margins).min())
     assert 0.0 < least < found.state.warn_below
     assert found.state.unclosed is None
     assert found.state.mode == OPENED.mode
 
 
-def test_the_tour_stops_at_both_ends() -> None:
-    tour = start_tour(Frame(OPENED))
-    assert tour.step_by(-1, Frame(OPENED)).at == 0
-    assert tour.step_by(9, Frame(OPENED)).at == len(STEPS) - 1
-
-
-def test_a_search_for_the_best_design_ends_the_tour_only_if_it_is_new() -> None:
+def test_last_step_of_the_tour_is_done_only_by_a_search_that_is_new() -> None:
     running = StartRun().apply(OPENED)
     tour = start_tour(Frame(running)).step_by(4, Frame(running))
     assert not tour.after_frame(Frame(running)).is_done
 
 
-def ended(state: State) -> State:
+def end_search(state: State) -> State:
     """Return a state after its search has ended with a result, without a process."""
     run = state.optimisation.run
     assert run is not None
@@ -98,51 +87,8 @@ def ended(state: State) -> State:
     return EndRun(run.number, SearchResult("converged", "converged", best), (best,)).apply(state)
 
 
-@pytest.mark.parametrize("ends_first", [True, False])
-@pytest.mark.parametrize("press", ["Next", "Skip"])
-def test_what_the_search_of_a_tour_left_is_put_back_when_the_tour_is_over(
-    server: viser.ViserServer, desk: Desk, press: str, ends_first: bool
-) -> None:
-    guide, client = guide_at_last_step(server, desk)
-    before = desk.state
-    desk.session.do(StartRun())
-    assert phase_of(desk.state) == "running"
-    if ends_first:
-        desk.session.do(_Becomes(ended(desk.state)))
-        assert desk.state.design != before.design
-    guide._press(press, client)
-    if not ends_first:
-        # The runner tells the end of a search that was cancelled.
-        assert phase_of(desk.state) == "cancelling"
-        desk.session.do(_Becomes(ended(desk.state)))
-        guide.follow(Frame(desk.state))
-    after = desk.state
-    assert after.optimisation.run is None
-    assert (after.design, after.pose, after.joints) == (before.design, before.pose, before.joints)
-
-
-@pytest.mark.parametrize("press", ["Next", "Skip"])
-def test_what_was_accepted_or_found_before_the_tour_stays_when_it_is_over(
-    server: viser.ViserServer, desk: Desk, press: str
-) -> None:
-    desk.session.do(StartRun())
-    desk.session.do(_Becomes(ended(desk.state)))
-    earlier = desk.state
-    guide, client = guide_at_last_step(server, desk)
-    guide._press(press, client)
-    assert desk.state == earlier
-    guide, client = guide_at_last_step(server, desk)
-    desk.session.do(StartRun())
-    desk.session.do(_Becomes(ended(desk.state)))
-    desk.session.do(Accept())
-    accepted = desk.state
-    guide._press(press, client)
-    guide.follow(Frame(desk.state))
-    assert desk.state == accepted
-
-
 @dataclass(frozen=True)
-class _Becomes(Action):
+class Become(Action):
     """Take another state, as a runner would lead to."""
 
     state: State
@@ -153,77 +99,93 @@ class _Becomes(Action):
         return self.state
 
 
-def guide_at_last_step(server: viser.ViserServer, desk: Desk) -> tuple[Any, Any]:
-    """Return the guide of a tour at its last step, and the browser that has it."""
-    client: Any = SimpleNamespace(client_id=3, gui=server.gui)
-    guide: Any = TourGuide(services_for(server, desk.session, buttons=Buttons(server)))
-    guide.begin(client)
-    frame = Frame(desk.state)
+class Tourist:
+    """A browser with a tour at its last step, and the guide of the tour."""
 
-    def to_last(tour: Tour) -> Tour:
-        return tour.step_by(len(STEPS), frame)
+    def __init__(self, server: viser.ViserServer, desk: Desk) -> None:
+        self._client: Any = SimpleNamespace(client_id=3, gui=server.gui)
+        self._buttons = Buttons(server)
+        self.guide = TourGuide(services_for(server, desk.session, buttons=self._buttons))
+        self.guide.begin(self._client)
+        for _ in STEPS[1:]:
+            self.press("Next")
 
-    guide._cards[3].change(to_last)
-    assert guide._cards[3].tour.is_last
-    return guide, client
-
-
-def phase_of(state: State) -> str | None:
-    run = state.optimisation.run
-    return None if run is None else run.phase
+    def press(self, name: str) -> None:
+        """Press a button of the card."""
+        self._buttons.press(PRESS, name, self._client)
 
 
-def test_the_card_offers_what_can_be_pressed() -> None:
-    first = card_words(start_tour(Frame(OPENED)))
-    assert "step 1 of 5" in first
-    assert 'data-value="Back"' not in first
-    assert 'data-value="Show me"' in first
-    assert ">Next<" in first
-    assert "Done" not in first
-    last = card_words(Tour(4, Frame(OPENED), 0, is_done=True))
-    assert 'data-value="Back"' in last
-    assert 'data-value="Show me"' not in last
-    assert ">Finish<" in last
-    assert "Done" in last
-    assert all(">Skip the tour<" in card for card in (first, last))
+@pytest.mark.parametrize("ends_first", [True, False])
+@pytest.mark.parametrize("press", ["Next", "Skip"])
+def test_end_of_the_tour_reverts_what_its_search_has_left(
+    server: viser.ViserServer, desk: Desk, press: str, ends_first: bool
+) -> None:
+    tourist = Tourist(server, desk)
+    before = desk.state
+    desk.session.do(StartRun())
+    assert desk.state.optimisation.is_on
+    if ends_first:
+        desk.session.do(Become(end_search(desk.state)))
+        assert desk.state.design != before.design
+    tourist.press(press)
+    if not ends_first:
+        # The runner tells the end of a search that was cancelled.
+        run = desk.state.optimisation.run
+        assert run is not None
+        assert run.phase == "cancelling"
+        desk.session.do(Become(end_search(desk.state)))
+        tourist.guide.follow(Frame(desk.state))
+    after = desk.state
+    assert after.optimisation.run is None
+    assert (after.design, after.pose, after.joints) == (before.design, before.pose, before.joints)
 
 
-def test_nothing_is_remembered_at_first(tmp_path: Path) -> None:
+@pytest.mark.parametrize("press", ["Next", "Skip"])
+def test_end_of_the_tour_keeps_what_was_accepted_or_found_before_it(
+    server: viser.ViserServer, desk: Desk, press: str
+) -> None:
+    desk.session.do(StartRun())
+    desk.session.do(Become(end_search(desk.state)))
+    tourist = Tourist(server, desk)
+    earlier = desk.state
+    tourist.press(press)
+    assert desk.state == earlier
+    tourist = Tourist(server, desk)
+    desk.session.do(StartRun())
+    desk.session.do(Become(end_search(desk.state)))
+    desk.session.do(Accept())
+    accepted = desk.state
+    tourist.press(press)
+    tourist.guide.follow(Frame(desk.state))
+    assert desk.state == accepted
+
+
+def test_preferences_are_remembered_each_by_itself_and_of_two_explorers(tmp_path: Path) -> None:
     assert PreferenceFile(tmp_path).chosen == Preferences(dark=None, tour_seen=False)
-    # To look at them makes no file.
+    # Reading them makes no file.
     assert list(tmp_path.iterdir()) == []
-
-
-def test_what_is_chosen_is_remembered_each_by_itself(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "folder"
-    PreferenceFile(folder).choose(tour_seen=True)
-    PreferenceFile(folder).choose(dark=True)
+    one, other = PreferenceFile(folder), PreferenceFile(folder)
+    one.choose(tour_seen=True)
+    other.choose(dark=True)
     assert PreferenceFile(folder).chosen == Preferences(dark=True, tour_seen=True)
-    PreferenceFile(folder).choose(dark=False)
-    assert PreferenceFile(folder).chosen == Preferences(dark=False, tour_seen=True)
-
-
-def test_two_explorers_do_not_forget_for_each_other(tmp_path: Path) -> None:
-    one, other = PreferenceFile(tmp_path), PreferenceFile(tmp_path)
-    one.choose(dark=True)
-    other.choose(tour_seen=True)
-    assert PreferenceFile(tmp_path).chosen == Preferences(dark=True, tour_seen=True)
+    # A later explorer may remember more.
+    (tmp_path / NAME).write_bytes(b'{"dark": true, "language": "fr"}')
+    assert PreferenceFile(tmp_path).chosen == Preferences(dark=True)
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        b"",
         b"{",
         b"null",
-        b"[1]",
         b'{"dark": 7}',
         b"\xff\xfe",
         b'{"dark":' + b"[" * 9000,
         b" " * 20_000 + b"{}",
     ],
 )
-def test_a_broken_file_counts_as_nothing_chosen_and_is_replaced(
+def test_preferences_in_a_broken_file_count_as_none_and_are_replaced(
     tmp_path: Path, text: bytes
 ) -> None:
     (tmp_path / NAME).write_bytes(text)
@@ -233,25 +195,19 @@ def test_a_broken_file_counts_as_nothing_chosen_and_is_replaced(
     assert json.loads((tmp_path / NAME).read_bytes()) == {"dark": True, "tour_seen": False}
 
 
-def test_what_a_later_explorer_remembers_is_no_trouble(tmp_path: Path) -> None:
-    (tmp_path / NAME).write_bytes(b'{"dark": true, "language": "fr"}')
-    assert PreferenceFile(tmp_path).chosen == Preferences(dark=True)
-
-
-def test_a_folder_that_takes_no_file_is_told_in_a_line(tmp_path: Path) -> None:
+def test_preferences_in_a_folder_that_takes_no_file_are_refused_in_a_line(tmp_path: Path) -> None:
     (tmp_path / "taken").write_bytes(b"")
     file = PreferenceFile(tmp_path / "taken")
-    with pytest.raises(StorageError) as caught:
+    with pytest.raises(StorageError) as refusal:
         file.choose(dark=True)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(refusal.value)
     assert file.chosen.dark is True
 
 
 @pytest.mark.parametrize(
-    "told",
+    "text",
     [
         "",
-        "null",
         "{}",
         '{"width": -1, "height": 5, "dark": false}',
         '{"width": 1e9, "height": 5, "dark": false}',
@@ -261,20 +217,19 @@ def test_a_folder_that_takes_no_file_is_told_in_a_line(tmp_path: Path) -> None:
         "[" * 100_000,
     ],
 )
-def test_what_no_browser_says_is_not_believed(told: str) -> None:
-    assert decode_facts(told) is None
+def test_facts_that_no_browser_sends_are_ignored(text: str) -> None:
+    assert decode_facts(text) is None
 
 
-def test_what_a_browser_says_is_read() -> None:
-    told = '{"width": 1024, "height": 768.5, "dark": true}'
-    assert decode_facts(told) == BrowserFacts(1024, 768.5, True)
+def test_facts_of_a_browser_are_read() -> None:
+    text = '{"width": 1024, "height": 768.5, "dark": true}'
+    assert decode_facts(text) == BrowserFacts(1024, 768.5, True)
 
 
 @pytest.mark.parametrize(
     ("width", "height", "narrow"),
     [
         (1280, 720, False),
-        (1920, 1080, False),
         (1024, 768, True),
         (768, 1024, True),
         (1099, 700, True),
@@ -300,23 +255,20 @@ class Gui:
         self.themes.append(theme)
 
 
-def test_a_theme_is_told_once_for_each_change() -> None:
-    gui, changes = Gui(), list[bool]()
-    untyped: Any = gui
-    theme = Theme(untyped, dark=False, changed=lambda: changes.append(theme.is_dark))
+def test_theme_is_set_once_for_each_change_and_is_no_step_of_the_history(desk: Desk) -> None:
+    themes: list[dict[str, Any]] = []
+
+    def keep(**theme: Any) -> None:
+        themes.append(theme)
+
+    gui: Any = SimpleNamespace(configure_theme=keep)
+    theme = Theme(gui, dark=False, changed=desk.session.redraw)
     for dark in (False, True, True, False):
         theme.choose(dark=dark)
-    assert changes == [True, False]
-    assert [t["dark_mode"] for t in gui.themes] == [False, True, False]
-    assert [t["brand_color"] for t in gui.themes] == [BRAND, BRAND_ON_DARK, BRAND]
+    assert [t["dark_mode"] for t in themes] == [False, True, False]
+    assert [t["brand_color"] for t in themes] == [BRAND, BRAND_ON_DARK, BRAND]
     # No tunnel to anywhere is offered in either.
-    assert not any(t["show_share_button"] for t in gui.themes)
-
-
-def test_the_theme_is_no_step_of_the_history(desk: Desk) -> None:
-    untyped: Any = Gui()
-    theme = Theme(untyped, dark=False, changed=desk.session.redraw)
-    theme.choose(dark=True)
+    assert not any(t["show_share_button"] for t in themes)
     assert desk.session.wait_until_idle()
     assert len(desk.session.history.steps) == 1
 
@@ -324,11 +276,7 @@ def test_the_theme_is_no_step_of_the_history(desk: Desk) -> None:
 def test_tour_used_on_many_threads_leaves_one_card_or_none(
     server: viser.ViserServer, services: Services
 ) -> None:
-    class Browser:
-        client_id = 3
-        gui = server.gui
-
-    client: Any = Browser()
+    client: Any = SimpleNamespace(client_id=3, gui=server.gui)
     gui: Any = server.gui
     guide = TourGuide(services)
     before = set(gui._panel_handle_from_uuid)
@@ -348,11 +296,11 @@ def test_tour_used_on_many_threads_leaves_one_card_or_none(
         except RuntimeError as error:
             failed.append(error)
 
-    hands = [threading.Thread(target=use, args=(seed,)) for seed in range(4)]
-    for hand in hands:
-        hand.start()
-    for hand in hands:
-        hand.join()
+    threads = [threading.Thread(target=use, args=(seed,)) for seed in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
     assert failed == []
     guide.begin(client)
     assert len(set(gui._panel_handle_from_uuid) - before) == 1
