@@ -1,4 +1,4 @@
-"""Tasks that tell of themselves while they run, and are ended early: by a word, else by force."""
+"""Tasks of the worker that send messages, are cancelled, or die with their process."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from queue import Queue
 from typing import Any
 
 import pytest
+from client import wait_for
 
 from explorer.app.session import jobs
 from explorer.app.session.jobs import RESTARTED, Worker
@@ -25,264 +25,249 @@ PATIENCE = 120.0
 NEVER, AT_ONCE = 3600.0, 0.001
 
 
-class Ear:
-    """What was heard, in order: what was told, then how it ended."""
+class Requester:
+    """Requests tasks of a worker, and keeps their messages and how they ended, in order."""
 
     def __init__(self, worker: Worker) -> None:
         self._worker = worker
-        self._heard: Queue[tuple[str, Any]] = Queue()
+        self._events: Queue[tuple[str, Any]] = Queue()
         self.number = -1
 
-    def ask(
+    def request(
         self,
         task: str,
         *arguments: Any,
         key: str = "task",
-        tells: bool = True,
+        sends: bool = True,
         is_drawing: bool = False,
     ) -> None:
         self.number = self._worker.submit(
             key,
             getattr(telling, task),
             arguments,
-            lambda value: self._heard.put(("done", value)),
-            lambda problem: self._heard.put(("failed", problem)),
-            receive=(lambda value: self._heard.put(("told", value))) if tells else None,
+            lambda value: self._events.put(("done", value)),
+            lambda problem: self._events.put(("failed", problem)),
+            receive=(lambda value: self._events.put(("message", value))) if sends else None,
             is_drawing=is_drawing,
         )
 
     def next(self) -> tuple[str, Any]:
-        return self._heard.get(timeout=PATIENCE)
+        return self._events.get(timeout=PATIENCE)
 
     def all(self) -> tuple[list[Any], tuple[str, Any]]:
-        """Return all that was told from now on, and the end."""
-        told: list[Any] = []
-        while (heard := self.next())[0] == "told":
-            told.append(heard[1])
-        return told, heard
+        """Return all messages from now on, and the end."""
+        messages: list[Any] = []
+        while (event := self.next())[0] == "message":
+            messages.append(event[1])
+        return messages, event
+
+    def assert_works(self) -> None:
+        """Check that the worker does what comes next."""
+        self.request("say", "again", sends=False)
+        assert self.next() == ("done", "again")
+
+
+@pytest.fixture(scope="module")
+def shared() -> Iterator[tuple[Worker, list[str]]]:
+    reports: list[str] = []
+    worker = Worker(reports.append, died="it died")
+    yield worker, reports
+    worker.stop()
 
 
 @pytest.fixture
-def reports() -> list[str]:
-    return []
+def worker(shared: tuple[Worker, list[str]]) -> Worker:
+    return shared[0]
 
 
 @pytest.fixture
-def worker(reports: list[str]) -> Iterator[Worker]:
-    made = Worker(reports.append, died="it died")
-    yield made
-    made.stop()
+def reports(shared: tuple[Worker, list[str]]) -> list[str]:
+    """Return the reports of the worker, without those of tests before."""
+    shared[1].clear()
+    return shared[1]
 
 
 @pytest.fixture
-def ear(worker: Worker) -> Ear:
-    return Ear(worker)
+def requester(worker: Worker) -> Requester:
+    return Requester(worker)
 
 
-def test_what_is_told_comes_whole_in_order_and_before_the_result(ear: Ear) -> None:
-    ear.ask("count", 500)
-    assert ear.all() == (list(range(500)), ("done", 500))
+def test_task_sends_all_messages_in_order_and_before_its_result(requester: Requester) -> None:
+    requester.request("count", 500)
+    assert requester.all() == (list(range(500)), ("done", 500))
 
 
-def test_it_comes_while_the_task_runs_and_a_word_ends_the_task(
-    ear: Ear, worker: Worker, reports: list[str]
+def test_task_sends_messages_while_it_runs_and_ends_when_it_is_cancelled(
+    requester: Requester, worker: Worker, reports: list[str]
 ) -> None:
-    ear.ask("count_until_cancelled")
+    requester.request("count_until_cancelled")
     # The task ends for no other reason, so this came before its end.
-    assert ear.next() == ("told", 0)
+    assert requester.next() == ("message", 0)
     process = worker.process_id
-    worker.cancel(ear.number, NEVER)
-    told, end = ear.all()
-    assert end == ("done", len(told) + 1)
-    ear.ask("say", "again", tells=False)
-    assert ear.next() == ("done", "again")
+    worker.cancel(requester.number, NEVER)
+    messages, end = requester.all()
+    assert end == ("done", len(messages) + 1)
+    requester.assert_works()
     assert worker.process_id == process
+    # One that is cancelled before it was begun ends at once.
+    requester.request("count_until_cancelled")
+    worker.cancel(requester.number, NEVER)
+    messages, end = requester.all()
+    assert end == ("done", len(messages))
+    # One that ends by an exception says so.
+    requester.request("end_when_cancelled")
+    assert requester.next() == ("message", 0)
+    worker.cancel(requester.number, NEVER)
+    assert requester.all()[1] == ("failed", CANCELLED)
     assert not reports
 
 
-def test_what_is_cancelled_before_it_was_begun_ends_at_once(ear: Ear, worker: Worker) -> None:
-    ear.ask("count_until_cancelled")
-    worker.cancel(ear.number, NEVER)
-    told, end = ear.all()
-    assert end == ("done", len(told))
-
-
-def test_the_next_task_is_not_cancelled_with_the_last(ear: Ear, worker: Worker) -> None:
-    ear.ask("count_until_cancelled")
-    worker.cancel(ear.number, NEVER)
-    ear.all()
-    ear.ask("count_until_cancelled")
-    for number in range(20):
-        assert ear.next() == ("told", number)
-    worker.cancel(ear.number, NEVER)
-    assert ear.all()[1][0] == "done"
-
-
-def test_who_does_not_heed_the_word_is_ended_by_force_and_nobody_complains(
-    ear: Ear, worker: Worker, reports: list[str]
+def test_next_task_is_neither_cancelled_nor_killed_with_the_last(
+    requester: Requester, worker: Worker
 ) -> None:
-    ear.ask("hang")
-    assert ear.next() == ("told", 0)
+    requester.request("count_until_cancelled")
+    worker.cancel(requester.number, NEVER)
+    first = requester.number
+    requester.all()
     process = worker.process_id
-    worker.cancel(ear.number, AT_ONCE)
-    assert ear.next() == ("failed", "it died")
+    requester.request("count_until_cancelled")
+    # The deadline of the first one passes now.
+    worker.cancel(first, AT_ONCE)
+    for number in range(100):
+        assert requester.next() == ("message", number)
+    worker.cancel(requester.number, NEVER)
+    assert requester.all()[1][0] == "done"
+    assert worker.process_id == process
+
+
+def test_task_that_does_not_end_when_cancelled_is_killed_without_a_report(
+    requester: Requester, worker: Worker, reports: list[str]
+) -> None:
+    requester.request("hang")
+    assert requester.next() == ("message", 0)
+    process = worker.process_id
+    worker.cancel(requester.number, AT_ONCE)
+    assert requester.next() == ("failed", "it died")
     assert not reports
-    ear.ask("say", "again", tells=False)
-    assert ear.next() == ("done", "again")
+    requester.assert_works()
     assert worker.process_id != process
 
 
-def test_what_does_not_tell_is_not_begun_once_it_is_cancelled(
-    ear: Ear, worker: Worker, reports: list[str]
+def test_cancelled_task_that_waits_is_not_begun_and_those_before_it_are(
+    worker: Worker, reports: list[str]
 ) -> None:
-    ear.ask("count_until_cancelled")
-    assert ear.next() == ("told", 0)
-    first, process = ear.number, worker.process_id
-    ear.ask("say", "nobody asks any more", tells=False)
-    # Its turn comes when the first one is done.
-    worker.cancel(ear.number, NEVER)
-    worker.cancel(first, NEVER)
-    assert ear.all()[1][0] == "done"
-    assert ear.next() == ("failed", "it died")
-    ear.ask("say", "again", tells=False)
-    assert ear.next() == ("done", "again")
-    assert worker.process_id == process
-    assert not reports
-
-
-def test_a_cancelled_task_leaves_those_before_it_alone(worker: Worker) -> None:
-    first, second, third = Ear(worker), Ear(worker), Ear(worker)
-    first.ask("count_until_cancelled")
-    assert first.next() == ("told", 0)
+    first, second, third = (Requester(worker) for _ in range(3))
+    first.request("count_until_cancelled")
+    assert first.next() == ("message", 0)
+    process = worker.process_id
     # Both wait for their turn.
-    second.ask("say", "still wanted", key="second", tells=False)
-    third.ask("say", "nobody asks any more", key="third", tells=False)
+    second.request("say", "still wanted", key="second", sends=False)
+    third.request("say", "nobody asks any more", key="third", sends=False)
     worker.cancel(third.number, NEVER)
     worker.cancel(first.number, NEVER)
     assert second.next() == ("done", "still wanted")
     assert third.next() == ("failed", "it died")
+    assert worker.process_id == process
+    assert not reports
 
 
-def test_a_long_drawing_ends_as_soon_as_a_newer_one_waits(
-    ear: Ear, worker: Worker, reports: list[str], monkeypatch: pytest.MonkeyPatch
+def test_long_drawing_ends_as_soon_as_a_newer_one_waits(
+    requester: Requester, worker: Worker, reports: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(jobs, "LONG_SECONDS", 0.0)
-    ear.ask("count_until_cancelled", is_drawing=True)
-    assert ear.next() == ("told", 0)
+    requester.request("count_until_cancelled", is_drawing=True)
+    assert requester.next() == ("message", 0)
     process = worker.process_id
-    ear.ask("count", 3, is_drawing=True)
-    told, end = ear.all()
+    requester.request("count", 3, is_drawing=True)
+    messages, end = requester.all()
     # The first one ends for no other reason.
-    assert end == ("done", len(told) + 1)
-    assert ear.all() == ([0, 1, 2], ("done", 3))
+    assert end == ("done", len(messages) + 1)
+    assert requester.all() == ([0, 1, 2], ("done", 3))
     assert worker.process_id == process
     assert not reports
 
 
-def test_a_drawing_that_kills_its_process_is_tried_twice_although_it_tells(
-    ear: Ear, reports: list[str]
+@pytest.mark.parametrize(
+    ("task", "is_drawing", "messages", "expected"),
+    [
+        ("die", True, [0, 0], [RESTARTED, "it died"]),
+        ("fall", False, [], [RESTARTED, "it died"]),
+        # What sends messages cannot start anew, unless only its result counts.
+        ("die", False, [0], ["it died"]),
+    ],
+)
+def test_task_that_kills_its_process_is_tried_twice_unless_it_sends_messages(
+    requester: Requester,
+    reports: list[str],
+    task: str,
+    is_drawing: bool,
+    messages: list[int],
+    expected: list[str],
 ) -> None:
-    ear.ask("die", is_drawing=True)
-    assert ear.all() == ([0, 0], ("failed", "it died"))
-    assert reports == [RESTARTED, "it died"]
+    requester.request(task, sends=task == "die", is_drawing=is_drawing)
+    assert requester.all() == (messages, ("failed", "it died"))
+    assert reports == expected
+    requester.assert_works()
+    assert reports == expected
 
 
-def test_a_task_that_ends_itself_when_cancelled_answers_so(ear: Ear, worker: Worker) -> None:
-    ear.ask("end_when_cancelled")
-    assert ear.next() == ("told", 0)
-    worker.cancel(ear.number, NEVER)
-    assert ear.all()[1] == ("failed", CANCELLED)
-
-
-def test_force_does_not_hit_the_next_task(ear: Ear, worker: Worker) -> None:
-    ear.ask("count_until_cancelled")
-    ear.next()
-    worker.cancel(ear.number, NEVER)
-    first = ear.number
-    assert ear.all()[1][0] == "done"
-    process = worker.process_id
-    ear.ask("count_until_cancelled")
-    ear.next()
-    # As if the deadline of the first one passed only now.
-    held: Any = worker
-    held._kill(first)
-    worker.cancel(ear.number, NEVER)
-    assert ear.all()[1][0] == "done"
-    assert worker.process_id == process
-
-
-def test_a_refusal_and_a_death_after_some_words(
-    ear: Ear, worker: Worker, reports: list[str]
+def test_refusal_after_messages_is_passed_on_without_a_report(
+    requester: Requester, reports: list[str]
 ) -> None:
-    ear.ask("refuse")
-    assert ear.all() == ([0], ("failed", "refused on purpose"))
+    requester.request("refuse")
+    assert requester.all() == ([0], ("failed", "refused on purpose"))
     assert not reports
-    ear.ask("die")
-    assert ear.all() == ([0], ("failed", "it died"))
-    assert reports == ["it died"]
-    ear.ask("count", 3)
-    assert ear.all() == ([0, 1, 2], ("done", 3))
 
 
-def test_work_that_kills_its_process_is_tried_twice(
-    ear: Ear, worker: Worker, reports: list[str]
-) -> None:
-    ear.ask("fall", tells=False)
-    assert ear.next() == ("failed", "it died")
-    assert reports == [RESTARTED, "it died"]
-    ear.ask("say", "again", tells=False)
-    assert ear.next() == ("done", "again")
-    assert len(reports) == 2
-
-
-def test_only_the_newest_request_of_a_key_waits(ear: Ear, worker: Worker) -> None:
-    ear.ask("say", "first", tells=False)
-    assert ear.next() == ("done", "first")
+def test_request_of_a_key_replaces_the_one_that_waits(requester: Requester, worker: Worker) -> None:
+    requester.request("say", "first", sends=False)
+    assert requester.next() == ("done", "first")
     process = worker.process_id
     assert process not in (None, os.getpid())
     assert process is not None
     # Stopped, so that it is at the first of them while the others are posted.
     os.kill(process, signal.SIGSTOP)
     for number in range(40):
-        ear.ask("say", str(number), tells=False)
+        requester.request("say", str(number), sends=False)
     os.kill(process, signal.SIGCONT)
     assert worker.wait_until_idle(PATIENCE)
-    ear.ask("say", "end", tells=False)
+    requester.request("say", "end", sends=False)
     results: list[str] = []
-    while (result := ear.next()[1]) != "end":
+    while (result := requester.next()[1]) != "end":
         results.append(result)
     assert len(results) <= 2
     assert results[-1] == "39"
 
 
 def test_killed_worker_is_reported_and_started_again(
-    ear: Ear, worker: Worker, reports: list[str]
+    requester: Requester, worker: Worker, reports: list[str]
 ) -> None:
-    ear.ask("say", "first", tells=False)
-    assert ear.next() == ("done", "first")
+    requester.request("say", "first", sends=False)
+    assert requester.next() == ("done", "first")
     first = worker.process_id
     assert first is not None
     # Stopped, so that the kill hits it in the middle of its work, which is done all the same.
     os.kill(first, signal.SIGSTOP)
-    ear.ask("say", "again", tells=False)
+    requester.request("say", "again", sends=False)
     os.kill(first, signal.SIGKILL)
-    assert ear.next() == ("done", "again")
+    assert requester.next() == ("done", "again")
     second = worker.process_id
     assert second not in (None, first)
     assert second is not None
     # And once more, while it has nothing to do.
     os.kill(second, signal.SIGKILL)
-    ear.ask("say", "once more", tells=False)
-    assert ear.next() == ("done", "once more")
+    requester.request("say", "once more", sends=False)
+    assert requester.next() == ("done", "once more")
     assert reports == [RESTARTED] * 2
     assert worker.process_id not in (None, first, second)
 
 
-def test_stopped_worker_ends_its_process_whatever_it_does(
-    ear: Ear, worker: Worker, reports: list[str]
-) -> None:
-    ear.ask("hang")
-    assert ear.next() == ("told", 0)
+def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
+    reports: list[str] = []
+    worker = Worker(reports.append)
+    requester = Requester(worker)
+    requester.request("hang")
+    assert requester.next() == ("message", 0)
     process = worker.process_id
     assert process is not None
     os.kill(process, signal.SIGSTOP)
@@ -292,36 +277,31 @@ def test_stopped_worker_ends_its_process_whatever_it_does(
     assert not reports
 
 
-def test_no_process_is_left_when_the_parent_is_gone() -> None:
+def test_worker_process_ends_when_its_parent_is_gone() -> None:
     code = """
 import os, sys
 from explorer.app.session.jobs import Worker
 from tests.app import telling
 worker = Worker(print)
-def told(value):
+def receive(value):
     if value == 5:
         print(worker.process_id, flush=True)
         os._exit(0)
-worker.submit("task", telling.count_until_cancelled, (), print, print, receive=told)
+worker.submit("task", telling.count_until_cancelled, (), print, print, receive=receive)
 worker.wait_until_idle(600.0)
 """
-    command = [sys.executable, "-c", code]
     done = subprocess.run(
-        command, stdout=subprocess.PIPE, text=True, timeout=PATIENCE, cwd=ROOT, check=True
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=ROOT, check=True
     )
     child = int(done.stdout)
     assert child != os.getpid()
-    assert _has_ended(child)
+    wait_for(lambda: has_ended(child))
 
 
-def _has_ended(process: int) -> bool:
-    for _ in range(1000):
-        try:
-            os.kill(process, 0)
-            state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
-        except (ProcessLookupError, FileNotFoundError):
-            return True
-        if state == "Z":
-            return True
-        threading.Event().wait(0.02)
-    return False
+def has_ended(process: int) -> bool:
+    """Whether a process is gone, or only waits for its parent to ask how it ended."""
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return True
+    return state == "Z"
