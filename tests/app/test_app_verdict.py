@@ -1,4 +1,4 @@
-"""The verdict on a pose: the worst of its measures, on the page, on paper and in text."""
+"""The verdict on a pose: the worst of its measures, on the page and in text."""
 
 from __future__ import annotations
 
@@ -38,46 +38,33 @@ ABOUT_PLATFORM_Z = next(
 )
 
 
-def nearly_meeting_lines() -> Frame:
-    """Return a frame 7 degrees, or 2.5 mm, from where the lines meet; every margin is long."""
-    return Frame(Jog(ABOUT_PLATFORM_Z, 66.0).apply(opened(OPTIMAL)))
-
-
-def test_verdict_seven_degrees_from_an_incidence_is_near() -> None:
-    frame = nearly_meeting_lines()
+def test_verdict_seven_degrees_from_an_incidence_is_near_and_so_is_its_margin() -> None:
+    # Where the lines nearly meet every margin is long.
+    frame = Frame(Jog(ABOUT_PLATFORM_Z, 66.0).apply(opened(OPTIMAL)))
     assert np.abs(frame.snapshot.margins).min() > frame.state.warn_below
     text = summary(frame)
     assert "Near a singularity" in text
-    assert "Clear of singularities" not in text
     assert "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting" in text
-
-
-def test_table_of_margins_colours_the_incidence_that_the_verdict_names() -> None:
-    frame = nearly_meeting_lines()
     colours = re.findall(r'class="ex-swatch" style="--colour:(#\w+)"', distance_table(frame))
     levels = frame.verdict.levels
     assert colours == [css(proximity_colour(level)) for level in levels]
     assert [level < 1.0 for level in levels] == [False, True, False]
-
-
-@pytest.mark.parametrize("design", PRESETS.values(), ids=lambda design: design.name)
-def test_verdict_of_a_preset_at_home_is_clear(design: Design) -> None:
-    assert Frame(opened(design)).verdict.kind == "clear"
+    assert proximity_colour(0.0) == SINGULAR
+    assert proximity_colour(math.nextafter(1.0, 0.0)) == WARNED
 
 
 @pytest.mark.parametrize("incidence", [1, 2, 3])
 def test_verdict_at_the_nearest_singular_pose_is_singular(incidence: int) -> None:
     found = Frame(GoToSingularity(incidence).apply(opened(OPTIMAL))).verdict
-    assert found.kind == "singular"
-    assert found.incidences == (incidence,)
+    assert (found.kind, found.incidences, found.distance) == ("singular", (incidence,), 0.0)
     assert found.levels[incidence - 1] == 0.0
-    assert found.distance == 0.0
+    assert found.brief(10.0) == f"Singular: δ{incidence} = 0"
 
 
 def test_verdict_of_poses_with_an_ill_conditioned_jacobian_is_never_clear() -> None:
     rng = np.random.default_rng(3)
     ill = 0
-    for _ in range(400):
+    for _ in range(150):
         # Around the singular poses, where the conditioning is low.
         place = rng.uniform([-15.0, -15.0, 0.2], [15.0, 15.0, 15.0])
         start = Pose.of_yaw_pitch_roll(place.tolist(), rng.uniform(-90.0, 90.0, 3).tolist())
@@ -87,7 +74,7 @@ def test_verdict_of_poses_with_an_ill_conditioned_jacobian_is_never_clear() -> N
         if snapshot.inverse_condition < 9e-3:
             ill += 1
             assert verdict(snapshot).kind != "clear"
-    assert ill > 50
+    assert ill > 20
 
 
 @given(all_cases())
@@ -123,23 +110,21 @@ def test_verdict_is_the_worst_of_margins_distances_turns_and_conditioning(case: 
         assert snapshot.inverse_condition >= warn.condition
 
 
-@pytest.mark.parametrize("design", PRESETS.values(), ids=lambda design: design.name)
 @pytest.mark.parametrize("measure", ["margin", "condition"])
 @pytest.mark.parametrize("share", [None, 0.02, 0.11])
 def test_verdict_where_the_map_warns_is_never_clear(
-    design: Design, measure: Literal["margin", "condition"], share: float | None
+    measure: Literal["margin", "condition"], share: float | None
 ) -> None:
-    rng, reach = np.random.default_rng(7), design.reach
-    warn_below = WARN_SHARE * reach if share is None else share * reach
-    place = home_pose(design)
-    bands = position_bands(design, place.rotation, measure, warn_below=warn_below)
-    points = rng.uniform([-reach, -reach, 0.0], reach, (2000, 3))
-    warned = points[bands.values(points) < 1.0][:60]
-    assert len(warned) > 20
-    for x, y, z in warned.tolist():
-        snapshot = evaluate(design, Pose((x, y, z), place.quaternion))
-        own = None if share is None else warn_below
-        assert verdict(snapshot, own).kind != "clear"
+    for design in PRESETS.values():
+        rng, reach, place = np.random.default_rng(7), design.reach, home_pose(design)
+        warn_below = WARN_SHARE * reach if share is None else share * reach
+        bands = position_bands(design, place.rotation, measure, warn_below=warn_below)
+        points = rng.uniform([-reach, -reach, 0.0], reach, (500, 3))
+        warned = points[bands.values(points) < 1.0][:30]
+        assert len(warned) > 5
+        for x, y, z in warned.tolist():
+            snapshot = evaluate(design, Pose((x, y, z), place.quaternion))
+            assert verdict(snapshot, None if share is None else warn_below).kind != "clear"
 
 
 def random_pose(design: Design, rng: np.random.Generator) -> Pose:
@@ -148,34 +133,23 @@ def random_pose(design: Design, rng: np.random.Generator) -> Pose:
     return Pose.of_yaw_pitch_roll(place.tolist(), rng.uniform(-90.0, 90.0, 3).tolist())
 
 
-def shifted(pose: Pose, length: float, rng: np.random.Generator) -> Pose:
-    """Return a pose moved by a length in a random direction."""
-    way = rng.normal(size=3)
-    x, y, z = (np.array(pose.position) + length * way / np.linalg.norm(way)).tolist()
-    return Pose((x, y, z), pose.quaternion)
-
-
-def turned(pose: Pose, angle: float, rng: np.random.Generator, *, about_a1: bool) -> Pose:
-    """Return a pose turned by an angle in radians about a random axis through b4 or a1."""
-    axis = rng.normal(size=3)
-    turn = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
-    position = np.array(pose.position)
-    return Pose.of(turn @ position if about_a1 else position, turn @ pose.rotation)
-
-
 @pytest.mark.parametrize("design", PRESETS.values(), ids=lambda design: design.name)
 @pytest.mark.parametrize("incidence", [1, 2, 3])
 def test_verdict_within_the_warning_distance_or_angle_of_an_incidence_is_never_clear(
     design: Design, incidence: int
 ) -> None:
     rng, warn = np.random.default_rng(incidence), warnings(design.reach)
-    for _ in range(25):
+    for _ in range(8):
         singular = GoToSingularity(incidence).apply(opened(design, random_pose(design, rng))).pose
         share = float(rng.uniform(0.0, 0.999))
+        # It is moved, and turned about b4 or a1.
+        way, axis = (each / np.linalg.norm(each) for each in rng.normal(size=(2, 3)))
+        place = np.array(singular.position)
+        turn = Rotation.from_rotvec(share * warn.turn * axis).as_matrix()
         for pose in (
-            shifted(singular, share * warn.distance, rng),
-            turned(singular, share * warn.turn, rng, about_a1=False),
-            turned(singular, share * warn.turn, rng, about_a1=True),
+            Pose.of(place + share * warn.distance * way, singular.rotation),
+            Pose.of(place, turn @ singular.rotation),
+            Pose.of(turn @ place, turn @ singular.rotation),
         ):
             found = verdict(evaluate(design, pose))
             assert found.kind != "clear"
@@ -183,9 +157,12 @@ def test_verdict_within_the_warning_distance_or_angle_of_an_incidence_is_never_c
 
 
 @pytest.mark.parametrize("design", PRESETS.values(), ids=lambda design: design.name)
-def test_verdict_far_from_all_incidences_is_clear(design: Design) -> None:
+def test_verdict_at_home_and_far_from_all_incidences_is_clear(design: Design) -> None:
+    home = Frame(opened(design)).verdict
+    assert home.kind == "clear"
+    assert home.brief(10.0).startswith(f"{home.distance * 10.0:.3g} mm to δ")
     rng, warn, far = np.random.default_rng(5), warnings(design.reach), 0
-    for _ in range(400):
+    for _ in range(120):
         snapshot = evaluate(design, random_pose(design, rng))
         if (
             min(snapshot.nearest_distances) > warn.distance
@@ -195,10 +172,10 @@ def test_verdict_far_from_all_incidences_is_clear(design: Design) -> None:
         ):
             far += 1
             assert verdict(snapshot).kind == "clear"
-    assert far > 50
+    assert far > 15
 
 
-def test_verdict_on_a_nearly_degenerate_design_tells_the_conditioning_and_its_margin() -> None:
+def test_verdict_on_a_nearly_degenerate_design_names_the_conditioning_and_its_margin() -> None:
     design = OPTIMAL.with_variable("b3", OPTIMAL.b2 + 0.02)
     pose = opened(OPTIMAL).pose
     snapshot = evaluate(design, pose)
@@ -212,7 +189,7 @@ def test_verdict_on_a_nearly_degenerate_design_tells_the_conditioning_and_its_ma
     assert found.brief(10.0).startswith("1/cond J ")
 
 
-def test_verdict_tells_a_measure_that_is_below_its_warning_value() -> None:
+def test_verdict_names_a_measure_that_is_below_its_warning_value() -> None:
     # Of a platform as large as the base, which a small turn displaces much.
     design = OPTIMAL.with_variables([19.0, 7.0, 14.0, -13.0, 12.0, 18.0])
     rng, warn = np.random.default_rng(0), warnings(design.reach)
@@ -221,13 +198,13 @@ def test_verdict_tells_a_measure_that_is_below_its_warning_value() -> None:
         "turn": r"\d\S*° of turning from δ{0} = 0, .*",
         "condition": r"1/cond J is \S+, most by δ{0}; δ{0} = 0 is \S+ mm away",
     }
-    told = set[str]()
-    for _ in range(1200):
+    causes = set[str]()
+    for _ in range(400):
         snapshot = evaluate(design, random_pose(design, rng))
         found = verdict(snapshot)
         if found.kind == "near":
             first = found.incidences[0]
-            told.add(found.cause)
+            causes.add(found.cause)
             assert re.fullmatch(patterns[found.cause].format(first), found.reason(10.0))
             distance = min(found.distance, abs(snapshot.margins[first - 1]) * DISTANCE_SHARE)
             assert {
@@ -235,15 +212,7 @@ def test_verdict_tells_a_measure_that_is_below_its_warning_value() -> None:
                 "turn": found.turn < warn.turn,
                 "condition": found.condition < warn.condition,
             }[found.cause]
-    assert told == set(patterns)
-
-
-@pytest.mark.parametrize("incidence", [1, 2, 3])
-def test_brief_verdict_names_distance_and_incidence(incidence: int) -> None:
-    state = GoToSingularity(incidence).apply(opened(OPTIMAL))
-    assert Frame(state).verdict.brief(10.0) == f"Singular: δ{incidence} = 0"
-    home = Frame(opened(OPTIMAL)).verdict
-    assert home.brief(10.0) == f"{home.distance * 10.0:.3g} mm to δ1 = 0"
+    assert causes == set(patterns)
 
 
 def test_verdict_scales_with_the_warning_length() -> None:
@@ -254,8 +223,3 @@ def test_verdict_scales_with_the_warning_length() -> None:
     ratio = 30.0 / state.warn_below
     for narrow, near in zip(Frame(state).verdict.levels, Frame(wide).verdict.levels, strict=True):
         assert math.isclose(narrow, near * ratio)
-
-
-def test_warned_levels_are_orange() -> None:
-    assert proximity_colour(0.0) == SINGULAR
-    assert proximity_colour(math.nextafter(1.0, 0.0)) == WARNED
