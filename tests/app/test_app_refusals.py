@@ -27,14 +27,14 @@ BROWSER = {"Accept": "text/html,application/xhtml+xml", "Accept-Encoding": "gzip
 @pytest.fixture(scope="module")
 def behind() -> Iterator[Running]:
     """An explorer behind a proxy."""
-    made = start(PRESETS["paper-optimal"], port=0, token=TOKEN, allow_hosts=[PROXY])
-    yield made
-    made.stop()
+    running = start(PRESETS["paper-optimal"], port=0, token=TOKEN, allow_hosts=[PROXY])
+    yield running
+    running.stop()
 
 
 def get(running: Running, target: str, **headers: str) -> tuple[HTTPResponse, str]:
     """Return the response to a request and its body, unpacked."""
-    connection = HTTPConnection("127.0.0.1", running.viser.get_port(), timeout=30)
+    connection = HTTPConnection("127.0.0.1", running.viser.get_port(), timeout=60)
     connection.request("GET", target, headers=headers)
     response = connection.getresponse()
     body = response.read()
@@ -67,13 +67,10 @@ def through_proxy(running: Running, origin: str, token: str = TOKEN) -> ClientCo
     )
 
 
-@pytest.mark.parametrize("scheme", ["http", "https"])
-def test_websocket_through_a_proxy_is_that_of_a_tab(behind: Running, scheme: str) -> None:
-    with closing(through_proxy(behind, f"{scheme}://{PROXY}")) as connection:
-        assert Client(connection).find("x")
-
-
 def test_websocket_through_a_proxy_needs_its_origin_and_the_token(behind: Running) -> None:
+    for scheme in ("http", "https"):
+        with closing(through_proxy(behind, f"{scheme}://{PROXY}")) as connection:
+            assert Client(connection).find("x")
     for origin, token, status in (
         (f"https://evil.{PROXY}", TOKEN, 403),
         (f"https://{PROXY}:444", TOKEN, 403),
@@ -92,9 +89,13 @@ def test_page_through_a_proxy_lets_itself_connect_there(behind: Running) -> None
     assert "connection?origin=" in page
     # The same with and without packing, but for the added part as viser serves it.
     assert get(behind, f"/?token={TOKEN}", Host=PROXY)[1] == page
+    response, page = get(behind, "/", **BROWSER)
+    assert response.status == 401
+    assert "?token=" in page
+    assert "<script" not in get(behind, "/", Host="<script>alert(1)</script>", **BROWSER)[1]
 
 
-@pytest.mark.parametrize("host", [f"other.{PROXY}", "evil.example:9", f"{PROXY}.evil.example"])
+@pytest.mark.parametrize("host", ["evil.example:9", f"{PROXY}.evil.example"])
 def test_wrong_host_is_answered_with_a_page_that_names_it_and_the_option(
     behind: Running, running: Running, host: str
 ) -> None:
@@ -112,18 +113,9 @@ def test_wrong_host_is_answered_with_a_page_that_names_it_and_the_option(
         assert f"--allow-host {host.partition(':')[0]}" in line
 
 
-def test_markup_in_a_host_stays_text(behind: Running) -> None:
-    _, page = get(behind, "/", Host="<script>alert(1)</script>", **BROWSER)
-    assert "<script" not in page
-
-
-def test_missing_token_is_answered_with_a_page(behind: Running) -> None:
-    response, page = get(behind, "/", **BROWSER)
-    assert response.status == 401
-    assert "?token=" in page
-
-
-def test_page_learns_why_its_websocket_is_refused(behind: Running, running: Running) -> None:
+def test_page_is_given_the_reason_why_its_websocket_is_refused(
+    behind: Running, running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
     port = running.viser.get_port()
     own = f"http://127.0.0.1:{port}"
     # A proxy that does not pass on the host: the page loads, its websocket is refused.
@@ -144,17 +136,7 @@ def test_page_learns_why_its_websocket_is_refused(behind: Running, running: Runn
     assert status == 200
     assert "Upgrade" in reason
     assert ask_reason(running, own)[0] == 200
-
-
-def test_page_learns_that_too_many_tabs_are_open(
-    running: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setattr(guard, "MOST_TABS", 0)
-    status, reason = ask_reason(running, f"http://127.0.0.1:{running.viser.get_port()}")
+    status, reason = ask_reason(running, own)
     assert status == 503
     assert "close one" in reason
-
-
-@pytest.mark.parametrize("origin", ["", "null", "<b>", "\n", "https://x\r\ny", "%", "é" * 50])
-def test_any_origin_is_answered_in_one_line(running: Running, origin: str) -> None:
-    assert ask_reason(running, origin)[0] == 403
