@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 import threading
-import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -15,24 +14,31 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from client import wait_for
 
 import explorer
 from explorer import InputError, Pose
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
-PATIENCE = 30.0
+
+
+@pytest.fixture(scope="module")
+def started() -> Iterator[explorer.Shown]:
+    with explorer.show(OPTIMAL) as shown:
+        yield shown
 
 
 @pytest.fixture
-def shown() -> Iterator[explorer.Shown]:
-    with explorer.show(OPTIMAL) as made:
-        yield made
+def shown(started: explorer.Shown) -> explorer.Shown:
+    """An explorer that shows the paper's optimum at home."""
+    started.design = OPTIMAL
+    return started
 
 
 def answers(url: str) -> bool:
     """Whether the page is served there."""
     try:
-        with urllib.request.urlopen(url, timeout=10.0) as page:
+        with urllib.request.urlopen(url, timeout=60.0) as page:
             return page.status == 200 and b"<html" in page.read()
     except (urllib.error.URLError, ConnectionError):
         return False
@@ -45,14 +51,12 @@ def displayed(shown: Any) -> dict[str, str]:
     return bundle
 
 
-def wait_until_gone(url: str) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while answers(url):
-        assert time.monotonic() < deadline, f"{url} is still served"
-        time.sleep(0.02)
+def ends(threads: set[threading.Thread]) -> bool:
+    """Whether only these threads are left."""
+    return not set(threading.enumerate()) - threads
 
 
-def test_a_notebook_gets_the_page_in_a_frame_and_a_shell_its_address(
+def test_notebook_gets_the_page_in_a_frame_and_a_shell_its_address(
     shown: explorer.Shown,
 ) -> None:
     assert answers(shown.url)
@@ -80,20 +84,25 @@ def test_design_and_pose_are_read_and_set_live(shown: explorer.Shown) -> None:
     assert shown.design == explorer.PRESETS["paper-initial"]
 
 
-def test_what_cannot_be_set_is_refused_in_one_line_and_changes_nothing(
+def test_value_that_cannot_be_set_is_refused_in_one_line_and_changes_nothing(
     shown: explorer.Shown,
 ) -> None:
-    untyped: object = 3
+    untyped: Any = 3
     with pytest.raises(InputError, match=r"^a design is an explorer\.Design, [^\n]*got 3$"):
-        shown.design = untyped  # pyright: ignore[reportAttributeAccessIssue]
+        shown.design = untyped
     with pytest.raises(InputError, match=r"^a pose is an explorer\.Pose; got 3$"):
-        shown.pose = untyped  # pyright: ignore[reportAttributeAccessIssue]
+        shown.pose = untyped
     with pytest.raises(explorer.DesignError, match=r"^[^\n]*no-such-design[^\n]*$"):
         shown.design = "no-such-design"
     assert (shown.design, shown.pose) == (OPTIMAL, explorer.home_pose(OPTIMAL))
+    with pytest.raises(InputError, match=r"^the height must be 100 pixels at least; got 5$"):
+        explorer.show(height=5)
+    port = int(shown.url.rpartition(":")[2])
+    with pytest.raises(explorer.ExplorerError, match=f"^port {port} is taken"):
+        explorer.show(port=port)
 
 
-def test_several_are_shown_at_once_each_with_its_own_state(shown: explorer.Shown) -> None:
+def test_explorers_shown_at_once_have_a_state_each(shown: explorer.Shown) -> None:
     with explorer.show("paper-initial", height=300) as other:
         assert other.url != shown.url
         assert answers(other.url)
@@ -104,7 +113,7 @@ def test_several_are_shown_at_once_each_with_its_own_state(shown: explorer.Shown
     assert answers(shown.url)
 
 
-def test_what_is_stopped_says_so_and_leaves_nothing_behind() -> None:
+def test_explorer_that_is_stopped_says_so_and_leaves_nothing_behind() -> None:
     before = set(threading.enumerate())
     with explorer.show() as shown:
         url = shown.url
@@ -117,36 +126,22 @@ def test_what_is_stopped_says_so_and_leaves_nothing_behind() -> None:
     with pytest.raises(InputError, match="stopped"):
         shown.design = OPTIMAL
     shown.stop()
-    deadline = time.monotonic() + PATIENCE
-    while set(threading.enumerate()) - before:
-        assert time.monotonic() < deadline, set(threading.enumerate()) - before
-        time.sleep(0.02)
-
-
-def test_what_nothing_refers_to_any_more_ends() -> None:
+    wait_for(lambda: ends(before))
+    # One that nothing refers to any more ends too.
     shown = explorer.show()
     url = shown.url
     assert answers(url)
     del shown
     gc.collect()
-    wait_until_gone(url)
+    wait_for(lambda: not answers(url))
 
 
-def test_a_height_too_small_or_a_taken_port_is_refused(shown: explorer.Shown) -> None:
-    with pytest.raises(InputError, match=r"^the height must be 100 pixels at least; got 5$"):
-        explorer.show(height=5)
-    port = int(shown.url.rpartition(":")[2])
-    with pytest.raises(explorer.ExplorerError, match=f"^port {port} is taken"):
-        explorer.show(port=port)
-
-
-def test_a_shell_that_ends_ends_it_without_a_word() -> None:
+def test_shell_that_ends_stops_its_explorers_without_a_word() -> None:
     code = "import explorer; first, second = explorer.show(), explorer.show(); print(first)"
     done = subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,
         text=True,
-        timeout=120,
         check=True,
         cwd=Path(explorer.__file__).parents[1],
     )
