@@ -1,32 +1,42 @@
-"""Workspaces drawn by the worker follow the newest state, in bands of colour and cut open."""
+"""Workspaces drawn by the worker: they follow the newest state, in bands of colour and cut open.
+
+Long drawings send their stages, can be cancelled, and are bounded.
+"""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
-from services import services_for
+from desk import viewed
+from services import StubWorker, services_for
 
+from explorer.app.features.legs.tasks import RadiusRequest, draw_radius_curve
 from explorer.app.features.workspace import tasks
 from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.regions import MOST_LIVE_NODES, find_accessible
 from explorer.app.features.workspace.tasks import (
     WorkspaceRequest,
     WorkspaceSurface,
     draw_workspace,
 )
-from explorer.app.scene.bands import COLOURED_EDGE, MOST_COLOURED, Colouring
+from explorer.app.features.workspace.words import drawing_words
+from explorer.app.scene.bands import COLOURED_EDGE, MOST_COLOURED, Colouring, Shell
 from explorer.app.scene.creases import creased_faces
-from explorer.app.server import start
+from explorer.app.server import Running
+from explorer.app.session import feed as session_feed
+from explorer.app.session.feed import Stage
 from explorer.app.session.jobs import Worker
-from explorer.app.session.worker import Channel
+from explorer.app.session.worker import CancelledError, Channel
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
+from explorer.app.state.view import WorkspaceView
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
@@ -34,17 +44,19 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import BAND_EDGES, band_colours
+from explorer.workspace.accessible.radii import with_radius
+from explorer.workspace.slices.volume import workspace_nodes
 from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = PRESETS["paper-optimal"]
+HOME_ROWS = tuple(tuple(row) for row in home_pose(OPTIMAL).rotation.tolist())
 PATIENCE = 120.0
 
 
 def a_request(**changes: Any) -> WorkspaceRequest:
-    rotation = tuple(tuple(row) for row in home_pose(OPTIMAL).rotation.tolist())
     plain = WorkspaceRequest(
         design=OPTIMAL,
-        rotation=rotation,
+        rotation=HOME_ROWS,
         region="limits",
         start=None,
         colour="plain",
@@ -58,40 +70,15 @@ def a_request(**changes: Any) -> WorkspaceRequest:
     return replace(plain, **changes)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def worker() -> Iterator[Worker]:
-    made = Worker(pytest.fail)
-    yield made
-    made.stop()
+    worker = Worker(pytest.fail)
+    yield worker
+    worker.stop()
 
 
-class Followed:
-    """A feed that is followed, and how often it asked to be drawn again."""
-
-    def __init__(self, worker: Worker) -> None:
-        self.drawn = threading.Semaphore(0)
-        self.feed = WorkspaceFeed(services_for(worker=worker, redraw=self.drawn.release))
-
-    def follow(self, state: State) -> None:
-        self.feed.follow(Frame(state))
-
-
-def shown(state: State, **changes: Any) -> State:
-    workspace = replace(state.view.workspace, solid=True, **changes)
-    return Set("view", replace(state.view, workspace=workspace)).apply(state)
-
-
-def test_drawing_follows_the_design_up_to_the_newest(worker: Worker) -> None:
-    followed = Followed(worker)
-    state = shown(opened(OPTIMAL))
-    for i in range(25):
-        state = SetVariable("a3x", 18.0 + 0.05 * i).apply(state)
-        followed.follow(state)
-    assert worker.wait_until_idle(PATIENCE)
-    drawing = followed.feed.drawing
-    assert drawing is not None
-    assert followed.feed.is_current
-    assert drawing.request.design.a3[0] == 18.0 + 0.05 * 24
+def with_solid(state: State) -> State:
+    return Set("view.workspace.solid", True).apply(state)
 
 
 def test_surface_is_sent_before_anything_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,55 +93,53 @@ def test_surface_is_sent_before_anything_is_measured(monkeypatch: pytest.MonkeyP
     assert sent[0] is drawing.surface
 
 
-def test_surface_of_the_newest_request_is_shown_before_its_numbers(worker: Worker) -> None:
-    followed = Followed(worker)
-    feed = followed.feed
-    state = shown(opened(OPTIMAL))
-    followed.follow(state)
+def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numbers(
+    worker: Worker,
+) -> None:
+    redraws = threading.Semaphore(0)
+    feed = WorkspaceFeed(services_for(worker=worker, redraw=redraws.release))
+    feed.follow(Frame(opened(OPTIMAL)))
     assert worker.wait_until_idle(PATIENCE)
-    for a3x in (18.0, 18.5):
-        while followed.drawn.acquire(blocking=False):
-            pass
-        followed.follow(SetVariable("a3x", a3x).apply(state))
-        assert followed.drawn.acquire(timeout=PATIENCE)
-        assert feed.surface is not None
-        assert feed.surface.request.design.a3[0] == a3x
-        assert worker.wait_until_idle(PATIENCE)
-        assert feed.drawing is not None
-        assert feed.surface is feed.drawing.surface
-    followed.follow(opened(OPTIMAL))
+    # A hidden drawing is not requested.
+    assert worker.process_id is None
+    assert feed.drawing is None
+    state = with_solid(opened(OPTIMAL))
+    for i in range(25):
+        state = SetVariable("a3x", 18.0 + 0.05 * i).apply(state)
+        feed.follow(Frame(state))
+    assert worker.wait_until_idle(PATIENCE)
+    assert feed.drawing is not None
+    assert feed.is_current
+    assert feed.drawing.request.design.a3[0] == 18.0 + 0.05 * 24
+    while redraws.acquire(blocking=False):
+        pass
+    feed.follow(Frame(SetVariable("a3x", 18.5).apply(state)))
+    assert redraws.acquire(timeout=PATIENCE)
+    assert feed.surface is not None
+    assert feed.surface.request.design.a3[0] == 18.5
+    assert worker.wait_until_idle(PATIENCE)
+    assert feed.drawing is not None
+    assert feed.surface is feed.drawing.surface
+    feed.follow(Frame(opened(OPTIMAL)))
     assert feed.surface is None
 
 
-def test_strata_are_requested_after_the_solid(monkeypatch: pytest.MonkeyPatch) -> None:
-    running = start(OPTIMAL, port=0)
-    try:
-        page = running.page
-        view = shown(opened(OPTIMAL)).view
-        view = replace(view, singular=replace(view.singular, strata=True))
-        page.session.do(Set("view", view))
-        assert page.wait_until_drawn(PATIENCE)
-        requested: list[str] = []
-        submit = page.worker.submit
+def test_strata_are_requested_after_the_solid(running: Running) -> None:
+    page, requested = running.page, list[str]()
+    submit = page.worker.submit
 
-        def record(key: object, task: Any, *arguments: Any, **options: Any) -> int:
-            requested.append(task.__name__)
-            return submit(key, task, *arguments, **options)
+    def record(key: object, task: Any, *arguments: Any, **options: Any) -> int:
+        requested.append(task.__name__)
+        return submit(key, task, *arguments, **options)
 
-        monkeypatch.setattr(page.worker, "submit", record)
+    view = with_solid(page.session.state).view
+    page.session.do(Set("view", replace(view, singular=replace(view.singular, strata=True))))
+    assert page.wait_until_drawn(PATIENCE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page.worker, "submit", record)
         page.session.do(SetVariable("a3x", 18.0))
         assert page.wait_until_drawn(PATIENCE)
-        assert requested.index("draw_workspace") < requested.index("strata_distances")
-    finally:
-        running.stop()
-
-
-def test_hidden_drawing_is_not_requested(worker: Worker) -> None:
-    followed = Followed(worker)
-    followed.follow(opened(OPTIMAL))
-    assert worker.wait_until_idle(PATIENCE)
-    assert worker.process_id is None
-    assert followed.feed.drawing is None
+    assert requested.index("draw_workspace") < requested.index("strata_distances")
 
 
 def test_empty_workspace_names_the_limit_that_empties_it() -> None:
@@ -167,43 +152,34 @@ def test_empty_workspace_names_the_limit_that_empties_it() -> None:
     assert "l1 maximum" in drawing.empty_because
 
 
-def area(triangles: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+def area(shells: Sequence[Shell]) -> float:
+    triangles = np.concatenate([shell.vertices[shell.faces] for shell in shells])
     a, b, c = np.moveaxis(triangles, 1, 0)
     return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
 
 
 @pytest.mark.parametrize("colour", ["margin", "condition"])
 def test_coloured_bands_cover_the_same_surface(colour: str) -> None:
-    plain = draw_workspace(a_request()).surface.shells[0]
-    banded = draw_workspace(a_request(colour=colour)).surface.shells
-    assert len(banded) > 1
-    total = sum(area(shell.vertices[shell.faces]) for shell in banded)
-    assert total == pytest.approx(area(plain.vertices[plain.faces]), rel=1e-9)
+    plain = draw_workspace(a_request()).surface
+    banded = draw_workspace(a_request(colour=colour)).surface
+    assert len(banded.shells) > 1
+    assert banded.coarse_edge is None
+    assert area(banded.shells) == pytest.approx(area(plain.shells), rel=1e-9)
 
 
-def large_beside_its_reach(reach: float) -> Design:
-    """Return a design whose legs are far longer than its reach, and so is its workspace."""
+def test_workspace_large_beside_the_reach_has_a_bounded_number_of_facets() -> None:
+    # Its legs are far longer than its reach, and so is its workspace.
     long: Any = (0.0, 20.0)
     limits = msgspec.structs.replace(OPTIMAL.limits, l1=long, d2=long, d4=long, l4=long)
-    a3 = (0.6 * reach, 0.8 * reach)
-    return msgspec.structs.replace(OPTIMAL, a3=a3, limits=limits, node_step=None)
-
-
-@pytest.mark.parametrize("reach", [5.0, 2.0])
-def test_workspace_large_beside_the_reach_has_a_bounded_number_of_facets(
-    reach: float,
-) -> None:
-    design = large_beside_its_reach(reach)
+    design = msgspec.structs.replace(OPTIMAL, a3=(1.2, 1.6), limits=limits, node_step=None)
     plain = draw_workspace(a_request(design=design)).surface.shells
     drawing = draw_workspace(a_request(design=design, colour="condition"))
     # A facet that lies in several bands is split between them.
     assert sum(len(shell.faces) for shell in drawing.surface.shells) < 1.5 * MOST_COLOURED
-    total = sum(area(shell.vertices[shell.faces]) for shell in drawing.surface.shells)
-    assert total == pytest.approx(sum(area(s.vertices[s.faces]) for s in plain), rel=1e-9)
-    # Their edge is told, since the colours are coarser than usual; margins need no small facets.
+    assert area(drawing.surface.shells) == pytest.approx(area(plain), rel=1e-9)
+    # The colours are coarser than usual, which is reported; margins need no small facets.
     assert drawing.surface.coarse_edge is not None
     assert drawing.surface.coarse_edge > COLOURED_EDGE * design.reach
-    assert draw_workspace(a_request(colour="condition")).surface.coarse_edge is None
     assert draw_workspace(a_request(design=design, colour="margin")).surface.coarse_edge is None
 
 
@@ -217,7 +193,7 @@ ORIENTATIONS = (
 
 
 @pytest.mark.parametrize("rotation", ORIENTATIONS)
-@pytest.mark.parametrize("warn_below", [1.0, 0.3, 4.0])
+@pytest.mark.parametrize("warn_below", [1.0, 0.3])
 def test_bands_of_margins_contain_the_values_of_their_colour(
     rotation: FloatArray, warn_below: float
 ) -> None:
@@ -237,8 +213,7 @@ def test_bands_of_margins_contain_the_values_of_their_colour(
             assert values.max() <= BAND_EDGES[index + 1] + 1e-9
 
 
-@pytest.mark.parametrize("colour", ["margin", "condition"])
-@pytest.mark.parametrize("cut", [None, "x", "y", "z"])
+@pytest.mark.parametrize(("colour", "cut"), [("margin", None), ("margin", "x"), ("condition", "z")])
 def test_bands_meet_where_the_measure_is_their_level(colour: Any, cut: Any) -> None:
     drawing = draw_workspace(a_request(colour=colour, cut=cut, level=None))
     request = drawing.request
@@ -269,3 +244,134 @@ def test_cut_shows_the_slice_at_its_level() -> None:
     assert drawing.slice_map.level == drawing.level == 5.0
     assert drawing.hull_volume is not None
     assert drawing.hull_volume >= drawing.mesh_volume * (1.0 - 1e-12)
+
+
+THICK = with_radius(OPTIMAL, 0.3)
+"""With these radii several pairs of legs collide within the limits."""
+
+
+def accessible_request(design: Design, **changes: Any) -> WorkspaceRequest:
+    return a_request(**{"design": design, "region": "accessible", "tolerance": 0.5, **changes})
+
+
+class Watched:
+    """A channel that keeps what is sent, and cancels at a stage."""
+
+    def __init__(self, last: int | None = None) -> None:
+        self.stages: list[Stage] = []
+        self.surfaces: list[WorkspaceSurface] = []
+        self.line = Channel(self._keep, lambda: len(self.stages) == last)
+
+    def _keep(self, value: Stage | WorkspaceSurface) -> None:
+        if isinstance(value, Stage):
+            self.stages.append(value)
+        else:
+            self.surfaces.append(value)
+
+
+def test_accessible_workspace_sends_a_stage_for_each_pair_of_legs_that_it_carves() -> None:
+    watched = Watched()
+    drawing = draw_workspace(accessible_request(THICK, level=1.0), watched.line)
+    assert drawing.accessible is not None
+    blocking = [pair.legs for pair in drawing.accessible.pairs if pair.blocked_volume > 0.0]
+    assert len(blocking) > 1
+    words = " ".join(stage.words for stage in watched.stages)
+    assert all(f"legs {first}–{second}" in words for first, second in blocking)
+    shares = [stage.share for stage in watched.stages]
+    assert shares == sorted(set(shares))
+    assert shares[0] == 0.0
+    assert shares[-1] < 1.0
+    assert watched.surfaces == [drawing.surface]
+
+
+@pytest.mark.parametrize("last", [0, 2])
+def test_cancelled_drawing_ends_at_the_next_stage_and_keeps_nothing_of_it(last: int) -> None:
+    # A tolerance that no other test asks for, so that nothing is kept yet.
+    request = accessible_request(THICK, tolerance=0.51)
+    watched = Watched(last)
+    with pytest.raises(CancelledError):
+        draw_workspace(request, watched.line)
+    assert len(watched.stages) == last
+    curve = Watched(last)
+    with pytest.raises(CancelledError):
+        draw_radius_curve(RadiusRequest(THICK, HOME_ROWS, None), curve.line)
+    assert len(curve.stages) == last
+
+
+def test_grid_too_fine_for_live_nodes_leaves_the_rest_of_the_drawing() -> None:
+    design = msgspec.structs.replace(OPTIMAL, node_step=0.25)
+    assert workspace_nodes(design).count > MOST_LIVE_NODES
+    drawing = draw_workspace(accessible_request(design))
+    assert drawing.trouble is None
+    assert drawing.accessible is not None
+    assert drawing.accessible.node_count is None
+    same = draw_workspace(accessible_request(OPTIMAL)).accessible
+    assert same is not None
+    assert same.node_count is not None
+    assert drawing.accessible.volume == same.volume
+
+
+def test_accessible_workspace_is_kept_for_the_next_request() -> None:
+    stages: list[str] = []
+    for expected in (True, False):
+        stages.clear()
+        find_accessible(THICK, HOME_ROWS, None, 0.52, lambda words, _: stages.append(words))
+        assert bool(stages) == expected
+
+
+def test_cancelled_drawing_leaves_none_of_an_older_design() -> None:
+    worker = StubWorker()
+    feed = WorkspaceFeed(services_for(worker=worker))
+    state = viewed(opened(THICK), workspace=WorkspaceView(solid=True))
+    feed.follow(Frame(state))
+    drawing = draw_workspace(worker.orders[0].request)
+    worker.orders[0].done(drawing)
+    assert feed.drawing is drawing
+    feed.follow(Frame(SetVariable("a3x", 18.0).apply(state)))
+    assert feed.drawing is drawing
+    feed.cancel()
+    assert feed.drawing is None
+    worker.orders[0].done(drawing)
+    assert feed.drawing is None
+    feed.retry()
+    assert not feed.is_settled
+
+
+def test_drawing_shows_its_stage_and_is_cancelled_and_requested_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(session_feed, "LONG_SECONDS", 0.0)
+    worker, redraws = Worker(lambda _: None), threading.Semaphore(0)
+    feed = WorkspaceFeed(services_for(worker=worker, redraw=redraws.release))
+
+    def wait_for(condition: Callable[[], object]) -> None:
+        while not condition():
+            assert redraws.acquire(timeout=PATIENCE)
+
+    state = Set("design.limits", THICK.limits).apply(opened(OPTIMAL))
+    state = viewed(state, workspace=WorkspaceView(solid=True, region="accessible"))
+    frame = Frame(state)
+    try:
+        feed.follow(frame)
+        wait_for(lambda: feed.stage is not None)
+        assert "% done" in drawing_words(frame, feed)
+        feed.cancel()
+        assert (feed.is_cancelled, feed.is_settled, feed.stage) == (True, True, None)
+        assert "Stopped" in drawing_words(frame, feed)
+        # The same frame does not ask for it again by itself.
+        feed.follow(frame)
+        assert worker.wait_until_idle(PATIENCE)
+        assert feed.is_cancelled
+        assert feed.drawing is None
+        feed.retry()
+        # What is shown no more is not computed to its end.
+        wait_for(lambda: feed.stage is not None)
+        feed.follow(Frame(viewed(state, workspace=WorkspaceView(region="accessible"))))
+        assert worker.wait_until_idle(PATIENCE)
+        assert (feed.problem, feed.drawing) == (None, None)
+        feed.follow(frame)
+        wait_for(lambda: feed.is_current)
+        assert not feed.is_cancelled
+        assert "units³" in drawing_words(frame, feed)
+    finally:
+        worker.stop()
