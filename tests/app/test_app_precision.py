@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import re
+from collections.abc import Generator
 from dataclasses import replace
 from typing import Any
 
@@ -53,7 +54,7 @@ TYPICAL_DESIGN = msgspec.structs.replace(
 SINGULAR = Pose((3.0, 4.0, 5.0), (1.0, 0.0, 0.0, 0.0))
 
 
-def shown(design: Design = TYPICAL_DESIGN, **precision: Any) -> State:
+def state_with(design: Design = TYPICAL_DESIGN, **precision: Any) -> State:
     """Return a design at home under a force, with what is drawn of its precision."""
     state = opened(design)
     forces = ForcesView(force=(3.0, -4.0, -10.0), moment=(0.05, 0.0, -0.02))
@@ -71,18 +72,20 @@ def words(html: str) -> str:
 
 
 @pytest.fixture
-def services(server: viser.ViserServer) -> Services:
-    return at_desk(server, Desk(opened(OPTIMAL)))
-
-
-def at_desk(server: viser.ViserServer, desk: Desk) -> Services:
-    """Return services whose worker answers at once."""
+def worker() -> Generator[StubWorker]:
     worker = StubWorker(at_once=True)
-    return services_for(server, desk.session, worker, buttons=Buttons(server))
+    yield worker
+    worker.stop()
 
 
-def test_figures_are_those_of_the_pose(services: Services) -> None:
-    state = shown()
+def show_in(desk: Desk, state: State) -> None:
+    """Have a desk show the design and the view of a state."""
+    desk.session.do(Set("design", state.design))
+    desk.session.do(Set("view", state.view))
+
+
+def test_panel_has_the_numbers_of_the_pose(services: Services) -> None:
+    state = state_with()
     precision = services.get(PosePrecision).of(Frame(state))
     worst, rms = precision.worst(), precision.rms()
     text = words(markup(PrecisionPanel(services), state))
@@ -98,9 +101,7 @@ def test_figures_are_those_of_the_pose(services: Services) -> None:
     assert sum(percents) == pytest.approx(100, abs=1)
 
 
-def test_ideal_design_is_offered_typical_values(server: viser.ViserServer) -> None:
-    desk = Desk(opened(OPTIMAL))
-    services = at_desk(server, desk)
+def test_ideal_design_is_offered_typical_values(services: Services, desk: Desk) -> None:
     panel = PrecisionPanel(services)
     text = markup(panel, desk.state)
     assert "states no errors" in text
@@ -110,50 +111,57 @@ def test_ideal_design_is_offered_typical_values(server: viser.ViserServer) -> No
     assert desk.state.design == typical_machine(OPTIMAL)[0]
     assert "Assume" not in markup(panel, desk.state)
     # What the design states stays.
+    actuators = Actuators(error_mm=(0.0, 0.0, 0.01, 0.0, 0.0, 0.0))
+    tolerances = Tolerances(b4=(0.0, 0.0, 0.2))
     stated = msgspec.structs.replace(
-        OPTIMAL,
-        actuators=Actuators(error_mm=(0.0, 0.0, 0.01, 0.0, 0.0, 0.0)),
-        struts=Struts(outer_mm=20.0),
-        tolerances=Tolerances(b4=(0.0, 0.0, 0.2)),
+        OPTIMAL, actuators=actuators, struts=Struts(outer_mm=20.0), tolerances=tolerances
     )
-    filled, assumed = typical_machine(stated)
-    assert assumed == ("stiffness of the actuators 1000 N/mm",)
-    assert filled == msgspec.structs.replace(
-        stated, actuators=msgspec.structs.replace(stated.actuators, stiffness_n_mm=(1000.0,) * 6)
+    stiff = msgspec.structs.replace(actuators, stiffness_n_mm=(1000.0,) * 6)
+    assert typical_machine(stated) == (
+        msgspec.structs.replace(stated, actuators=stiff),
+        ("stiffness of the actuators 1000 N/mm",),
     )
-    desk.session.stop()
 
 
 def test_source_that_only_turns_the_tool_is_listed(services: Services) -> None:
     errors = Actuators(error_mm=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0))
-    state = shown(msgspec.structs.replace(OPTIMAL, actuators=errors))
+    state = state_with(msgspec.structs.replace(OPTIMAL, actuators=errors))
     text = words(markup(PrecisionPanel(services), state))
     assert re.search(r"By source\s+l1\s+0(\.0+)? mm", text)
     rows = "".join(budget_rows(budget_of(budget_request(state))))
     assert "states no tolerances" not in rows
     assert set(re.findall(r"--share:([\d.]+)%", rows)) == {"0.00"}
+    # Without tolerances sources are ranked by unit errors.
+    rows = "".join(budget_rows(budget_of(budget_request(state_with(OPTIMAL, budget=True)))))
+    assert "states no tolerances" in rows
+    bars = [float(each) for each in re.findall(r"--share:([\d.]+)%", rows)]
+    assert bars == sorted(bars, reverse=True)
+    assert bars[0] == 100.0
 
 
-def test_deflection_too_large_to_be_drawn_is_told(services: Services) -> None:
-    struts = Struts(outer_mm=1e-40, inner_mm=0.0)
-    state = shown(msgspec.structs.replace(OPTIMAL, struts=struts), deflected=True)
-    assert "mm/N" in words(markup(PrecisionPanel(services), state))
-    drawn = by_name(DeflectedScene(services).updates(Placed(Frame(state))))
-    assert not any(each["visible"] for each in drawn.values())
-
-
-def test_singular_pose_is_told_and_nothing_is_drawn(services: Services) -> None:
-    state = replace(shown(ellipsoid=True, deflected=True), pose=SINGULAR)
-    text = markup(PrecisionPanel(services), state)
-    assert text.count("singular") == 2
+@pytest.mark.parametrize("case", ["huge deflection", "singular pose"])
+def test_scene_of_a_huge_deflection_or_a_singular_pose_is_empty(
+    services: Services, case: str
+) -> None:
+    state = state_with(ellipsoid=True, deflected=True)
+    scenes: list[Any] = [DeflectedScene(services)]
+    if case == "singular pose":
+        state = replace(state, pose=SINGULAR)
+        scenes.append(ErrorEllipsoidScene(services))
+    else:
+        struts = Struts(outer_mm=1e-40, inner_mm=0.0)
+        state = state_with(msgspec.structs.replace(OPTIMAL, struts=struts), deflected=True)
+    text = words(markup(PrecisionPanel(services), state))
     assert "nan" not in text
-    for scene in (ErrorEllipsoidScene(services), DeflectedScene(services)):
+    assert text.count("singular") == (2 if case == "singular pose" else 0)
+    assert ("mm/N" in text) == (case == "huge deflection")
+    for scene in scenes:
         drawn = by_name(scene.updates(Placed(Frame(state))))
         assert not any(each["visible"] for each in drawn.values())
 
 
 def test_ellipsoid_is_that_of_the_covariance(services: Services) -> None:
-    placed = Placed(Frame(shown(ellipsoid=True)))
+    placed = Placed(Frame(state_with(ellipsoid=True)))
     precision = services.get(PosePrecision).of(placed.frame)
     drawn = by_name(ErrorEllipsoidScene(services).updates(placed))
     body, label = drawn["/precision/ellipsoid/body"], drawn["/precision/ellipsoid/label"]["text"]
@@ -173,12 +181,16 @@ def test_ellipsoid_is_that_of_the_covariance(services: Services) -> None:
 def test_deflected_shape_is_the_linear_motion_magnified(
     services: Services, times: float | None
 ) -> None:
-    state = shown(deflected=True, times=times)
+    state = state_with(deflected=True, times=times)
     placed = Placed(Frame(state))
     precision = services.get(PosePrecision).of(placed.frame)
     drawn = by_name(DeflectedScene(services).updates(placed))
     magnified = drawn_times(placed, precision)
     assert times in (None, magnified)
+    # One that leaves the scene is limited.
+    wide = Placed(Frame(state_with(deflected=True, times=1e30)))
+    balls = by_name(DeflectedScene(services).updates(wide))["/precision/balls"]
+    assert np.abs(balls["batched_positions"]).max() < 200.0
     v, w = precision.deflection[:3], precision.deflection[3:]
     tool = placed.on_platform(state.design.tool.position)
     names = list(placed.platform_points)
@@ -205,12 +217,6 @@ def test_deflected_shape_is_the_linear_motion_magnified(
         assert tip == pytest.approx(total, rel=1e-9)
 
 
-def test_magnification_that_leaves_the_scene_is_limited(services: Services) -> None:
-    placed = Placed(Frame(shown(deflected=True, times=1e30)))
-    drawn = by_name(DeflectedScene(services).updates(placed))
-    assert np.abs(drawn["/precision/balls"]["batched_positions"]).max() < 200.0
-
-
 @pytest.mark.parametrize(
     "values", [{"times": 0.0}, {"wanted": -1.0}, {"wanted": 1e-300}, {"wanted_turn": math.inf}]
 )
@@ -219,12 +225,11 @@ def test_precision_of_the_view_that_is_not_positive_is_refused(values: dict[str,
         PrecisionView(**values)
 
 
-@pytest.mark.parametrize("over", ["pose", "box", "workspace"])
+@pytest.mark.parametrize("over", ["pose", "workspace"])
 def test_budget_keeps_what_is_wanted_and_is_set_in_one_step(
-    server: viser.ViserServer, over: Any
+    services: Services, desk: Desk, over: Any
 ) -> None:
-    desk = Desk(shown(budget=True, over=over, wanted=0.5))
-    services = at_desk(server, desk)
+    show_in(desk, state_with(budget=True, over=over, wanted=0.5))
     part = BudgetPart(services)
     before = desk.state.design
     services.get(BudgetFeed).follow(Frame(desk.state))
@@ -236,54 +241,41 @@ def test_budget_keeps_what_is_wanted_and_is_set_in_one_step(
     desk.press(services.buttons, SET)
     design = desk.state.design
     assert design != before
+    # Tolerances that may be any stay.
+    endless = list(stated_tolerances(design))
+    endless[0], endless[6] = math.inf, math.inf
+    assert SetTolerances(tuple(endless)).apply(desk.state).design == design
     known = np.isfinite(drawing.costs.tolerances)
     np.testing.assert_array_equal(stated_tolerances(design)[known], drawing.costs.tolerances[known])
     # The costs of what is set are those that were told.
     again = budget_of(budget_request(Set("view.precision.wanted", None).apply(desk.state)))
     assert known.all()
     assert again.costs.worst_displacement == pytest.approx(drawing.costs.worst_displacement)
-    desk.session.stop()
 
 
-def test_budget_without_tolerances_ranks_by_unit_errors() -> None:
-    drawing = budget_of(budget_request(shown(OPTIMAL, budget=True)))
-    text = "".join(budget_rows(drawing))
-    assert "states no tolerances" in text
-    bars = [float(each) for each in re.findall(r"--share:([\d.]+)%", text)]
-    assert bars == sorted(bars, reverse=True)
-    assert bars[0] == 100.0
-
-
-def test_budget_that_cannot_be_kept_is_told_in_one_line(server: viser.ViserServer) -> None:
-    desk = Desk(shown(budget=True, wanted=0.01, keep_actuators=True))
-    worker = StubWorker()
-    services = services_for(server, desk.session, worker, buttons=Buttons(server))
-    part = BudgetPart(services)
-    services.get(BudgetFeed).follow(Frame(desk.state))
+def test_budget_that_cannot_be_kept_is_reported_in_one_line(
+    server: viser.ViserServer, desk: Desk
+) -> None:
+    show_in(desk, state_with(budget=True, wanted=0.01, keep_actuators=True))
+    worker, buttons = StubWorker(), Buttons(server)
+    services = services_for(server, desk.session, worker, buttons=buttons)
+    part, before = BudgetPart(services), desk.state
+    services.get(BudgetFeed).follow(Frame(before))
     with pytest.raises(NoAnswerError) as error:
         worker.work()
     worker.orders[-1].failed(str(error.value))
-    text = words(markup(part, desk.state))
+    text = words(markup(part, before))
     assert "There is no budget" in text
     assert "actuators" in text
-    desk.press(services.buttons, SET)
-    assert desk.session.history.at == 0
-    desk.session.stop()
+    desk.press(buttons, SET)
+    assert desk.state == before
 
 
 def test_table_has_every_source_with_its_part() -> None:
-    rows = list(csv.reader(io.StringIO(budget_table(budget_request(shown())).decode())))
+    rows = list(csv.reader(io.StringIO(budget_table(budget_request(state_with())).decode())))
     assert rows[0] == list(COLUMNS)
     assert sorted(row[1] for row in rows[1:]) == sorted(SOURCES)
     by_name = {row[1]: row for row in rows[1:]}
     assert by_name["b2y"][0] == "platform"
     assert by_name["guide tilt y"][2:4] == ["degree", "0.1"]
     assert sum(float(row[8]) for row in rows[1:]) == pytest.approx(1.0)
-
-
-def test_tolerances_that_may_be_any_stay() -> None:
-    state = shown()
-    found = list(stated_tolerances(state.design))
-    found[0], found[6] = math.inf, math.inf
-    after = SetTolerances(tuple(found)).apply(state)
-    assert after.design == state.design
