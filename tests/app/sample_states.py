@@ -121,7 +121,7 @@ def _limits(i: int, share: float) -> Limits:
     )
 
 
-def _wish(_: State, i: int, share: float) -> Action:
+def _request(_: State, i: int, share: float) -> Action:
     return Change(
         "optimisation.request",
         {
@@ -194,7 +194,7 @@ MAKERS: tuple[Make, ...] = (
             "holds_load": share > 0.5,
         },
     ),
-    _wish,
+    _request,
     lambda state, i, share: StartRun(),
     lambda state, i, share: Advance(state.optimisation.count, iterates_of(state, i)),
     lambda state, i, share: CancelRun(),
@@ -241,7 +241,7 @@ def iterates_of(state: State, count: int) -> tuple[Iterate, ...]:
                 design=problem.design_at(values),
                 values=values,
                 # Loads are infinite where a box is on a singular plane.
-                objective=None if number % 9 == 8 else 1.0 / (1.0 + number % 5),
+                objective=None if number % 5 == 3 else 1.0 / (1.0 + number % 5),
                 volume=8000.0 / 3.0 + number,
                 worst="clearance of legs 2 and 3" if number % 2 else "",
                 spare=-0.25 if number % 3 == 1 else 1.0 / 3.0,
@@ -293,8 +293,8 @@ def rich_state() -> State:
         SetJoint(0, 99.1),
     ]
     for action in actions:
-        made = action if isinstance(action, Action) else action(state)
-        state = made.apply(state)
+        step = action if isinstance(action, Action) else action(state)
+        state = step.apply(state)
     return state
 
 

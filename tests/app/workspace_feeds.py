@@ -1,6 +1,9 @@
-"""The feeds of the workspace, with a worker that draws at once when it is told to."""
+"""Drawings of feeds, with a worker that computes on request; those of the workspace."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
 
 from services import StubWorker, services_for
 
@@ -8,8 +11,17 @@ from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feature import WORKSPACE
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
+from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+
+
+class _HasRequest(Protocol):
+    @property
+    def request(self) -> object: ...
+
+
+Drawing = TypeVar("Drawing", bound=_HasRequest)
 
 
 def follow(services: Services, state: State) -> StubWorker:
@@ -20,6 +32,18 @@ def follow(services: Services, state: State) -> StubWorker:
         services.get(kind).follow(Frame(state))
     worker.work()
     return worker
+
+
+def draw(
+    services: Services, kind: Callable[[Services], Feed[Any, Drawing]], state: State
+) -> Drawing:
+    """Have a feed request the drawing of a state; return it."""
+    worker, feed = services.worker, services.get(kind)
+    assert isinstance(worker, StubWorker)
+    feed.follow(Frame(state))
+    worker.work()
+    assert feed.drawing is not None
+    return feed.drawing
 
 
 def drawing_of(state: State) -> WorkspaceDrawing:
