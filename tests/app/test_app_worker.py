@@ -124,21 +124,20 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     assert feed.surface is None
 
 
-def test_strata_are_requested_after_the_solid(running: Running) -> None:
+def test_strata_are_requested_after_the_solid(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
     page, requested = running.page, list[str]()
-    submit = page.worker.submit
 
     def record(key: object, task: Any, *arguments: Any, **options: Any) -> int:
         requested.append(task.__name__)
-        return submit(key, task, *arguments, **options)
+        return -1
 
+    monkeypatch.setattr(page.worker, "submit", record)
     view = with_solid(page.session.state).view
     page.session.do(Set("view", replace(view, singular=replace(view.singular, strata=True))))
-    assert page.wait_until_drawn(PATIENCE)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page.worker, "submit", record)
-        page.session.do(SetVariable("a3x", 18.0))
-        assert page.wait_until_drawn(PATIENCE)
+    page.session.do(SetVariable("a3x", 18.0))
+    assert page.session.wait_until_idle()
     assert requested.index("draw_workspace") < requested.index("strata_distances")
 
 
