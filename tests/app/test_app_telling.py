@@ -188,35 +188,28 @@ def test_long_drawing_ends_as_soon_as_a_newer_one_waits(
 
 
 @pytest.mark.parametrize(
-    ("task", "is_drawing", "messages", "expected"),
+    ("task", "is_drawing", "messages", "problem", "expected"),
     [
-        ("die", True, [0, 0], [RESTARTED, "it died"]),
-        ("fall", False, [], [RESTARTED, "it died"]),
+        ("die", True, [0, 0], "it died", [RESTARTED, "it died"]),
+        ("fall", False, [], "it died", [RESTARTED, "it died"]),
         # What sends messages cannot start anew, unless only its result counts.
-        ("die", False, [0], ["it died"]),
+        ("die", False, [0], "it died", ["it died"]),
+        ("refuse", False, [0], "refused on purpose", []),
     ],
 )
-def test_task_that_kills_its_process_is_tried_twice_unless_it_sends_messages(
+def test_task_that_refuses_or_kills_its_process_is_reported(
     requester: Requester,
     reports: list[str],
     task: str,
     is_drawing: bool,
     messages: list[int],
+    problem: str,
     expected: list[str],
 ) -> None:
-    requester.request(task, sends=task == "die", is_drawing=is_drawing)
-    assert requester.all() == (messages, ("failed", "it died"))
-    assert reports == expected
+    requester.request(task, sends=task != "fall", is_drawing=is_drawing)
+    assert requester.all() == (messages, ("failed", problem))
     requester.assert_works()
     assert reports == expected
-
-
-def test_refusal_after_messages_is_passed_on_without_a_report(
-    requester: Requester, reports: list[str]
-) -> None:
-    requester.request("refuse")
-    assert requester.all() == ([0], ("failed", "refused on purpose"))
-    assert not reports
 
 
 def test_request_of_a_key_replaces_the_one_that_waits(requester: Requester, worker: Worker) -> None:
