@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import threading
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +16,6 @@ from desk import Desk
 from services import services_for
 
 from explorer.app.browser.browser_facts import BrowserFacts, decode_facts
-from explorer.app.features.feature import Services
 from explorer.app.features.help.tour import STEPS, start_tour
 from explorer.app.features.help.tour_panel import PRESS, TourGuide
 from explorer.app.features.optimise.actions import Accept, EndRun, StartRun
@@ -53,6 +51,8 @@ def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(start: State) 
         state = tour.step.show(Frame(state)).apply(state)
         tour = tour.after_frame(Frame(state))
         assert tour.is_done
+        # It comes close to a singularity without reaching it.
+        assert np.abs(Frame(state).snapshot.margins).min() > 0.0
         # Once done it stays so, whatever is done next.
         assert tour.after_frame(Frame(start)).is_done
         if step.after is not None:
@@ -61,15 +61,6 @@ def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(start: State) 
         tour = tour.step_by(1, Frame(state))
     assert tour.at == len(STEPS) - 1
     assert state.optimisation.is_on
-
-
-def test_tour_comes_close_to_a_singularity_without_reaching_it() -> None:
-    tour = start_tour(Frame(OPENED)).step_by(1, Frame(OPENED))
-    found = Frame(tour.step.show(Frame(OPENED)).apply(OPENED))
-    least = float(np.abs(found.snapshot.margins).min())
-    assert 0.0 < least < found.state.warn_below
-    assert found.state.unclosed is None
-    assert found.state.mode == OPENED.mode
 
 
 def test_last_step_of_the_tour_is_done_only_by_a_search_that_is_new() -> None:
@@ -210,7 +201,6 @@ def test_preferences_in_a_folder_that_takes_no_file_are_refused_in_a_line(tmp_pa
         "",
         "{}",
         '{"width": -1, "height": 5, "dark": false}',
-        '{"width": 1e9, "height": 5, "dark": false}',
         '{"width": "1", "height": 5, "dark": false}',
         '{"width": 1, "height": 5, "dark": 1}',
         '{"width": 1, "height": 5, "dark": true, "more": 1}',
@@ -244,17 +234,6 @@ def test_panels_are_stacked_where_the_window_is_narrow_and_high(
     assert is_narrow(BrowserFacts(width, height, False)) is narrow
 
 
-class Gui:
-    """What a theme needs of viser's."""
-
-    def __init__(self) -> None:
-        self.themes: list[dict[str, Any]] = []
-
-    def configure_theme(self, **theme: Any) -> None:
-        """Keep what it is told."""
-        self.themes.append(theme)
-
-
 def test_theme_is_set_once_for_each_change_and_is_no_step_of_the_history(desk: Desk) -> None:
     themes: list[dict[str, Any]] = []
 
@@ -271,38 +250,3 @@ def test_theme_is_set_once_for_each_change_and_is_no_step_of_the_history(desk: D
     assert not any(t["show_share_button"] for t in themes)
     assert desk.session.wait_until_idle()
     assert len(desk.session.history.steps) == 1
-
-
-def test_tour_used_on_many_threads_leaves_one_card_or_none(
-    server: viser.ViserServer, services: Services
-) -> None:
-    client: Any = SimpleNamespace(client_id=3, gui=server.gui)
-    gui: Any = server.gui
-    guide = TourGuide(services)
-    before = set(gui._panel_handle_from_uuid)
-    failed: list[BaseException] = []
-
-    def use(seed: int) -> None:
-        rng = np.random.default_rng(seed)
-        try:
-            for _ in range(30):
-                act = rng.integers(3)
-                if act == 0:
-                    guide.begin(client)
-                elif act == 1:
-                    guide.end(client)
-                else:
-                    guide.follow(Frame(opened(PRESETS["paper-initial"])))
-        except RuntimeError as error:
-            failed.append(error)
-
-    threads = [threading.Thread(target=use, args=(seed,)) for seed in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert failed == []
-    guide.begin(client)
-    assert len(set(gui._panel_handle_from_uuid) - before) == 1
-    guide.end(client)
-    assert set(gui._panel_handle_from_uuid) == before
