@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import viser
-from desk import Desk, by_name, number, rows_of
+from desk import Desk, by_name, number
 from scipy.spatial.transform import Rotation, Slerp
 from services import StubWorker, services_for
 
@@ -38,7 +38,7 @@ from explorer.app.features.singularity.jog_scene import JogScene, motion_line, s
 from explorer.app.features.singularity.panel import SingularityPanel, summary
 from explorer.app.features.singularity.performance import performance_table
 from explorer.app.features.singularity.scene import LONGEST, BallScene, EllipsoidScene, NearestGhost
-from explorer.app.features.singularity.strata import GOALS, StrataPanel, distances_of, neighbours
+from explorer.app.features.singularity.strata import GOALS, StrataPanel, distances_of
 from explorer.app.features.singularity.tasks import StrataRequest, strata_distances
 from explorer.app.inputs.ranges import coordinate_span
 from explorer.app.scene.placing import Placed
@@ -52,8 +52,7 @@ from explorer.mechanism.displacement import displacement
 from explorer.mechanism.kinematics import attachment_points
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Pose
-from explorer.singularity.bruhat import COVERED, OF_INCIDENCES, WORDS, conditions, incidences
-from explorer.singularity.jacobian import jacobian
+from explorer.singularity.bruhat import OF_INCIDENCES, incidences
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_stratum
 from explorer.singularity.strata import GENERIC, STRATA
@@ -62,6 +61,7 @@ from explorer.singularity.uncoupled import UNCOUPLED
 
 OPTIMAL = PRESETS["paper-optimal"]
 MOTIONS = range(len(UNCOUPLED))
+BATCHED = ("batched_positions", "batched_scales")
 
 
 def random_states(count: int, seed: int = 3) -> list[State]:
@@ -98,7 +98,7 @@ def plain(html: str) -> str:
 
 
 @pytest.mark.parametrize("stratum", [w for w in STRATA if w != GENERIC])
-def test_a_stratum_is_gone_to_by_the_shortest_way(stratum: tuple[int, ...]) -> None:
+def test_stratum_is_reached_by_the_shortest_way(stratum: tuple[int, ...]) -> None:
     for state in random_states(2):
         after = GoToStratum(stratum).apply(state)
         expected = nearest_in_stratum(OPTIMAL, state.pose, stratum)
@@ -114,61 +114,38 @@ def test_a_stratum_is_gone_to_by_the_shortest_way(stratum: tuple[int, ...]) -> N
 
 
 @pytest.mark.parametrize("lower", [(2, 4, 3, 1), (1, 2, 3, 4)])
-def test_what_has_no_nearest_pose_is_refused_in_words(lower: tuple[int, ...]) -> None:
+def test_stratum_without_a_nearest_pose_is_refused(lower: tuple[int, ...]) -> None:
     state = GoToStratum(lower).apply(opened(OPTIMAL))
-    with pytest.raises(InputError, match="arbitrarily close to every pose"):
-        GoToStratum(GENERIC).apply(state)
-    with pytest.raises(InputError, match=rf"lies in {re.escape(stratum_name(lower))} already"):
-        GoToStratum(lower).apply(state)
-    with pytest.raises(InputError, match=r"\(3, 4, 2, 1\) borders on"):
-        GoToStratum((3, 4, 2, 1)).apply(state)
-    with pytest.raises(InputError, match="permutation"):
-        GoToStratum((1, 1, 2, 3)).apply(state)
+    for goal, words in (
+        (GENERIC, "arbitrarily close to every pose"),
+        (lower, rf"lies in {re.escape(stratum_name(lower))} already"),
+        ((3, 4, 2, 1), r"\(3, 4, 2, 1\) borders on"),
+        ((1, 1, 2, 3), "permutation"),
+    ):
+        with pytest.raises(InputError, match=words):
+            GoToStratum(goal).apply(state)
 
 
-def test_each_node_of_the_diagram_leads_to_its_stratum(services: Services, desk: Desk) -> None:
-    panel = StrataPanel(services)
-    desk.session.do(Set("view.singular", SingularView(strata=True)))
-    contents = [
-        str(value)
-        for _, name, value in panel.updates(Frame(desk.state))
-        if name == "content" and "data-press" in str(value)
-    ]
-    (html,) = contents
-    goals = re.findall(r'data-press="strata.go" data-value="(\d{4})" title="(\([\d, ]+\))', html)
-    digits = {name: stratum_name(stratum) for name, stratum in GOALS.items()}
-    assert dict(goals) == digits
-    assert len(goals) == len(STRATA) - 1
-    assert stratum_name(GENERIC) in html
-    desk.press(services.buttons, "strata.go", "3412")
-    assert Frame(desk.state).snapshot.stratum == (3, 4, 1, 2)
-    desk.press(services.buttons, "strata.go", "3421")
-    desk.state  # noqa: B018 - waits until it is done
-    assert "borders on" in desk.complaints[-1]
-
-
-def test_no_diagram_is_made_while_it_is_closed(
+def test_diagram_has_a_node_for_each_stratum_and_is_made_only_while_it_is_open(
     services: Services, desk: Desk, worker: StubWorker
 ) -> None:
     panel = StrataPanel(services)
+
+    def contents() -> list[str]:
+        updates = panel.updates(Frame(desk.state))
+        return [str(value) for _, name, value in updates if name == "content"]
+
     desk.session.do(Set("view.singular.strata", value=False))
     services.get(StrataFeed).follow(Frame(desk.state))
     assert worker.orders == []
-    contents = [v for _, n, v in panel.updates(Frame(desk.state)) if n == "content"]
-    assert len(contents) == 1
-
-
-@pytest.mark.parametrize("state", [opened(OPTIMAL), *singular_states()])
-def test_the_panel_says_where_one_more_incidence_leads(state: State) -> None:
-    frame = Frame(state)
-    here = frame.snapshot.stratum
-    words = plain(neighbours(frame, strata_distances(_request(state)).distances))
-    assert stratum_name(here) in words
-    # Those of a generic pose stand in the table of the margins.
-    for lower in COVERED[here] if here != GENERIC else ():
-        zero = ", ".join(f"δ{i}" for i in incidences(lower))
-        assert f"{zero} = 0: {', '.join(WORDS[c] for c in conditions(lower))}" in words
-    assert ("Both flags coincide" in words) is (here == (1, 2, 3, 4))
+    assert len(contents()) == 1
+    desk.session.do(Set("view.singular.strata", value=True))
+    (html,) = (content for content in contents() if "data-press" in content)
+    goals = re.findall(r'data-press="strata.go" data-value="(\d{4})" title="(\([\d, ]+\))', html)
+    assert dict(goals) == {name: stratum_name(stratum) for name, stratum in GOALS.items()}
+    assert len(goals) == len(STRATA) - 1
+    desk.press(services.buttons, "strata.go", "3412")
+    assert Frame(desk.state).snapshot.stratum == (3, 4, 1, 2)
 
 
 def test_distances_come_from_the_worker_but_those_of_one_incidence_at_once() -> None:
@@ -176,33 +153,17 @@ def test_distances_come_from_the_worker_but_those_of_one_incidence_at_once() -> 
     feed = StrataFeed(services_for())
     known = distances_of(Frame(state), feed)
     assert set(known) == {GENERIC, *OF_INCIDENCES}
-    every = strata_distances(_request(state)).distances
+    every = strata_distances(StrataRequest(state.design, state.pose)).distances
     assert set(every) == set(STRATA)
     for stratum, distance in known.items():
         assert distance == pytest.approx(every[stratum], rel=1e-9, abs=1e-12)
-
-
-def _request(state: State) -> StrataRequest:
-    return StrataRequest(state.design, state.pose)
 
 
 # Uncoupled motions
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_a_jog_moves_one_margin_and_no_other(motion: int) -> None:
-    rng = np.random.default_rng(motion)
-    moved = UNCOUPLED[motion].incidence - 1
-    others = [i for i in range(3) if i != moved]
-    for state in (*random_states(10), *singular_states()):
-        after = Jog(motion, float(rng.uniform(-60.0, 60.0))).apply(state)
-        before, now = deltas(state.pose), deltas(after.pose)
-        size = float(np.linalg.norm(after.pose.position)) + 1.0
-        np.testing.assert_allclose(now[others], before[others], atol=1e-13 * size)
-
-
-@pytest.mark.parametrize("motion", MOTIONS)
-def test_a_jog_counts_from_where_it_began_and_leads_back_there(motion: int) -> None:
+def test_jog_counts_from_its_start_and_leads_back_there(motion: int) -> None:
     start = random_states(1)[0]
     state = start
     for amount in (3.0, -7.5, 20.0):
@@ -214,7 +175,7 @@ def test_a_jog_counts_from_where_it_began_and_leads_back_there(motion: int) -> N
     assert Jog(motion, 0.0).apply(state).pose == start.pose
 
 
-def test_anything_else_that_moves_the_platform_ends_a_jog() -> None:
+def test_jog_ends_when_the_platform_moves_otherwise() -> None:
     state = Jog(2, 4.0).apply(random_states(1)[0])
     for action in (SetPosition(0, 3.0), GoHome(), Open(OPTIMAL), Jog(5, 2.0)):
         after = action.apply(state)
@@ -225,8 +186,8 @@ def test_anything_else_that_moves_the_platform_ends_a_jog() -> None:
     assert after.jog.start.position[0] == 3.0
 
 
-@pytest.mark.parametrize("state", random_states(6))
-def test_the_ends_of_a_slider_say_where_the_margin_vanishes(state: State) -> None:
+@pytest.mark.parametrize("state", random_states(4))
+def test_slider_of_a_motion_has_marks_where_the_margin_vanishes(state: State) -> None:
     frame = Frame(state)
     for index, motion in enumerate(UNCOUPLED):
         travel, span = shown_travel(state, index), jog_span(state, index)
@@ -246,38 +207,51 @@ def test_the_ends_of_a_slider_say_where_the_margin_vanishes(state: State) -> Non
             assert abs(deltas(after.pose)[motion.incidence - 1]) < 1e-12 * size
 
 
-def test_no_number_of_a_motion_is_larger_than_its_slider_on_any_path() -> None:
+def test_marks_of_a_motion_are_on_its_slider_on_any_path() -> None:
     # On the way from mode 1 to mode 5 here, b4 passes where the motion along x does nothing.
     paper = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-40.0, 0.0, 0.0))
-    states = [opened(OPTIMAL, paper), *random_states(12, seed=8), *singular_states()]
+    states = [opened(OPTIMAL, paper), *random_states(4, seed=8), *singular_states()]
     for state in states:
-        here = Frame(state)
-        modes = here.snapshot.modes
+        modes = Frame(state).snapshot.modes
         first, last = modes.position[1], modes.position[5]
-        turns = Rotation.from_matrix(modes.rotation[[1, 5]])
-        between = Slerp([0.0, 1.0], turns)
-        for share in (0.0, 0.25, 0.5 - 1e-9, 0.5, 0.5 + 1e-13, 0.75, 1.0):
-            there = opened(
-                OPTIMAL,
-                Pose.of((1.0 - share) * first + share * last, between(share).as_matrix()),
-            )
+        between = Slerp([0.0, 1.0], Rotation.from_matrix(modes.rotation[[1, 5]]))
+        for share in (0.0, 0.5 - 1e-9, 0.5, 0.5 + 1e-13, 0.75):
+            position = (1.0 - share) * first + share * last
+            there = opened(OPTIMAL, Pose.of(position, between(share).as_matrix()))
             edge = coordinate_span(there).high
             for index, motion in enumerate(UNCOUPLED):
                 most = edge if motion.kind == "translation" else 180.0
+                span = jog_span(there, index)
+                assert span.low <= 0.0 <= span.high
+                # The start is among the values of the slider.
+                assert abs(span.low / span.step - round(span.low / span.step)) < 1e-6
                 for at, shown in travel_marks(Frame(there), index):
+                    assert span.low <= at <= span.high
                     assert abs(at) <= most
                     if shown not in (NEVER, BEYOND, HERE, ""):
                         assert abs(number(shown.rstrip("°"))) <= most
-                    assert "e" not in shown or shown in (NEVER, BEYOND, HERE)
+                        assert "e" not in shown
 
 
-@pytest.mark.parametrize("state", random_states(4))
-def test_the_marks_of_a_motion_stay_where_it_is_singular_while_it_goes(
-    services: Services, desk: Desk, state: State
-) -> None:
-    desk.session.do(SetPose(state.pose))
+def test_slider_of_a_motion_jogs(services: Services, desk: Desk) -> None:
     panel = JogPanel(services)
-    index = 1
+    sliders: dict[str, Any] = {
+        handle.label: handle
+        for handle, _, _ in panel.updates(Frame(desk.state))
+        if isinstance(handle, viser.GuiSliderHandle)
+    }
+    assert len(sliders) == 6
+    before = desk.state
+    desk.use(sliders[jog_label(UNCOUPLED[0])], 12.0)
+    assert desk.state.pose == Jog(0, 12.0).apply(before).pose
+
+
+def test_marks_of_a_motion_stay_where_it_is_singular_while_it_moves(
+    services: Services, desk: Desk
+) -> None:
+    (state,) = random_states(1)
+    desk.session.do(SetPose(state.pose))
+    panel, index = JogPanel(services), 1
     marks: list[list[tuple[float, str]]] = []
     for amount in (0.0, 10.0, 25.0):
         desk.session.do(Jog(index, amount))
@@ -288,21 +262,7 @@ def test_the_marks_of_a_motion_stay_where_it_is_singular_while_it_goes(
     assert [value for value, _ in marks[0]] == pytest.approx([travel.low, travel.high])
 
 
-def test_a_slider_jogs(services: Services, desk: Desk) -> None:
-    panel = JogPanel(services)
-    sliders: dict[str, Any] = {
-        handle.label: handle
-        for handle, _, _ in panel.updates(Frame(desk.state))
-        if isinstance(handle, viser.GuiSliderHandle)
-    }
-    label = jog_label(UNCOUPLED[0])
-    before = desk.state
-    desk.use(sliders[label], 12.0)
-    assert desk.state.pose == Jog(0, 12.0).apply(before).pose
-    assert len(sliders) == 6
-
-
-def test_at_a_singular_pose_motions_say_so_and_lead_away() -> None:
+def test_motions_at_a_singular_pose_say_so_and_lead_away() -> None:
     for index, motion in enumerate(UNCOUPLED):
         home = opened(OPTIMAL)
         state = GoToSingularity(motion.incidence).apply(home)
@@ -320,40 +280,21 @@ def test_at_a_singular_pose_motions_say_so_and_lead_away() -> None:
             assert Frame(after).snapshot.stratum == GENERIC
 
 
-@pytest.mark.parametrize("state", [*random_states(3), *singular_states()])
-def test_sliders_of_motions_hold_their_start_and_their_marks(state: State) -> None:
-    for index in MOTIONS:
-        span = jog_span(state, index)
-        assert span.low <= 0.0 <= span.high
-        assert span.low < span.high
-        # The start is among the values of the slider.
-        assert abs(span.low / span.step - round(span.low / span.step)) < 1e-6
-        for at, _ in travel_marks(Frame(state), index):
-            assert span.low <= at <= span.high
-
-
-@pytest.mark.parametrize("state", random_states(5))
-def test_a_motion_is_drawn_from_singularity_to_singularity(state: State) -> None:
+@pytest.mark.parametrize("state", random_states(3))
+def test_motion_is_drawn_from_singularity_to_singularity(state: State) -> None:
     placed = Placed(Frame(state))
-    for index, motion in enumerate(UNCOUPLED):
-        drawn = motion_line(placed, motion, placed.frame.travels[index])
-        for end, is_singular, amount in zip(
-            (0, -1),
-            drawn.singular,
-            (placed.frame.travels[index].low, placed.frame.travels[index].high),
-            strict=True,
-        ):
-            if is_singular and motion.frame == "base":
-                there = motion.moved(state.pose, amount)
-                np.testing.assert_allclose(
-                    drawn.points[end], placed.scale * np.array(there.position), atol=1e-9
-                )
-            if not is_singular:
-                assert motion.kind == "translation"
+    for motion, travel in zip(UNCOUPLED, placed.frame.travels, strict=True):
+        drawn = motion_line(placed, motion, travel)
         assert np.isfinite(drawn.points).all()
+        ends = zip((0, -1), drawn.singular, (travel.low, travel.high), strict=True)
+        for end, is_singular, amount in ends:
+            if is_singular and motion.frame == "base":
+                there = placed.scale * np.array(motion.moved(state.pose, amount).position)
+                np.testing.assert_allclose(drawn.points[end], there, atol=1e-9)
+            assert is_singular or motion.kind == "translation"
 
 
-def test_the_motion_in_use_is_drawn_or_all_six_or_none(services: Services) -> None:
+def test_motion_in_use_is_drawn_or_all_six_or_none(services: Services) -> None:
     scene = JogScene(services)
     state = random_states(1)[0]
     for arrows, at_rest, in_use in (
@@ -370,20 +311,13 @@ def test_the_motion_in_use_is_drawn_or_all_six_or_none(services: Services) -> No
             assert lines == [i in expected for i in MOTIONS]
 
 
-@pytest.mark.parametrize("state", singular_states())
-def test_motions_are_drawn_at_singular_poses_too(services: Services, state: State) -> None:
-    drawn = by_name(JogScene(services).updates(Placed(Frame(viewed(state, arrows="all six")))))
-    for properties in drawn.values():
-        for name in ("points", "batched_positions", "batched_scales"):
-            if name in properties:
-                assert np.isfinite(properties[name]).all()
-
-
 # Distances
 
 
-@pytest.mark.parametrize("state", random_states(4))
-def test_the_distances_and_their_ghosts(services: Services, state: State) -> None:
+@pytest.mark.parametrize("state", random_states(2))
+def test_distances_and_their_ghosts_are_those_of_the_nearest_poses(
+    services: Services, state: State
+) -> None:
     nearest = nearest_singularities(OPTIMAL, state.pose)
     words = plain(distance_table(Frame(state)))
     distances = [each.distance for each in nearest]
@@ -391,9 +325,10 @@ def test_the_distances_and_their_ghosts(services: Services, state: State) -> Non
     for index, margin in enumerate(deltas(state.pose).tolist()):
         row = re.search(rf"δ{index + 1} (\S+) (\S+) mm (\S+)° Go {INCIDENCES[index]}", words)
         assert row is not None
-        assert number(row[1]) == pytest.approx(margin, abs=5e-3)
-        assert number(row[2]) == pytest.approx(OPTIMAL.unit_mm * distances[index], rel=1e-2)
-        assert number(row[3]) == pytest.approx(turns[index], abs=0.06)
+        expected = (margin, OPTIMAL.unit_mm * distances[index], turns[index])
+        assert [number(text) for text in row.groups()] == pytest.approx(
+            expected, rel=1e-2, abs=0.06
+        )
     scene = NearestGhost(services)
     least = int(np.argmin(distances))
     for ghost, index in (("δ1 = 0", 0), ("δ2 = 0", 1), ("δ3 = 0", 2), ("nearest", least)):
@@ -412,7 +347,7 @@ def test_the_distances_and_their_ghosts(services: Services, state: State) -> Non
         np.testing.assert_allclose(ways[:, 1], ends, rtol=1e-4, atol=1e-4)
 
 
-def test_the_buttons_go_to_the_nearest_pose_and_say_where_it_is_reached(
+def test_buttons_lead_to_the_nearest_pose_and_refuse_where_it_is_reached(
     services: Services, desk: Desk
 ) -> None:
     DistancePanel(services)
@@ -431,18 +366,8 @@ def test_the_buttons_go_to_the_nearest_pose_and_say_where_it_is_reached(
 # Performance
 
 
-@pytest.mark.parametrize("state", random_states(4))
-def test_the_ellipsoids_hold_what_unit_actuators_do(services: Services, state: State) -> None:
-    rates = jacobian(OPTIMAL, state.pose.position, state.pose.rotation)
-    rng = np.random.default_rng(1)
-    joints = rng.normal(size=(4000, 6))
-    joints /= np.linalg.norm(joints, axis=1, keepdims=True)
-    speeds = np.linalg.norm((joints @ np.linalg.inv(rates).T)[:, :3], axis=1)
-    rows = {row[0]: row[1:] for row in rows_of(performance_table(Frame(state)))}
-    most = number(rows["speed of b4"][1])
-    assert speeds.max() <= most * (1.0 + 5e-3)
-    assert speeds.max() > 0.7 * most
-    assert number(rows["force at b4"][0]) == pytest.approx(1.0 / most, rel=1e-2)
+@pytest.mark.parametrize("state", random_states(2))
+def test_ellipsoids_are_at_b4_and_have_their_axes(services: Services, state: State) -> None:
     scene = EllipsoidScene(services)
     for kind in ("speed", "force"):
         placed = Placed(Frame(viewed(state, ellipsoid=kind)))
@@ -458,24 +383,9 @@ def test_the_ellipsoids_hold_what_unit_actuators_do(services: Services, state: S
         )
 
 
-@pytest.mark.parametrize("state", random_states(5))
-def test_the_ball_touches_the_nearest_singular_plane(services: Services, state: State) -> None:
-    placed = Placed(Frame(viewed(state, ball=True)))
-    drawn = by_name(BallScene(services).updates(placed))
-    radius = drawn["/ball/ball"]["scale"] / placed.scale
-    touch = np.array(drawn["/ball/touch"]["position"]) / placed.scale
-    p = np.array(state.pose.position)
-    assert np.linalg.norm(touch - p) == pytest.approx(radius)
-    assert np.abs(margins(touch, state.pose.rotation)).min() < 1e-9
-    rng = np.random.default_rng(0)
-    away = rng.normal(size=(500, 3))
-    inside = p + 0.999 * radius * away / np.linalg.norm(away, axis=1, keepdims=True)
-    assert (np.sign(margins(inside, state.pose.rotation)) == np.sign(deltas(state.pose))).all()
-
-
 @pytest.mark.parametrize("state", singular_states())
 @pytest.mark.filterwarnings("error")
-def test_everything_is_told_and_drawn_at_singular_poses(
+def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
     services: Services, desk: Desk, state: State
 ) -> None:
     shown = viewed(
@@ -494,7 +404,8 @@ def test_everything_is_told_and_drawn_at_singular_poses(
         EllipsoidScene(services),
         BallScene(services),
         NearestGhost(services),
+        JogScene(services),
     ):
         for _, name, value in scene.updates(placed):
-            if name in ("points", "scale", "position", "wxyz"):
+            if name in ("points", "scale", "position", "wxyz", *BATCHED):
                 assert np.isfinite(np.asarray(value, dtype=np.float64)).all()
