@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -48,7 +49,7 @@ def number_of(history: History | None) -> float | None:
     return None if history is None else history.step.state.pose.position[0]
 
 
-def leave(folder: Path, number: int) -> Path:
+def leave_session(folder: Path, number: int) -> Path:
     """Save a session as an explorer does that ends; return its file."""
     store = SessionFile(folder)
     store.save(numbered(number))
@@ -95,23 +96,10 @@ def test_next_explorer_continues_in_the_same_file(tmp_path: Path) -> None:
     assert resume(folder) == 5
 
 
-def test_newest_session_is_resumed_although_clocks_were_set_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    year = 365.25 * 86400.0
-    now = time.time()
-    for number in range(6):
-        # Each start of the explorer is a year before the last one.
-        monkeypatch.setattr(time, "time", lambda number=number: now - number * year)
-        path = leave(tmp_path, number)
-        os.utime(path, (now - number * year, now - number * year))
-    assert resume(tmp_path) == 5
-
-
 def test_explorers_side_by_side_have_a_file_each_and_the_last_save_is_the_newest(
     tmp_path: Path,
 ) -> None:
-    leave(tmp_path, 0)
+    leave_session(tmp_path, 0)
     one, two, three = (SessionFile(tmp_path) for _ in range(3))
     assert number_of(one.resume().history) == 0
     assert two.resume().history is None
@@ -130,31 +118,32 @@ def test_explorers_side_by_side_have_a_file_each_and_the_last_save_is_the_newest
         store.close()
 
 
-def test_explorers_that_start_at_once_resume_a_session_each(tmp_path: Path) -> None:
+def test_explorers_that_start_at_once_resume_a_session_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # On a slow disk the last in the row waits long.
+    monkeypatch.setattr("explorer.app.storage.folder.PATIENCE_SECONDS", PATIENCE)
     for number in range(4):
-        leave(tmp_path, number)
+        leave_session(tmp_path, number)
     stores = [SessionFile(tmp_path) for _ in range(8)]
-    resumed: list[float | None] = []
-
-    def start(store: SessionFile) -> None:
-        resumed.append(number_of(store.resume().history))
-
-    threads = [threading.Thread(target=start, args=(store,)) for store in stores]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(len(stores)) as threads:
+        resumed = [number_of(each.history) for each in threads.map(SessionFile.resume, stores)]
     assert sorted(each for each in resumed if each is not None) == [0, 1, 2, 3]
-    assert resumed.count(None) == 4
     for store in stores:
         store.close()
 
 
-def test_only_the_newest_sessions_without_an_explorer_are_kept(tmp_path: Path) -> None:
+def test_only_the_newest_sessions_are_kept_although_clocks_were_set_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     living = SessionFile(tmp_path)
     living.save(numbered(-1))
+    now = time.time()
     for number in range(MOST_ORPHANS + 5):
-        leave(tmp_path, number)
+        # Each start of the explorer is a year before the last one.
+        before = now - number * 365.25 * 86400.0
+        monkeypatch.setattr(time, "time", lambda before=before: before)
+        os.utime(leave_session(tmp_path, number), (before, before))
     store = SessionFile(tmp_path)
     assert number_of(store.resume().history) == MOST_ORPHANS + 4
     # Its own, those without an explorer, and that of the explorer that runs.
@@ -165,27 +154,39 @@ def test_only_the_newest_sessions_without_an_explorer_are_kept(tmp_path: Path) -
     assert resume(tmp_path) == -2
 
 
-def test_locks_and_scratch_files_are_removed_unless_their_explorer_runs(tmp_path: Path) -> None:
+def test_leftovers_are_removed_unless_their_explorer_runs_and_other_paths_ignored(
+    tmp_path: Path,
+) -> None:
     living = SessionFile(tmp_path)
     living.save(numbered(1))
     assert living.path is not None
-    path = leave(tmp_path, 2)
+    path = leave_session(tmp_path, 2)
     writing = tmp_path / f".{living.path.name}.0123.part"
     dead = [tmp_path / f".{path.name}.0123.part", tmp_path / ".0123.json.4.part"]
     dead.append(tmp_path / "0123.lock")
     for each in (writing, *dead):
         each.write_bytes(b"part")
+    # Folders, links and pipes named like sessions are ignored.
+    (tmp_path / "folder.json").mkdir()
+    (tmp_path / "gone.json").symlink_to(tmp_path / "nowhere")
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe.json")
     assert resume(tmp_path) == 2
     assert writing.exists()
     assert not any(each.exists() for each in dead)
     living.close()
 
 
+OPENED = opened(PRESETS["paper-optimal"])
+FAR = Pose((1e39, 0.0, 0.0), OPENED.pose.quaternion)
+TOO_FAR = start_history(replace(OPENED, pose=FAR, joints=joints_of(OPENED.design, FAR)))
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "cut": lambda whole: whole[: len(whole) // 2],
     "changed": lambda whole: whole.replace(b"2.0", b"3.0", 1),
     "empty": lambda _: b"",
     "other": lambda _: b'{"schema": 1}\n',
+    # No page can show it.
+    "too far": lambda _: encode_session(TOO_FAR, 3),
 }
 
 
@@ -193,8 +194,8 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 def test_damaged_file_is_renamed_and_the_session_before_is_resumed(
     tmp_path: Path, damage: str
 ) -> None:
-    leave(tmp_path, 1)
-    path = leave(tmp_path, 2)
+    leave_session(tmp_path, 1)
+    path = leave_session(tmp_path, 2)
     damaged = DAMAGES[damage](path.read_bytes())
     for ending in (".broken", ".broken2"):
         path.write_bytes(damaged)
@@ -211,24 +212,8 @@ def test_damaged_file_is_renamed_and_the_session_before_is_resumed(
     assert resume(tmp_path) == 1
 
 
-def test_session_that_no_page_shows_is_set_aside(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
-    store = SessionFile()
-    state = opened(PRESETS["paper-optimal"])
-    far = Pose((1e39, 0.0, 0.0), state.pose.quaternion)
-    store.save(start_history(replace(state, pose=far, joints=joints_of(state.design, far))))
-    store.close()
-    data = open_user_data(resume=True)
-    assert data.history is None
-    (message,) = data.messages
-    assert "too far to be drawn" in message
-    assert [path.suffix for path in (tmp_path / "sessions").glob("*.broken")] == [".broken"]
-
-
 def test_file_of_a_newer_explorer_is_left_alone_and_new_saves_are_newer(tmp_path: Path) -> None:
-    leave(tmp_path, 1)
+    leave_session(tmp_path, 1)
     newer = tmp_path / "newer.json"
     newer.write_bytes(b'{"schema": 99, "generation": 1000, "more": [1]}\nbinary \xff')
     before = newer.read_bytes()
@@ -240,25 +225,13 @@ def test_file_of_a_newer_explorer_is_left_alone_and_new_saves_are_newer(tmp_path
     assert newer.read_bytes() == before
     assert store.save(numbered(2)) == 1001
     store.close()
-
-
-def test_largest_generation_does_not_make_later_sessions_unreadable(tmp_path: Path) -> None:
-    (tmp_path / "0.json").write_bytes(encode_session(numbered(1), LARGEST_GENERATION))
-    for number in (2, 3):
+    # Even the largest generation leaves later sessions readable.
+    (tmp_path / "0.json").write_bytes(encode_session(numbered(3), LARGEST_GENERATION))
+    for number in (4, 5):
         store = SessionFile(tmp_path)
         assert number_of(store.resume().history) == number - 1
         store.save(numbered(number))
         store.close()
-    assert resume(tmp_path) == 3
-
-
-def test_folders_links_and_pipes_named_like_sessions_are_ignored(tmp_path: Path) -> None:
-    leave(tmp_path, 1)
-    (tmp_path / "folder.json").mkdir()
-    (tmp_path / "gone.json").symlink_to(tmp_path / "nowhere")
-    if hasattr(os, "mkfifo"):
-        os.mkfifo(tmp_path / "pipe.json")
-    assert resume(tmp_path) == 1
 
 
 def test_session_is_only_read_where_nothing_can_be_written(
@@ -268,7 +241,7 @@ def test_session_is_only_read_where_nothing_can_be_written(
         raise StorageError("read-only")
 
     for number in (1, 2):
-        path = leave(tmp_path, number)
+        path = leave_session(tmp_path, number)
     path.write_bytes(b"damaged")
     before = contents(tmp_path)
     with monkeypatch.context() as patch:
@@ -287,7 +260,9 @@ def test_session_is_only_read_where_nothing_can_be_written(
     store.close()
 
 
-def test_file_in_place_of_the_folder_is_reported_in_one_line(tmp_path: Path) -> None:
+def test_folder_that_is_a_file_or_locked_is_reported_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "data").write_bytes(b"")
     store = SessionFile(tmp_path / "data" / "sessions")
     resumed = store.resume()
@@ -296,6 +271,10 @@ def test_file_in_place_of_the_folder_is_reported_in_one_line(tmp_path: Path) -> 
         store.save(numbered(1))
     assert resumed.messages == (str(refusal.value),)
     assert "\n" not in str(refusal.value)
+    # So is a folder that another explorer locks.
+    monkeypatch.setattr("explorer.app.storage.folder.PATIENCE_SECONDS", 0.0)
+    with lock_folder(tmp_path), pytest.raises(StorageError, match="another explorer"):
+        SessionFile(tmp_path).save(numbered(1))
 
 
 def test_session_whose_folder_is_moved_is_saved_in_a_new_one(tmp_path: Path) -> None:
@@ -309,17 +288,16 @@ def test_session_whose_folder_is_moved_is_saved_in_a_new_one(tmp_path: Path) -> 
     assert resume(tmp_path / "elsewhere") == 1
 
 
-def test_folder_locked_by_another_explorer_is_refused(
+def test_data_folder_is_that_of_the_environment(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("explorer.app.storage.folder.PATIENCE_SECONDS", 0.0)
-    with lock_folder(tmp_path), pytest.raises(StorageError, match="another explorer"):
-        SessionFile(tmp_path).save(numbered(1))
-
-
-def test_data_folder_is_that_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert data_folder() == Path(os.environ["EXPLORER_DATA"])
-    assert SessionFile().folder == data_folder() / "sessions"
+    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
+    leave_session(tmp_path / "sessions", 5)
+    # An explorer that is opened with a design leaves the saved session.
+    fresh, again = open_user_data(resume=False), open_user_data(resume=True)
+    assert fresh.history is None
+    assert number_of(again.history) == 5
+    again.store.close()
     monkeypatch.setenv("EXPLORER_DATA", "~/mine")
     assert data_folder() == Path.home() / "mine"
     monkeypatch.setenv("EXPLORER_DATA", "")
@@ -371,15 +349,17 @@ class MemoryStore:
         self.is_closed = True
 
 
-def autosaver(store: MemoryStore, quiet: float, longest: float) -> tuple[Autosaver, list[str]]:
+def start_autosaver(
+    store: MemoryStore, quiet: float, longest: float
+) -> tuple[Autosaver, list[str]]:
     messages: list[str] = []
     saver = Autosaver(store, messages.append, quiet=quiet, longest=longest, retry=NEVER)
     return saver, messages
 
 
-def test_only_the_last_of_many_changes_is_saved() -> None:
+def test_last_of_many_changes_is_saved_and_one_posted_during_a_save_is_next() -> None:
     store = MemoryStore()
-    saver, messages = autosaver(store, NEVER, NEVER)
+    saver, messages = start_autosaver(store, NEVER, NEVER)
     for number in range(100):
         saver.post(numbered(number))
     assert store.saved == []
@@ -393,6 +373,16 @@ def test_only_the_last_of_many_changes_is_saved() -> None:
     assert store.saved == [99, 100]
     assert store.is_closed
     assert messages == []
+    store = MemoryStore()
+    store.may_save.clear()
+    saver, _ = start_autosaver(store, 0.0, 0.0)
+    saver.post(numbered(1))
+    assert store.began.wait(PATIENCE)
+    saver.post(numbered(2))
+    store.may_save.set()
+    assert saver.flush(PATIENCE)
+    assert store.saved == [1, 2]
+    saver.stop()
 
 
 @pytest.mark.parametrize(
@@ -402,7 +392,7 @@ def test_change_is_saved_once_it_is_quiet_or_after_the_longest_time(
     quiet: float, longest: float, is_endless: bool
 ) -> None:
     store = MemoryStore()
-    saver, _ = autosaver(store, quiet, longest)
+    saver, _ = start_autosaver(store, quiet, longest)
     saver.post(numbered(0))
 
     def is_saved() -> bool:
@@ -416,7 +406,7 @@ def test_change_is_saved_once_it_is_quiet_or_after_the_longest_time(
 
 def test_failure_is_reported_once_and_so_is_its_end() -> None:
     store = MemoryStore(problem=StorageError("the disk is full; make room"))
-    saver, messages = autosaver(store, 0.0, 0.0)
+    saver, messages = start_autosaver(store, 0.0, 0.0)
     for number in range(3):
         saver.post(numbered(number))
         assert not saver.flush(PATIENCE)
@@ -442,7 +432,7 @@ def test_failure_is_reported_once_and_so_is_its_end() -> None:
 
 def test_failed_save_is_tried_again_while_changes_are_posted() -> None:
     store = MemoryStore(problem=StorageError("full"))
-    saver, messages = autosaver(store, NEVER, 0.05)
+    saver, messages = start_autosaver(store, NEVER, 0.05)
     saver.post(numbered(0))
     wait_for(lambda: messages)
     store.problem = None
@@ -452,19 +442,6 @@ def test_failed_save_is_tried_again_while_changes_are_posted() -> None:
         return bool(store.saved)
 
     wait_for(is_saved)
-    saver.stop()
-
-
-def test_change_posted_during_a_save_is_saved_next() -> None:
-    store = MemoryStore()
-    store.may_save.clear()
-    saver, _ = autosaver(store, 0.0, 0.0)
-    saver.post(numbered(1))
-    assert store.began.wait(PATIENCE)
-    saver.post(numbered(2))
-    store.may_save.set()
-    assert saver.flush(PATIENCE)
-    assert store.saved == [1, 2]
     saver.stop()
 
 
@@ -496,16 +473,3 @@ def test_resumed_session_is_undone_and_redone(desk: Desk, tmp_path: Path) -> Non
     finally:
         session.stop()
     assert desk.complaints == []
-
-
-def test_explorer_opened_with_a_design_leaves_the_saved_session(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
-    leave(tmp_path / "sessions", 5)
-    fresh = open_user_data(resume=False)
-    assert fresh.history is None
-    again = open_user_data(resume=True)
-    assert number_of(again.history) == 5
-    again.store.close()
-    fresh.store.close()
