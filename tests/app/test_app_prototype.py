@@ -25,7 +25,6 @@ from explorer.app.features.prototype.files import ASSEMBLIES
 from explorer.app.features.prototype.panel import (
     FIT,
     PrototypePanel,
-    parts_table,
     trouble_of,
 )
 from explorer.app.features.prototype.parts import Parts, PartsRequest, parts_drawing
@@ -372,32 +371,6 @@ def test_stock_holds_the_part(parts: Parts) -> None:
         assert stock.length == pytest.approx(size[axis])
         across = np.delete(size, axis)
         assert across.max() * (1.0 - 1e-9) <= stock.diameter <= np.hypot(*across)
-
-
-def test_panel_shows_and_changes_how_the_prototype_is_drawn(
-    desk: Desk, services: Services, feed: PartsFeed
-) -> None:
-    panel = PrototypePanel(services)
-    begin = list(panel.updates(Frame(desk.state)))
-    drawn, apart, density = (handle for handle, name, _ in begin if name == "value")
-    assert not any(value for _, name, value in begin if name == "visible")
-    desk.use(drawn, True)
-    desk.use(apart, 0.25)
-    desk.use(density, 7850.0)
-    assert desk.state.view.drawn_as == "prototype"
-    assert desk.state.view.prototype == PrototypeView(0.25, 7850.0)
-    desk.use(density, -1.0)
-    assert desk.state.view.prototype.density == 7850.0
-    assert len(desk.complaints) == 1
-    assert "positive" in desk.complaints[0]
-    feed.follow(Frame(desk.state))
-    updates = list(panel.updates(Frame(desk.state)))
-    assert feed.parts is not None
-    table = parts_table(feed.parts.listed, 7850.0)
-    assert table in [value for _, name, value in updates if name == "content"]
-    assert [value for _, name, value in updates if name == "visible"] == [False, True]
-    desk.use(drawn, False)
-    assert desk.state.view.drawn_as == "schematic"
 
 
 def test_files_of_the_assembly_are_those_of_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
