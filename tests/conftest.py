@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 import signal
 from collections.abc import Generator
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
+from kernels import import_all
 
-import explorer
 from explorer.numerics.compiled import warm
 
 TESTS = Path(__file__).parent
@@ -77,14 +76,19 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _all_is_imported() -> None:  # pyright: ignore[reportUnusedFunction]
-    """Import the whole package, which needs no optional one, before anything is drawn.
+def _same_examples() -> Generator[None]:  # pyright: ignore[reportUnusedFunction]
+    """Let Hypothesis draw no constants of the package's modules.
 
-    Constants of the modules that are there are among the examples: else these would depend
-    on the tests that ran before in the same process.
+    It would draw those of the modules that are imported by then, so that the examples of a test
+    depended on the tests that ran before it, and it would read each of these modules first.
     """
-    for module in pkgutil.walk_packages(explorer.__path__, "explorer."):
-        importlib.import_module(module.name)
+
+    def is_local_module_file(path: str) -> bool:
+        return False
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(providers, "is_local_module_file", is_local_module_file)
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -99,5 +103,6 @@ def _data_of_its_own(  # pyright: ignore[reportUnusedFunction]
 
 @pytest.fixture(scope="session")
 def warm_kernels() -> None:
-    """Compile all kernels before the first test that asks for it."""
+    """Load all kernels before the first test that asks for it."""
+    import_all()
     warm()
