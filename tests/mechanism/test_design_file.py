@@ -121,13 +121,9 @@ def test_unusable_limit_is_refused_in_a_file_and_in_python(
 @pytest.mark.parametrize("odd", [math.nan, math.inf])
 def test_limit_that_is_not_finite_is_refused(odd: float) -> None:
     box = ((0.0, 0.0, 0.0), (1.0, 1.0, odd))
-    unusable: list[dict[str, Any]] = [
-        *({name: (0.0, odd)} for name in ("l1", "guide")),
-        {"box": box},
-        {"margin": odd},
-    ]
-    for limits in unusable:
-        assert "finite" in refusal(partial(Limits, **limits), kind=DesignError)
+    limits: dict[str, Any] = {"l1": (0.0, odd), "guide": (0.0, odd), "box": box, "margin": odd}
+    for name, limit in limits.items():
+        assert "finite" in refusal(partial(Limits, **{name: limit}), kind=DesignError)
 
 
 @pytest.mark.parametrize(
@@ -156,7 +152,7 @@ def test_truncated_file_is_refused_at_every_length() -> None:
     data = json.dumps(FULL).encode()
     decode_design(data, "whole")
     for length in range(len(data)):
-        message_of(data[:length])
+        message_of(data[:length], "a\nb\rc\u2028d\x1b" + "file" * 20)
 
 
 @pytest.mark.parametrize("field", PLAIN)
@@ -164,22 +160,12 @@ def test_file_without_a_variable_is_refused_by_its_name(field: str) -> None:
     assert field in message_of({key: value for key, value in PLAIN.items() if key != field})
 
 
-@pytest.mark.parametrize("source", ["a\nb\rc\u2028d", "\x1b\n" + "file" * 50])
-def test_message_about_any_source_is_short_and_printable(source: str) -> None:
-    message_of(b"{", source)
-    assert "unknown field" in message_of(PLAIN | {"x": 1}, source[:80])
-
-
 @pytest.mark.parametrize("name", ["", ".", "no\nsuch", "nul\0l", "x" * 5000, "~", "nowhere.json"])
 def test_file_name_that_cannot_be_opened_is_refused(name: str) -> None:
     with pytest.raises(DesignError) as caught:
         load_design(name)
-    assert len(str(caught.value).splitlines()) == 1
-
-
-def test_missing_file_is_refused_with_the_names_of_the_presets() -> None:
-    message = refusal(load_design, "nowhere.json", kind=DesignError)
-    assert all(name in message for name in PRESETS)
+    (line,) = str(caught.value).splitlines()
+    assert name != "nowhere.json" or all(preset in line for preset in PRESETS)
 
 
 def test_file_read_has_every_field_or_its_default() -> None:
@@ -279,47 +265,28 @@ def test_field_given_twice_is_refused_at_every_level(more: bytes, name: str) -> 
 
 
 @pytest.mark.parametrize("name", ["../../x", "/etc/passwd", "a/b", "C:\\x", "CON", ".", "", "ä 漢"])
-def test_name_like_a_path_is_kept_as_text(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_name_like_a_path_is_kept_as_text(name: str) -> None:
     design = decode(PLAIN | {"name": name})
     assert design.name == name
     assert decode_design(encode_design(design), name) == design
-    assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("w", [1e-308, 1e-200, 1e-17])
-def test_home_with_lines_parallel_but_for_rounding_has_no_workspace(w: float) -> None:
-    home = {"position": [5, 3, 5], "quaternion": [w, 1, w, -w]}
+def test_home_with_lines_parallel_but_for_rounding_has_no_workspace() -> None:
+    home = {"position": [5, 3, 5], "quaternion": [1e-17, 1, 1e-17, -1e-17]}
     result = workspace_volume(decode(PLAIN | {"home": home}))
     assert result.volume == 0.0
     assert "margin δ2" in result.empty_because
 
 
-@pytest.mark.parametrize("step", [1e-40, 1e-30, 1e-20])
-def test_node_step_too_small_to_count_is_refused(step: float) -> None:
+def test_node_step_too_small_to_count_is_refused() -> None:
     limits = {"box": [[-1e39, -1e39, 0], [1e39, 1e39, 1e39]], "margin": None}
-    design = decode(PLAIN | {"node_step": step, "limits": limits})
+    design = decode(PLAIN | {"node_step": 1e-30, "limits": limits})
     assert refusal(workspace_nodes, design).startswith("a node step of ")
 
 
-def test_fuzzed_files_are_opened_or_refused_with_one_line() -> None:
-    opened = [attempt(fuzzed(number)) is not None for number in range(700)]
-    assert 50 < sum(opened) < 600
-
-
-def test_many_more_fuzzed_files_are_read_or_refused_with_one_line() -> None:
-    read = 0
-    for number in range(700, 4000):
-        message = ""
-        try:
-            design = decode_design(fuzzed(number), "fuzz")
-        except DesignError as error:
-            message = str(error)
-        else:
-            read += 1
-            assert decode_design(encode_design(design), "again") == design
-        assert message.isprintable()
-        assert len(message) <= LONGEST_LINE + 1
-    assert 300 < read < 3000
+@pytest.mark.parametrize(
+    ("first", "count"), [(0, 150), pytest.param(150, 3850, marks=pytest.mark.long)]
+)
+def test_fuzzed_files_are_opened_or_refused_with_one_line(first: int, count: int) -> None:
+    usable = [attempt(fuzzed(number)) is not None for number in range(first, first + count)]
+    assert 0.07 * count < sum(usable) < 0.9 * count

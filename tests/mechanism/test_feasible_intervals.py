@@ -6,17 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 from refusals import refusal
-from strategies import Case, cases, designs, ordinary_cases, ordinary_designs, singular_cases
+from strategies import Case, designs, ordinary_cases, ordinary_designs, singular_cases
 
-from explorer import (
-    JOINTS,
-    PRESETS,
-    Design,
-    discriminants,
-    forward,
-    inverse,
-    rotation_from_yaw_pitch_roll,
-)
+from explorer import JOINTS, PRESETS, Design, discriminants, forward, inverse
 from explorer.mechanism.design import LENGTHS
 from explorer.mechanism.feasible_intervals import Interval, feasible_intervals, nearest_feasible
 from explorer.numerics.arrays import BoolArray, FloatArray
@@ -39,13 +31,6 @@ def inside(intervals: tuple[Interval, ...], values: FloatArray, slack: float) ->
     for low, high in intervals:
         result |= (values >= low - slack) & (values <= high + slack)
     return result
-
-
-def random_joints(design: Design, rng: np.random.Generator, apart: float) -> FloatArray:
-    """Return joints that need not close, with |d1 − d3| at most a share of |b3 − b2|."""
-    joints = rng.uniform(0.0, 20.0, 6)
-    joints[3] = joints[1] + rng.uniform(-apart, apart) * (design.b3 - design.b2)
-    return joints
 
 
 def check_by_samples(design: Design, joints: FloatArray, joint: int, size: float) -> None:
@@ -71,56 +56,30 @@ def test_intervals_of_closing_joints_are_where_samples_close(case: Case, joint: 
 def test_intervals_of_joints_that_do_not_close_are_where_samples_close(
     design: Design, seed: int, joint: int
 ) -> None:
-    joints = random_joints(design, np.random.default_rng(seed), 1.5)
+    rng = np.random.default_rng(seed)
+    joints = rng.uniform(0.0, 20.0, 6)
+    joints[3] = joints[1] + rng.uniform(-1.5, 1.5) * (design.b3 - design.b2)
     size = float(max(*np.abs(joints).tolist(), *map(abs, design.variables)))
     check_by_samples(design, joints, joint, size)
 
 
-def test_intervals_of_random_joints_are_none_one_and_several() -> None:
-    design = PRESETS["paper-optimal"]
-    rng = np.random.default_rng(2)
-    counts: set[int] = set()
-    for _ in range(60):
-        other, position = random_joints(design, rng, 1.0), rng.uniform(-15.0, 15.0, 3)
-        rotation = rotation_from_yaw_pitch_roll(rng.uniform(-180.0, 180.0, 3))
-        for joints in (other, inverse(design, position, rotation)):
-            counts |= {len(intervals) for intervals in feasible_intervals(design, joints)}
-    assert {0, 1, 2} <= counts
-
-
-@given(cases(designs(nearness=(1.0, 1e-3))))
-def test_intervals_of_a_regular_pose_contain_its_joints(case: Case) -> None:
-    assume(case.regularity > 1e-3)
-    for value, intervals in zip(
-        case.joints, feasible_intervals(case.design, case.joints), strict=True
-    ):
-        assert inside(intervals, np.array([value]), 1e-9 * case.size).all()
-
-
 @given(ordinary_cases())
-def test_intervals_are_disjoint_ascending_and_of_lengths_not_negative(case: Case) -> None:
-    for name, intervals in zip(JOINTS, feasible_intervals(case.design, case.joints), strict=True):
+def test_intervals_are_disjoint_and_end_at_singular_joints_or_a_length_of_zero(case: Case) -> None:
+    assume(case.regularity > 1e-2)
+    for joint, intervals in enumerate(feasible_intervals(case.design, case.joints)):
         ends = [end for interval in intervals for end in interval]
+        assert len(ends) >= 2
         assert ends == sorted(ends)
         assert all(low < high for low, high in intervals)
-        assert name not in LENGTHS or all(low >= 0.0 for low in ends)
+        if JOINTS[joint] in LENGTHS:
+            assert ends[0] >= 0.0
+            ends = [end for end in ends if end != 0.0]
+        least = discriminants(case.design, with_values(case.joints, joint, np.array(ends)))
+        size = np.maximum(case.size, np.abs(ends))
+        assert (np.abs(least.min(axis=1)) <= 1e-7 * size**2).all()
 
 
-@given(ordinary_cases())
-def test_end_of_an_interval_is_singular_or_a_length_of_zero(case: Case) -> None:
-    assume(case.regularity > 1e-2)
-    count = 0
-    for joint, intervals in enumerate(feasible_intervals(case.design, case.joints)):
-        for end in (end for interval in intervals for end in interval):
-            count += 1
-            if end != 0.0 or JOINTS[joint] not in LENGTHS:
-                rows = with_values(case.joints, joint, np.array([end]))
-                least = float(discriminants(case.design, rows).min())
-                assert abs(least) <= 1e-7 * max(case.size, abs(end)) ** 2
-    assert count >= 12
-
-
-@given(ordinary_cases(), st.sampled_from([1e-20, 1e-6, 1e6, 1e20]))
+@given(ordinary_cases(), st.sampled_from([1e-6, 1e6]))
 def test_intervals_scale_with_the_design(case: Case, scale: float) -> None:
     assume(case.regularity > 1e-2)
     larger = case.scaled(scale)

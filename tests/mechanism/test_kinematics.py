@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -20,20 +20,15 @@ from strategies import (
     all_cases,
     amplification,
     cases,
-    designs,
     isolation,
-    near_singular_cases,
     ordinary_cases,
     ordinary_designs,
-    quarter_turns,
-    singular_cases,
     span_amplification,
 )
 
 from explorer import (
     PRESETS,
     Design,
-    InputError,
     discriminants,
     forward,
     home_pose,
@@ -45,7 +40,7 @@ from explorer import (
 from explorer.mechanism.kinematics import LARGEST_RATIO, ForwardKinematics, checked_joints
 from explorer.mechanism.margins import mode_of, signs_of
 from explorer.mechanism.trilateration import solve_rows
-from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import determinant
 from explorer.singularity.strata import inversions
 
@@ -86,64 +81,36 @@ def random_rows(design: Design, count: int, seed: int) -> FloatArray:
     return joints
 
 
-class Solution(NamedTuple):
-    """The results of `solve_rows`."""
-
-    position: FloatArray
-    rotation: FloatArray
-    feasible: BoolArray
-    discriminants: FloatArray
-
-
-def solve_with(kernel: Any, design: Design, rows: FloatArray, *leading: int) -> Solution:
-    count = len(rows)
-    out = (
-        np.full((count, 8, 3), np.nan),
-        np.full((count, 8, 3, 3), np.nan),
-        np.zeros(count, dtype=np.bool_),
-        np.full((count, 3), np.nan),
-    )
-    kernel(*leading, np.array(design.variables), np.ascontiguousarray(rows), *out)
-    return Solution(*out)
-
-
 @pytest.fixture(scope="module")
 def compiled() -> None:
     """Compile the kernel, so that each of thousands of small calls is quick."""
     solve_rows.compile()
 
 
-def test_reference_cases_cover_all_modes() -> None:
+def test_reference_cases_have_their_joints_modes_margins_determinant_and_stratum(
+    compiled: None,
+) -> None:
     assert len(REFERENCE) == 200
     assert {int(mode_of(np.array(case["margins"]))) for case in REFERENCE} == set(range(8))
-
-
-@pytest.mark.parametrize("case", REFERENCE, ids=range(len(REFERENCE)))
-def test_reference_case_has_its_joints_modes_margins_determinant_and_stratum(
-    case: dict[str, Any],
-) -> None:
-    design = Design(**case["design"])
-    position, rotation = np.array(case["position"]), np.array(case["rotation"])
-    size = max(*map(abs, design.variables), float(np.abs(position).max()))
-
-    joints = inverse(design, position, rotation)
-    assert_allclose(joints, case["joints"], rtol=1e-12, atol=1e-12 * size)
-    margin = margins(position, rotation)
-    assert_allclose(margin, case["margins"], rtol=1e-11, atol=1e-11 * size)
-    assert_allclose(determinant(design, joints, margin), case["jacobian_determinant"], rtol=1e-10)
-    flags = tuple(stratum(position, rotation).tolist())
-    assert flags == tuple(case["stratum"])
-    assert inversions(flags) == case["stratum_dimension"]
-
-    solved = forward(design, case["joints"])
-    assert solved.feasible
-    seen: set[int] = set()
-    for mode in case["assembly_modes"]:
-        k = int(mode_of(np.array(mode["margins"])))
-        seen.add(k)
-        assert_allclose(solved.position[k], mode["position"], rtol=0, atol=1e-9 * size)
-        assert_allclose(solved.rotation[k], mode["rotation"], rtol=0, atol=1e-9)
-    assert seen == set(range(8))
+    for case in REFERENCE:
+        design = Design(**case["design"])
+        position, rotation = np.array(case["position"]), np.array(case["rotation"])
+        size = max(*map(abs, design.variables), float(np.abs(position).max()))
+        joints, margin = inverse(design, position, rotation), margins(position, rotation)
+        assert_allclose(joints, case["joints"], rtol=1e-12, atol=1e-12 * size)
+        assert_allclose(margin, case["margins"], rtol=1e-11, atol=1e-11 * size)
+        product = determinant(design, joints, margin)
+        assert_allclose(product, case["jacobian_determinant"], rtol=1e-10)
+        flags = tuple(stratum(position, rotation).tolist())
+        assert flags == tuple(case["stratum"])
+        assert inversions(flags) == case["stratum_dimension"]
+        solved = forward(design, case["joints"])
+        assert solved.feasible
+        modes = {int(mode_of(np.array(mode["margins"]))): mode for mode in case["assembly_modes"]}
+        assert {*modes} == {*range(8)}
+        for k, mode in modes.items():
+            assert_allclose(solved.position[k], mode["position"], rtol=0, atol=1e-9 * size)
+            assert_allclose(solved.rotation[k], mode["rotation"], rtol=0, atol=1e-9)
 
 
 @given(cases())
@@ -160,15 +127,6 @@ def test_forward_of_inverse_is_the_pose_in_the_mode_of_its_sign_triple(case: Cas
     assert_allclose(solved.rotation[mode], case.rotation, rtol=0, atol=turned)
 
 
-@given(ordinary_cases())
-def test_forward_of_inverse_of_ordinary_poses_is_the_pose_to_ten_digits(case: Case) -> None:
-    assume(case.regularity > 1e-2)
-    solved = forward(case.design, case.joints)
-    mode = int(mode_of(case.margins))
-    assert_allclose(solved.position[mode], case.position, rtol=0, atol=1e-10 * case.size)
-    assert_allclose(solved.rotation[mode], case.rotation, rtol=0, atol=1e-10)
-
-
 @given(all_cases())
 def test_modes_have_the_given_joints(case: Case) -> None:
     joints = case.joints
@@ -180,18 +138,10 @@ def test_modes_have_the_given_joints(case: Case) -> None:
     assert error.max() <= closing_error(case)
 
 
-@given(singular_cases() | near_singular_cases())
-def test_joints_of_singular_and_nearly_singular_poses_close(case: Case) -> None:
-    assert forward(case.design, case.joints).feasible
-
-
-@pytest.mark.parametrize("scale", [1e-20, 1e-6, 1.0, 1e6, 1e20])
-def test_joints_of_many_poses_close_at_every_scale(compiled: None, scale: float) -> None:
-    rng = np.random.default_rng(7)
-    base = PRESETS["paper-initial"]
-    design = base.with_variables([v * scale for v in base.variables])
+def test_joints_of_thousands_of_poses_close(compiled: None) -> None:
+    rng, design = np.random.default_rng(7), PRESETS["paper-initial"]
     rotation = rotation_from_quaternion(rng.normal(size=(5000, 4)))
-    position = rng.uniform(-20.0, 20.0, (5000, 3)) * scale
+    position = rng.uniform(-20.0, 20.0, (5000, 3))
     assert forward(design, inverse(design, position, rotation)).feasible.all()
 
 
@@ -204,13 +154,6 @@ def test_mode_k_has_the_sign_triple_of_the_bits_of_k(case: Case) -> None:
         signs = tuple(1 if mode & bit else -1 for bit in (0b100, 0b010, 0b001))
         assert signs_of(mode) == signs
         assert (margin[mode] * signs >= -noise).all()
-
-
-@given(cases(ordinary_designs()))
-def test_modes_of_regular_joints_are_eight_distinct_poses(case: Case) -> None:
-    assume(case.regularity > 1e-3)
-    solved = forward(case.design, case.joints)
-    assert_array_equal(mode_of(margins(solved.position, solved.rotation)), range(8))
 
 
 @given(all_cases())
@@ -334,12 +277,9 @@ def test_kinematics_with_another_guide_and_a2_are_unchanged(case: Case, end: flo
         assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize("shape", [(), (1,), (3,), (2, 3), (2, 1, 2), (0,), (3, 0)])
-@pytest.mark.parametrize("name", list(PRESETS))
-def test_forward_of_a_batch_equals_single_calls(
-    compiled: None, name: str, shape: tuple[int, ...]
-) -> None:
-    design = PRESETS[name]
+@pytest.mark.parametrize("shape", [(), (1,), (2, 1, 2), (3, 0)])
+def test_forward_of_a_batch_equals_single_calls(compiled: None, shape: tuple[int, ...]) -> None:
+    design = PRESETS["paper-optimal"]
     count = math.prod(shape)
     joints = random_rows(design, max(count, 1), 3)[:count].reshape(*shape, 6)
     solved = forward(design, joints)
@@ -358,20 +298,23 @@ def test_forward_of_a_batch_equals_single_calls(
 
 @given(all_cases(), st.integers(0, 2**32 - 1))
 def test_interpreted_and_compiled_kernels_agree(compiled: None, case: Case, seed: int) -> None:
-    assert solve_rows.ready
     rows = np.vstack([case.joints, random_rows(case.design, 3, seed)])
-    interpreted = solve_with(inspect.unwrap(solve_rows), case.design, rows)
-    fast = solve_with(solve_rows, case.design, rows, len(rows))
+
+    def solve_with(kernel: Any, *leading: int) -> tuple[Any, ...]:
+        out = np.zeros((4, 8, 3)), np.zeros((4, 8, 3, 3)), np.zeros(4, np.bool_), np.zeros((4, 3))
+        kernel(*leading, np.array(case.design.variables), rows, *out)
+        return out
+
+    position, rotation, feasible, squares = solve_with(inspect.unwrap(solve_rows))
+    fast = solve_with(solve_rows, len(rows))
     largest = max(case.size, float(np.abs(rows).max()))
     # The compiler may fuse a product and a sum, so agreement is to rounding.
     atol = squared_margin_error(case) * (largest / case.size) ** 2
-    assert_array_equal(interpreted.feasible, fast.feasible)
-    assert_allclose(interpreted.discriminants, fast.discriminants, rtol=1e-6, atol=atol)
-    regular = interpreted.discriminants.min(axis=1) > 100.0 * math.sqrt(EPSILON) * largest**2
-    assert_allclose(
-        interpreted.position[regular], fast.position[regular], rtol=0, atol=1e-6 * largest
-    )
-    assert_allclose(interpreted.rotation[regular], fast.rotation[regular], rtol=0, atol=1e-6)
+    assert_array_equal(feasible, fast[2])
+    assert_allclose(squares, fast[3], rtol=1e-6, atol=atol)
+    regular = squares.min(axis=1) > 100.0 * math.sqrt(EPSILON) * largest**2
+    assert_allclose(position[regular], fast[0][regular], rtol=0, atol=1e-6 * largest)
+    assert_allclose(rotation[regular], fast[1][regular], rtol=0, atol=1e-6)
 
 
 @given(ordinary_cases(), st.integers(0, 5))
@@ -407,42 +350,6 @@ def test_feasibility_changes_exactly_where_a_discriminant_changes_sign(
     assert not feasible[least < -error].any()
 
 
-@given(designs(), st.integers(0, 2**32 - 1))
-def test_infeasible_joints_give_finite_rigid_poses(
-    compiled: None, design: Design, seed: int
-) -> None:
-    solved = forward(design, random_rows(design, 64, seed))
-    assert not solved.feasible.all()
-    check_finite_and_rigid(solved)
-
-
-@given(all_cases(), st.integers(0, 5), st.integers(0, 60), st.sampled_from([-1.0, 1.0]))
-def test_joints_across_the_limit_give_finite_rigid_poses(
-    compiled: None, case: Case, joint: int, octave: int, sign: float
-) -> None:
-    joints = case.joints
-    joints[joint] += sign * case.size * 0.5**octave
-    joints[[0, 2, 4, 5]] = np.abs(joints[[0, 2, 4, 5]])
-    check_finite_and_rigid(forward(case.design, joints))
-    assert np.isfinite(discriminants(case.design, joints)).all()
-
-
-@pytest.mark.parametrize("exponent", range(16))
-@pytest.mark.parametrize("joint", range(6))
-def test_outsized_joints_are_infeasible_or_refused(exponent: int, joint: int) -> None:
-    design = PRESETS["paper-initial"]
-    joints = np.array([9.0, 3.0, 8.0, 4.0, 7.0, 6.0])
-    joints[joint] += 1e3 * 10.0**exponent
-    if joints[joint] > LARGEST_RATIO * max(map(abs, design.variables)):
-        with pytest.raises(InputError, match="must not exceed"):
-            forward(design, joints)
-        return
-    solved = forward(design, joints)
-    assert not solved.feasible
-    check_finite_and_rigid(solved)
-    assert np.isfinite(discriminants(design, joints)).all()
-
-
 def check_finite_and_rigid(solved: ForwardKinematics) -> None:
     assert np.isfinite(solved.position).all()
     gram = solved.rotation @ np.swapaxes(solved.rotation, -1, -2)
@@ -450,16 +357,42 @@ def check_finite_and_rigid(solved: ForwardKinematics) -> None:
     assert (np.linalg.det(solved.rotation) > 0.0).all()
 
 
-def test_joints_of_zero_do_not_close() -> None:
-    for design in PRESETS.values():
-        solved = forward(design, np.zeros(6))
+@given(all_cases(), st.integers(0, 2**32 - 1))
+def test_joints_that_do_not_close_give_finite_rigid_poses(
+    compiled: None, case: Case, seed: int
+) -> None:
+    # Each joint across its limit by 1 to 2⁻⁶⁰ of the size, besides random joints.
+    rng = np.random.default_rng(seed)
+    joints = np.repeat(case.joints[None, :], 60, axis=0)
+    shifts = rng.choice([-1.0, 1.0], 60) * case.size * 0.5 ** np.arange(60)
+    joints[np.arange(60), rng.integers(0, 6, 60)] += shifts
+    joints[:, [0, 2, 4, 5]] = np.abs(joints[:, [0, 2, 4, 5]])
+    rows = np.vstack([joints, random_rows(case.design, 64, seed), np.zeros((1, 6))])
+    solved = forward(case.design, rows)
+    assert not solved.feasible.all()
+    assert not solved.feasible[-1]
+    check_finite_and_rigid(solved)
+    assert np.isfinite(discriminants(case.design, rows)).all()
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_outsized_joints_are_infeasible_or_refused(joint: int) -> None:
+    design = PRESETS["paper-initial"]
+    for exponent in range(16):
+        joints = np.array([9.0, 3.0, 8.0, 4.0, 7.0, 6.0])
+        joints[joint] += 1e3 * 10.0**exponent
+        if joints[joint] > LARGEST_RATIO * max(map(abs, design.variables)):
+            assert "must not exceed" in refusal(forward, design, joints)
+            continue
+        solved = forward(design, joints)
         assert not solved.feasible
         check_finite_and_rigid(solved)
+        assert np.isfinite(discriminants(design, joints)).all()
 
 
 @given(
     ordinary_cases(),
-    st.sampled_from([1e-20, 1e-12, 1e-6, 1e-3, 1e3, 1e6, 1e12, 1e20]),
+    st.sampled_from([1e-6, 1e-3, 1e3, 1e6]),
 )
 def test_forward_in_another_unit_scales_positions_and_keeps_rotations(
     case: Case, scale: float
@@ -498,35 +431,20 @@ def test_unusable_joints_are_refused(joints: Any, words: str) -> None:
     design = PRESETS["paper-initial"]
     for function in (forward, discriminants, checked_joints):
         assert words in refusal(function, design, joints)
+    assert checked_joints(design, [1, -2, 3, -4, 5, 6]).tolist()[1] == -2.0
 
 
-def test_joints_of_carriages_on_the_negative_side_are_accepted() -> None:
-    assert checked_joints(PRESETS["paper-initial"], [1, -2, 3, -4, 5, 6]).tolist()[1] == -2.0
-
-
-@pytest.mark.parametrize("turn", range(0, 24, 5))
+@pytest.mark.parametrize("turn", [0, 7, 20])
 def test_positions_that_underflow_give_rigid_poses(compiled: None, turn: int) -> None:
     design = PRESETS["paper-initial"]
     directions = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 2, 3], [0, -1, 3], [2, 1, 0]])
-    shrinks = 10.0 ** -np.arange(1.0, 320.0)
-    yaw = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
-    for rotation in (QUARTER_TURNS[turn], yaw @ QUARTER_TURNS[turn]):
+    shrinks = 10.0 ** -np.arange(1.0, 320.0, 20.0)
+    for other in ([1.0, 0.0, 0.0, 0.0], [0.8, 0.3, -0.2, 0.5]):
+        rotation = rotation_from_quaternion(other) @ QUARTER_TURNS[turn]
         joints = inverse(design, shrinks[:, None, None] * directions, rotation)
         solved = forward(design, joints)
         assert solved.feasible.all()
         check_finite_and_rigid(solved)
-
-
-@given(quarter_turns(), st.integers(40, 110))
-def test_tilted_platforms_near_the_guide_give_rigid_poses(
-    rotation: FloatArray, exponent: int
-) -> None:
-    design = PRESETS["paper-optimal"]
-    near_guide = np.array([3.0, 3.0 * 10.0**-exponent, -4.0 * 10.0**-exponent])
-    tilted = rotation @ rotation_from_quaternion([0.8, 0.3, -0.2, 0.5])
-    solved = forward(design, inverse(design, near_guide, tilted))
-    assert solved.feasible
-    check_finite_and_rigid(solved)
 
 
 def test_read_only_joints_in_a_large_batch_are_accepted() -> None:

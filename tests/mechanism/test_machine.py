@@ -12,15 +12,7 @@ import pytest
 from refusals import refusal
 
 from explorer import PRESETS, Design, DesignError, decode_design, encode_design
-from explorer.mechanism.machine import (
-    DIMENSIONS,
-    Actuators,
-    Guide,
-    Payload,
-    Struts,
-    Tolerances,
-    Tool,
-)
+from explorer.mechanism.machine import DIMENSIONS, Guide, Payload, Struts, Tolerances, Tool
 
 OPTIMAL = PRESETS["paper-optimal"]
 SIX = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
@@ -60,9 +52,7 @@ def decode(**fields: Any) -> Design:
     ],
 )
 def test_machine_unusable_value_is_refused_by_its_name(fields: dict[str, Any], words: str) -> None:
-    message = refusal(lambda: decode(**fields), kind=DesignError)
-    assert words in message
-    assert len(message.splitlines()) == 1
+    assert words in refusal(lambda: decode(**fields), kind=DesignError)
 
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, "1", True, 10**400])
@@ -70,13 +60,9 @@ def test_machine_value_that_is_no_finite_number_is_refused(odd: Any) -> None:
     refusal(lambda: Payload(mass_kg=odd), kind=DesignError)
     refusal(lambda: Tool(position=(0.0, odd, 0.0)), kind=DesignError)
     refusal(lambda: Guide(force_n=odd), kind=DesignError)
+    refusal(lambda: msgspec.structs.replace(OPTIMAL, payload=odd), kind=DesignError)
     refusal(lambda: Struts(stress_mpa=odd), kind=DesignError)
     refusal(lambda: msgspec.structs.replace(OPTIMAL, gravity=(0.0, 0.0, odd)), kind=DesignError)
-
-
-def test_machine_of_wrong_type_is_refused_in_python() -> None:
-    odd: Any = {"mass_kg": 1.0}
-    refusal(lambda: msgspec.structs.replace(OPTIMAL, payload=odd), kind=DesignError)
 
 
 def test_machine_of_schema_one_is_ideal() -> None:
@@ -96,7 +82,12 @@ def test_machine_written_and_read_keeps_every_bit() -> None:
         "tool": {"position": [0.1, 0.2, 0.3], "quaternion": [1, 2, 3, 4]},
         "payload": {"mass_kg": 0.7, "centre": [1, 2, 3]},
         "gravity": [1, -2, 3],
-        "actuators": {"push_n": SIX, "error_mm": [0.05] * 6, "stiffness_n_mm": SIX},
+        "actuators": {
+            "push_n": SIX,
+            "pull_n": SIX[::-1],
+            "error_mm": [0.05] * 6,
+            "stiffness_n_mm": SIX,
+        },
         "struts": {"outer_mm": 6, "inner_mm": 4, "stress_mpa": 200, "modulus_gpa": 200},
         "guide": {"force_n": 100, "moment_nm": 3},
         "tolerances": {"a1": [0.1, 0.2, 0.3], "guide_tilt_deg": [0.1, 0], "b4": [0, 0, 0.5]},
@@ -105,7 +96,8 @@ def test_machine_written_and_read_keeps_every_bit() -> None:
     assert decode_design(encode_design(design), "again") == design
     assert math.hypot(*design.gravity) == pytest.approx(1.0, rel=1e-15)
     assert math.hypot(*design.tool.quaternion) == pytest.approx(1.0, rel=1e-15)
-    push, pull = design.actuators.limits
+    np.testing.assert_array_equal(design.actuators.limits, [SIX, SIX[::-1]])
+    push, pull = decode(actuators={"push_n": SIX}).actuators.limits
     np.testing.assert_array_equal(push, pull)
 
 
@@ -116,12 +108,6 @@ def test_struts_largest_moment_is_that_of_a_tube() -> None:
     assert tube.bending_stiffness == pytest.approx(70e3 * 289.81, rel=1e-4)
     assert msgspec.structs.replace(tube, moment_nm=3.0).largest_moment == 3.0
     assert math.isinf(msgspec.structs.replace(tube, stress_mpa=None).largest_moment)
-
-
-def test_actuators_pull_may_differ_from_push() -> None:
-    push, pull = (2.0, 2.0, 2.0, 2.0, 2.0, 2.0), (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-    actuators = Actuators(push_n=push, pull_n=pull)
-    np.testing.assert_array_equal(actuators.limits, [push, pull])
 
 
 def test_tolerances_have_the_order_of_the_dimensions() -> None:

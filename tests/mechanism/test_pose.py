@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refusal
+from scipy.spatial.transform import Rotation
 from strategies import QUARTER_TURNS, rotations, small_rotations
 
 from explorer import (
@@ -30,25 +31,18 @@ quaternions = st.tuples(components, components, components, components).filter(
 )
 
 
-def elementary(axis: int, degrees: float) -> FloatArray:
-    """Return the rotation about a coordinate axis, written out."""
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    matrix = np.eye(3)
-    matrix[i, i] = matrix[j, j] = c
-    matrix[i, j], matrix[j, i] = -s, s
-    return matrix
-
-
 @given(rotations())
-def test_rotation_converted_to_a_quaternion_and_back_is_unchanged(rotation: FloatArray) -> None:
-    quaternion = quaternion_from_rotation(rotation)
+def test_rotation_converted_and_back_is_unchanged(rotation: FloatArray) -> None:
+    pose = Pose.of([1.0, 2.0, 3.0], rotation)
+    quaternion, turns = quaternion_from_rotation(rotation), yaw_pitch_roll_from_rotation(rotation)
+    assert pose.position == (1.0, 2.0, 3.0)
     assert abs(float(np.linalg.norm(quaternion)) - 1.0) <= ROUNDING
     assert quaternion[0] >= 0.0
+    assert abs(turns[1]) <= 90.0 + 1e-9
     assert_allclose(rotation_from_quaternion(quaternion), rotation, rtol=0, atol=ROUNDING)
-    pose = Pose.of([1.0, 2.0, 3.0], rotation)
-    assert pose.position == (1.0, 2.0, 3.0)
     assert_allclose(pose.rotation, rotation, rtol=0, atol=ROUNDING)
+    # Near a pitch of 90° its sine is flat, so half the digits of the angle are lost.
+    assert_allclose(rotation_from_yaw_pitch_roll(turns), rotation, rtol=0, atol=3e-7)
 
 
 @given(quaternions, st.sampled_from([-1.0, 1e-150, 1e-9, 2.0, 1e9, 1e150]))
@@ -58,16 +52,10 @@ def test_quaternion_of_any_length_and_sign_is_that_of_its_rotation(
     rotation = rotation_from_quaternion(quaternion)
     unit = np.array(quaternion) / np.linalg.norm(quaternion)
     assert abs(abs(float(quaternion_from_rotation(rotation) @ unit)) - 1.0) <= ROUNDING
+    scalar_last = Rotation.from_quat(np.roll(unit, -1)).as_matrix()
+    assert_allclose(rotation, scalar_last, rtol=0, atol=ROUNDING)
     other = rotation_from_quaternion(np.array(quaternion) * factor)
     assert_allclose(other, rotation, rtol=0, atol=ROUNDING)
-
-
-@given(rotations())
-def test_rotation_converted_to_yaw_pitch_roll_and_back_is_unchanged(rotation: FloatArray) -> None:
-    converted = yaw_pitch_roll_from_rotation(rotation)
-    assert abs(converted[1]) <= 90.0 + 1e-9
-    # Near a pitch of 90° its sine is flat, so half the digits of the angle are lost.
-    assert_allclose(rotation_from_yaw_pitch_roll(converted), rotation, rtol=0, atol=3e-7)
 
 
 @given(angles, st.floats(-89.0, 89.0), angles)
@@ -75,7 +63,7 @@ def test_yaw_pitch_roll_turn_about_intrinsic_z_y_x_and_convert_back(
     yaw: float, pitch: float, roll: float
 ) -> None:
     rotation = rotation_from_yaw_pitch_roll([yaw, pitch, roll])
-    expected = elementary(2, yaw) @ elementary(1, pitch) @ elementary(0, roll)
+    expected = Rotation.from_euler("ZYX", [yaw, pitch, roll], degrees=True).as_matrix()
     assert_allclose(rotation, expected, rtol=0, atol=ROUNDING)
     difference = yaw_pitch_roll_from_rotation(rotation) - [yaw, pitch, roll]
     assert_allclose((difference + 180.0) % 360.0 - 180.0, 0.0, atol=1e-10)
@@ -99,12 +87,6 @@ def test_small_rotations_and_quarter_turns_convert_to_the_last_digits(rotation: 
     quaternion, turns = quaternion_from_rotation(rotation), yaw_pitch_roll_from_rotation(rotation)
     for again in (rotation_from_quaternion(quaternion), rotation_from_yaw_pitch_roll(turns)):
         assert_allclose(again, rotation, rtol=0, atol=ROUNDING)
-
-
-def test_quaternion_is_scalar_first() -> None:
-    half = math.sqrt(0.5)
-    assert_allclose(rotation_from_quaternion([half, 0, 0, half]), elementary(2, 90.0), atol=1e-15)
-    assert_array_equal(rotation_from_quaternion([1, 0, 0, 0]), np.eye(3))
 
 
 def test_conversions_of_a_batch_equal_those_of_its_entries() -> None:
@@ -132,11 +114,8 @@ def test_conversions_of_a_batch_equal_those_of_its_entries() -> None:
 def test_matrix_that_is_no_rotation_is_refused(matrix: Any) -> None:
     for function in (checked_rotation, quaternion_from_rotation, yaw_pitch_roll_from_rotation):
         refusal(function, matrix)
-
-
-@given(rotations())
-def test_rotation_off_by_less_than_the_tolerance_is_used_unchanged(rotation: FloatArray) -> None:
-    assert_array_equal(checked_rotation(rotation + 1e-8), rotation + 1e-8)
+    nearly = np.eye(3) + 1e-8
+    assert_array_equal(checked_rotation(nearly), nearly)
 
 
 @pytest.mark.parametrize(
@@ -164,13 +143,7 @@ def test_pose_keeps_its_quaternion_at_unit_length(
     w, x, y, z = (factor * value for value in quaternion)
     pose = Pose((1.0, 2.0, 3.0), (w, x, y, z))
     assert abs(float(np.linalg.norm(pose.quaternion)) - 1.0) <= ROUNDING
-    assert Pose(pose.position, pose.quaternion) == pose
+    again = Pose(pose.position, pose.quaternion)
+    assert again == pose
+    assert hash(again) == hash(pose)
     assert_allclose(pose.rotation, rotation_from_quaternion(quaternion), rtol=0, atol=1e-14)
-
-
-def test_poses_of_equal_values_are_equal_and_frozen() -> None:
-    one, other = Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0)), Pose((1, 2, 3), (2, 0, 0, 0))
-    assert one == other
-    assert hash(one) == hash(other)
-    with pytest.raises(AttributeError):
-        one.position = (0.0, 0.0, 0.0)  # pyright: ignore[reportAttributeAccessIssue]

@@ -19,7 +19,7 @@ shares = st.floats(0.0, 1.0) | st.just(0.0)
 
 
 @st.composite
-def allowed(draw: st.DrawFn) -> Case:
+def allowed_cases(draw: st.DrawFn) -> Case:
     """Draw a design in a pose that its limits allow, often at one of them."""
     case: Case = draw(cases())
     size = max(case.size, float(np.abs(case.joints).max()))
@@ -44,29 +44,24 @@ def allowed(draw: st.DrawFn) -> Case:
     return Case(design, case.position, case.rotation)
 
 
-@given(allowed())
-def test_what_limits_allow_lies_within_the_possible_ranges(case: Case) -> None:
+@given(allowed_cases())
+def test_joints_and_position_within_the_limits_lie_within_the_possible_ranges(case: Case) -> None:
     ranges = possible_ranges(case.design)
     # Limits themselves are kept up to rounding.
     slack = 1e-9 * max(case.size, float(np.abs(case.joints).max()))
-    for values, bounds in ((case.joints, ranges.joints), (case.position, ranges.position)):
-        for value, (low, high) in zip(values.tolist(), bounds, strict=True):
-            assert low - slack <= value <= high + slack
-
-
-@given(allowed())
-def test_ranges_without_a_limit_hold_those_with_it(case: Case) -> None:
-    ranges = possible_ranges(case.design)
+    low, high = np.array((*ranges.joints, *ranges.position)).T
+    values = np.array([*case.joints, *case.position])
+    assert (low - slack <= values).all()
+    assert (values <= high + slack).all()
+    # Without a limit the ranges are no narrower.
     for free in (without_box(case.design), without_guide(case.design)):
         wider = possible_ranges(free)
-        for inner, outer in zip(
-            (*ranges.joints, *ranges.position), (*wider.joints, *wider.position), strict=True
-        ):
-            assert outer[0] <= inner[0]
-            assert inner[1] <= outer[1]
+        lowest, highest = np.array((*wider.joints, *wider.position)).T
+        assert (lowest <= low).all()
+        assert (high <= highest).all()
 
 
-def test_ranges_of_the_paper_s_optimum_are_its_box_and_its_lengths() -> None:
+def test_ranges_of_the_papers_optimum_are_its_box_and_its_lengths() -> None:
     design = PRESETS["paper-optimal"]
     ranges = possible_ranges(design)
     assert ranges.position == ((0.0, 20.0), (-12.0, 22.0), (0.0, 18.0))
@@ -77,7 +72,7 @@ def test_ranges_of_the_paper_s_optimum_are_its_box_and_its_lengths() -> None:
     assert ranges.joints[1] == (-design.b2, 20.0 + design.b2)
 
 
-def test_a_home_below_the_base_leaves_heights_below_it() -> None:
+def test_ranges_of_a_home_below_the_base_have_heights_below_it() -> None:
     design = without_box(PRESETS["paper-optimal"])
     assert design.home is not None
     x, y, z = design.home.position
