@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings, strategies as st
+from hypothesis import assume, example, given, strategies as st
 from multistart import searched_distance
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from strategies import (
     EPSILON,
-    WAYS,
     Case,
     all_cases,
     designs,
@@ -38,11 +37,6 @@ from explorer.numerics.compiled import MANY_ROWS
 from explorer.singularity.nearest_lines import Constants, bound_over, value_at
 
 OPTIMAL = PRESETS["paper-optimal"]
-CLOSURES = ((3, 4, 2, 1), (4, 2, 3, 1), (4, 3, 1, 2))
-
-
-def way(case: Case, position: FloatArray, rotation: FloatArray) -> float:
-    return float(displacement(case.design, case.position, case.rotation, position, rotation))
 
 
 def random_poses(seed: int, count: int) -> tuple[FloatArray, FloatArray]:
@@ -50,7 +44,7 @@ def random_poses(seed: int, count: int) -> tuple[FloatArray, FloatArray]:
     return rng.uniform(-12.0, 12.0, (count, 3)), Rotation.random(count, rng=rng).as_matrix()
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_nearest_poses_are_as_near_as_those_of_slsqp_from_many_starts(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a3x, a3y, b1x, b1y, b2, span = (
@@ -66,41 +60,38 @@ def test_nearest_poses_are_as_near_as_those_of_slsqp_from_many_starts(seed: int)
 
 
 @given(all_cases())
+@example(Case(OPTIMAL, np.zeros(3), np.eye(3)))
 def test_nearest_poses_lie_on_the_singular_set_at_their_distance(case: Case) -> None:
     nearest = nearest_singular_poses(case.design, case.position, case.rotation)
     span = max(case.size, float(np.abs(nearest.position).max()))
-    assert_allclose(
-        nearest.rotation @ np.swapaxes(nearest.rotation, -1, -2),
-        np.broadcast_to(np.eye(3), (3, 3, 3)),
-        atol=1e-12,
-    )
-    for index in range(3):
-        margin = margins(nearest.position[index], nearest.rotation[index])[index]
-        assert abs(margin) <= 1e-14 * span
-        distance = way(case, nearest.position[index], nearest.rotation[index])
-        assert nearest.distance[index] == pytest.approx(distance, abs=8 * EPSILON * span)
-
-
-@given(all_cases())
-def test_nearest_poses_are_no_farther_than_a_translation(case: Case) -> None:
+    gram = nearest.rotation @ np.swapaxes(nearest.rotation, -1, -2)
+    assert_allclose(gram, np.broadcast_to(np.eye(3), (3, 3, 3)), atol=1e-12)
+    for index, distance in enumerate(nearest.distance):
+        p, r = nearest.position[index], nearest.rotation[index]
+        assert abs(margins(p, r)[index]) <= 1e-14 * span
+        moved = displacement(case.design, case.position, case.rotation, p, r)
+        assert distance == pytest.approx(float(moved), abs=8 * EPSILON * span)
+        # From there it is at no distance.
+        assert nearest_singular_poses(case.design, p, r).distance[index] <= 1e-12 * span
+    # They are no farther than a translation.
     margin = np.abs(case.margins)
     margin[1] /= max(math.hypot(case.rotation[1, 0], case.rotation[2, 0]), 1e-300)
-    nearest = nearest_singular_poses(case.design, case.position, case.rotation)
     assert (nearest.distance <= margin * (1.0 + 1e-9) + 1e-13 * case.size).all()
 
 
 @pytest.mark.parametrize("b1y", [-3.8858, 0.3, 1e-3, 20.0])
-@pytest.mark.parametrize("spread", [1.0, 30.0])
-def test_bounds_of_many_poses_are_close_to_the_distances(b1y: float, spread: float) -> None:
+def test_bounds_of_many_poses_are_close_to_the_distances(b1y: float) -> None:
     # Platforms from wide to nearly collinear, and positions from near to far.
     design = OPTIMAL.with_variable("b1y", b1y)
-    positions, rotations = random_poses(1, 500)
-    nearest = nearest_singular_poses(design, spread * positions, rotations)
-    square = PlatformPoints.of(design).length ** 2
+    positions, rotations = random_poses(1, MANY_ROWS)
+    positions[::2] *= 30.0
+    nearest = nearest_singular_poses(design, positions, rotations)
+    length = PlatformPoints.of(design).length
     assert (nearest.bound <= nearest.distance).all()
-    # The tolerance of the bound is one of squares.
+    # The tolerance of the bound is one of squares, where the two lines do not nearly coincide.
+    apart = np.hypot(positions[:, 1], positions[:, 2]) > 0.2 * length
     gap = nearest.distance**2 - nearest.bound**2
-    assert (gap <= 2e-8 * nearest.distance**2 + 1e-12 * square).all()
+    assert (gap <= 2e-8 * nearest.distance**2 + 1e-12 * length**2)[apart].all()
 
 
 @given(st.data())
@@ -122,18 +113,14 @@ def test_bound_of_a_box_is_below_its_values(data: st.DataObject) -> None:
     )
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_nearest_pose_of_a_singular_pose_is_itself(way: tuple[int, ...]) -> None:
-    @given(singular_cases(way))
-    @settings(max_examples=30)
-    def law(case: Case) -> None:
-        nearest = nearest_singular_poses(case.design, case.position, case.rotation)
-        length = PlatformPoints.of(case.design).length
-        assert np.isfinite(nearest.position).all()
-        distances = nearest.distance[[incidence - 1 for incidence in way]]
-        assert distances.max() <= 1e-12 * max(case.size, length)
-
-    law()
+@given(singular_cases())
+def test_nearest_pose_of_a_singular_pose_is_itself(case: Case) -> None:
+    nearest = nearest_singular_poses(case.design, case.position, case.rotation)
+    vanishing = np.abs(case.margins) <= 8.0 * EPSILON * case.size
+    length = PlatformPoints.of(case.design).length
+    assert vanishing.any()
+    assert np.isfinite(nearest.position).all()
+    assert nearest.distance[vanishing].max() <= 1e-12 * max(case.size, length)
 
 
 def test_nearest_singularity_at_a_distance_of_zero_is_the_pose_itself() -> None:
@@ -145,23 +132,10 @@ def test_nearest_singularity_at_a_distance_of_zero_is_the_pose_itself() -> None:
     assert nearest[0].name == "a1 on the platform plane"
 
 
-@given(all_cases())
-@example(Case(OPTIMAL, np.zeros(3), np.eye(3)))
-def test_nearest_pose_of_a_nearest_pose_is_itself(case: Case) -> None:
-    nearest = nearest_singular_poses(case.design, case.position, case.rotation)
-    for index in range(3):
-        again = nearest_singular_poses(
-            case.design, nearest.position[index], nearest.rotation[index]
-        )
-        span = max(case.size, float(np.abs(nearest.position).max()))
-        assert again.distance[index] <= 1e-12 * span
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_nearest_pose_lies_in_the_stratum_of_its_incidence(seed: int) -> None:
-    p, r = random_poses(10 + seed, 50)
+def test_nearest_pose_lies_in_the_stratum_of_its_incidence() -> None:
+    p, r = random_poses(10, MANY_ROWS)
     nearest = nearest_singular_poses(OPTIMAL, p, r)
-    for index, closure in enumerate(CLOSURES):
+    for index, closure in enumerate(((3, 4, 2, 1), (4, 2, 3, 1), (4, 3, 1, 2))):
         seen = stratum(nearest.position[:, index], nearest.rotation[:, index], OPTIMAL.reach)
         assert (seen == closure).all()
 
@@ -214,7 +188,7 @@ def test_nearest_poses_of_a_compiled_batch_equal_interpreted_ones() -> None:
     assert many.distance.shape == (MANY_ROWS // 4, 4, 3)
     assert many.position.shape == (MANY_ROWS // 4, 4, 3, 3)
     assert many.rotation.shape == (MANY_ROWS // 4, 4, 3, 3, 3)
-    for index in range(0, MANY_ROWS, 37):
+    for index in range(0, MANY_ROWS, 61):
         alone = nearest_singularities(OPTIMAL, Pose.of(p[index], r[index]))
         assert [each.incidence for each in alone] == [1, 2, 3]
         distances = [each.distance for each in alone]

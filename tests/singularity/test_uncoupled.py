@@ -14,70 +14,54 @@ from strategies import Case, all_cases, ordinary_cases
 
 from explorer import PRESETS, UNCOUPLED, Pose, forward, home_pose, inverse, margins
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.uncoupled import Travel, UncoupledMotion, travels
+from explorer.singularity.uncoupled import Travel, travels
 
 DESIGN = PRESETS["paper-optimal"]
 HOME = home_pose(DESIGN)
 GENERIC = Pose((3.0, 4.0, 5.0), (0.8, 0.3, -0.4, 0.2))
 UNLIMITED = Travel(-math.inf, math.inf)
-each_motion = pytest.mark.parametrize("motion", UNCOUPLED, ids=lambda motion: motion.name)
 
 
 def margins_of(pose: Pose) -> FloatArray:
     return margins(pose.position, pose.rotation)
 
 
-def test_motions_are_two_for_each_margin() -> None:
-    assert [motion.incidence for motion in UNCOUPLED] == [1, 2, 3, 1, 2, 3]
+def test_motions_change_one_margin_each_and_two_share_it() -> None:
     assert len({motion.name for motion in UNCOUPLED}) == 6
+    for motion, index in zip(UNCOUPLED, (0, 1, 2, 0, 1, 2), strict=True):
+        change = margins_of(motion.moved(GENERIC, 0.1)) - margins_of(GENERIC)
+        assert np.flatnonzero(np.abs(change) > 1e-3).tolist() == [index] == [motion.incidence - 1]
 
 
-@each_motion
-def test_motion_changes_its_margin_and_no_other(motion: UncoupledMotion) -> None:
-    change = margins_of(motion.moved(GENERIC, 0.1)) - margins_of(GENERIC)
-    assert abs(change[motion.incidence - 1]) > 1e-3
-
-    @given(ordinary_cases(), st.floats(-3.0, 3.0))
-    def law(case: Case, amount: float) -> None:
-        length = case.size if motion.kind == "translation" else 1.0
-        before, after = case.margins, margins_of(motion.moved(case.pose, amount * length))
-        others = np.arange(3) != motion.incidence - 1
-        assert_allclose(after[others], before[others], atol=1e-13 * case.size)
-
-    law()
-
-
-@each_motion
-def test_motion_is_a_translation_along_its_line_or_a_rotation_about_it(
-    motion: UncoupledMotion,
+@given(ordinary_cases(), st.floats(-3.0, 3.0))
+def test_motions_change_no_other_margin_and_move_along_or_about_their_lines(
+    case: Case, amount: float
 ) -> None:
-    @given(ordinary_cases(), st.floats(-3.0, 3.0))
-    def law(case: Case, amount: float) -> None:
-        pose = case.pose
-        moved = motion.moved(pose, amount)
+    pose, size = case.pose, case.size
+    for motion in UNCOUPLED:
+        after = motion.moved(pose, amount)
         point, direction = motion.line(pose)
-        turn = moved.rotation @ pose.rotation.T
-        shift = np.array(moved.position) - turn @ np.array(pose.position)
+        turn = after.rotation @ pose.rotation.T
+        shift = np.array(after.position) - turn @ np.array(pose.position)
         if motion.kind == "translation":
             assert_allclose(turn, np.eye(3), atol=1e-14)
-            assert_allclose(shift, amount * direction, atol=1e-13 * case.size)
+            assert_allclose(shift, amount * direction, atol=1e-13 * size)
         else:
             assert_allclose(turn, Rotation.from_rotvec(amount * direction).as_matrix(), atol=1e-14)
-            assert_allclose(turn @ point + shift, point, atol=1e-13 * case.size)
-        assert_allclose(margins_of(motion.moved(moved, -amount)), margins_of(pose), atol=1e-11)
+            assert_allclose(turn @ point + shift, point, atol=1e-13 * size)
+        others = np.arange(3) != motion.incidence - 1
+        assert_allclose(margins_of(after)[others], case.margins[others], atol=1e-13 * size)
+        assert_allclose(margins_of(motion.moved(after, -amount)), margins_of(pose), atol=1e-11)
 
-    law()
 
-
-@each_motion
-def test_travel_ends_on_the_singular_set_and_not_before(motion: UncoupledMotion) -> None:
-    index, is_translation = motion.incidence - 1, motion.kind == "translation"
-
-    @given(all_cases())
-    @example(Case(DESIGN, np.array([1.0, 0.0, 0.0]), np.eye(3)))
-    def law(case: Case) -> None:
-        pose, travel = case.pose, motion.travel(case.pose)
+@given(all_cases())
+@example(Case(DESIGN, np.array([1.0, 0.0, 0.0]), np.eye(3)))
+def test_travels_end_on_the_singular_set_and_not_before(case: Case) -> None:
+    pose = case.pose
+    for motion, travel in zip(UNCOUPLED, travels(pose), strict=True):
+        index, is_translation = motion.incidence - 1, motion.kind == "translation"
         before = float(margins_of(pose)[index])
+        assert travel == motion.travel(pose)
         assert travel.low <= 0.0 <= travel.high
         if not is_translation and travel != Travel(0.0, 0.0):
             assert travel.high - travel.low == pytest.approx(math.pi, abs=1e-15)
@@ -87,22 +71,17 @@ def test_travel_ends_on_the_singular_set_and_not_before(motion: UncoupledMotion)
                 continue
             span = case.size + (abs(end) if is_translation else 0.0)
             assert abs(margins_of(motion.moved(pose, end))[index]) <= 1e-14 * span
-            for share in (0.1, 0.5, 0.9):
-                between = float(margins_of(motion.moved(pose, share * end))[index])
-                assert abs(before) <= 1e-9 * case.size or between * before > 0.0
-
-    law()
+            between = margins_of(motion.moved(pose, 0.9 * end))[index]
+            assert abs(before) <= 1e-9 * case.size or between * before > 0.0
 
 
-@given(all_cases())
-def test_travels_are_the_travels_of_each_motion(case: Case) -> None:
-    assert travels(case.pose) == tuple(motion.travel(case.pose) for motion in UNCOUPLED)
-
-
-def test_travel_of_a_level_platform_along_its_line_is_unlimited() -> None:
+def test_travel_of_a_level_platform_is_unlimited_along_lines_and_zero_on_the_base() -> None:
     travel = {motion.name: motion.travel(HOME) for motion in UNCOUPLED}
     assert travel["along the platform's x"] == travel["along the base's x"] == UNLIMITED
     assert math.isfinite(travel["about the platform's z"].high)
+    on_base = Pose((3.0, 4.0, 0.0), HOME.quaternion)
+    third = [motion for motion in UNCOUPLED if motion.incidence == 3]
+    assert {motion.travel(on_base) for motion in third} == {Travel(0.0, 0.0)}
 
 
 def test_travel_of_a_platform_level_but_for_rounding_is_unlimited() -> None:
@@ -120,12 +99,6 @@ def test_travel_of_a_platform_level_but_for_rounding_is_unlimited() -> None:
         assert travel == UNLIMITED or max(map(abs, ends)) < 1e6 * DESIGN.reach
 
 
-def test_travel_on_the_singular_set_is_zero() -> None:
-    pose = Pose((3.0, 4.0, 0.0), HOME.quaternion)
-    third = [motion for motion in UNCOUPLED if motion.incidence == 3]
-    assert {motion.travel(pose) for motion in third} == {Travel(0.0, 0.0)}
-
-
 def test_rotation_about_the_guide_changes_l4_alone() -> None:
     turned = UNCOUPLED[5].moved(GENERIC, 0.7)
     before, after = (inverse(DESIGN, each.position, each.rotation) for each in (GENERIC, turned))
@@ -133,6 +106,6 @@ def test_rotation_about_the_guide_changes_l4_alone() -> None:
     assert abs(after[5] - before[5]) > 0.1
 
 
-@pytest.mark.parametrize("amount", [math.nan, math.inf])
-def test_motion_by_an_infinite_amount_is_refused(amount: float) -> None:
-    assert "finite amount" in refusal(UNCOUPLED[0].moved, HOME, amount)
+def test_motion_by_an_infinite_amount_is_refused() -> None:
+    for amount in (math.nan, math.inf):
+        assert "finite amount" in refusal(UNCOUPLED[0].moved, HOME, amount)
