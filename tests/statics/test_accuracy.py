@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from refusals import refusal
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
-from statics_cases import CASES, Loaded, random_poses
+from statics_cases import CASES, random_poses
 
 from explorer import (
     PRESETS,
@@ -44,14 +44,13 @@ ERRORS = np.array([0.01, 0.02, 0.015, 0.005, 0.02, 0.01])
 TOOL = np.array([0.5, -0.3, 1.5])
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_errors_of_reference_are_those_of_the_reference(case: Loaded) -> None:
-    worst = worst_error(*case.pose, case.actuator_errors, case.tool)
-    assert float(worst.displacement) == pytest.approx(float(case.worst_displacement), rel=1e-9)
-    assert float(worst.turn) == pytest.approx(float(case.worst_turn), rel=1e-9)
-    found = pose_error_by_geometry(*case.pose, case.tool)
-    expected = case.pose_error_by_geometry
-    assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+def test_errors_of_reference_are_those_of_the_reference() -> None:
+    for case in CASES:
+        worst = worst_error(*case.pose, case.actuator_errors, case.tool)
+        assert_allclose(worst, (case.worst_displacement, case.worst_turn), rtol=1e-9)
+        found = pose_error_by_geometry(*case.pose, case.tool)
+        expected = case.pose_error_by_geometry
+        assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_worst_error_is_the_largest_of_all_corners() -> None:
@@ -68,8 +67,8 @@ def test_worst_error_is_the_largest_of_all_corners() -> None:
     assert (alone.turn.max(axis=1) <= worst.turn * (1.0 + 1e-12)).all()
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_errors_bound_100000_poses_of_forward_kinematics_to_the_second_order(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(2))
+def test_errors_bound_40000_poses_of_forward_kinematics_to_the_second_order(seed: int) -> None:
     rng = np.random.default_rng(seed)
     (position,), (rotation,) = random_poses(OPTIMAL, 1, seed, margin=0.2)
     tool = rng.uniform(-0.2, 0.2, 3) * OPTIMAL.reach
@@ -77,7 +76,7 @@ def test_errors_bound_100000_poses_of_forward_kinematics_to_the_second_order(see
     largest = 1e-4 * OPTIMAL.reach * rng.uniform(0.5, 1.0, 6)
     # Every error comes with its opposite, and the corners are among them.
     corners = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))[:32]
-    signs = np.concatenate([corners, rng.uniform(-1.0, 1.0, (50_000 - len(corners), 6))])
+    signs = np.concatenate([corners, rng.uniform(-1.0, 1.0, (20_000 - len(corners), 6))])
 
     def moved(errors: FloatArray) -> tuple[FloatArray, FloatArray]:
         found = forward(OPTIMAL, held + errors)
@@ -122,7 +121,7 @@ def joints_of(dimensions: FloatArray, position: FloatArray, rotation: FloatArray
     return np.array([*joints, float(np.linalg.norm(b4 - a3))])
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_error_by_geometry_is_that_of_a_machine_with_23_other_dimensions(seed: int) -> None:
     rng = np.random.default_rng(seed)
     (position,), (rotation,) = random_poses(OPTIMAL, 1, seed)
@@ -146,7 +145,7 @@ def test_error_by_geometry_is_that_of_a_machine_with_23_other_dimensions(seed: i
         assert np.abs(solved.fun).max() < 1e-12
         return np.asarray(solved.x)
 
-    for _ in range(20):
+    for _ in range(8):
         errors = rng.normal(size=23)
         errors *= 1e-2 / np.abs(found @ errors).max()
         # What the linear model lacks falls by four when all errors halve.

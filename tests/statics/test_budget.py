@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import Any
 
 import msgspec
@@ -21,7 +20,6 @@ from explorer import (
     Design,
     InputError,
     NoAnswerError,
-    ToleranceBudget,
     Tolerances,
     decode_design,
     encode_design,
@@ -45,7 +43,6 @@ from explorer.statics.budget.costs import (
     source_influences,
     stated_tolerances,
 )
-from explorer.statics.budget.cuts import Cuts
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = home_pose(OPTIMAL)
@@ -67,15 +64,6 @@ def as_errors(design: Design, tolerances: FloatArray) -> FloatArray:
     """Return tolerances in mm and degrees as errors in design units and radians."""
     finite = np.where(np.isfinite(tolerances), tolerances, 0.0)
     return np.where(IS_TILT, np.radians(finite), finite / design.unit_mm)
-
-
-def scaled(design: Design, factor: float) -> Design:
-    """Return the same machine in design units that are smaller by a factor."""
-    return msgspec.structs.replace(
-        design.with_variables([factor * value for value in design.variables]),
-        unit_mm=design.unit_mm / factor,
-        home=None,
-    )
 
 
 def test_costs_are_those_of_the_worst_position_in_mm_and_degrees() -> None:
@@ -104,21 +92,16 @@ def test_costs_are_those_of_the_worst_position_in_mm_and_degrees() -> None:
     ranked = costs.displacement_within[costs.ranking]
     assert (np.diff(ranked) <= 0.0).all()
     assert sorted(costs.ranking) == list(range(29))
-
-
-def test_costs_of_ideal_design_are_those_per_error_alone() -> None:
-    costs = source_costs(OPTIMAL, box_positions(), HOME.rotation)
-    assert (costs.worst_displacement, costs.worst_turn, costs.rms_turn) == (0.0, 0.0, 0.0)
-    assert not costs.shares.any()
-    assert not costs.displacement_within.any()
-    stated = source_costs(STATED, box_positions(), HOME.rotation)
-    assert_allclose(costs.displacement, stated.displacement)
-    by_length = (costs.displacement / costs.lengths)[costs.ranking]
+    ideal = source_costs(OPTIMAL, positions, HOME.rotation, TOOL)
+    assert (ideal.worst_displacement, ideal.worst_turn, ideal.rms_turn) == (0.0, 0.0, 0.0)
+    assert not ideal.shares.any()
+    assert not ideal.displacement_within.any()
+    assert_allclose(ideal.displacement, costs.displacement)
+    by_length = (ideal.displacement / ideal.lengths)[ideal.ranking]
     assert (np.diff(by_length) <= 0.0).all()
 
 
-@pytest.mark.parametrize("wanted_turn", [None, 0.1, 0.005])
-@pytest.mark.parametrize("keep", [False, True])
+@pytest.mark.parametrize(("wanted_turn", "keep"), [(None, False), (0.1, True), (0.005, False)])
 def test_found_tolerances_keep_what_is_wanted_for_all_errors(
     wanted_turn: float | None, keep: bool
 ) -> None:
@@ -151,7 +134,7 @@ def test_found_tolerances_keep_what_is_wanted_for_all_errors(
 
 def vertices_of(vectors: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Return the signs of sums that are farthest in a direction, each once but for its opposite."""
-    directions = rng.normal(size=(200_000, 3))
+    directions = rng.normal(size=(20_000, 3))
     signs = np.where(directions @ vectors >= 0.0, 1.0, -1.0)
     signs *= signs[:, :1]
     return np.unique(signs, axis=0)
@@ -189,8 +172,7 @@ def least_by_slsqp(
     return scale * float(solved.fun)
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("wanted_turn", [None, 0.05])
+@pytest.mark.parametrize(("seed", "wanted_turn"), [(0, None), (1, 0.05)])
 def test_least_effort_is_that_of_slsqp_over_all_vertices(
     seed: int, wanted_turn: float | None
 ) -> None:
@@ -214,27 +196,12 @@ def test_no_other_tolerances_over_the_box_take_less_effort() -> None:
     shares = shares / np.repeat([0.05, 0.05], 3)[:, None]
     lengths, rng = error_lengths(OPTIMAL), np.random.default_rng(1)
     least: list[float] = []
-    for size in (1e-4, 1e-3, 1e-2, 0.1, 1.0):
-        for _ in range(20):
-            tried = found.tolerances * np.exp(size * rng.normal(size=29))
-            worst = largest_error(shares, tried)
-            tried /= max(worst.displacement.max(), worst.turn.max())
-            least.append(float((1.0 / (tried * lengths)).sum()))
+    for size in np.repeat([1e-4, 1e-3, 1e-2, 0.1, 1.0], 4):
+        tried = found.tolerances * np.exp(size * rng.normal(size=29))
+        worst = largest_error(shares, tried)
+        tried /= max(worst.displacement.max(), worst.turn.max())
+        least.append(float((1.0 / (tried * lengths)).sum()))
     assert min(least) >= found.least_effort
-
-
-def test_tolerances_of_one_bound_are_those_of_the_multiplier() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        row, costs = rng.uniform(0.1, 1.0, (2, 9))
-        costs *= 10.0 ** float(rng.uniform(-30.0, 30.0))
-        cuts = Cuts(costs)
-        cuts.add(2.0 * row, 2.0)
-        expected = np.sqrt(costs / row) / np.sqrt(costs * row).sum()
-        assert (expected < 1.0).all()
-        assert_allclose(cuts.solve(), expected, rtol=1e-3)
-        assert cuts.least == pytest.approx(float((costs / expected).sum()), rel=1e-9)
-        assert cuts.least <= (costs / expected).sum() * (1.0 + 1e-14)
 
 
 def test_parallel_sources_share_by_the_root_of_their_influence() -> None:
@@ -248,51 +215,35 @@ def test_parallel_sources_share_by_the_root_of_their_influence() -> None:
     assert ratios.max() / ratios.min() < 1.1
 
 
-@pytest.mark.parametrize("factor", [1e-25, 1e-4, 1e4, 1e25])
-def test_tolerances_do_not_depend_on_the_design_unit(factor: float) -> None:
-    design = scaled(OPTIMAL, factor)
+@pytest.mark.parametrize(("unit", "larger"), [(1e-4, 1.0), (1e4, 1.0), (1.0, 1e-4), (1.0, 100.0)])
+def test_tolerances_grow_with_the_machine_and_do_not_depend_on_its_unit(
+    unit: float, larger: float
+) -> None:
+    design = msgspec.structs.replace(
+        OPTIMAL.with_variables([unit * value for value in OPTIMAL.variables]),
+        unit_mm=larger * OPTIMAL.unit_mm / unit,
+        home=None,
+    )
     positions = box_positions()
-    found = tolerance_budget(design, factor * positions, HOME.rotation, 0.05, 0.05)
+    found = tolerance_budget(design, unit * positions, HOME.rotation, 0.05 * larger, 0.05)
     expected = tolerance_budget(OPTIMAL, positions, HOME.rotation, 0.05, 0.05)
-    assert_allclose(found.tolerances, expected.tolerances, rtol=0.1)
-    assert found.least_effort == pytest.approx(expected.least_effort, rel=2e-6)
-
-
-@pytest.mark.parametrize("unit_mm", [1e-3, 1.0, 1e3])
-def test_tolerances_of_large_and_small_machines_grow_with_what_is_wanted(unit_mm: float) -> None:
-    positions = box_positions()
-    design = msgspec.structs.replace(OPTIMAL, unit_mm=unit_mm)
-    found = tolerance_budget(design, positions, HOME.rotation, 5e-3 * unit_mm)
-    expected = tolerance_budget(OPTIMAL, positions, HOME.rotation, 0.05)
-    sizes = np.where(IS_TILT, 1.0, unit_mm / OPTIMAL.unit_mm)
+    sizes = np.where(IS_TILT, 1.0, larger)
     assert_allclose(found.tolerances, expected.tolerances * sizes, rtol=0.1)
-    least = expected.least_effort * OPTIMAL.unit_mm / unit_mm
-    assert found.least_effort == pytest.approx(least, rel=2e-6)
+    assert found.least_effort == pytest.approx(expected.least_effort / larger, rel=2e-6)
 
 
-@pytest.mark.parametrize("wanted", [1e-40, 1e-9, 1e9, 1e40])
-def test_wanted_precision_of_any_size_is_kept(wanted: float) -> None:
-    found = tolerance_budget(OPTIMAL, box_positions(), HOME.rotation, wanted)
-    assert 0.9 * wanted < found.costs.worst_displacement <= wanted
-
-
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_effort_is_near_its_lower_bound_for_any_design_in_any_pose(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    size = 10.0 ** float(rng.uniform(-25.0, 25.0))
-    variables = size * rng.normal(size=6) * np.power(10.0, rng.uniform(-3.0, 0.0, 6))
-    unit_mm = 10.0 ** float(rng.uniform(-3.0, 3.0))
-    design = msgspec.structs.replace(
-        OPTIMAL.with_variables(variables.tolist()), unit_mm=unit_mm, home=None
-    )
+    variables = 10.0 * rng.normal(size=6) * np.power(10.0, rng.uniform(-3.0, 0.0, 6))
+    design = msgspec.structs.replace(OPTIMAL.with_variables(variables.tolist()), home=None)
     rotation = Rotation.random(random_state=rng).as_matrix()
     # Many of these are near a singular plane.
     position = design.reach * rng.normal(size=(1, 3)) * np.power(10.0, rng.uniform(-8.0, 1.0, 3))
-    wanted = 10.0 ** float(rng.uniform(-20.0, 20.0))
-    turn = 10.0 ** float(rng.uniform(-10.0, 10.0)) if seed % 2 else None
-    found = tolerance_budget(design, position, rotation, wanted, turn)
+    wanted, turn = 10.0 ** rng.uniform(-9.0, 9.0, 2)
+    found = tolerance_budget(design, position, rotation, wanted, turn if seed % 2 else None)
     assert found.costs.worst_displacement <= wanted
-    assert turn is None or found.costs.worst_turn <= turn
+    assert seed % 2 == 0 or found.costs.worst_turn <= turn
     # Rounding down to two digits takes less than a tenth of each tolerance.
     assert 0.0 < found.excess < 0.11
 
@@ -313,7 +264,7 @@ def test_source_that_moves_nothing_takes_any_tolerance() -> None:
     assert 0.045 < worst <= 0.05
 
 
-def test_errors_of_actuators_that_exceed_what_is_wanted_are_told() -> None:
+def test_errors_of_kept_actuators_beyond_what_is_wanted_are_refused() -> None:
     given = STATED, box_positions(), HOME.rotation
     alone = source_costs(
         msgspec.structs.replace(STATED, tolerances=Tolerances()), *given[1:]
@@ -326,15 +277,11 @@ def test_errors_of_actuators_that_exceed_what_is_wanted_are_told() -> None:
     found = tolerance_budget(*given, alone * (1.0 + 1e-6), keep_actuators=True)
     assert found.costs.worst_displacement <= alone * (1.0 + 1e-6)
     assert (found.tolerances > 0.0).all()
-
-
-def test_exact_actuators_that_are_kept_cost_nothing() -> None:
-    exact = msgspec.structs.replace(STATED, actuators=Actuators())
-    given = exact, box_positions(), HOME.rotation, 0.05
-    kept = tolerance_budget(*given, keep_actuators=True)
+    # Exact actuators that are kept cost nothing.
+    exact = msgspec.structs.replace(STATED, actuators=Actuators()), *given[1:]
+    kept = tolerance_budget(*exact, 0.05, keep_actuators=True)
     assert not kept.tolerances[:6].any()
-    assert kept.costs.worst_displacement <= 0.05
-    assert kept.effort < tolerance_budget(*given).effort
+    assert kept.effort < tolerance_budget(*exact, 0.05).effort
 
 
 def test_positions_about_a_singularity_have_no_budget() -> None:
@@ -355,12 +302,10 @@ def test_positions_about_a_singularity_have_no_budget() -> None:
 @pytest.mark.parametrize("wanted", [0.0, -1.0, np.nan, np.inf, 1e-300, 1e308])
 def test_unusable_wanted_precision_is_refused(wanted: float) -> None:
     given = OPTIMAL, [HOME.position], HOME.rotation
-    assert "displacement must be positive" in refusal(
-        tolerance_budget, *given, wanted, kind=InputError
-    )
-    assert "turn must be positive" in refusal(
-        tolerance_budget, *given, 1.0, wanted, kind=InputError
-    )
+    message = refusal(tolerance_budget, *given, wanted, kind=InputError)
+    assert "displacement must be positive" in message
+    message = refusal(tolerance_budget, *given, 1.0, wanted, kind=InputError)
+    assert "turn must be positive" in message
 
 
 def test_costs_without_positions_are_refused() -> None:
@@ -379,8 +324,6 @@ def test_design_with_found_tolerances_keeps_what_is_wanted_after_its_file_is_rea
     assert costs.worst_displacement == found.costs.worst_displacement
     assert costs.worst_displacement <= 0.05
     assert costs.worst_turn <= 0.05
-    read: ToleranceBudget = pickle.loads(pickle.dumps(found))
-    assert_allclose(read.tolerances, found.tolerances)
 
 
 def test_budget_over_the_workspace_holds_at_its_nodes() -> None:

@@ -9,21 +9,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from refusals import refusal
-from scipy.optimize import least_squares, minimize_scalar
-from scipy.spatial.transform import Rotation
-from statics_cases import CASES, Loaded, random_poses
+from scipy.optimize import minimize_scalar
+from statics_cases import CASES, random_poses
 
 from explorer import (
     PRESETS,
     Actuators,
     InputError,
     Struts,
-    actuator_forces,
     compliance,
     compliance_shares,
     deflection,
     home_pose,
-    inverse,
     principal_compliances,
 )
 from explorer.numerics.arrays import FloatArray
@@ -35,10 +32,10 @@ BENDING = np.array([4e4, 6e4])
 TOOL = (0.5, -0.3, 1.5)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_compliance_of_reference_is_that_of_the_reference(case: Loaded) -> None:
-    found = compliance(*case.pose, case.actuator_stiffness, case.bending_stiffness, case.tool)
-    assert_allclose(found, case.compliance, atol=1e-9 * np.abs(case.compliance).max())
+def test_compliance_of_reference_is_that_of_the_reference() -> None:
+    for case in CASES:
+        found = compliance(*case.pose, case.actuator_stiffness, case.bending_stiffness, case.tool)
+        assert_allclose(found, case.compliance, atol=1e-9 * np.abs(case.compliance).max())
 
 
 def test_compliance_is_symmetric_and_positive() -> None:
@@ -48,32 +45,6 @@ def test_compliance_is_symmetric_and_positive() -> None:
     assert (np.linalg.eigvalsh(found)[:, 0] > 0.0).all()
     stiffer = compliance(OPTIMAL, positions, rotations, 2.0 * STIFFNESS, 2.0 * BENDING, TOOL)
     assert_allclose(stiffer, 0.5 * found, rtol=1e-12)
-
-
-def test_compliance_is_the_motion_of_soft_legs_under_a_small_load() -> None:
-    home = home_pose(OPTIMAL)
-    position, rotation = np.array(home.position), home.rotation
-    held = inverse(OPTIMAL, position, rotation)
-    load = 1e-4 * np.array([3.0, -2.0, 4.0, 5.0, -6.0, 2.0])
-    soft = 1.0 / STIFFNESS
-    soft[[1, 3]] += held[[2, 4]] ** 3 / (3.0 * BENDING)
-
-    def moved(twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        turn = Rotation.from_rotvec(twist[3:]).as_matrix() @ rotation
-        # The tool point, not b4, moves by the first three.
-        return position + rotation @ TOOL + twist[:3] - turn @ TOOL, turn
-
-    def unbalanced(scaled: np.ndarray) -> np.ndarray:
-        pose = moved(1e-6 * scaled)
-        stretch = inverse(OPTIMAL, *pose) - held
-        # A leg that is pushed together pushes back.
-        forces = actuator_forces(OPTIMAL, *pose, load, TOOL)
-        return 1e6 * (stretch + soft * forces)
-
-    solution = least_squares(unbalanced, np.zeros(6), xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    twist = 1e-6 * solution.x
-    found = deflection(compliance(OPTIMAL, position, rotation, STIFFNESS, BENDING, TOOL), load)
-    assert_allclose(found, twist, rtol=1e-4, atol=1e-4 * np.abs(twist).max())
 
 
 def test_largest_deflection_is_caused_by_its_force_and_meets_the_bound_of_duality() -> None:
@@ -129,30 +100,6 @@ def test_largest_deflection_without_force_or_load_is_that_of_the_other() -> None
     assert np.isinf(largest_deflection(np.full((6, 6), np.inf), load, 7.0)[0])
     for force in (-1.0, np.nan, np.inf):
         assert "not negative" in refusal(largest_deflection, found, load, force, kind=InputError)
-
-
-@pytest.mark.parametrize("scale", [1e-300, 1e-170, 1e-100, 1e100, 1e170])
-def test_largest_deflection_scales_with_compliance_and_with_loads_of_any_size(scale: float) -> None:
-    rng = np.random.default_rng(5)
-    positions, rotations = random_poses(OPTIMAL, 30)
-    found = compliance(OPTIMAL, positions, rotations, STIFFNESS, BENDING, TOOL)
-    found[:10, 3:, :3] = found[:10, :3, 3:] = 0.0
-    loads, forces = rng.normal(size=(30, 6)), rng.uniform(0.5, 2.0, 30)
-    largest, worst = largest_deflection(found, loads, forces)
-    softer, same = largest_deflection(scale * found, loads, forces)
-    assert_allclose(softer, scale * largest, rtol=1e-9)
-    assert_allclose(same, worst, rtol=1e-6, atol=1e-6)
-    assert_allclose(largest_deflection(found, scale * loads, scale * forces)[0], scale * largest)
-    # One of the two far beyond the other.
-    still, alone = (largest_deflection(found, *of)[0] for of in ((loads, 0.0), (0.0 * loads, 1.0)))
-    one, other = (
-        largest_deflection(found, loads, scale),
-        largest_deflection(found, scale * loads, 1),
-    )
-    first, second = (still, scale * alone), (scale * still, alone)
-    for of, parts in ((one, first), (other, second)):
-        assert (of[0] <= (parts[0] + parts[1]) * (1.0 + 1e-12)).all()
-        assert (of[0] >= np.maximum(*parts) * (1.0 - 1e-12)).all()
 
 
 def test_principal_compliances_are_the_extremes_of_directions() -> None:

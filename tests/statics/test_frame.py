@@ -104,7 +104,7 @@ def test_compliance_of_a_strut_alone_is_that_of_a_cantilever() -> None:
     assert frame.compliance_at("tip")[0, 0] == pytest.approx(5.0**3 / (3.0 * 250.0), rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(4))
 def test_compliance_is_that_of_a_frame_of_beams(seed: int) -> None:
     rng = np.random.default_rng(seed)
     design = OPTIMAL.with_variables((OPTIMAL.variables + rng.uniform(-1.0, 1.0, 6)).tolist())

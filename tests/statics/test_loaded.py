@@ -5,10 +5,10 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
-from machines import six
+from machines import FULL, six
 from numpy.testing import assert_allclose
 
-from explorer import PRESETS, Actuators, Design, Guide, Payload, Struts, Tool, Weights
+from explorer import PRESETS, Actuators, Design, Guide, Payload, Struts, Weights
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
 from explorer.statics.forces import largest_force
@@ -21,15 +21,10 @@ OWN = Weights(cylinders=(0.1, 0.2, 0.15, 0.1), cylinder_centres=(1.0, 1.0, 2.0, 
 
 
 def limited(**changes: object) -> Design:
-    """Return a design with a tool, a payload and limits of all its parts."""
-    parts: dict[str, object] = {
-        "tool": Tool((1.0, -1.0, 2.0)),
-        "payload": Payload(0.5, (1.0, 2.0, 3.0), 2.0),
-        "actuators": Actuators(push_n=(60, 50, 40, 50, 45, 70), pull_n=(30, 40, 50, 60, 70, 80)),
-        "struts": Struts(moment_nm=4.0),
-        "guide": Guide(force_n=40.0, moment_nm=5.0),
-    }
-    return msgspec.structs.replace(OPTIMAL, **(parts | changes))
+    """Return a design with a payload and limits of all parts, some of them changed."""
+    payload = Payload(0.5, (1.0, 2.0, 3.0), 2.0)
+    guide = Guide(force_n=40.0, moment_nm=5.0)
+    return msgspec.structs.replace(FULL, **({"payload": payload, "guide": guide} | changes))
 
 
 def loaded_poses(design: Design, count: int, seed: int = 3) -> list[LoadedPose]:
@@ -48,9 +43,9 @@ def loaded_poses(design: Design, count: int, seed: int = 3) -> list[LoadedPose]:
 def test_no_sampled_direction_uses_a_larger_share_than_the_worst(limits: str) -> None:
     none = {"actuators": Actuators(), "struts": Struts()}
     design = limited(**(none if limits == "guide" else {}))
-    directions = np.random.default_rng(4).normal(size=(40_000, 3))
+    directions = np.random.default_rng(4).normal(size=(20_000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    for loaded in loaded_poses(design, 6):
+    for loaded in loaded_poses(design, 3):
         worst = loaded.worst_force(12.0)
         loads = np.tile(loaded.load, (len(directions), 1))
         loads[:, :3] += 12.0 * directions
@@ -60,7 +55,7 @@ def test_no_sampled_direction_uses_a_larger_share_than_the_worst(limits: str) ->
         )
         sampled = float(limit_shares(design, held).max())
         assert sampled <= worst.share * (1.0 + 1e-12)
-        assert sampled >= worst.share * 0.998
+        assert sampled >= worst.share * 0.997
         # The direction reaches it, and the part is the one that does.
         load = np.array(loaded.load) + [*(12.0 * worst.direction), 0.0, 0.0, 0.0]
         there = LoadedPose(design, pose, six(load), OWN)
@@ -68,7 +63,7 @@ def test_no_sampled_direction_uses_a_larger_share_than_the_worst(limits: str) ->
         assert there.worst == worst.part
 
 
-def test_the_largest_payload_takes_a_part_to_its_limit() -> None:
+def test_largest_payload_takes_a_part_to_its_limit() -> None:
     for loaded in loaded_poses(limited(), 8):
         mass = loaded.largest_payload
         if mass == 0.0:
@@ -82,7 +77,7 @@ def test_the_largest_payload_takes_a_part_to_its_limit() -> None:
         assert share == pytest.approx(1.0, rel=1e-9)
 
 
-def test_the_largest_force_takes_a_part_to_its_limit_in_its_worst_direction() -> None:
+def test_largest_force_takes_a_part_to_its_limit_in_its_worst_direction() -> None:
     rng = np.random.default_rng(6)
     for loaded in loaded_poses(limited(), 5):
         newton = loaded.newton
@@ -99,7 +94,7 @@ def test_the_largest_force_takes_a_part_to_its_limit_in_its_worst_direction() ->
         assert there.worst == newton.part
 
 
-def test_actuators_alone_hold_what_the_largest_force_says() -> None:
+def test_largest_force_of_actuators_alone_is_that_of_the_function() -> None:
     actuators = Actuators(push_n=(50, 50, 50, 50, 50, 50))
     design = limited(struts=Struts(), guide=Guide(), actuators=actuators)
     for loaded in loaded_poses(design, 5):
@@ -108,7 +103,7 @@ def test_actuators_alone_hold_what_the_largest_force_says() -> None:
         assert 1.0 / loaded.newton.share == pytest.approx(float(expected), rel=1e-12)
 
 
-def test_the_weight_of_the_payload_can_be_left_out() -> None:
+def test_loaded_pose_that_weighs_no_payload_has_no_forces() -> None:
     design = limited()
     with_weight = LoadedPose(design, HOME)
     without = LoadedPose(design, HOME, weighs_payload=False)
@@ -116,7 +111,7 @@ def test_the_weight_of_the_payload_can_be_left_out() -> None:
     assert np.abs(with_weight.held.actuators).max() > 1.0
 
 
-def test_without_limits_no_share_is_used_and_no_direction_is_worst() -> None:
+def test_loaded_pose_without_limits_uses_no_share_and_has_no_worst_direction() -> None:
     loaded = LoadedPose(OPTIMAL, HOME, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
     assert loaded.share == 0.0
     assert np.isinf(loaded.largest_payload)
@@ -126,7 +121,7 @@ def test_without_limits_no_share_is_used_and_no_direction_is_worst() -> None:
     assert np.isnan(worst.direction).all()
 
 
-def test_in_a_singular_pose_nothing_holds_a_load() -> None:
+def test_loaded_pose_that_is_singular_holds_no_load() -> None:
     pose = Pose((10.0, 5.0, 0.0), HOME.quaternion)
     loaded = LoadedPose(limited(), pose, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
     assert not loaded.is_regular

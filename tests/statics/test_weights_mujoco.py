@@ -40,12 +40,10 @@ def loaded_model(design: Design) -> Any:
     return model
 
 
-def our_forces(
-    design: Design, position: FloatArray, rotation: FloatArray, share: float = 1.0
-) -> FloatArray:
+def our_forces(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
     weights = machine_weights(design, bar_masses(design, DENSITY))
     wrench = carry(design, position, rotation, weights, TOOL).wrench
-    return actuator_forces(design, position, rotation, wrench + share * LOAD, TOOL)
+    return actuator_forces(design, position, rotation, wrench + LOAD, TOOL)
 
 
 def apply_load(design: Design, model: Any, data: Any, share: float = 1.0) -> None:
@@ -88,14 +86,14 @@ def random_design(seed: int) -> Design:
     )
 
 
-TEN = [THICK, TILTED, *map(random_design, range(8))]
+DESIGNS = [THICK, TILTED, *map(random_design, range(4))]
 
 
-@pytest.mark.parametrize("design", TEN, ids=range(len(TEN)))
+@pytest.mark.parametrize("design", DESIGNS, ids=range(len(DESIGNS)))
 def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design) -> None:
     model = loaded_model(design)
     data = engine.MjData(model)
-    positions, rotations = random_poses(design, 20, seed=2)
+    positions, rotations = random_poses(design, 10, seed=2)
     for position, rotation in zip(positions, rotations, strict=True):
         data.qpos[:] = simulation_joints(design, position, rotation)
         data.qvel[:] = 0.0
@@ -110,13 +108,13 @@ def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design)
 
 
 def test_forces_with_weights_are_those_of_the_servos_at_rest() -> None:
-    design, share = THICK, 1.0
+    design = THICK
     model = loaded_model(design)
     data = engine.MjData(model)
     engine.mj_resetDataKeyframe(model, data, 0)
     engine.mj_forward(model, data)
     for step in range(1000):
-        apply_load(design, model, data, share * min(1.0, step / 500))
+        apply_load(design, model, data, min(1.0, step / 500))
         engine.mj_step(model, data)
     assert np.abs(data.qvel).max() < 1e-6
     forces = np.array(data.actuator_force)
@@ -124,5 +122,5 @@ def test_forces_with_weights_are_those_of_the_servos_at_rest() -> None:
     metres = 1e-3 * design.unit_mm
     platform = data.body("platform")
     place, turn = platform.xpos / metres, platform.xmat.reshape(3, 3)
-    ours = our_forces(design, place, turn, share)
+    ours = our_forces(design, place, turn)
     assert_allclose(ours, forces, atol=1e-3 * np.abs(forces).max())
