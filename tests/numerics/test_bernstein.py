@@ -41,19 +41,14 @@ def coefficients(seed: int) -> FloatArray:
     return random.normal(size=int(random.integers(2, MOST_DEGREE + 2)))
 
 
-@pytest.mark.parametrize("seed", range(200))
-def test_first_negative_place_is_the_first_falling_root(seed: int) -> None:
-    b = coefficients(seed)
-    degree = len(b) - 1
-    found = first_negative(np.append(b, 0.0), degree, np.zeros(STACK))
-    if b[0] < 0.0:
-        assert found == 0.0
-        return
-    roots = as_polynomial(b).roots()
-    real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
-    inside = [x for x in real if 0.0 < x < 1.0 and values(b, np.array([x + 1e-6]))[0] < 0.0]
-    expected = inside[0] if inside else NOWHERE
-    assert found == pytest.approx(expected, abs=1e-8)
+def test_first_negative_place_is_the_first_falling_root() -> None:
+    for b in map(coefficients, range(200)):
+        found = first_negative(np.append(b, 0.0), len(b) - 1, np.zeros(STACK))
+        roots = as_polynomial(b).roots()
+        real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
+        inside = [x for x in real if 0.0 < x < 1.0 and values(b, np.array([x + 1e-6]))[0] < 0.0]
+        expected = 0.0 if b[0] < 0.0 else (*inside, NOWHERE)[0]
+        assert found == pytest.approx(expected, abs=1e-8)
 
 
 @given(st.integers(0, 10_000), st.floats(0.0, 1.0))

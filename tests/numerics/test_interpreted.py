@@ -51,21 +51,6 @@ def regions() -> FloatArray:
     return np.concatenate([shares, parts.astype(np.float64), values.ravel(), settled.ravel()])
 
 
-def dips() -> FloatArray:
-    """Return greatest tilts that the worst orientations for lengths and guide end."""
-    limits = msgspec.structs.replace(
-        OPTIMAL.limits,
-        l1=(8.7, 20.1),
-        d2=(7.7, 12.9),
-        d4=(5.4, 15.2),
-        guide=(5.1, 14.9),
-        margin=None,
-        carriage_order="any",
-    )
-    design = msgspec.structs.replace(OPTIMAL, limits=limits)
-    return greatest_tilts(design, POSITION, [-180.0, -75.0, 0.0, 83.0, 103.0], azimuths=5)
-
-
 def forces_beyond_all_numbers() -> FloatArray:
     loads = np.random.default_rng(4).uniform(-1.0, 1.0, (12, 6))
     scales = 10.0 ** np.linspace(290.0, 308.0, 12)
@@ -75,7 +60,6 @@ def forces_beyond_all_numbers() -> FloatArray:
 CASES: dict[str, Callable[[], FloatArray]] = {
     "tilts": tilts,
     "greatest tilts": lambda: greatest_tilts(OPTIMAL, positions()[:2], azimuths=5),
-    "dips of tilts": dips,
     "share": lambda: np.array([orientation_share(OPTIMAL, POSITION, 200).share]),
     "regions": regions,
     "forces": forces_beyond_all_numbers,
