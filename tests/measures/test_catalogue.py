@@ -21,7 +21,6 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import FloatArray
 from explorer.optimise.curves import GOALS
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.problem import OBJECTIVES, OVER_BOX, YAW, ObjectiveName
@@ -30,20 +29,12 @@ from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
-from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = PRESETS["paper-optimal"]
 EXTREMES = [*(f"exact_extent_{axis}" for axis in "xyz"), "least_margin"]
-CASES = (*PRESETS.values(), *(ordinary_case(seed)[0] for seed in range(8)))
-
-
-def samples(design: Design, rotation: FloatArray, about: Solid, count: int = 8000) -> FloatArray:
-    """Return random positions in a workspace, shape (n, 3), from a box larger than a mesh of it."""
-    lows, highs = about.vertices.min(axis=0), about.vertices.max(axis=0)
-    room = 0.05 * (highs - lows)
-    points = np.random.default_rng(5).uniform(lows - room, highs + room, (count, 3))
-    return points[(slacks(constraints(design, rotation), points) >= 0.0).all(axis=-1)]
+CASES = (OPTIMAL, *(ordinary_case(seed)[0] for seed in range(2)))
+each_case = pytest.mark.parametrize("design", CASES, ids=range(len(CASES)))
 
 
 def compared(design: Design) -> Measurements:
@@ -51,7 +42,7 @@ def compared(design: Design) -> Measurements:
     return measure_design(Case(design), measures_in("compare"))
 
 
-@pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
+@each_case
 def test_measures_of_compare_equal_their_functions(design: Design) -> None:
     found, home = compared(design), home_pose(design)
     snapshot, nodes = evaluate(design, home), workspace_nodes(design)
@@ -65,24 +56,26 @@ def test_measures_of_compare_equal_their_functions(design: Design) -> None:
     assert found.empty_because == ()
 
 
-@pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
-def test_extremes_of_random_designs_hold_for_samples_and_are_reached(design: Design) -> None:
+@each_case
+def test_extremes_hold_for_samples_and_are_reached(design: Design) -> None:
     r, reach = home_pose(design).rotation, design.reach
-    fine = workspace_solid(design, r, 0.0005 * reach)
+    fine = workspace_solid(design, r, 0.0005 * reach).vertices
     ends, least = extent_of(design, r), least_margins(design, r)
     assert ends is not None
     assert least is not None
     lows, highs = ends
-    points = samples(design, r, fine)
+    # Samples of a box that is larger than the mesh.
+    box = lows - 0.05 * (highs - lows), highs + 0.05 * (highs - lows)
+    points = np.random.default_rng(5).uniform(*box, (4000, 3))
+    points = points[(slacks(constraints(design, r), points) >= 0.0).all(axis=-1)]
     assert len(points) > 100
     assert (points >= lows - 1e-9 * reach).all()
     assert (points <= highs + 1e-9 * reach).all()
     assert (np.abs(margins(points, r)) >= least - 1e-9 * reach).all()
     # The mesh lies within its tolerance.
-    assert np.abs(fine.vertices.min(axis=0) - lows).max() < 0.001 * reach
-    assert np.abs(fine.vertices.max(axis=0) - highs).max() < 0.001 * reach
-    on_mesh = np.abs(margins(fine.vertices, r)).min(axis=0)
-    assert (on_mesh - least).max() < 0.001 * reach
+    assert np.abs(fine.min(axis=0) - lows).max() < 0.001 * reach
+    assert np.abs(fine.max(axis=0) - highs).max() < 0.001 * reach
+    assert (np.abs(margins(fine, r)).min(axis=0) - least).max() < 0.001 * reach
 
 
 def test_measures_at_a_pose_are_of_its_orientation() -> None:
@@ -96,15 +89,10 @@ def test_measures_at_a_pose_are_of_its_orientation() -> None:
     assert own.values == {name: at_pose[name] for name in own.values}
 
 
-def test_extent_of_paper_optimum_is_its_box() -> None:
-    extent = extent_of(OPTIMAL, home_pose(OPTIMAL).rotation)
-    assert OPTIMAL.limits.box is not None
-    assert np.array(extent) == pytest.approx(np.array(OPTIMAL.limits.box), abs=1e-9)
-
-
-def test_least_margins_of_separate_parts_are_of_each_part() -> None:
+def test_extremes_of_separate_parts_are_those_of_each_part() -> None:
     design = limited(OPTIMAL, margin=None, box=((0.0, -12.0, -3.0), (20.0, 22.0, 18.0)))
     r = home_pose(design).rotation
+    assert np.array(extent_of(design, r)) == pytest.approx(np.array(design.limits.box), abs=1e-9)
     least = least_margins(design, r)
     assert least is not None
     assert least.tolist() == [0.0, 0.0, 0.0]
@@ -114,7 +102,7 @@ def test_least_margins_of_separate_parts_are_of_each_part() -> None:
     assert least_margins(limited(design, margin=0.5), r) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(8))
 def test_least_clearance_alone_equals_that_of_all_pairs(seed: int) -> None:
     design, rotation = ordinary_case(seed) if seed % 2 else troubled_case(seed)
     radii = np.random.default_rng(seed).uniform(0.0, 0.05, 4) * design.reach
@@ -142,10 +130,9 @@ def test_clearance_beyond_counts_off_singular_planes_only() -> None:
     assert clearance_beyond(OPTIMAL, 100.0) == (None, None)
 
 
-@pytest.mark.parametrize("factor", [1e-15, 0.1, 1e12])
-@pytest.mark.parametrize("seed", range(3))
-def test_measures_of_scaled_design_have_their_power_of_length(seed: int, factor: float) -> None:
-    design = ordinary_case(seed)[0]
+@pytest.mark.parametrize("factor", [1e-6, 1e3])
+def test_measures_of_scaled_design_have_their_power_of_length(factor: float) -> None:
+    design = ordinary_case(0)[0]
     one, other = compared(design), compared(scaled_design(design, factor))
     for name, small in one.values.items():
         measure, large = CATALOGUE[name], other[name]
@@ -156,7 +143,7 @@ def test_measures_of_scaled_design_have_their_power_of_length(seed: int, factor:
         assert large == pytest.approx(small * factor**measure.power, rel=near, abs=tiny), name
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(8))
 def test_measures_of_troubled_designs_are_finite_or_none(seed: int) -> None:
     found = compared(troubled_case(seed)[0])
     assert bool(found["volume"]) != bool(found.empty_because)
@@ -188,7 +175,7 @@ def test_measures_of_too_fine_grid_lack_nodes_only() -> None:
     assert found["exact_extent_x"] is not None
 
 
-@pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
+@each_case
 def test_gradients_of_measures_equal_finite_differences(design: Design) -> None:
     # Limits that are tied to the reach would change with the design.
     reach = 1.2 * design.reach
@@ -208,14 +195,10 @@ def test_gradients_of_measures_equal_finite_differences(design: Design) -> None:
             assert gradient.get(name, 0.0) == pytest.approx(expected, abs=1e-5 * size), name
 
 
-def test_labels_of_measures_are_all_different() -> None:
+def test_reach_and_longest_leg_are_two_measures_where_lengths_are_fixed() -> None:
+    design = ordinary_case(1)[0]
     labels = [measure.label for measure in CATALOGUE.values()]
     assert len({*labels}) == len(labels)
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_reach_and_longest_leg_are_two_measures_where_lengths_are_fixed(seed: int) -> None:
-    design = ordinary_case(seed)[0]
     reach, longest = CATALOGUE["reach"], CATALOGUE["longest_leg"]
     fixed = [getattr(design.limits, name)[1] or 0.0 for name in LENGTHS]
     assert reach.function(Case(design)) == np.hypot(*design.a3)
@@ -225,11 +208,10 @@ def test_reach_and_longest_leg_are_two_measures_where_lengths_are_fixed(seed: in
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
-@pytest.mark.parametrize("seed", range(4))
 def test_objective_of_a_search_is_the_measure_that_it_is_named_after(
-    seed: int, objective: ObjectiveName
+    objective: ObjectiveName,
 ) -> None:
-    design = ordinary_case(seed)[0]
+    design = ordinary_case(0)[0]
     if objective == "smallest-reach":
         design = limited(design, **dict.fromkeys(LENGTHS, (0.0, None)))
     if objective in OVER_BOX:

@@ -60,8 +60,10 @@ def values(
 def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
     found = {name: value or math.nan for name, value in values(MACHINE).items()}
     assert tuple(found) == NAMES
+    units = [CATALOGUE[name].unit_in("mm") for name in NAMES]
+    assert units == ["", "", "kg", "N m", "mm", "°", "mm/N", "mm"]
     rotation = home_pose(MACHINE).rotation
-    positions = np.random.default_rng(1).uniform(*BOX, (3000, 3))
+    positions = np.random.default_rng(1).uniform(*BOX, (1000, 3))
     given = MACHINE, positions, rotation
     held = reactions(*given, np.zeros(6), None, design_weights(MACHINE))
     shares = limit_shares(MACHINE, held)
@@ -107,6 +109,10 @@ def test_measures_of_statics_in_a_singular_box_are_none_with_a_reason() -> None:
     case = Case(MACHINE, box=box)
     measured = measure_design(case, NAMES)
     assert "the required box has singular positions" in reason_for_missing(case, measured)
+    for name in WITH_GRADIENT:
+        gradient = CATALOGUE[name].gradient
+        assert gradient is not None
+        assert gradient(case) == {}
 
 
 def test_measures_of_statics_are_of_the_given_orientation() -> None:
@@ -117,13 +123,8 @@ def test_measures_of_statics_are_of_the_given_orientation() -> None:
     assert one != measure_design(Case(MACHINE, box=BOX), NAMES).values
 
 
-def test_measures_of_statics_name_their_units() -> None:
-    units = [CATALOGUE[name].unit_in("mm") for name in NAMES]
-    assert units == ["", "", "kg", "N m", "mm", "°", "mm/N", "mm"]
-
-
 @pytest.mark.parametrize("prefix", ["home_", ""])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_gradients_of_statics_match_central_differences(seed: int, prefix: str) -> None:
     rng = np.random.default_rng(seed)
     force = float(rng.uniform(0.0, 20.0)) if seed % 2 else 0.0
@@ -156,11 +157,3 @@ def test_gradients_of_statics_match_central_differences(seed: int, prefix: str) 
             assert found[parameter] == pytest.approx(expected, abs=1e-5 * size), parameter
         low, high = (value(name, design, side * step) for side in (-1.0, 1.0))
         assert found["yaw"] == pytest.approx((high - low) / (2.0 * step), abs=1e-5 * size)
-
-
-def test_gradients_of_statics_of_a_singular_box_are_unknown() -> None:
-    box = ((9.0, 4.0, -1.0), (11.0, 6.0, 1.0))
-    for name in WITH_GRADIENT:
-        gradient = CATALOGUE[name].gradient
-        assert gradient is not None
-        assert gradient(Case(MACHINE, box=box)) == {}
