@@ -28,7 +28,7 @@ from explorer.mechanism.design_file import (
     load_design,
 )
 from explorer.mechanism.pose import Pose
-from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import workspace_volume
 
 Migration = Callable[[dict[str, Any]], dict[str, Any]]
 
@@ -53,19 +53,15 @@ def message_of(data: bytes | dict[str, Any], source: str = "some.json") -> str:
     ("fields", "words"),
     [
         ({"a3": [8, 0]}, "a3y = 0"),
-        ({"b1": [3, 0]}, "b1y = 0"),
         ({"b3": 2}, "b3 - b2 = 0"),
         ({"a3": [8, 1e-13]}, "degenerate"),
-        ({"a3": [0, 0], "b1": [0, 0], "b2": 0, "b3": 0}, "largest design variable"),
         ({"a3": [0, 1e-31], "b1": [0, 1e-31], "b2": 0, "b3": 1e-31}, "largest design variable"),
         ({"a3": [0, 1e31]}, "largest design variable"),
         *(({"a3": value}, "a3") for value in ([8], [8, 5, 0], 8)),
         *(({"b2": value}, "b2") for value in ("2", True, None, [2])),
         ({"a4": 1}, "unknown field `a4`"),
         ({"limits": {"l2": [0, 1]}}, "unknown field `l2`"),
-        ({"home": HOME | {"yaw": 0}}, "unknown field `yaw`"),
         ({"a\nb\r\u2028c": 1}, "unknown field"),
-        ({"x" * 100_000: 1}, "unknown field"),
         ({"\x1b[31m\u202e\n\x7f": 1}, "unknown field"),
         *(({"schema": x}, "schema") for x in (0, -1, 0.5, "1", None, True, [1], {"schema": 1})),
         ({"name": 1}, "name"),
@@ -74,11 +70,9 @@ def message_of(data: bytes | dict[str, Any], source: str = "some.json") -> str:
             for name in ("a\nb", "\0", "\x7f", "\x1b[31m", "\u202ex", "\u2028", "x" * 101)
         ),
         ({"unit_mm": 0}, "unit_mm must be positive"),
-        ({"unit_mm": -1}, "unit_mm must be positive"),
         ({"unit_mm": None}, "unit_mm"),
         ({"node_step": 0}, "node_step must be positive"),
         ({"limits": None}, "limits"),
-        ({"limits": []}, "limits"),
         ({"home": {"position": [1, 2, 3]}}, "quaternion"),
         ({"home": HOME | {"quaternion": [0, 0, 0, 0]}}, "quaternion must not be all zeros"),
         ({"home": HOME | {"quaternion": [1, 0, 0]}}, "quaternion"),
@@ -96,17 +90,14 @@ def test_file_with_unusable_field_is_refused_by_its_name(
     [
         ({"l1": [5, 1]}, "limits.l1"),
         ({"l1": 5.0}, "limits.l1"),
-        ({"l1": "05"}, "limits.l1"),
         ({"d2": [-1, 1]}, "limits.d2 minimum"),
         ({"d2": [1, 2, 3]}, "limits.d2"),
-        ({"d4": [1]}, "limits.d4"),
         ({"l4": [None, 1]}, "limits.l4"),
         *(({"guide": guide}, "limits.guide") for guide in ([5, 1], [1, 2, 3], 5.0)),
         *(({"gap": gap}, "limits.gap") for gap in (-1, None, "wide", 1e41)),
         ({"box": [[0, 9, 0], [1, 1, 1]]}, "limits.box y"),
         ({"box": [0, 0, 0, 1, 1, 1]}, "limits.box"),
         *(({"box": [low, [1, 1]]}, "limits.box") for low in ([0, 0], [0, 0, 0])),
-        ({"box": [[0, 0, 0]]}, "limits.box"),
         ({"margin": -1}, "limits.margin"),
         *(({"leg_radii": radii}, "limits.leg_radii") for radii in ([1, 1, 1], [1, 1, 1, -1], 0.5)),
     ],
@@ -264,24 +255,11 @@ def test_field_given_twice_is_refused_at_every_level(more: bytes, name: str) -> 
     assert f"{name!r} is given twice" in message_of(PLAIN_TEXT[:-1] + b", " + more + b"}")
 
 
-@pytest.mark.parametrize("name", ["../../x", "/etc/passwd", "a/b", "C:\\x", "CON", ".", "", "ä 漢"])
-def test_name_like_a_path_is_kept_as_text(name: str) -> None:
-    design = decode(PLAIN | {"name": name})
-    assert design.name == name
-    assert decode_design(encode_design(design), name) == design
-
-
 def test_home_with_lines_parallel_but_for_rounding_has_no_workspace() -> None:
     home = {"position": [5, 3, 5], "quaternion": [1e-17, 1, 1e-17, -1e-17]}
     result = workspace_volume(decode(PLAIN | {"home": home}))
     assert result.volume == 0.0
     assert "margin δ2" in result.empty_because
-
-
-def test_node_step_too_small_to_count_is_refused() -> None:
-    limits = {"box": [[-1e39, -1e39, 0], [1e39, 1e39, 1e39]], "margin": None}
-    design = decode(PLAIN | {"node_step": 1e-30, "limits": limits})
-    assert refusal(workspace_nodes, design).startswith("a node step of ")
 
 
 @pytest.mark.parametrize(

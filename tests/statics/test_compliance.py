@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import msgspec
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from refusals import refusal
-from scipy.optimize import minimize_scalar
 from statics_cases import CASES, random_poses
 
 from explorer import (
@@ -23,7 +20,6 @@ from explorer import (
     home_pose,
     principal_compliances,
 )
-from explorer.numerics.arrays import FloatArray
 from explorer.statics.compliance import largest_deflection, stiffness_of
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -47,7 +43,7 @@ def test_compliance_is_symmetric_and_positive() -> None:
     assert_allclose(stiffer, 0.5 * found, rtol=1e-12)
 
 
-def test_largest_deflection_is_caused_by_its_force_and_meets_the_bound_of_duality() -> None:
+def test_largest_deflection_is_caused_by_its_force_and_by_no_larger_one() -> None:
     rng = np.random.default_rng(4)
     positions, rotations = random_poses(OPTIMAL, 60)
     found = compliance(OPTIMAL, positions, rotations, STIFFNESS, BENDING, TOOL)
@@ -59,33 +55,13 @@ def test_largest_deflection_is_caused_by_its_force_and_meets_the_bound_of_dualit
     loads[:20], loads[10:20, :3] = 0.0, stiff[10:]
     largest, worst = largest_deflection(found, loads, forces)
     assert_allclose(np.linalg.norm(worst, axis=1), forces, rtol=1e-12)
-    # The force that is found causes the displacement, so that none less is the largest.
-    with_force = loads.copy()
-    with_force[:, :3] += worst
-    caused = np.linalg.norm(deflection(found, with_force)[:, :3], axis=1)
-    assert_allclose(caused, largest, rtol=1e-9)
-    # For each m above the square of the largest principal compliance, |C f + d|² is at most
-    # m F² + m d · (m − C²)⁻¹ d, and for the best m it is that.
+    directions = rng.normal(size=(3000, 1, 3))
+    others = forces[:, None] * directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     still = deflection(found, loads)[:, :3]
-    for matrix, moved, force, most in zip(found[:, :3, :3], still, forces, largest, strict=True):
-        softest = np.linalg.eigvalsh(matrix)[-1] ** 2
-
-        def bound(
-            log: float,
-            matrix: FloatArray = matrix,
-            moved: FloatArray = moved,
-            force: float = force,
-            softest: float = softest,
-        ) -> float:
-            m = softest * (1.0 + math.exp(log))
-            inner = np.asarray(np.linalg.solve(m * np.eye(3) - matrix @ matrix, moved))
-            return math.sqrt(m * force**2 + m * float(moved @ inner))
-
-        least = minimize_scalar(
-            bound, bounds=(-30.0, 30.0), method="bounded", options={"xatol": 1e-9}
-        )
-        assert most <= bound(float(least.x)) * (1.0 + 1e-9)
-        assert most == pytest.approx(bound(float(least.x)), rel=1e-6)
+    moves = np.einsum("nij,knj->kni", found[:, :3, :3], np.concatenate([worst[None], others]))
+    caused, *sampled = np.linalg.norm(still + moves, axis=-1)
+    assert_allclose(caused, largest, rtol=1e-9)
+    assert (np.array(sampled) <= largest * (1.0 + 1e-12)).all()
 
 
 def test_largest_deflection_without_force_or_load_is_that_of_the_other() -> None:

@@ -60,13 +60,7 @@ def apply_load(design: Design, model: Any, data: Any, share: float = 1.0) -> Non
 def loops_of(model: Any, data: Any) -> FloatArray:
     """Return the Jacobian (9, 15) of the ball joints."""
     own = np.array(data.efc_type) == int(engine.mjtConstraint.mjCNSTR_EQUALITY)
-    dense = np.zeros((data.nefc, model.nv))
-    if engine.mj_isSparse(model):
-        engine.mju_sparse2dense(
-            dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
-        )
-    else:
-        dense = np.array(data.efc_J).reshape(data.nefc, model.nv)
+    dense = np.array(data.efc_J).reshape(data.nefc, model.nv)
     return dense[own]
 
 
