@@ -1,19 +1,26 @@
-"""Exact intervals of the joints, against dense sampling of the forward kinematics."""
+"""Exact intervals of the joints beside dense samples, and the ranges that limits leave."""
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 from refusals import refusal
-from strategies import Case, designs, ordinary_cases, ordinary_designs, singular_cases
+from strategies import Case, cases, designs, ordinary_cases, ordinary_designs, singular_cases
 
 from explorer import JOINTS, PRESETS, Design, discriminants, forward, inverse
-from explorer.mechanism.design import LENGTHS
+from explorer.mechanism.design import LENGTHS, Limits
 from explorer.mechanism.feasible_intervals import Interval, feasible_intervals, nearest_feasible
+from explorer.mechanism.pose import Pose
+from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
 from explorer.numerics.arrays import BoolArray, FloatArray
 
 joint_indices = st.integers(0, 5)
+some_designs = designs(sizes=(10.0, 1e-6, 1e6), nearness=(1.0,))
 seeds = st.integers(0, 2**32 - 1)
 SAMPLES = 400
 
@@ -47,7 +54,7 @@ def check_by_samples(design: Design, joints: FloatArray, joint: int, size: float
     assert closes[inside(intervals, values, -slack)].all()
 
 
-@given(ordinary_cases() | singular_cases(among=ordinary_designs()), joint_indices)
+@given(cases(some_designs) | singular_cases(among=some_designs), joint_indices)
 def test_intervals_of_closing_joints_are_where_samples_close(case: Case, joint: int) -> None:
     check_by_samples(case.design, case.joints, joint, case.size)
 
@@ -77,22 +84,6 @@ def test_intervals_are_disjoint_and_end_at_singular_joints_or_a_length_of_zero(c
         least = discriminants(case.design, with_values(case.joints, joint, np.array(ends)))
         size = np.maximum(case.size, np.abs(ends))
         assert (np.abs(least.min(axis=1)) <= 1e-7 * size**2).all()
-
-
-@given(ordinary_cases(), st.sampled_from([1e-6, 1e6]))
-def test_intervals_scale_with_the_design(case: Case, scale: float) -> None:
-    assume(case.regularity > 1e-2)
-    larger = case.scaled(scale)
-    # At a double root an interval may be divided, so only the outer ends are compared.
-    for one, other in zip(
-        feasible_intervals(case.design, case.joints),
-        feasible_intervals(larger.design, case.joints * scale),
-        strict=True,
-    ):
-        ends = np.array([one[0][0], one[-1][1]]) * scale
-        np.testing.assert_allclose(
-            [other[0][0], other[-1][1]], ends, rtol=0, atol=1e-6 * scale * case.size
-        )
 
 
 def nearest(design: Design, joints: FloatArray, joint: int) -> float | None:
@@ -128,7 +119,7 @@ def test_nearest_feasible_value_of_closing_joints_is_the_present_one(
     assert abs(value - case.joints[joint]) <= 1e-12 * case.size
 
 
-@given(singular_cases(among=designs(sizes=(10.0, 1e-6, 1e6), nearness=(1.0,))), joint_indices)
+@given(singular_cases(among=some_designs), joint_indices)
 def test_nearest_feasible_value_at_a_singular_pose_closes_or_is_none(
     case: Case, joint: int
 ) -> None:
@@ -170,3 +161,70 @@ def test_intervals_at_the_identity_orientation_are_empty_for_the_radii_alone() -
 )
 def test_intervals_of_unusable_joints_are_refused(joints: FloatArray) -> None:
     refusal(feasible_intervals, PRESETS["paper-initial"], joints)
+
+
+shares = st.floats(0.0, 1.0) | st.just(0.0)
+
+
+@st.composite
+def allowed_cases(draw: st.DrawFn) -> Case:
+    """Draw a design in a pose that its limits allow, often at one of them."""
+    case: Case = draw(cases())
+    size = max(case.size, float(np.abs(case.joints).max()))
+
+    def around(value: float, least: float = -math.inf) -> tuple[float, float]:
+        low, high = (draw(shares) * size for _ in range(2))
+        return max(least, value - low), value + high
+
+    joints = dict(zip(JOINTS, case.joints.tolist(), strict=True))
+    lengths: dict[str, Any] = {name: around(joints[name], 0.0) for name in LENGTHS}
+    ends = around(0.0)
+    guide = (min(joints["d1"], joints["d3"]) + ends[0], max(joints["d1"], joints["d3"]) + ends[1])
+    x, y, z = (around(value) for value in case.position.tolist())
+    box = (x[0], y[0], z[0]), (x[1], y[1], z[1])
+    limits = Limits(
+        **lengths,
+        guide=draw(st.sampled_from((None, guide))),
+        box=draw(st.sampled_from((None, box))),
+        margin=draw(st.sampled_from((None, 0.0, abs(float(case.margins[2]))))),
+    )
+    design = msgspec.structs.replace(case.design, limits=limits, home=case.pose)
+    return Case(design, case.position, case.rotation)
+
+
+@given(allowed_cases())
+def test_joints_and_position_within_the_limits_lie_within_the_possible_ranges(case: Case) -> None:
+    ranges = possible_ranges(case.design)
+    # Limits themselves are kept up to rounding.
+    slack = 1e-9 * max(case.size, float(np.abs(case.joints).max()))
+    low, high = np.array((*ranges.joints, *ranges.position)).T
+    values = np.array([*case.joints, *case.position])
+    assert (low - slack <= values).all()
+    assert (values <= high + slack).all()
+    # Without a limit the ranges are no narrower.
+    for free in (without_box(case.design), without_guide(case.design)):
+        wider = possible_ranges(free)
+        lowest, highest = np.array((*wider.joints, *wider.position)).T
+        assert (lowest <= low).all()
+        assert (high <= highest).all()
+
+
+def test_ranges_of_the_papers_optimum_are_its_box_and_its_lengths() -> None:
+    design = PRESETS["paper-optimal"]
+    ranges = possible_ranges(design)
+    assert ranges.position == ((0.0, 20.0), (-12.0, 22.0), (0.0, 18.0))
+    for name in LENGTHS:
+        low, high = ranges.joints[JOINTS.index(name)]
+        assert (low, high) == (0.0, design.reach)
+    # From the box, and as far beyond as the platform's points are from b4.
+    assert ranges.joints[1] == (-design.b2, 20.0 + design.b2)
+
+
+def test_ranges_of_a_home_below_the_base_have_heights_below_it() -> None:
+    design = without_box(PRESETS["paper-optimal"])
+    assert design.home is not None
+    x, y, z = design.home.position
+    below = msgspec.structs.replace(design, home=Pose((x, y, -z), design.home.quaternion))
+    low, high = possible_ranges(below).position[2]
+    assert low < 0.0
+    assert high == 0.0

@@ -307,28 +307,6 @@ def test_outsized_joints_are_infeasible_or_refused(joint: int) -> None:
         assert np.isfinite(discriminants(design, joints)).all()
 
 
-@given(
-    ordinary_cases(),
-    st.sampled_from([1e-6, 1e-3, 1e3, 1e6]),
-)
-def test_forward_in_another_unit_scales_positions_and_keeps_rotations(
-    case: Case, scale: float
-) -> None:
-    larger = case.scaled(scale).design
-    assume(case.regularity > 1e-2)
-    joints = case.joints
-    one, other = forward(case.design, joints), forward(larger, joints * scale)
-    assert other.feasible
-    assert_allclose(other.position, one.position * scale, rtol=0, atol=1e-9 * scale * case.size)
-    assert_allclose(other.rotation, one.rotation, rtol=0, atol=1e-9)
-    assert_allclose(
-        discriminants(larger, joints * scale),
-        discriminants(case.design, joints) * scale**2,
-        rtol=0,
-        atol=1e-12 * (scale * case.size) ** 2,
-    )
-
-
 @pytest.mark.parametrize(
     ("joints", "words"),
     [

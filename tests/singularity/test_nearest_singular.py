@@ -1,4 +1,4 @@
-"""The nearest singular poses: singular, globally nearest, and finite in degenerate cases."""
+"""The nearest singular poses, and those of each stratum: in it, and globally nearest."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, strategies as st
-from multistart import searched_distance
+from hypothesis import assume, example, given, settings, strategies as st
+from incidence import REPRESENTATIVES, is_clear_cut
+from multistart import searched_distance, searched_least
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from strategies import (
     EPSILON,
+    QUARTER_TURNS,
     Case,
     all_cases,
     designs,
@@ -24,6 +26,7 @@ from strategies import (
 from explorer import (
     PRESETS,
     Design,
+    InputError,
     Pose,
     home_pose,
     margins,
@@ -34,7 +37,10 @@ from explorer import (
 from explorer.mechanism.displacement import PlatformPoints, displacement
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
-from explorer.singularity.nearest_lines import Constants, bound_over, value_at
+from explorer.singularity.bruhat import COVERED, OF_INCIDENCES, Stratum, conditions, is_below
+from explorer.singularity.nearest_lines import Constants, bound_over, terms_at, value_at
+from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_stratum, seen_stratum
+from explorer.singularity.strata import GENERIC, STRATA
 
 OPTIMAL = PRESETS["paper-optimal"]
 
@@ -94,23 +100,22 @@ def test_bounds_of_many_poses_are_close_to_the_distances(b1y: float) -> None:
     assert (gap <= 2e-8 * nearest.distance**2 + 1e-12 * length**2)[apart].all()
 
 
-@given(st.data())
-def test_bound_of_a_box_is_below_its_values(data: st.DataObject) -> None:
-    number = st.floats(-1.0, 1.0)
-    values = [data.draw(number) for _ in range(9)]
-    far = data.draw(st.sampled_from((0.1, 1.0, 10.0)))
-    values[6:8] = far * values[6], far * values[7]
-    k = Constants._make([*values, 2.0])
-    phi, sigma = data.draw(st.floats(0.0, math.pi)), data.draw(st.floats(0.0, 2 * math.pi))
-    alpha, beta = (data.draw(st.sampled_from((1.0, 0.1, 1e-3))) for _ in range(2))
-    bound = bound_over(phi, sigma, alpha, beta, k)
-    steps = np.linspace(-1.0, 1.0, 9)
-    values = [value_at(phi + i * alpha, sigma + j * beta, k) for i in steps for j in steps]
-    assert min(values) >= bound - 1e-12 * (1.0 + float(np.square(k).sum()))
-    # To second order it is the value itself.
-    assert value_at(phi, sigma, k) - bound <= 100.0 * (1.0 + float(np.square(k).sum())) * max(
-        alpha, beta
-    )
+def test_bound_of_a_box_is_below_its_values_and_close_to_them() -> None:
+    rng = np.random.default_rng(0)
+    for index in range(120):
+        k = Constants._make([*rng.uniform(-1.0, 1.0, 9).tolist(), 2.0])
+        phi, sigma = rng.uniform(0.0, math.pi), rng.uniform(0.0, 2.0 * math.pi)
+        if index % 2:
+            # Where the hypotenuse of f vanishes, f is curved the most.
+            terms = terms_at(phi, sigma, k)
+            k = k._replace(l_x=-terms.da / terms.cos_sigma, m_x=terms.db * terms.cos_sigma)
+        alpha, beta = 10.0 ** -rng.integers(0, 4, 2)
+        bound, steps = bound_over(phi, sigma, alpha, beta, k), np.linspace(-1.0, 1.0, 5)
+        values = [value_at(phi + i * alpha, sigma + j * beta, k) for i in steps for j in steps]
+        size = 1.0 + float(np.square(k).sum())
+        assert min(values) >= bound - 1e-12 * size
+        # To second order it is the value itself.
+        assert value_at(phi, sigma, k) - bound <= 100.0 * size * max(alpha, beta)
 
 
 @given(singular_cases())
@@ -193,3 +198,141 @@ def test_nearest_poses_of_a_compiled_batch_equal_interpreted_ones() -> None:
         assert [each.incidence for each in alone] == [1, 2, 3]
         distances = [each.distance for each in alone]
         assert_allclose(distances, many.distance.reshape(-1, 3)[index], atol=1e-12)
+
+
+SQUARE = Design(a3=(10.0, 10.0), b1=(0.0, 10.0), b2=0.0, b3=10.0)
+# Each example searches in all strata.
+FEW = settings().max_examples // 5
+# Strata with as many conditions as their codimension, which SLSQP needs.
+SEARCHED = ((3, 4, 1, 2), (4, 2, 1, 3), (2, 1, 4, 3))
+OTHERS = ((2, 4, 3, 1), (4, 1, 3, 2), (3, 2, 4, 1), (1, 4, 3, 2), (3, 2, 1, 4), (2, 3, 4, 1))
+
+
+def way(case: Case, one: Pose, other: Pose) -> float:
+    return float(
+        displacement(case.design, one.position, one.rotation, other.position, other.rotation)
+    )
+
+
+def vanishing(w: Stratum, p: FloatArray, r: FloatArray) -> list[float]:
+    """Return the values that vanish in the closure of a stratum, each once."""
+    u, v, n = r.T
+    meanings = {
+        (1, 3, 1): {"np": n @ p},
+        (2, 2, 1): {"cross": u[1] * p[2] - u[2] * p[1]},
+        (3, 1, 1): {"z": p[2]},
+        (1, 2, 1): {"np": n @ p, "vp": v @ p},
+        (2, 1, 1): {"y": p[1], "z": p[2]},
+        (2, 3, 2): {"np": n @ p, "nx": n[0]},
+        (3, 2, 2): {"z": p[2], "uz": u[2]},
+        (1, 1, 1): {"x": p[0], "y": p[1], "z": p[2]},
+        (2, 2, 2): {"uy": u[1], "uz": u[2], "y": p[1], "z": p[2]},
+        (3, 3, 3): {"nx": n[0], "ny": n[1], "z": p[2]},
+    }
+    found: dict[str, float] = {}
+    for each in conditions(w):
+        found |= {name: float(value) for name, value in meanings[each].items()}
+    return list(found.values())
+
+
+@given(ordinary_cases())
+@example(Case(SQUARE, np.array([0.0, 0.0, 1e-4]), np.eye(3)[[0, 2, 1]] * [-1.0, 1.0, 1.0]))
+@example(Case(SQUARE, np.array([25.0, 30.0, 0.0]), np.eye(3)))
+@settings(max_examples=FEW)
+def test_nearest_pose_in_a_closure_lies_in_it_and_no_nearer_than_in_the_closures_around(
+    case: Case,
+) -> None:
+    reach, nearest = case.design.reach, nearest_in_strata(case.design, case.pose)
+    for w, found in nearest.items():
+        assert found.stratum == w
+        seen = seen_stratum(case.design, found.pose)
+        place = Case(case.design, np.array(found.pose.position), found.pose.rotation)
+        if is_below(seen, w) or is_clear_cut(place, reach):
+            assert found.seen == seen
+        else:
+            # At the tolerance other incidences hold as well, which need not agree.
+            assert found.seen == w
+            assert_allclose(vanishing(w, place.position / reach, place.rotation), 0.0, atol=1e-9)
+        assert is_below(found.seen, w)
+        assert found.distance == pytest.approx(way(case, case.pose, found.pose), abs=1e-12)
+        for lower in COVERED[w]:
+            assert nearest[lower].distance >= found.distance - 1e-9 * case.size
+
+
+@pytest.mark.parametrize(
+    "w", [*SEARCHED, *(pytest.param(w, marks=pytest.mark.long) for w in OTHERS)]
+)
+def test_nearest_pose_is_as_near_as_that_of_slsqp_from_many_starts(w: Stratum) -> None:
+    rng = np.random.default_rng(sum(10**i * x for i, x in enumerate(w)))
+    position, rotation = rng.uniform(-8.0, 8.0, 3), Rotation.random(random_state=rng).as_matrix()
+    found = nearest_in_stratum(OPTIMAL, Pose.of(position, rotation), w)
+    searched = searched_least(
+        OPTIMAL, position, rotation, lambda p, r: vanishing(w, p, r), starts=8
+    )
+    assert found.distance == pytest.approx(searched, abs=1e-8)
+    assert found.distance <= searched + 1e-8
+
+
+@given(ordinary_cases(), positions(), rotations(), st.sampled_from((1.0, 1e-2, 1e-5)))
+@settings(max_examples=FEW)
+def test_distances_change_no_more_than_the_platform_moves(
+    case: Case, shift: FloatArray, turn: FloatArray, share: float
+) -> None:
+    turned = Rotation.from_rotvec(share * Rotation.from_matrix(turn).as_rotvec()).as_matrix()
+    pose, other = case.pose, Pose.of(case.position + share * shift, turned @ case.rotation)
+    moved = way(case, pose, other)
+    here, there = (nearest_in_strata(case.design, each) for each in (pose, other))
+    for w in STRATA:
+        assert abs(here[w].distance - there[w].distance) <= moved + 1e-8 * case.size
+
+
+def test_nearest_pose_at_the_tolerance_of_incidences_lies_in_the_requested_closure() -> None:
+    # b4 comes so near to a1, and b2b3 to the guide, that a1 counts as on the line, too.
+    design = Design(a3=(10.0, 10.0), b1=(0.0, 10.0), b2=0.0, b3=2.5)
+    pose = Pose.of([0.0, 0.15625, 0.0], QUARTER_TURNS[4])
+    found = nearest_in_stratum(design, pose, (3, 1, 4, 2))
+    assert is_below(found.seen, (3, 1, 4, 2))
+    p, n = np.array(found.pose.position), found.pose.rotation[:, 2]
+    assert_allclose([p[1], p[2], n[0], n @ p], 0.0, atol=1e-14)
+
+
+@given(designs(), positions(), rotations())
+@settings(max_examples=FEW)
+def test_nearest_poses_of_designs_of_any_size_are_finite(
+    design: Design, place: FloatArray, rotation: FloatArray
+) -> None:
+    size = max(map(abs, design.variables))
+    for w in STRATA:
+        found = nearest_in_stratum(design, Pose.of(size * place, rotation), w)
+        assert np.isfinite(found.distance)
+        assert is_below(found.seen, w)
+
+
+def test_nearest_pose_of_a_pose_in_the_closure_is_itself_and_of_one_outside_is_not() -> None:
+    for w, (position, rotation) in REPRESENTATIVES.items():
+        pose = Pose.of(position, rotation)
+        for upper in (v for v in STRATA if is_below(w, v)):
+            found = nearest_in_stratum(OPTIMAL, pose, upper)
+            assert found.pose is pose
+            assert (found.distance, found.seen) == (0.0, w)
+        for lower in COVERED[w]:
+            assert nearest_in_stratum(OPTIMAL, pose, lower).distance > 1e-3
+
+
+def test_nearest_poses_of_home_are_the_nearest_singular_ones_or_have_closed_forms() -> None:
+    home = home_pose(OPTIMAL)
+    for w, nearest in zip(OF_INCIDENCES, nearest_singularities(OPTIMAL, home), strict=True):
+        found = nearest_in_stratum(OPTIMAL, home, w)
+        assert (found.pose, found.distance) == (nearest.pose, nearest.distance)
+        assert found.seen == w
+    found = nearest_in_strata(OPTIMAL, home)
+    assert found[GENERIC].pose is home
+    # A level platform comes down to the base.
+    assert found[3, 2, 1, 4].distance == pytest.approx(home.position[2], abs=1e-12)
+    assert_allclose(found[1, 2, 3, 4].pose.position, 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("w", [(1, 2, 3), (1, 1, 2, 3), (5, 4, 3, 2)])
+def test_permutation_that_is_no_stratum_is_refused(w: Stratum) -> None:
+    with pytest.raises(InputError, match="permutation"):
+        nearest_in_stratum(OPTIMAL, home_pose(OPTIMAL), w)

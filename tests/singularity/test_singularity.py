@@ -10,7 +10,6 @@ from differences import assert_is_jacobian
 from hypothesis import assume, given, strategies as st
 from incidence import distance_of_lines, distance_to_plane, tetrahedron_volume
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.spatial.transform import Rotation
 from strategies import (
     EPSILON,
     Case,
@@ -32,7 +31,7 @@ from explorer import (
     margins,
     rotation_from_quaternion,
 )
-from explorer.mechanism.margins import TETRAHEDRA, mode_name, mode_of, signs_of
+from explorer.mechanism.margins import TETRAHEDRA, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import determinant, inverse_condition, tetrahedron_volumes
@@ -100,14 +99,9 @@ def test_jacobian_at_the_tool_is_the_derivative_of_inverse_by_its_twists(
 
 
 def test_jacobian_at_tools_of_a_batch_is_that_of_each() -> None:
-    rng = np.random.default_rng(1)
-    design, tools = PRESETS["paper-optimal"], rng.normal(size=(5, 3))
-    r = Rotation.random(4, random_state=rng).as_matrix()[:, None]
-    p = rng.uniform(1.0, 9.0, (4, 1, 3))
-    matrices = jacobian(design, p, r, tools)
-    assert matrices.shape == (4, 5, 6, 6)
-    assert_allclose(matrices[2, 3], jacobian(design, p[2, 0], r[2, 0], tools[3]), atol=1e-13)
-    assert_array_equal(jacobian(design, p, r, np.zeros(3)), jacobian(design, p, r))
+    design, p, r = PRESETS["paper-optimal"], (3.0, 4.0, 5.0), np.eye(3)
+    tools = np.random.default_rng(1).normal(size=(5, 3))
+    assert_allclose(jacobian(design, p, r, tools)[3], jacobian(design, p, r, tools[3]), atol=1e-13)
     with pytest.raises(InputError, match="tool must be finite"):
         jacobian(design, p, r, (0.0, np.nan, 0.0))
 
@@ -214,15 +208,6 @@ def test_jacobian_row_of_a_leg_of_no_length_is_zero(position: list[float], row: 
     assert_array_equal(jacobian_of(case)[row], 0.0)
     assert condition_of(case) == 0.0
     assert determinant_of(case) == 0.0
-
-
-def test_modes_signs_and_names_agree() -> None:
-    for mode in range(8):
-        signs = signs_of(mode)
-        assert int(mode_of(np.array(signs, dtype=np.float64))) == mode
-        assert mode_name(mode) == " ".join("+" if sign > 0 else "−" for sign in signs)
-    assert signs_of(0b100) == (1, -1, -1)
-    assert signs_of(0b001) == (-1, -1, 1)
 
 
 @given(all_cases())

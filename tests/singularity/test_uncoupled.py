@@ -1,4 +1,4 @@
-"""The six motions that change one margin each: their lines and their travel."""
+"""The six motions that change one margin each, and the least turns to the incidences."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from scipy.spatial.transform import Rotation
 from strategies import Case, all_cases, ordinary_cases
 
 from explorer import PRESETS, UNCOUPLED, Pose, forward, home_pose, inverse, margins
+from explorer.errors import InputError
 from explorer.numerics.arrays import FloatArray
+from explorer.singularity.jacobian import jacobian, scaled_margins
+from explorer.singularity.turning import least_turns
 from explorer.singularity.uncoupled import Travel, travels
 
 DESIGN = PRESETS["paper-optimal"]
@@ -109,3 +112,79 @@ def test_rotation_about_the_guide_changes_l4_alone() -> None:
 def test_motion_by_an_infinite_amount_is_refused() -> None:
     for amount in (math.nan, math.inf):
         assert "finite amount" in refusal(UNCOUPLED[0].moved, HOME, amount)
+
+
+def random_poses(count: int) -> tuple[FloatArray, FloatArray]:
+    rng = np.random.default_rng(4)
+    return rng.uniform(-10.0, 10.0, (count, 3)), Rotation.random(count, random_state=4).as_matrix()
+
+
+def turned(
+    p: FloatArray, r: FloatArray, vector: FloatArray, *, about_a1: bool
+) -> tuple[FloatArray, FloatArray]:
+    turn = Rotation.from_rotvec(vector).as_matrix()
+    return (np.einsum("nij,nj->ni", turn, p) if about_a1 else p), turn @ r
+
+
+@pytest.mark.parametrize("about_a1", [False, True])
+def test_no_shorter_turn_about_b4_or_a1_changes_a_sign(*, about_a1: bool) -> None:
+    p, r = random_poses(3000)
+    rng = np.random.default_rng(1)
+    axes = rng.normal(size=p.shape)
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    signs = np.sign(margins(p, r))
+    for index, angle in enumerate(least_turns(p, r).T):
+        q, s = turned(p, r, 0.999 * angle[:, None] * axes, about_a1=about_a1)
+        assert (np.sign(margins(q, s))[:, index] == signs[:, index]).all()
+
+
+def test_a_turn_of_that_size_reaches_the_incidence() -> None:
+    p, r = random_poses(300)
+    x, z = np.broadcast_to([1.0, 0.0, 0.0], p.shape), np.broadcast_to([0.0, 0.0, 1.0], p.shape)
+    turns = least_turns(p, r)
+    # About b4 or a1, an axis along both the moved line or normal and what it must turn to.
+    ways = {
+        0: [(np.cross(r[:, :, 2], p), False)],
+        1: [
+            (np.cross(r[:, :, 0], np.cross(p, x)), False),
+            (np.cross(x, np.cross(r[:, :, 0], p)), True),
+        ],
+        2: [(np.cross(z, p), True)],
+    }
+    for index, axes in ways.items():
+        best = np.full(len(p), math.inf)
+        for axis, about_a1 in axes:
+            unit = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+            for sign in (1.0, -1.0):
+                vector = sign * turns[:, index, None] * unit
+                q, s = turned(p, r, vector, about_a1=about_a1)
+                best = np.minimum(best, np.abs(margins(q, s))[:, index])
+        assert best.max() < 1e-12
+
+
+@given(all_cases())
+def test_turns_do_not_depend_on_the_unit_and_no_uncoupled_rotation_is_shorter(case: Case) -> None:
+    turns = least_turns(case.position, case.rotation)
+    assert ((turns >= 0.0) & (turns <= 0.5 * math.pi)).all()
+    smaller = case.scaled(1e-3)
+    np.testing.assert_allclose(least_turns(smaller.position, smaller.rotation), turns, atol=1e-7)
+    for motion in UNCOUPLED:
+        if motion.kind == "rotation":
+            travel = motion.travel(case.pose)
+            assert turns[motion.incidence - 1] <= min(-travel.low, travel.high) + 1e-6
+
+
+def test_turns_of_a_pose_that_is_not_finite_are_refused() -> None:
+    with pytest.raises(InputError, match="finite"):
+        least_turns([math.nan, 0.0, 0.0], np.eye(3))
+
+
+@given(all_cases())
+def test_product_of_the_scaled_margins_is_the_determinant_over_the_cubed_reach(case: Case) -> None:
+    design, reach = case.design, case.design.reach
+    scaled = scaled_margins(design, case.joints, case.margins)
+    rates = jacobian(design, case.position, case.rotation) / np.array([1.0] * 3 + [reach] * 3)
+    values = np.linalg.svd(rates, compute_uv=False)
+    # Rounding of the determinant is that of its largest terms.
+    size = float(np.prod(values[:5])) * values[0]
+    assert abs(abs(float(np.linalg.det(rates))) - float(np.prod(scaled))) <= 1e-9 * size

@@ -134,11 +134,6 @@ def small_rotations(draw: st.DrawFn) -> FloatArray:
     return rotation_from_quaternion([1.0, *(0.5 * angle * a for a in axis)])
 
 
-def quarter_turns() -> st.SearchStrategy[FloatArray]:
-    """Draw one of the 24 rotations of a cube, whose entries are exact."""
-    return st.sampled_from(range(24)).map(lambda index: QUARTER_TURNS[index].copy())
-
-
 QUARTER_TURNS = np.array(
     [
         matrix
@@ -147,11 +142,13 @@ QUARTER_TURNS = np.array(
         if np.linalg.det(matrix := np.diag(signs) @ np.eye(3)[list(order)] + 0.0) > 0.0
     ]
 )
+"""The 24 rotations of a cube, whose entries are exact."""
 
 
 def rotations() -> st.SearchStrategy[FloatArray]:
     """Draw a rotation of any kind."""
-    return uniform_rotations() | small_rotations() | quarter_turns()
+    quarter_turns = st.sampled_from(range(24)).map(lambda index: QUARTER_TURNS[index].copy())
+    return uniform_rotations() | small_rotations() | quarter_turns
 
 
 @st.composite
