@@ -1,4 +1,4 @@
-"""A loaded pose: worst directions beside many sampled ones, and its largest payload and force."""
+"""A loaded pose: worst directions beside sampled ones, its largest payload and force, extremes."""
 
 from __future__ import annotations
 
@@ -6,14 +6,32 @@ import msgspec
 import numpy as np
 import pytest
 from machines import FULL, six
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
-from explorer import PRESETS, Actuators, Design, Guide, Payload, Struts, Weights
-from explorer.mechanism.home import home_pose
+from explorer import (
+    PRESETS,
+    Actuators,
+    Design,
+    Guide,
+    Payload,
+    Struts,
+    Tolerances,
+    Tool,
+    Weights,
+    rotation_from_yaw_pitch_roll,
+)
+from explorer.mechanism.design import Limits
+from explorer.mechanism.home import home_pose, home_signs
+from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
-from explorer.statics.forces import largest_force
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.statics.forces import actuator_forces, largest_force
+from explorer.statics.held import largest_shares, limit_values, load_case
 from explorer.statics.loaded import LoadedPose
-from explorer.statics.reactions import limit_shares, reactions
+from explorer.statics.reactions import limit_shares, part_limits, reactions
+from explorer.statics.tool_precision import ToolPrecision
+from explorer.statics.weights import design_weights
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = home_pose(OPTIMAL)
@@ -140,3 +158,137 @@ def test_parts_with_a_limit_are_those_whose_share_a_load_changes() -> None:
         loaded = LoadedPose(limited(**(none | {change: kept})), HOME, six(load))
         assert (loaded.limited == (loaded.shares > 0.0)).all()
         assert loaded.limited.any()
+
+
+ROTATION = home_pose(OPTIMAL).rotation
+
+
+def with_force(force: float) -> Design:
+    """Return a design with a payload that adds a force, and limits of all parts."""
+    payload = msgspec.structs.replace(FULL.payload, force_n=force)
+    return msgspec.structs.replace(FULL, payload=payload)
+
+
+def positions(count: int) -> FloatArray:
+    """Return regular positions in the mode of home, shape (count, 3)."""
+    return np.random.default_rng(7).uniform((4, 1, 4), (16, 9, 14), (count, 3))
+
+
+def shares(design: Design, at: FloatArray, load: FloatArray) -> FloatArray:
+    """Return the shares of the limits under a load at the tool, besides the payload's weight."""
+    weights = design_weights(design)
+    held = reactions(design, at, ROTATION, load, design.tool.position, weights)
+    return limit_shares(design, held)
+
+
+def test_shares_are_the_largest_of_all_directions() -> None:
+    at = positions(20)
+    ours = shares(with_force(7.0), at, np.zeros(6))
+    directions = np.random.default_rng(1).normal(size=(10_000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    loads = np.zeros((len(directions), 1, 6))
+    loads[:, 0, :3] = 7.0 * directions
+    sampled = shares(with_force(0.0), at, loads).max(axis=0)
+    assert (sampled <= ours * (1.0 + 1e-12)).all()
+    assert_allclose(sampled, ours, rtol=2e-3)
+
+
+@pytest.mark.parametrize("force", [0.0, 7.0])
+def test_kernel_of_regions_has_the_same_shares(force: float) -> None:
+    design, at = with_force(force), positions(300)
+    load = np.array([3.0, -2.0, 5.0, 10.0, -20.0, 5.0])
+    expected = shares(design, at, load).max(axis=1)
+    case = load_case(design, ROTATION, load)
+    found, parts = largest_shares(case, ROTATION, at)
+    assert_allclose(found, expected, rtol=1e-9)
+    assert set(parts.tolist()) <= set(range(part_limits(design).shape[1]))
+    least = limit_values(case, ROTATION, np.arange(20), at).min(axis=0)
+    assert (np.abs(found - 1.0) > 1e-9).all()
+    assert_array_equal(least > 0.0, found < 1.0)
+
+
+def test_functions_of_limits_cross_a_singular_plane_without_fold_or_jump() -> None:
+    """f(l4) grows towards δ3 = 0; without a moment about b4 f(l1) does not."""
+    design = msgspec.structs.replace(
+        with_force(0.0),
+        tool=Tool(),
+        payload=Payload(),
+        actuators=Actuators(push_n=(15, 15, 15, 15, 15, 15)),
+    )
+    rotation = rotation_from_yaw_pitch_roll((-73.1, 40.0, 30.0))
+    design = msgspec.structs.replace(design, home=Pose.of((10.0, 5.0, 9.0), rotation))
+    case = load_case(design, rotation, np.array([3.0, -2.0, -10.0, 0.0, 0.0, 0.0]))
+    heights = np.linspace(0.01, -0.01, 41)[:, None]
+
+    def across(plane: int) -> FloatArray:
+        """Return the functions along a line across a face of the home mode."""
+        inward = planes_of_singularity(rotation)[plane] * home_signs(design)[plane]
+        at = np.random.default_rng(2).uniform(-20.0, 20.0, (500, 3))
+        at -= (at @ inward)[:, None] * inward
+        depths = margins(at, rotation) * home_signs(design)
+        depths[:, plane] = np.inf
+        inner = at[depths.min(axis=1).argmax()]
+        return limit_values(case, rotation, np.arange(20), inner + heights * inward)
+
+    values = across(2)[[5, 15]]
+    grows = values[values[:, 20].argmin()]
+    assert grows[20] == pytest.approx(-1.0, abs=1e-6)
+    assert (np.diff(grows) < 1e-12).all()
+    values = across(0)
+    assert values[[0, 10]] == pytest.approx(1.0, abs=1e-6)
+    assert values.min() > -1.0
+    assert np.abs(np.diff(values, n=2)).max() < 1e-4
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_forces_and_precision_of_extreme_designs_and_poses_are_numbers(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    variables = 10.0 ** rng.uniform(-9.0, 9.0) * np.array(OPTIMAL.variables)
+    design = OPTIMAL.with_variables((variables * 10.0 ** rng.uniform(-2.0, 2.0, 6)).tolist())
+    six = tuple((10.0 ** rng.uniform(-9.0, 9.0, 6)).tolist())
+    offsets = tuple((10.0 ** rng.uniform(-9.0, 9.0, 3)).tolist())
+    design = msgspec.structs.replace(
+        design,
+        limits=Limits(),
+        home=None,
+        tool=Tool(tuple((design.reach * rng.normal(size=3)).tolist())),
+        payload=Payload(offsets[2], force_n=offsets[0]),
+        guide=Guide(*offsets[:2]),
+        actuators=Actuators(six, six[::-1], six, six),
+        struts=Struts(outer_mm=offsets[0], stress_mpa=offsets[1]),
+        tolerances=Tolerances(a1=offsets, b4=offsets),
+    )
+    # Down to positions whose squares vanish.
+    position = design.reach * rng.normal(size=3) * 10.0 ** -rng.choice([0.0, 3.0, 14.0, 200.0])
+    turn = rng.normal(size=4) * [1.0, *rng.choice([0.0, 1.0], 2), 1.0]
+    pose = Pose(tuple(position.tolist()), tuple(turn.tolist()))
+    loaded = LoadedPose(design, pose, six)
+    precision = ToolPrecision(loaded)
+    numbers = [
+        *(loaded.share, loaded.largest_payload, loaded.newton.share, loaded.worst_force(1.0).share),
+        *(precision.largest_displacement, *precision.worst()[:2], *precision.rms()),
+        *np.ravel(precision.deflection).tolist(),
+        *np.ravel(precision.principal.displacement).tolist(),
+    ]
+    assert not np.isnan([float(each) for each in numbers]).any()
+    shares = np.array(precision.shares)
+    assert np.isnan(shares).all() or sum(shares) == pytest.approx(1.0)
+    if precision.is_regular:
+        assert not np.isnan(precision.ellipsoid.semi_axes).any()
+        assert np.isfinite(precision.carriages).all()
+
+
+def test_pose_at_a1_is_singular_and_near_it_forces_grow_as_the_margins_shrink() -> None:
+    at = np.array([0.3, 0.5, 0.8])
+    rotation = Pose((0.0, 0.0, 0.0), (0.8, 0.1, 0.3, 0.5)).rotation
+    forces = {
+        size: actuator_forces(OPTIMAL, size * OPTIMAL.reach * at, rotation, (1, 2, 3, 4, 5, 6))
+        for size in (1e-12, 1e-20, 1e-25, 1e-27, 1e-100, 1e-200, 1e-320, 0.0)
+    }
+    # Legs 1 and 4 divide by one margin; legs 2 and 3 hold what these two cause, over another.
+    powers = np.array([1, 2, 2, 2, 2, 1])
+    for size in (1e-20, 1e-25):
+        expected = forces[1e-12] * (1e-12 / size) ** powers
+        assert_allclose(forces[size], expected, rtol=1e-8)
+    for size in (1e-27, 1e-100, 1e-200, 1e-320, 0.0):
+        assert np.isinf(forces[size]).all()

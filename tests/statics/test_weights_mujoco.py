@@ -1,4 +1,4 @@
-"""Forces with all weights, judged by MuJoCo: the equilibrium of the model, and its servos."""
+"""Forces with all weights, judged by MuJoCo: the equilibrium of the model."""
 
 from __future__ import annotations
 
@@ -32,27 +32,13 @@ TOOL = np.array([0.5, 1.0, -2.0])
 LOAD = np.array([3.0, -2.0, 4.0, 20.0, -10.0, 5.0])
 
 
-def loaded_model(design: Design) -> Any:
-    """Return the model under standard gravity."""
-    model = engine.MjModel.from_xml_string(simulation_mjcf(design))
-    # Gravity is that of the scene, MuJoCo's own 9.81 m/s².
-    model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
-    return model
-
-
-def our_forces(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
-    weights = machine_weights(design, bar_masses(design, DENSITY))
-    wrench = carry(design, position, rotation, weights, TOOL).wrench
-    return actuator_forces(design, position, rotation, wrench + LOAD, TOOL)
-
-
-def apply_load(design: Design, model: Any, data: Any, share: float = 1.0) -> None:
-    """Apply a share of the load at the tool, as generalised forces of the model."""
+def apply_load(design: Design, model: Any, data: Any) -> None:
+    """Apply the load at the tool, as generalised forces of the model."""
     metres = 1e-3 * design.unit_mm
     platform = data.body("platform")
     base = data.body("base").xmat.reshape(3, 3)
     point = platform.xpos + platform.xmat.reshape(3, 3) @ (metres * TOOL)
-    force, moment = base @ (share * LOAD[:3]), base @ (share * metres * LOAD[3:])
+    force, moment = base @ LOAD[:3], base @ (metres * LOAD[3:])
     data.qfrc_applied[:] = 0.0
     engine.mj_applyFT(model, data, force, moment, point, platform.id, data.qfrc_applied)
 
@@ -85,7 +71,10 @@ DESIGNS = [THICK, TILTED, *map(random_design, range(4))]
 
 @pytest.mark.parametrize("design", DESIGNS, ids=range(len(DESIGNS)))
 def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design) -> None:
-    model = loaded_model(design)
+    model = engine.MjModel.from_xml_string(simulation_mjcf(design))
+    # Gravity is that of the scene, MuJoCo's own 9.81 m/s².
+    model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
+    weights = machine_weights(design, bar_masses(design, DENSITY))
     data = engine.MjData(model)
     positions, rotations = random_poses(design, 10, seed=2)
     for position, rotation in zip(positions, rotations, strict=True):
@@ -97,24 +86,6 @@ def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design)
         needed = np.array(data.qfrc_bias) - np.array(data.qfrc_applied)
         columns = np.concatenate([np.eye(model.nv)[list(ACTUATED)], loops_of(model, data)]).T
         forces = np.linalg.solve(columns, needed)[:6]
-        ours = our_forces(design, position, rotation)
+        wrench = LOAD + carry(design, position, rotation, weights, TOOL).wrench
+        ours = actuator_forces(design, position, rotation, wrench, TOOL)
         assert_allclose(ours, forces, atol=1e-8 * np.abs(forces).max())
-
-
-def test_forces_with_weights_are_those_of_the_servos_at_rest() -> None:
-    design = THICK
-    model = loaded_model(design)
-    data = engine.MjData(model)
-    engine.mj_resetDataKeyframe(model, data, 0)
-    engine.mj_forward(model, data)
-    for step in range(1000):
-        apply_load(design, model, data, min(1.0, step / 500))
-        engine.mj_step(model, data)
-    assert np.abs(data.qvel).max() < 1e-6
-    forces = np.array(data.actuator_force)
-    # The servos give a little, so the pose is that at which they came to rest.
-    metres = 1e-3 * design.unit_mm
-    platform = data.body("platform")
-    place, turn = platform.xpos / metres, platform.xmat.reshape(3, 3)
-    ours = our_forces(design, place, turn)
-    assert_allclose(ours, forces, atol=1e-3 * np.abs(forces).max())
