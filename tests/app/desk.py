@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import inspect
 import re
-from collections.abc import Iterable
+import threading
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ import viser
 
 from explorer.app.session.session import Session, Who
 from explorer.app.state.actions import Set
+from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons
@@ -35,11 +37,21 @@ class Desk:
 
     def __init__(self, state: State) -> None:
         self.complaints: list[str] = []
-        self.session = Session(state, lambda _: None, self.complain, self._fail)
+        self._drawn = threading.Condition()
+        self.session = Session(state, self._draw, self.complain, self._fail)
 
     @property
     def state(self) -> State:
         assert self.session.wait_until_idle()
+        return self.session.state
+
+    def draw(self, frame: Frame) -> None:
+        """Follow a frame, on the session's thread; a desk of its own kind overrides this."""
+
+    def wait(self, condition: Callable[[State], bool]) -> State:
+        """Return the state once it meets a condition, also while the session is never idle."""
+        with self._drawn:
+            assert self._drawn.wait_for(lambda: condition(self.session.state), 120.0)
         return self.session.state
 
     def use(self, handle: Any, value: object) -> None:
@@ -63,6 +75,11 @@ class Desk:
         """Keep a complaint, whoever it is for."""
         del who
         self.complaints.append(message)
+
+    def _draw(self, frame: Frame) -> None:
+        self.draw(frame)
+        with self._drawn:
+            self._drawn.notify_all()
 
     def _fail(self, error: Exception) -> None:
         raise error
