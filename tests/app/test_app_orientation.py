@@ -5,17 +5,18 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Generator
 from dataclasses import replace
 from html import unescape
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 from limited_designs import limited
 from services import StubWorker, services_for
 
 from explorer.app.features.feature import Services
+from explorer.app.features.orientation import tasks
 from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
 from explorer.app.features.orientation.feature import ORIENTATION
 from explorer.app.features.orientation.feeds import PositionFeed, RangeFeed, TiltsFeed
@@ -52,7 +53,6 @@ from explorer.app.state.actions import Set, SetAngle, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import WorkspaceView
-from explorer.app.storage.packing import Packer, Unpacker, resolve
 from explorer.app.widgets.colours import css
 from explorer.errors import InputError
 from explorer.mechanism.design import Swing
@@ -67,7 +67,7 @@ from explorer.workspace.limits.constraints import GAP
 from explorer.workspace.orientations.sets import cone_of_directions
 from explorer.workspace.orientations.share import OrientationShare, orientation_share
 from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap, greatest_tilt, tilt_map
-from explorer.workspace.orientations.torsions import tilt_by_torsion
+from explorer.workspace.orientations.torsions import TiltByTorsion, tilt_by_torsion
 from explorer.workspace.orientations.turns import limit_names
 from explorer.workspace.solids.solids import inclusive_solid, total_solid
 
@@ -81,11 +81,33 @@ def shown(state: State, **changes: Any) -> State:
     return Set("view.orientation", replace(state.view.orientation, **changes)).apply(state)
 
 
-def facts_of(markup: str) -> dict[str, Any]:
-    found = re.search(r'data-tilts="([^"]+)"', markup)
-    assert found is not None
-    facts: dict[str, Any] = json.loads(unescape(found[1]))
-    return facts
+def facts_of(markup: str, name: str = "tilts") -> dict[str, Any]:
+    (found,) = re.findall(rf'data-{name}="([^"]+)"', markup)
+    return json.loads(unescape(found))
+
+
+@pytest.fixture(scope="module")
+def tilts() -> Generator[TiltsDrawing]:
+    """The tilts over the workspace at fewer nodes than the page has."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tasks, "NODES", 8)
+        services, worker = services_and_worker()
+        feed = services.get(TiltsFeed)
+        feed.follow(Frame(shown(opened(OPTIMAL), tilts=True)))
+        worker.work()
+        assert feed.drawing is not None
+        yield feed.drawing
+
+
+@pytest.fixture(scope="module")
+def by_torsion() -> TiltByTorsion:
+    return tilt_by_torsion(OPTIMAL, (10.0, 5.0, 9.0))
+
+
+def services_and_worker() -> tuple[Services, StubWorker]:
+    services = services_for()
+    assert isinstance(services.worker, StubWorker)
+    return services, services.worker
 
 
 def test_angles_that_are_set_are_those_of_the_pose() -> None:
@@ -95,12 +117,9 @@ def test_angles_that_are_set_are_those_of_the_pose() -> None:
         assert tilt_torsion_of(state.pose.rotation)[axis] == pytest.approx(value, abs=1e-9)
     assert tilt_torsion_of(state.pose.rotation) == pytest.approx((-140.0, 25.0, -50.0), abs=1e-9)
     assert state.pose.position == home_pose(OPTIMAL).position
+    there = GoToTilt(30.0, 20.0).apply(state)
+    assert tilt_torsion_of(there.pose.rotation) == pytest.approx((30.0, 20.0, -50.0), abs=1e-9)
     assert SetTiltTorsion(1, 25.0).words() == "tilt = 25°"
-
-
-def test_going_to_a_tilt_keeps_position_and_torsion() -> None:
-    state = GoToTilt(30.0, 20.0).apply(SetTiltTorsion(2, -60.0).apply(opened(OPTIMAL)))
-    assert tilt_torsion_of(state.pose.rotation) == pytest.approx((30.0, 20.0, -60.0), abs=1e-9)
     assert GoToTilt(30.0, 20.0).words() == "Tilt 20° towards 30°"
 
 
@@ -111,25 +130,20 @@ def test_map_draws_each_tilt_at_its_place_in_the_colour_of_its_limit() -> None:
     markup = polar_map(tilts, least, here, HOME)
     facts = facts_of(markup)
     assert facts == {"centre": list(CENTRE), "radius": RADIUS, "edge": edge_of(tilts, here, HOME)}
-    points = re.search(r'class="possible" points="([^"]+)"', markup)
-    assert points is not None
-    for pair, azimuth, tilt in zip(points[1].split(), tilts.azimuths, tilts.tilts, strict=True):
-        x, y = map(float, pair.split(","))
-        distance = RADIUS * tilt / facts["edge"]
-        angle = np.radians(azimuth)
-        assert x == pytest.approx(CENTRE[0] + distance * np.cos(angle), abs=0.06)
-        assert y == pytest.approx(CENTRE[1] - distance * np.sin(angle), abs=0.06)
+    (pairs,) = re.findall(r'class="possible" points="([^"]+)"', markup)
+    points = np.array([pair.split(",") for pair in pairs.split()], dtype=float)
+    distances, angles = RADIUS * tilts.tilts / facts["edge"], np.radians(tilts.azimuths)
+    expected = CENTRE + distances[:, None] * np.stack([np.cos(angles), -np.sin(angles)], axis=1)
+    np.testing.assert_allclose(points, expected, atol=0.06)
     # The border goes through every tilt, in the colour of what ends it.
     borders = re.findall(r'class="border" stroke="([^"]+)" d="M([^"]+)"', markup)
     assert {stroke for stroke, _ in borders} == {css(colour_of(limit)) for limit in tilts.limits}
-    for pair, limit in zip(points[1].split(), tilts.limits, strict=True):
-        at = pair.replace(",", " ")
+    for pair, limit in zip(pairs.split(), tilts.limits, strict=True):
         own = [path.split("L") for stroke, path in borders if stroke == css(colour_of(limit))]
-        assert any(at in path for path in own)
+        assert any(pair.replace(",", " ") in path for path in own)
     # Home is always drawn, dashed where its torsion is another one.
     assert 'class="home"' in markup
     assert 'class="home is-other"' in polar_map(tilts, least, here._replace(torsion=0.0), HOME)
-    assert edge_of(tilts, here, HOME._replace(tilt=170.0)) == 180.0
     # The circle of the greatest tilt in every azimuth touches the border where it ends.
     circle = re.search(
         r'class="least".* r="([^"]+)"/><circle class="dot" cx="(.+?)" cy="(.+?)"', markup
@@ -138,8 +152,7 @@ def test_map_draws_each_tilt_at_its_place_in_the_colour_of_its_limit() -> None:
     radius, x, y = map(float, circle.groups())
     assert radius == pytest.approx(RADIUS * least.tilt / facts["edge"], abs=0.06)
     assert np.hypot(x - CENTRE[0], y - CENTRE[1]) == pytest.approx(radius, abs=0.15)
-    border = [list(map(float, pair.split(","))) for pair in points[1].split()]
-    assert np.hypot(*(np.array(border) - [x, y]).T).min() < 5.0
+    assert np.hypot(*(points - [x, y]).T).min() < 5.0
 
 
 def test_map_without_any_tilt_is_drawn_too() -> None:
@@ -172,37 +185,44 @@ def test_limits_have_colours_of_their_own() -> None:
         assert colour_of(name) != FREE, name
 
 
-def test_feeds_compute_what_is_shown_and_nothing_else() -> None:
-    services, state = services_for(), opened(OPTIMAL)
-    worker = services.worker
-    assert isinstance(worker, StubWorker)
-
-    def follow(now: State) -> None:
-        for kind in ORIENTATION.later_feeds:
-            services.get(kind).follow(Frame(now))
-        worker.work()
-
-    follow(state)
+def test_position_feed_computes_share_and_torsions() -> None:
+    services, worker = services_and_worker()
+    state = opened(OPTIMAL)
+    for kind in ORIENTATION.later_feeds:
+        services.get(kind).follow(Frame(state))
+    worker.work()
+    # Nothing else is shown.
     assert [order.task.__name__ for order in worker.orders] == ["orientations_at"]
     drawing = services.get(PositionFeed).drawing
     assert drawing is not None
     assert drawing.share == orientation_share(OPTIMAL, state.pose.position)
-    best = tilt_by_torsion(OPTIMAL, state.pose.position).best
-    assert drawing.by_torsion.best == best
-    follow(shown(state, tilts=True, over="total", range=15.0))
-    tilts = services.get(TiltsFeed).drawing
-    assert tilts is not None
+    assert drawing.by_torsion.best == tilt_by_torsion(OPTIMAL, state.pose.position).best
+
+
+def test_tilts_over_positions_are_the_greatest_of_each(tilts: TiltsDrawing) -> None:
     for index in np.random.default_rng(0).integers(len(tilts.tilts), size=20):
         expected = greatest_tilt(OPTIMAL, tilts.positions[index], tilts.request.torsion).tilt
         assert tilts.tilts[index] == pytest.approx(expected, abs=1e-6)
+
+
+def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(tasks, "ORIENTATIONS", 8)
+    rotations = cone_of_directions(home_pose(OPTIMAL).rotation, 15.0, 8)
     volumes: dict[str, float] = {}
-    for over, make in (("total", total_solid), ("inclusive", inclusive_solid)):
-        follow(shown(state, over=over, range=15.0))
-        ranged = services.get(RangeFeed).drawing
-        assert ranged is not None
-        rotations = cone_of_directions(home_pose(OPTIMAL).rotation, 15.0, ORIENTATIONS)
-        volumes[over] = ranged.solid.volume
+    for over, make, bound in (
+        ("total", total_solid, "at most "),
+        ("inclusive", inclusive_solid, "at least "),
+    ):
+        services, worker = services_and_worker()
+        feed = services.get(RangeFeed)
+        feed.follow(Frame(shown(opened(OPTIMAL), over=over, range=15.0)))
+        worker.work()
+        assert feed.drawing is not None
+        volumes[over] = feed.drawing.solid.volume
         assert volumes[over] == pytest.approx(make(OPTIMAL, rotations).volume, rel=1e-3)
+        assert bound in range_words(feed)
     assert volumes["total"] < volumes["inclusive"]
 
 
@@ -218,53 +238,55 @@ def test_range_turns_the_tilted_orientations_either_way() -> None:
     assert len(set(counts.tolist())) == 1
 
 
-@pytest.mark.parametrize("turn", [-1.0, 181.0])
-def test_turns_beyond_half_a_turn_are_refused(turn: float) -> None:
-    with pytest.raises(InputError, match="turns must be 0° to 180°"):
-        shown(opened(OPTIMAL), turn=turn)
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        *(({"turn": turn}, "turns must be 0° to 180°") for turn in (-1.0, 181.0)),
+        *(({"range": tilt}, "above 0° and up to 180°") for tilt in (0.0, 181.0)),
+    ],
+)
+def test_range_or_turn_beyond_half_a_turn_is_refused(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        shown(opened(OPTIMAL), **changes)
 
 
-def test_strip_of_torsions_has_the_tilts_and_a_mark_at_the_torsion() -> None:
-    found = tilt_by_torsion(OPTIMAL, (10.0, 5.0, 9.0))
-    markup = torsion_strip(found, -90.0, 0.0)
-    told = re.search(r'data-torsions="([^"]+)"', markup)
-    assert told is not None
-    facts: dict[str, Any] = json.loads(unescape(told[1]))
-    assert facts["tilts"] == [
-        None if np.isnan(tilt) else pytest.approx(tilt, abs=0.05) for tilt in found.tilts
+def test_strip_of_torsions_has_the_tilts_and_a_mark_at_the_torsion(
+    by_torsion: TiltByTorsion,
+) -> None:
+    markup = torsion_strip(by_torsion, -90.0, 0.0)
+    assert facts_of(markup, "torsions")["tilts"] == [
+        None if np.isnan(tilt) else pytest.approx(tilt, abs=0.05) for tilt in by_torsion.tilts
     ]
     assert f'class="here" d="M{0.75 * LEFT + 0.25 * RIGHT:.1f} ' in markup
+    best = by_torsion.best
+    for tilt, count in ((best.tilt - 0.06, 1), (best.tilt - 0.04, 0), (np.nan, 1)):
+        assert torsion_strip(by_torsion, 0.0, tilt).count('class="dot"') == count
+    assert best_words(best, best.tilt).endswith(", as here")
+    assert "at" in best_words(best, best.tilt - 1.0).split()
     nowhere = tilt_by_torsion(OPTIMAL, (30.0, 5.0, 9.0))
     empty = torsion_strip(nowhere, 0.0, np.nan)
-    assert "nan" not in empty
-    assert 'class="curve"' not in empty
-    assert 'class="possible"' not in empty
-    assert 'class="dot"' not in empty
+    assert not {"nan", "curve", "possible", "dot"} & {*re.findall(r"\w+", empty)}
     assert best_words(nowhere.best, np.nan) == "none"
-    assert best_words(found.best, found.best.tilt).endswith(", as here")
-    assert "at" in best_words(found.best, found.best.tilt - 1.0).split()
 
 
-def test_strip_of_torsions_has_gaps_and_marks_the_best_torsion_unless_it_is_no_better() -> None:
-    found = tilt_by_torsion(OPTIMAL, (10.0, 5.0, 9.0))
-    curves = re.findall(r'class="curve" d="M([^"]+)"', torsion_strip(found, 0.0, 0.0))
+def test_curve_of_torsions_has_gaps_where_no_tilt_is_possible(by_torsion: TiltByTorsion) -> None:
+    curves = re.findall(r'class="curve" d="M([^"]+)"', torsion_strip(by_torsion, 0.0, 0.0))
     drawn = [float(pair.split()[0]) for curve in curves for pair in curve.split("L")]
-    torsions = [*found.torsions.tolist(), 180.0]
-    possible = np.isfinite([*found.tilts.tolist(), found.tilts[0]])
+    torsions = np.array([*by_torsion.torsions.tolist(), 180.0])
+    possible = np.isfinite([*by_torsion.tilts.tolist(), by_torsion.tilts[0]])
     assert 0 < possible.sum() < len(possible)
-    expected = [LEFT + (RIGHT - LEFT) * (t + 180.0) / 360.0 for t in torsions]
-    kept = [x for x, is_possible in zip(expected, possible, strict=True) if is_possible]
-    assert drawn == pytest.approx(kept, abs=0.06)
-    best = found.best
-    for tilt, count in ((best.tilt - 0.06, 1), (best.tilt - 0.04, 0), (best.tilt, 0), (np.nan, 1)):
-        assert torsion_strip(found, 0.0, tilt).count('class="dot"') == count
-    middle = 0.5 * float(found.torsions[20] + found.torsions[21])
-    assert tilt_at(found, middle) == pytest.approx(found.tilts[20:22].mean(), nan_ok=True)
-    assert tilt_at(found, 540.0) == pytest.approx(found.tilts[0], nan_ok=True)
+    expected = LEFT + (RIGHT - LEFT) * (torsions + 180.0) / 360.0
+    assert drawn == pytest.approx(expected[possible], abs=0.06)
+
+
+def test_tilt_at_any_torsion_is_between_those_of_its_neighbours(by_torsion: TiltByTorsion) -> None:
+    middle = 0.5 * float(by_torsion.torsions[20] + by_torsion.torsions[21])
+    between = by_torsion.tilts[20:22].mean()
+    assert tilt_at(by_torsion, middle) == pytest.approx(between, nan_ok=True)
+    assert tilt_at(by_torsion, 540.0) == pytest.approx(by_torsion.tilts[0], nan_ok=True)
     for torsion in (1e308, -1e308):
-        # A torsion of any size is one of the row.
-        same = math.remainder(torsion, 360.0)
-        assert tilt_at(found, torsion) == pytest.approx(tilt_at(found, same), nan_ok=True)
+        same = tilt_at(by_torsion, math.remainder(torsion, 360.0))
+        assert tilt_at(by_torsion, torsion) == pytest.approx(same, nan_ok=True)
 
 
 def test_share_of_none_or_all_names_the_number_of_orientations() -> None:
@@ -289,18 +311,6 @@ def test_angles_stay_as_they_were_set_at_tilts_that_do_not_determine_them() -> N
     assert turned.tilt_torsion == pytest.approx((0.0, 0.0, 10.0), abs=1e-9)
 
 
-def test_angles_that_were_set_are_saved_and_older_files_lack_them() -> None:
-    state = SetTiltTorsion(1, 0.0).apply(GoToTilt(60.0, 20.0).apply(opened(OPTIMAL)))
-    packer = Packer()
-    number = packer.add(state)
-    objects = [msgspec.json.decode(each) for each in packer.objects]
-    saved = resolve(objects)[number]
-    assert Unpacker().state(saved).tilt_torsion == state.tilt_torsion
-    assert state.tilt_torsion.azimuth == 60.0
-    older = {name: value for name, value in saved.items() if name != "set_tilt_torsion"}
-    assert Unpacker().state(older).tilt_torsion.azimuth == 0.0
-
-
 def panel_text(services: Services, state: State) -> str:
     """Return what the panel shows of a position, as HTML."""
     here, feed = state.tilt_torsion, services.get(PositionFeed)
@@ -309,11 +319,9 @@ def panel_text(services: Services, state: State) -> str:
     return "".join(parts) + strip_words(feed, here, least)
 
 
-def test_what_belongs_to_an_older_position_is_shown_as_outdated() -> None:
-    services, state = services_for(), opened(OPTIMAL)
-    worker = services.worker
-    assert isinstance(worker, StubWorker)
-    feed = services.get(PositionFeed)
+def test_panel_marks_values_of_an_older_position_as_outdated_and_shows_a_failure() -> None:
+    services, worker = services_and_worker()
+    state, feed = opened(OPTIMAL), services.get(PositionFeed)
     assert "…" in panel_text(services, state)
     feed.follow(Frame(state))
     worker.work()
@@ -324,73 +332,35 @@ def test_what_belongs_to_an_older_position_is_shown_as_outdated() -> None:
     assert outdated.count("is-outdated") == 3
     # The best tilt of the older position is compared with that of the same position.
     assert ", as here" in outdated
-    worker.work()
-    assert "is-outdated" not in panel_text(services, moved_on)
-
-
-def test_failure_of_the_share_is_shown() -> None:
-    services, state = services_for(), opened(OPTIMAL)
-    worker = services.worker
-    assert isinstance(worker, StubWorker)
-    services.get(PositionFeed).follow(Frame(state))
     worker.orders[-1].failed("the worker ended")
-    shown_text = panel_text(services, state)
-    assert "The share and the largest tilt could not be computed" in shown_text
-    assert "the worker ended" in shown_text
-    assert "…" not in shown_text
+    failed = panel_text(services, moved_on)
+    assert "The share and the largest tilt could not be computed" in failed
+    assert "the worker ended" in failed
+    assert "…" not in failed
 
 
-@pytest.mark.parametrize(("over", "bound"), [("inclusive", "at least"), ("total", "at most")])
-def test_volume_over_sampled_orientations_is_a_bound(over: str, bound: str) -> None:
-    services, state = services_for(), shown(opened(OPTIMAL), over=over, range=15.0)
-    worker = services.worker
-    assert isinstance(worker, StubWorker)
-    services.get(RangeFeed).follow(Frame(state))
-    worker.work()
-    assert f"{bound} " in range_words(services.get(RangeFeed))
+@pytest.mark.parametrize(("axis", "flipped"), [(0, False), (1, True), (2, False)])
+def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side(
+    tilts: TiltsDrawing, axis: int, flipped: bool
+) -> None:
+    assert kept_nodes(tilts, WorkspaceView()).all()
+    view = WorkspaceView(solid=True, cut=AXES[axis], level=6.0, flipped=flipped)
+    request = workspace_request(Frame(Set("view.workspace", view).apply(opened(OPTIMAL))))
+    assert request is not None
+    surface = draw_workspace(request).surface
+    ends = [shell.vertices[:, axis] for shell in surface.shells if len(shell.vertices)]
+    low, high = min(map(np.min, ends)), max(map(np.max, ends))
+    kept = tilts.positions[kept_nodes(tilts, view), axis]
+    assert len(kept)
+    assert low - 1e-9 <= kept.min()
+    assert kept.max() <= high + 1e-9
 
 
-def tilts_over(state: State) -> TiltsDrawing:
-    """Return the tilts over the workspace that the worker draws for a state."""
-    services = services_for()
-    feed, worker = services.get(TiltsFeed), services.worker
-    feed.follow(Frame(state))
-    assert isinstance(worker, StubWorker)
-    worker.work()
-    assert feed.drawing is not None
-    return feed.drawing
-
-
-def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side() -> None:
-    state = shown(opened(OPTIMAL), tilts=True)
-    drawing = tilts_over(state)
-    assert kept_nodes(drawing, WorkspaceView()).all()
-    for axis, cut in enumerate(AXES):
-        for flipped in (False, True):
-            view = WorkspaceView(solid=True, cut=cut, level=6.0, flipped=flipped)
-            request = workspace_request(Frame(Set("view.workspace", view).apply(state)))
-            assert request is not None
-            surface = draw_workspace(request).surface
-            ends = [shell.vertices[:, axis] for shell in surface.shells if len(shell.vertices)]
-            low, high = min(map(np.min, ends)), max(map(np.max, ends))
-            kept = drawing.positions[kept_nodes(drawing, view), axis]
-            assert len(kept)
-            assert low - 1e-9 <= kept.min()
-            assert kept.max() <= high + 1e-9
-
-
-def test_scale_ends_at_a_round_tilt_with_the_colours_of_its_stops() -> None:
-    drawing = tilts_over(shown(opened(OPTIMAL), tilts=True))
-    most = most_of(drawing)
-    assert most - 10.0 < drawing.tilts.max() <= most
+def test_scale_ends_at_a_round_tilt_with_the_colours_of_its_stops(tilts: TiltsDrawing) -> None:
+    most = most_of(tilts)
+    assert most - 10.0 < tilts.tilts.max() <= most
     places = np.linspace(0.0, most, len(STOPS))
     assert [tuple(colour) for colour in colours_of(places, most).tolist()] == list(STOPS)
-    assert f"{len(drawing.tilts):,} nodes" in scale_of_tilts(drawing)
-    empty = replace(drawing, positions=np.zeros((0, 3)), tilts=np.zeros(0))
+    assert f"{len(tilts.tilts):,} nodes" in scale_of_tilts(tilts)
+    empty = replace(tilts, positions=np.zeros((0, 3)), tilts=np.zeros(0))
     assert "beyond a limit" in scale_of_tilts(empty)
-
-
-@pytest.mark.parametrize("tilt", [0.0, -1.0, 181.0])
-def test_range_beyond_half_a_turn_is_refused(tilt: float) -> None:
-    with pytest.raises(InputError, match="above 0° and up to 180°"):
-        shown(opened(OPTIMAL), range=tilt)
