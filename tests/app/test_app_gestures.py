@@ -6,17 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from desk import Desk
 
 from explorer.app.session.gestures import PAUSE_SECONDS, UserAction
-from explorer.app.session.session import Session
 from explorer.app.state.action import Action
 from explorer.app.state.actions import (
     GoHome,
     Open,
     Reset,
     Set,
-    SetAngle,
     SetJoint,
     SetMode,
     SetPosition,
@@ -45,13 +43,10 @@ def start_of(state: State) -> Pose:
     return state.gesture.start
 
 
-def test_opened_design_has_no_last_move() -> None:
-    assert opened(OPTIMAL).gesture is None
-    assert Frame(opened(OPTIMAL)).last_move is None
-
-
 def test_drag_of_many_events_is_one_move_from_where_it_began() -> None:
     state = start = opened(OPTIMAL)
+    assert start.gesture is None
+    assert Frame(start).last_move is None
     for i in range(30):
         state = UserAction(SetPosition(0, 10.0 + 0.2 * (i + 1)), "x", 50.0 + 0.016 * i).apply(state)
     assert start_of(state) == start.pose
@@ -61,26 +56,6 @@ def test_drag_of_many_events_is_one_move_from_where_it_began() -> None:
     expected = move_clearance(OPTIMAL, start.pose, state.pose)
     np.testing.assert_array_equal(move.clearance, expected.clearance)
     np.testing.assert_array_equal(move.overlaps, expected.overlaps)
-
-
-@given(
-    st.lists(st.tuples(st.sampled_from("ab"), st.floats(0.0, 2.0 * PAUSE_SECONDS)), min_size=1),
-    st.booleans(),
-)
-def test_pause_or_another_control_begins_a_new_move(
-    events: list[tuple[str, float]], is_turn: bool
-) -> None:
-    state = opened(OPTIMAL)
-    time = 1e9
-    # A slower bookkeeping: the whole list of events, cut wherever a move ends.
-    moves: list[tuple[Pose, str, float]] = []
-    for i, (source, gap) in enumerate(events):
-        time += gap
-        is_same = bool(moves) and moves[-1][1] == source and time - moves[-1][2] <= PAUSE_SECONDS
-        moves.append((moves[-1][0] if is_same else state.pose, source, time))
-        action = SetAngle(0, float(i)) if is_turn else SetPosition(0, 10.5 + 0.1 * i)
-        state = UserAction(action, source, time).apply(state)
-        assert start_of(state) == moves[-1][0]
 
 
 def test_gesture_of_one_press_continues_after_a_rest_and_ends_with_it(moved: State) -> None:
@@ -111,18 +86,10 @@ def test_change_of_design_or_mode_ends_the_move(moved: State, action: Action, ho
         assert Frame(after).last_move is None
 
 
-@pytest.mark.parametrize(
-    "action",
-    [
-        Set("design.limits", Limits(leg_radii=(0.5, 0.5, 0.5, 0.5))),
-        Set("design.unit_mm", 3.0),
-        Set("view", opened(OTHER).view),
-    ],
-    ids=lambda action: type(action).__name__,
-)
-def test_action_that_moves_nothing_leaves_the_last_move(moved: State, action: Action) -> None:
-    after = UserAction(action, "other", 100.1).apply(moved)
-    assert after.gesture == moved.gesture
+def test_action_that_moves_nothing_leaves_the_last_move(moved: State) -> None:
+    thick = Set("design.limits", Limits(leg_radii=(0.5, 0.5, 0.5, 0.5)))
+    for action in (thick, Set("design.unit_mm", 3.0), Set("view", opened(OTHER).view)):
+        assert UserAction(action, "other", 100.1).apply(moved).gesture == moved.gesture
 
 
 def test_last_move_has_the_radii_of_the_present_design(moved: State) -> None:
@@ -157,37 +124,26 @@ def test_drag_through_lengths_that_cannot_close_is_one_move(moved: State) -> Non
     assert start_of(state) == moved.pose
 
 
-def test_button_begins_a_new_move(moved: State) -> None:
+def test_button_begins_a_new_move_and_a_singularity_does_not(moved: State) -> None:
     home = UserAction(GoHome(), object(), 100.1).apply(moved)
     assert start_of(home) == moved.pose
     again = UserAction(GoHome(), object(), 100.2).apply(home)
     assert again.gesture == home.gesture
-
-
-def test_drag_through_a_singularity_is_one_move(moved: State) -> None:
     through = UserAction(SetPosition(2, -4.0), "z", 300.0).apply(moved)
     assert through.mode != moved.mode
     assert start_of(through) == moved.pose
 
 
-def test_session_separates_gestures_by_key_and_time() -> None:
-    faults: list[Exception] = []
-    session = Session(opened(OPTIMAL), lambda _: None, lambda _, __: None, faults.append)
+def test_session_separates_gestures_by_key_and_time(desk: Desk) -> None:
+    def post(key: object, value: float, pauses: float) -> Pose:
+        desk.session.post(key, lambda _: SetPosition(0, value), stamp=pauses * PAUSE_SECONDS)
+        return start_of(desk.state)
 
-    def post(key: object, value: float, stamp: float) -> Pose:
-        session.post(key, lambda _: SetPosition(0, value), stamp=stamp)
-        assert session.wait_until_idle()
-        return start_of(session.state)
-
-    pauses = PAUSE_SECONDS
-    assert post("x", 11.0, 10.0 * pauses) == OPTIMAL.home
-    assert post("x", 12.0, 10.9 * pauses) == OPTIMAL.home
-    session.redraw()
-    assert post("x", 13.0, 11.8 * pauses) == OPTIMAL.home
-    assert post("drag", 14.0, 11.9 * pauses).position[0] == 13.0
-    assert post("drag", 15.0, 13.0 * pauses).position[0] == 14.0
-    session.do(GoHome())
-    assert session.wait_until_idle()
-    assert start_of(session.state).position[0] == 15.0
-    assert faults == []
-    session.stop()
+    assert post("x", 11.0, 10.0) == OPTIMAL.home
+    assert post("x", 12.0, 10.9) == OPTIMAL.home
+    desk.session.redraw()
+    assert post("x", 13.0, 11.8) == OPTIMAL.home
+    assert post("drag", 14.0, 11.9).position[0] == 13.0
+    assert post("drag", 15.0, 13.0).position[0] == 14.0
+    desk.session.do(GoHome())
+    assert start_of(desk.state).position[0] == 15.0

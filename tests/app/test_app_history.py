@@ -10,15 +10,16 @@ from dataclasses import replace
 
 import pytest
 from desk import Desk
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 
 import explorer.app
 from explorer.app.features.optimise.actions import CancelRun, EndRun, StartRun
 from explorer.app.features.paths.actions import Advance, CancelPlan, Go, Play, SetPathTime
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum, Jog
 from explorer.app.features.studies.actions import BrushAxis, OpenStudy
+from explorer.app.session import history
 from explorer.app.session.gestures import PAUSE_SECONDS, UserAction
-from explorer.app.session.history import MOST_STEPS, restore, settle, start_history
+from explorer.app.session.history import restore, settle, start_history
 from explorer.app.session.session import REDO, UNDO
 from explorer.app.state.action import Action
 from explorer.app.state.actions import (
@@ -41,7 +42,11 @@ from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 
+# Each example is a whole session.
+few = settings(max_examples=settings().max_examples // 3)
 OPTIMAL, OTHER = PRESETS["paper-optimal"], PRESETS["paper-initial"]
+
+CANCELLED = SearchResult("cancelled", "cancelled before the first iterate")
 
 lengths = st.floats(0.5, 25.0)
 actions = st.one_of(
@@ -91,6 +96,7 @@ def recorder() -> Recorder:
     return Recorder()
 
 
+@few
 @given(st.lists(st.tuples(actions, st.sampled_from("abc"), st.floats(0.0, 3.0)), max_size=25))
 def test_history_undoes_and_redoes_every_step_exactly(
     events: list[tuple[Action, str, float]],
@@ -102,13 +108,12 @@ def test_history_undoes_and_redoes_every_step_exactly(
         except ExplorerError:
             continue
         # The step holds the state that the page shows.
-        history = recorder.history
-        assert history.step.state == settle(recorder.state)
-        assert history.step.words
-        assert history.at == len(history.steps) - 1
-    history = recorder.history
-    assert [step.number for step in history.steps] == [*range(len(history.steps))]
-    states = [step.state for step in history.steps]
+        assert recorder.history.step.state == settle(recorder.state)
+        assert recorder.history.step.words
+        assert recorder.history.at == len(recorder.history.steps) - 1
+    before, steps = recorder.history, recorder.history.steps
+    assert [step.number for step in steps] == [*range(len(steps))]
+    states = [step.state for step in steps]
     assert all(a != b for a, b in itertools.pairwise(states))
     for step, expected, refusal in ((-1, states[-2::-1], "undo"), (1, states[1:], "redo")):
         for state in expected:
@@ -116,13 +121,14 @@ def test_history_undoes_and_redoes_every_step_exactly(
             assert settle(recorder.state) == state
         with pytest.raises(InputError, match=f"nothing to {refusal}"):
             recorder.move(step)
-    for step in history.steps:
-        assert history.move_to(step.number).step is step
+    for step in steps:
+        assert before.move_to(step.number).step is step
 
 
 presses = st.one_of(st.none(), st.builds(Press, st.integers(1, 2), st.integers(1, 3)))
 
 
+@few
 @given(
     st.lists(
         st.tuples(st.sampled_from("ab"), presses, st.floats(0.0, 3.0 * PAUSE_SECONDS)), min_size=1
@@ -164,15 +170,17 @@ def test_change_after_undoing_is_a_new_step_even_at_once(recorder: Recorder) -> 
     assert recorder.history.steps[2] is kept
 
 
-def test_oldest_steps_are_dropped_and_the_others_keep_their_numbers(recorder: Recorder) -> None:
-    for index in range(MOST_STEPS + 50):
+def test_oldest_steps_are_dropped_and_the_others_keep_their_numbers(
+    recorder: Recorder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(history, "MOST_STEPS", 10)
+    for index in range(25):
         recorder.do(SetPosition(0, 10.5 + index * 1e-3))
-    history = recorder.history
-    assert len(history.steps) == MOST_STEPS
-    assert history.steps[-1].number == MOST_STEPS + 50
-    assert history.move_to(history.steps[0].number).at == 0
+    steps = recorder.history.steps
+    assert [step.number for step in steps] == [*range(16, 26)]
+    assert recorder.history.move_to(16).at == 0
     with pytest.raises(InputError, match="not kept"):
-        history.move_to(history.steps[0].number - 1)
+        recorder.history.move_to(15)
 
 
 def test_playing_path_belongs_to_the_step_that_began_it(recorder: Recorder) -> None:
@@ -195,9 +203,8 @@ def test_search_is_one_step_and_no_step_is_undone_meanwhile() -> None:
     with pytest.raises(InputError, match="cancel that first"):
         recorder.move(0)
     # A change of the view meanwhile belongs to the step.
-    recorder.do(OpenStudy("trade-off"))
-    recorder.do(CancelRun())
-    recorder.do(EndRun(1, SearchResult("cancelled", "cancelled before the first iterate")))
+    for action in (OpenStudy("trade-off"), CancelRun(), EndRun(1, CANCELLED)):
+        recorder.do(action)
     assert len(recorder.words) == 1
     recorder.move(-1)
     assert recorder.state.optimisation.run is None
@@ -208,16 +215,21 @@ def test_search_is_one_step_and_no_step_is_undone_meanwhile() -> None:
 
 
 def test_page_drawn_again_after_undo_leaves_what_can_be_redone(recorder: Recorder) -> None:
-    recorder.do(Set("paths.kind", "planned"))
-    recorder.do(Go())
-    recorder.do(CancelPlan())
-    recorder.do(StartRun())
-    recorder.do(EndRun(1, SearchResult("cancelled", "cancelled before the first iterate")))
+    planned = Set("paths.kind", "planned")
+    for action in (planned, Go(), CancelPlan(), StartRun(), EndRun(1, CANCELLED)):
+        recorder.do(action)
     words = recorder.words
     recorder.move(-len(words))
     recorder.do(Set("hold", recorder.state.hold))
     assert recorder.words == words
     recorder.move(len(words))
+
+
+def test_unclosed_length_is_undone_with_its_message(recorder: Recorder) -> None:
+    recorder.do(SetJoint(0, 1000.0))
+    assert recorder.state.unclosed is not None
+    recorder.move(-1)
+    assert (recorder.state.unclosed, recorder.state.joints) == (None, opened(OPTIMAL).joints)
 
 
 def test_session_undoes_and_redoes_exactly(desk: Desk) -> None:
@@ -237,13 +249,6 @@ def test_session_undoes_and_redoes_exactly(desk: Desk) -> None:
     assert desk.state.design.variables[0] == 15.0
 
 
-def test_unclosed_length_is_undone_with_its_message(recorder: Recorder) -> None:
-    recorder.do(SetJoint(0, 1000.0))
-    assert recorder.state.unclosed is not None
-    recorder.move(-1)
-    assert (recorder.state.unclosed, recorder.state.joints) == (None, opened(OPTIMAL).joints)
-
-
 VIEWS: list[Action] = [
     Set("view.flags", False, "Flags"),
     Set("view.warn_below", 0.5),
@@ -252,6 +257,7 @@ VIEWS: list[Action] = [
 CHANGES: list[Action] = [SetPosition(0, 9.0), SetVariable("a3x", 18.0), SetJoint(0, 12.0)]
 
 
+@few
 @given(st.lists(st.sampled_from([*VIEWS, *CHANGES, "undo", "redo"]), max_size=20))
 def test_what_is_shown_is_no_step_and_undo_leaves_it(done: list[Action | str]) -> None:
     recorder, alone = Recorder(opened(OPTIMAL)), Recorder(opened(OPTIMAL))
@@ -273,24 +279,25 @@ def test_what_is_shown_is_no_step_and_undo_leaves_it(done: list[Action | str]) -
         assert settle(recorder.state) == settle(replace(alone.state, view=view))
 
 
-WORDED = [
-    (SetJoint(0, 12.5), "l1 = 12.5"),
-    (SetPosition(2, 9.25), "z = 9.25"),
-    (SetAngle(0, -70.0), "yaw = −70°"),
-    (SetPose(Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))), "Move b4 to 1, 2, 3"),
-    (SetMode(1), "Assembly mode 1 (− − +)"),
-    (SetVariable("b3", 5.0), "b3 = 5"),
-    (Jog(0, 2.0), "δ1 alone, by 2°"),
-    (GoToStratum((3, 4, 2, 1)), "Go to stratum (3, 4, 2, 1)"),
-    (GoToSingularity(2), "Go to the nearest pose with δ2 = 0"),
-    (Open(OTHER), f"Open {OTHER.name}"),
-    (OpenStudy("trade-off"), "Study trade-off"),
-    (BrushAxis("mean_margin", ((1.0, 2.0),)), "Brush mean margin at nodes"),
-]
-
-
-@pytest.mark.parametrize(("action", "expected"), WORDED, ids=lambda each: str(each)[:20])
-def test_step_says_what_was_done(recorder: Recorder, action: Action, expected: str) -> None:
+@pytest.mark.parametrize(
+    ("action", "expected"),
+    [
+        (SetJoint(0, 12.5), "l1 = 12.5"),
+        (SetPosition(2, 9.25), "z = 9.25"),
+        (SetAngle(0, -70.0), "yaw = −70°"),
+        (SetPose(Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))), "Move b4 to 1, 2, 3"),
+        (SetMode(1), "Assembly mode 1 (− − +)"),
+        (SetVariable("b3", 5.0), "b3 = 5"),
+        (Jog(0, 2.0), "δ1 alone, by 2°"),
+        (GoToStratum((3, 4, 2, 1)), "Go to stratum (3, 4, 2, 1)"),
+        (GoToSingularity(2), "Go to the nearest pose with δ2 = 0"),
+        (Open(OTHER), f"Open {OTHER.name}"),
+        (OpenStudy("trade-off"), "Study trade-off"),
+        (BrushAxis("mean_margin", ((1.0, 2.0),)), "Brush mean margin at nodes"),
+    ],
+    ids=lambda each: str(each)[:20],
+)
+def test_step_names_its_action(recorder: Recorder, action: Action, expected: str) -> None:
     recorder.do(action)
     assert recorder.words == [expected]
 
