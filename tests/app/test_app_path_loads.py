@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Generator
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any
@@ -13,19 +12,20 @@ import numpy as np
 import pytest
 import viser
 from desk import Desk
-from services import services_for
+from services import StubWorker, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import load_of
 from explorer.app.features.forces.tasks import WeightsRequest, weights_of_parts
+from explorer.app.features.paths import runner
 from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.load_plot import LoadPlot, columns_of, top_of
 from explorer.app.features.paths.loads import JourneyLoads, PathShares, demand_note, load_words
-from explorer.app.features.paths.panel import PathsPanel, plan_words
+from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.features.paths.runner import PathRunner
-from explorer.app.session.session import Session
+from explorer.app.features.paths.tasks import PlanRequest, plan
 from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, Set, SetPose
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State, opened
@@ -37,7 +37,6 @@ from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.loads import TOLERANCE, path_loads
-from explorer.statics.reactions import LIMITED
 from explorer.statics.weights import Weights, design_weights
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -56,27 +55,25 @@ DOWN = (0.0, 0.0, -40.0)
 needs_ompl = pytest.mark.skipif(find_spec("ompl") is None, reason="OMPL is not installed")
 
 
-def asked(*more: Action, force: Triple = DOWN, holds: bool = True) -> tuple[Action, ...]:
-    """Return the actions that ask for a path between the ends."""
-    return (
-        Open(PRESS),
-        SetPose(START),
-        Set("view.forces.force", force),
-        Set("paths.goal", GOAL),
-        Set("paths.kind", "planned"),
-        Set("paths.holds_load", holds),
-        Set("paths.seconds", 20.0),
-        *more,
-        Go(),
-    )
-
-
 def straight(*more: Action, force: Triple = DOWN) -> State:
     """Return a state with the straight path between the ends."""
     state = opened(PRESS, START)
-    for action in (*asked(*more, force=force)[2:-1], Set("paths.kind", "straight"), Go()):
+    for action in (
+        Set("view.forces.force", force),
+        Set("paths.goal", GOAL),
+        Set("paths.holds_load", True),
+        Set("paths.seconds", 20.0),
+        *more,
+        Go(),
+    ):
         state = action.apply(state)
     return state
+
+
+def through_the_base() -> State:
+    """Return a state with a straight path through a singular pose."""
+    x, y, z = home_pose(PRESS).position
+    return straight(Set("paths.goal", Pose((x, y, -z), home_pose(PRESS).quaternion)))
 
 
 def journey_of(state: State) -> Journey:
@@ -84,94 +81,52 @@ def journey_of(state: State) -> Journey:
     return state.journey
 
 
-class Planner:
-    """A session whose frames a path runner follows, and its problems."""
-
-    def __init__(self) -> None:
-        self.problems: list[str] = []
-        self._runner: PathRunner | None = None
-        self.session = Session(
-            opened(OPTIMAL), self._draw, lambda m, _: self.problems.append(m), self._fail
-        )
-        services = services_for(session=self.session, tell=self.problems.append)
-        self._runner = self.runner = PathRunner(services)
-
-    def _draw(self, frame: Frame) -> None:
-        if self._runner is not None:
-            self._runner.follow(frame)
-
-    def _fail(self, error: Exception) -> None:
-        raise error
-
-    def plan(self, actions: tuple[Action, ...]) -> State:
-        """Return the state once a path has been planned."""
-        for action in actions:
-            self.session.do(action)
-        deadline = time.monotonic() + 60.0
-        state = self.session.settled()
-        while state.paths.request == 0 or state.paths.is_planning:
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-            state = self.session.settled()
-        return state
-
-
 @pytest.fixture
-def planner() -> Generator[Planner]:
-    made = Planner()
-    yield made
-    made.session.stop()
-    made.runner.stop()
+def request_plan(monkeypatch: pytest.MonkeyPatch) -> Callable[[State], PlanRequest]:
+    """Return what the page asks the planner for in a state."""
+    worker = StubWorker()
+
+    def use_stub(*_: object, **__: object) -> StubWorker:
+        return worker
+
+    monkeypatch.setattr(runner, "Worker", use_stub)
+    paths = PathRunner(services_for())
+
+    def request(state: State) -> PlanRequest:
+        paths.follow(Frame(state))
+        return worker.orders[-1].request
+
+    return request
 
 
 @needs_ompl
-@pytest.mark.parametrize("at", ["b4", "tool"])
-def test_planned_path_holds_the_load_of_the_tab_forces_if_it_is_demanded(
-    planner: Planner, at: str
+@pytest.mark.parametrize(
+    ("at", "weighed", "force"), [("tool", "payload", -40.0), ("b4", "payload and legs", -25.0)]
+)
+def test_planned_path_holds_load_and_weights_of_the_tab_forces(
+    request_plan: Callable[[State], PlanRequest], at: str, weighed: str, force: float
 ) -> None:
-    state = planner.plan(asked(Set("view.at", at)))
-    assert state.paths.problem is None
-    journey = journey_of(state)
-    assert len(journey.poses) > 2
-    along = path_loads(PRESS, journey.poses, load_of(state), tool=journey.tool)
-    assert 0.5 < along.largest.share <= 1.0 + TOLERANCE
-    assert planner.problems == []
-
-
-@needs_ompl
-def test_planned_path_without_the_demand_is_straight(planner: Planner) -> None:
-    journey = journey_of(planner.plan(asked(holds=False)))
-    assert journey.poses == (START, GOAL)
-    assert path_loads(PRESS, journey.poses, [*DOWN, 0.0, 0.0, 0.0]).largest.share > 1.5
-
-
-@needs_ompl
-@pytest.mark.parametrize("weighed", ["none", "payload and legs"])
-def test_planned_path_holds_the_weights_that_are_chosen(planner: Planner, weighed: str) -> None:
-    forces: tuple[Action, ...] = (
+    state = straight(
+        Set("view.at", at),
         Set("view.forces.weighed", weighed),
         Set("view.prototype.density", 3000.0),
+        force=(0.0, 0.0, force),
     )
-    state = planner.plan(asked(*forces, force=(0.0, 0.0, -25.0)))
-    assert state.paths.problem is None
-    weights = Weights()
-    if weighed != "none":
+    state = Go().apply(Set("paths.kind", "planned").apply(state))
+    poses = plan(request_plan(state)).poses
+    weights = None
+    if weighed == "payload and legs":
         own = weights_of_parts(WeightsRequest(PRESS, 3000.0)).weights
         weights = replace(own, on_platform=(*own.on_platform, PRESS.payload))
-    along = path_loads(PRESS, journey_of(state).poses, load_of(state), weights=weights)
-    assert along.largest.share <= 1.0 + TOLERANCE
+    along = path_loads(PRESS, poses, load_of(state), tool=state.tool, weights=weights)
+    assert 0.5 < along.largest.share <= 1.0 + TOLERANCE
 
 
-def test_end_that_does_not_hold_the_load_is_told(planner: Planner) -> None:
-    state = planner.plan(asked(force=(0.0, 0.0, -70.0)))
-    assert state.journey is None
-    words = plan_words(state)
-    assert words is not None
-    assert "No path" in words
-    largest = path_loads(PRESS, (START, START), load_of(state)).largest
-    assert largest.part == LIMITED.index("d2")
-    told = f"{100.0 * largest.share:.4g} % of its limit"
-    assert f"The start does not hold the load: actuator d2 at {told}" in words
+def test_planned_path_without_the_demand_has_no_load_to_hold(
+    request_plan: Callable[[State], PlanRequest],
+) -> None:
+    state = straight(Set("paths.holds_load", False))
+    assert request_plan(Go().apply(Set("paths.kind", "planned").apply(state))).load is None
 
 
 # What is told of the present path
@@ -183,14 +138,11 @@ def shares_of(services: Services, state: State) -> JourneyLoads:
     return found
 
 
-@pytest.mark.parametrize("at", ["b4", "tool"])
-def test_shares_over_time_are_those_of_the_path(services: Services, at: str) -> None:
-    state = straight(Set("view.at", at))
+def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
+    state = straight(Set("view.at", "tool"))
     journey = journey_of(state)
-    assert (journey.tool is None) == (at == "b4")
     found = shares_of(services, state)
-    given = PRESS, journey.poses, load_of(state)
-    expected = path_loads(*given, tool=journey.tool, samples=2001)
+    expected = path_loads(PRESS, journey.poses, load_of(state), tool=journey.tool, samples=2001)
     assert found.largest == expected.largest
     largest: FloatArray = expected.shares.max(axis=1)
     most = np.interp(journey.trajectory.at, expected.at, largest)
@@ -225,9 +177,7 @@ def test_words_name_the_largest_share_its_part_and_time(services: Services) -> N
     assert f"at {found.seconds:.2f} s" in words
     idle = Set("view.forces.weighed", "none").apply(straight(force=(0.0, 0.0, 0.0)))
     assert "No part bears a load" in load_words(shares_of(services, idle))
-    x, y, z = home_pose(PRESS).position
-    below = Pose((x, y, -z), home_pose(PRESS).quaternion)
-    state = straight(Set("paths.goal", below))
+    state = through_the_base()
     found = shares_of(services, state)
     crossing = journey_of(state).margins.crossings[0]
     assert found.largest.place == crossing.move + crossing.share
@@ -267,9 +217,7 @@ def test_chart_has_the_shares_the_limit_and_what_is_beyond(services: Services) -
 
 
 def test_chart_of_singular_path_is_finite_and_goes_beyond_its_top(services: Services) -> None:
-    x, y, z = home_pose(PRESS).position
-    below = Pose((x, y, -z), home_pose(PRESS).quaternion)
-    found = shares_of(services, straight(Set("paths.goal", below)))
+    found = shares_of(services, through_the_base())
     top = top_of(found)
     _, _, share, beyond, _ = columns_of(found, 0.0, top)
     assert np.isfinite(share).all()

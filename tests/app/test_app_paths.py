@@ -6,7 +6,8 @@ import itertools
 import os
 import signal
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Literal, cast
 
@@ -49,7 +50,7 @@ from explorer.app.features.paths.runner import DIED, PathRunner
 from explorer.app.features.paths.scene import PathScene
 from explorer.app.features.paths.tasks import PlanRequest, plan
 from explorer.app.scene.placing import Placed
-from explorer.app.session.session import Session
+from explorer.app.state.action import Action
 from explorer.app.state.actions import Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import STRAIGHT_SECONDS, End, Journey
@@ -70,48 +71,41 @@ TILTED = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-73.1, 12.0, 9.0))
 GOAL = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-73.0, 10.0, 0.0))
 
 
-class Bench:
+class Bench(Desk):
     """A session whose frames a path runner follows."""
 
-    def __init__(self, state: State) -> None:
-        self.problems: list[str] = []
+    def __init__(self) -> None:
+        self.reports: list[str] = []
         self.times: list[float] = []
-        self._runner: PathRunner | None = None
-        self.session = Session(state, self._draw, lambda m, _: self.problems.append(m), self._fail)
-        self._runner = self.runner = PathRunner(
-            services_for(session=self.session, tell=self.problems.append)
-        )
+        super().__init__(opened(OPTIMAL))
+        self.runner = PathRunner(services_for(session=self.session, tell=self.reports.append))
 
-    def _draw(self, frame: Frame) -> None:
+    def draw(self, frame: Frame) -> None:
         if frame.state.journey is not None:
             self.times.append(frame.state.journey.at)
-        if self._runner is not None:
-            self._runner.follow(frame)
+        self.runner.follow(frame)
 
-    def _fail(self, error: Exception) -> None:
-        raise error
+    def do(self, *actions: Action) -> None:
+        for action in actions:
+            self.session.do(action)
 
-    def wait(self, condition: Callable[[State], bool]) -> State:
-        deadline = time.monotonic() + 60.0
-        while not condition(self.session.state):
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-        return self.session.state
+    def wait_for_plan(self, request: int) -> State:
+        return self.wait(lambda s: s.paths.request == request and not s.paths.is_planning)
 
 
 @pytest.fixture
 def bench() -> Generator[Bench]:
-    made = Bench(opened(OPTIMAL))
-    yield made
-    made.session.stop()
-    made.runner.stop()
+    bench = Bench()
+    yield bench
+    bench.session.stop()
+    bench.runner.stop()
 
 
 def with_ends(state: State, start: End = None, goal: End = None) -> State:
     return replace(state, paths=replace(state.paths, start=start, goal=goal))
 
 
-def watched(first: int, last: int, pose: Pose = TILTED) -> State:
+def start_between(first: int, last: int, pose: Pose = TILTED) -> State:
     return Go().apply(with_ends(opened(OPTIMAL, pose), first, last))
 
 
@@ -129,10 +123,10 @@ def to_plan(goal: Pose = GOAL) -> State:
 
 
 @pytest.mark.parametrize(("first", "last"), list(itertools.permutations(range(0, 8, 3), 2)))
-def test_a_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
+def test_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
     first: int, last: int
 ) -> None:
-    state = watched(first, last)
+    state = start_between(first, last)
     journey = journey_of(state)
     joints = joints_of(OPTIMAL, TILTED)
     modes = forward(OPTIMAL, joints)
@@ -177,25 +171,22 @@ def test_straight_path_leads_between_any_two_ends(start: End, goal: End) -> None
 def test_goal_is_the_neighbouring_mode_until_one_is_chosen_and_stays_once_it_is_gone_to() -> None:
     state = opened(OPTIMAL)
     assert (state.mode, goal_of(state)) == (1, 5)
-    after = Go().apply(state)
-    assert after.paths.goal == 5
-    end = SetPathTime(STRAIGHT_SECONDS).apply(after)
-    assert (end.mode, goal_of(end)) == (5, 5)
+    end = SetPathTime(STRAIGHT_SECONDS).apply(Go().apply(state))
+    assert (end.mode, end.paths.goal, goal_of(end)) == (5, 5, 5)
 
 
-@pytest.mark.parametrize("kind", ["straight", "planned"])
 @pytest.mark.parametrize(
     ("start", "goal"), [(None, TILTED), (GOAL, GOAL), (3, 3), (None, 1), (1, TILTED)]
 )
-def test_path_from_a_pose_to_itself_is_refused(kind: str, start: End, goal: End) -> None:
+def test_path_from_a_pose_to_itself_is_refused(start: End, goal: End) -> None:
     state = with_ends(opened(OPTIMAL, TILTED), start, goal)
-    assert state.mode == 1
-    with pytest.raises(InputError, match="are the same pose: choose another goal"):
-        Go().apply(Set("paths.kind", kind).apply(state))
+    for kind in ("straight", "planned"):
+        with pytest.raises(InputError, match="are the same pose: choose another goal"):
+            Go().apply(Set("paths.kind", kind).apply(state))
 
 
 def test_modes_on_the_way_are_those_of_the_legs_at_the_ends() -> None:
-    state = SetPathTime(0.3 * STRAIGHT_SECONDS).apply(watched(1, 4))
+    state = SetPathTime(0.3 * STRAIGHT_SECONDS).apply(start_between(1, 4))
     again = Go().apply(state)
     for pose, before in zip(journey_of(again).poses, journey_of(state).poses, strict=True):
         np.testing.assert_allclose(pose.position, before.position, atol=1e-9)
@@ -208,8 +199,8 @@ def test_modes_on_the_way_are_those_of_the_legs_at_the_ends() -> None:
     assert ends_of(with_ends(free, None, 6))[1].position == pytest.approx(modes.position[6])
 
 
-def test_a_path_is_of_its_design() -> None:
-    state = watched(1, 5)
+def test_path_is_of_its_design() -> None:
+    state = start_between(1, 5)
     other = SetVariable("b2", 2.7).apply(state)
     assert other.journey is None
     for action in (SetPathTime(1.0), Play(True)):
@@ -223,7 +214,7 @@ def test_a_path_is_of_its_design() -> None:
 
 
 def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
-    state = watched(1, 5)
+    state = start_between(1, 5)
     duration = journey_of(state).trajectory.duration
     assert duration == pytest.approx(STRAIGHT_SECONDS)
     for _ in range(4):
@@ -241,18 +232,14 @@ def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
         SetPathTime(float("nan")).apply(paused)
 
 
-def test_a_runner_plays_in_real_time_and_rests_when_it_is_paused(bench: Bench) -> None:
+def test_runner_plays_in_real_time_until_it_is_paused(bench: Bench) -> None:
     began = time.monotonic()
-    bench.session.do(Go())
-    state = bench.wait(lambda state: state.journey is not None and state.journey.at > 0.3)
-    passed = time.monotonic() - began
-    assert journey_of(state).at <= passed + 0.1
-    bench.session.do(Play(False))
-    bench.wait(lambda state: not journey_of(state).is_playing)
-    assert bench.session.wait_until_idle()
-    at = journey_of(bench.session.state).at
-    time.sleep(0.2)
-    assert journey_of(bench.session.state).at == at
+    bench.do(Go())
+    state = bench.wait(lambda state: state.journey is not None and state.journey.at > 0.1)
+    assert journey_of(state).at <= time.monotonic() - began
+    bench.do(Play(False))
+    paused = bench.state
+    assert Advance(1.0).apply(paused) is paused
     assert bench.times == sorted(bench.times)
 
 
@@ -260,8 +247,8 @@ def test_a_runner_plays_in_real_time_and_rests_when_it_is_paused(bench: Bench) -
 
 
 @pytest.mark.parametrize(("first", "last", "at"), [(1, 5, 0.0), (0, 7, 3.0), (2, 4, 8.0)])
-def test_the_chart_shows_the_margins_over_time(first: int, last: int, at: float) -> None:
-    state = SetPathTime(at).apply(watched(first, last))
+def test_chart_shows_the_margins_over_time(first: int, last: int, at: float) -> None:
+    state = SetPathTime(at).apply(start_between(first, last))
     journey = journey_of(state)
     x, k1, k2, k3, zero, crossed, now = columns_of(journey)
     assert (np.diff(x) >= 0.0).all()
@@ -286,7 +273,7 @@ def test_chart_is_there_and_empty_while_there_is_no_path(services: Services) -> 
             for handle, name, value in plot.updates(Frame(state))
             if isinstance(handle, viser.GuiUplotHandle)
         }
-        for state in (opened(OPTIMAL), watched(1, 5))
+        for state in (opened(OPTIMAL), start_between(1, 5))
     )
     for shown in (without, watched_one):
         assert shown["visible"] is True
@@ -295,9 +282,9 @@ def test_chart_is_there_and_empty_while_there_is_no_path(services: Services) -> 
     assert all(np.isnan(column).all() for column in empty[1:])
 
 
-def test_the_path_and_its_crossings_are_drawn(services: Services) -> None:
+def test_path_and_its_crossings_are_drawn(services: Services) -> None:
     scene = PathScene(services)
-    state = watched(1, 7)
+    state = start_between(1, 7)
     drawn = {(h.name, n): v for h, n, v in scene.updates(Placed(Frame(state)))}
     scale = Placed(Frame(state)).scale
     line: Any = drawn["/path/line", "points"]
@@ -314,24 +301,24 @@ def test_the_path_and_its_crossings_are_drawn(services: Services) -> None:
 # Planning
 
 
-@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan")])
-def test_planning_needs_some_time(seconds: float) -> None:
-    with pytest.raises(InputError, match="above zero"):
-        Set("paths.seconds", seconds).apply(opened(OPTIMAL))
+def test_planning_needs_some_time() -> None:
+    for seconds in (0.0, float("nan")):
+        with pytest.raises(InputError, match="above zero"):
+            Set("paths.seconds", seconds).apply(opened(OPTIMAL))
 
 
-def test_a_plan_is_made_in_a_process_of_its_own_and_keeps_everything(bench: Bench) -> None:
-    bench.session.do(Set("design.limits", with_radius(OPTIMAL, 0.2).limits))
-    for action in (Set("paths.goal", GOAL), Set("paths.kind", "planned"), Go()):
-        bench.session.do(action)
-    state = bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
+def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again(
+    bench: Bench,
+) -> None:
+    bench.do(Set("design.limits", with_radius(OPTIMAL, 0.2).limits))
+    bench.do(Set("paths.goal", GOAL), Set("paths.kind", "planned"), Go())
+    state = bench.wait_for_plan(1)
     assert state.paths.problem is None
     journey = journey_of(state)
     assert journey.kind == "planned"
-    assert journey.poses[0] == opened(OPTIMAL).pose
+    assert (journey.poses[0], journey.poses[-1]) == (opened(OPTIMAL).pose, GOAL)
     # It is played at once, as a straight one.
     assert bench.wait(lambda state: journey_of(state).at > 0.0).pose != GOAL
-    assert journey.poses[-1] == GOAL
     assert not journey.margins.crossings
     least = np.abs(journey.margins.margins).min(axis=0)
     closest = int(least.argmin())
@@ -339,53 +326,34 @@ def test_a_plan_is_made_in_a_process_of_its_own_and_keeps_everything(bench: Benc
     inner = [journey.pose_at(float(t)) for t in np.linspace(0, journey.trajectory.duration, 50)]
     positions, rotations = ([p.position for p in inner], [p.rotation for p in inner])
     assert poses_are_valid(state.design, np.array(positions), np.array(rotations)).all()
-    assert bench.runner.worker.process_id not in (None, os.getpid())
+    process = bench.runner.worker.process_id
+    assert process not in (None, os.getpid())
+    # A plan that would never be ready.
+    os.kill(process, signal.SIGSTOP)
+    bench.do(SetPose(opened(OPTIMAL).pose), Go())
+    assert "Planning, for 2 s at most" in str(plan_words(bench.wait(lambda s: s.paths.is_planning)))
+    bench.do(CancelPlan())
+    bench.wait_for_plan(2)
+    assert bench.runner.worker.wait_until_idle(60.0)
+    assert bench.state.paths.problem is None
+    # Cancelled before it was begun, it leaves the process.
+    with suppress(ProcessLookupError):
+        os.kill(process, signal.SIGCONT)
+    bench.do(Go())
+    assert journey_of(bench.wait_for_plan(3)).poses[-1] == GOAL
+    assert bench.complaints == bench.reports == []
 
 
-def test_why_there_is_no_path_is_told(bench: Bench) -> None:
+def test_panel_says_why_there_is_no_path() -> None:
     below = Pose((14.0, -2.0, -6.0), opened(OPTIMAL).pose.quaternion)
-    for action in (Set("paths.goal", below), Set("paths.kind", "planned"), Go()):
-        bench.session.do(action)
-    state = bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
-    with pytest.raises(ExplorerError) as expected:
+    with pytest.raises(ExplorerError) as refusal:
         plan(PlanRequest(OPTIMAL, opened(OPTIMAL).pose, below, 2.0))
-    assert state.paths.problem == str(expected.value)
-    words = plan_words(state)
-    assert words is not None
-    assert "The start is in mode 1" in words
+    state = TakePlan(1, None, str(refusal.value)).apply(Go().apply(to_plan(below)))
+    assert "The start is in mode 1" in str(plan_words(state))
     assert state.journey is None
 
 
-def test_planning_is_cancelled_at_once_and_begun_again(bench: Bench) -> None:
-    for action in (Set("paths.goal", GOAL), Set("paths.kind", "planned"), Go()):
-        bench.session.do(action)
-    bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
-    process = bench.runner.worker.process_id
-    assert process is not None
-    # One that would never be done.
-    os.kill(process, signal.SIGSTOP)
-    bench.session.do(Go())
-    state = bench.wait(lambda state: state.paths.request == 2)
-    words = plan_words(state)
-    assert words is not None
-    assert "Planning, for 2 s at most" in words
-    # Else it would not be begun at all, and the process need not end.
-    worker: Any = bench.runner.worker
-    bench.wait(lambda _: worker._current is not None)
-    bench.session.do(CancelPlan())
-    state = bench.wait(lambda state: not state.paths.is_planning)
-    assert bench.runner.worker.wait_until_idle(10.0)
-    assert bench.session.wait_until_idle()
-    state = bench.session.state
-    assert (state.paths.problem, state.journey) == (None, None)
-    bench.session.do(Go())
-    state = bench.wait(lambda state: state.paths.request == 3 and not state.paths.is_planning)
-    assert journey_of(state).poses[-1] == GOAL
-    assert bench.runner.worker.process_id != process
-    assert bench.problems == []
-
-
-def test_an_answer_that_comes_late_or_for_another_design_is_not_taken() -> None:
+def test_plan_that_comes_late_or_for_another_design_is_not_taken() -> None:
     state = Go().apply(to_plan())
     journey = Journey("planned", "", OPTIMAL, (opened(OPTIMAL).pose, GOAL))
     for late in (CancelPlan().apply(state), Go().apply(state)):
@@ -413,16 +381,24 @@ def controls_of(services: Services, panel: PathsPanel, state: State) -> dict[str
 
 def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) -> None:
     paths, buttons = PathsPanel(services), services.buttons
+    time_slider = paths.time.handle
+
+    def shown(handle: Any) -> dict[str, Any]:
+        return {n: v for h, n, v in paths.updates(Frame(desk.state)) if h is handle}
+
+    assert shown(time_slider)["disabled"] is True
     desk.click(paths.go)
     assert journey_of(desk.state).is_playing
+    slider = shown(time_slider)
+    assert slider["disabled"] is False
+    assert slider["max"] == pytest.approx(STRAIGHT_SECONDS, abs=0.011)
     desk.press(buttons, "paths.play", "off")
     assert not journey_of(desk.state).is_playing
     desk.press(buttons, "paths.play", "on")
     assert journey_of(desk.state).is_playing
-    for handle, name, value in paths.updates(Frame(desk.state)):
-        if handle is paths.time.handle:
-            setattr(handle, name, value)
-    desk.use(paths.time.handle, 2.5)
+    for name, value in slider.items():
+        setattr(time_slider, name, value)
+    desk.use(time_slider, 2.5)
     assert journey_of(desk.state).at == 2.5
     assert desk.state.pose == journey_of(desk.state).pose
     desk.press(buttons, "paths.export")
@@ -431,11 +407,8 @@ def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) ->
     desk.press(buttons, "paths.kind", "planned")
     desk.session.do(Set("paths.goal", GOAL))
     desk.click(paths.go)
-    planning = desk.state
-    assert planning.paths.is_planning
-    assert {n: v for h, n, v in paths.updates(Frame(planning)) if h is paths.go} == {
-        "disabled": True
-    }
+    assert desk.state.paths.is_planning
+    assert shown(paths.go) == {"disabled": True}
     desk.press(buttons, "paths.cancel")
     assert not desk.state.paths.is_planning
 
@@ -509,12 +482,3 @@ def test_mode_at_a_singular_pose_is_refused_in_words_or_a_pose_with_the_same_leg
             with pytest.raises(InputError, match="edge of what closes"):
                 ends_of(state)
             assert "ex-close" in end_numbers(state, "goal")
-
-
-def test_the_time_slider_ends_where_the_path_does(services: Services, desk: Desk) -> None:
-    panel = PathsPanel(services)
-    disabled = {n: v for h, n, v in panel.updates(Frame(desk.state)) if h is panel.time.handle}
-    assert disabled["disabled"] is True
-    updates = {n: v for h, n, v in panel.updates(Frame(watched(1, 5))) if h is panel.time.handle}
-    assert updates["disabled"] is False
-    assert updates["max"] == pytest.approx(STRAIGHT_SECONDS, abs=0.011)
