@@ -58,6 +58,9 @@ def random_states(count: int) -> list[State]:
     ]
 
 
+STATES = random_states(12)
+
+
 def clearances(state: State) -> np.ndarray[Any, np.dtype[np.float64]]:
     return leg_clearances(state.design, state.pose.position, state.pose.rotation).clearance
 
@@ -70,26 +73,25 @@ def in_column(values: list[float]) -> Any:
     return pytest.approx(values, abs=0.51 * 10.0 ** (1 - DIGITS) * max(map(abs, values)))
 
 
-@pytest.mark.parametrize("state", random_states(12))
-def test_the_table_shows_the_clearance_of_each_pair(state: State) -> None:
-    expected = clearances(state)
-    html = clearance_table(Frame(state))
-    rows = rows_of(html)
-    assert [row[0] for row in rows] == [f"{i} – {j}" for i, j in PAIRS]
-    assert [number(row[1]) for row in rows] == in_column(expected.tolist())
-    millimetres = (expected * OPTIMAL.unit_mm).tolist()
-    assert [number(row[2]) for row in rows] == in_column(millimetres)
-    collides = bool((expected < 0.0).any())
-    assert ("Legs collide" in html) is collides
-    assert ("Legs are clear" in html) is not collides
-    lines = re.findall(r"<tr.*?</tr>", html)[1:]
-    assert ["ex-beyond" in line for line in lines] == (expected < 0.0).tolist()
-    assert [i for i, line in enumerate(lines) if "ex-strong" in line] == [int(expected.argmin())]
-
-
-def test_random_states_collide_and_keep_clear() -> None:
-    collided = [bool((clearances(state) < 0.0).any()) for state in random_states(12)]
-    assert {True, False} == set(collided)
+def test_table_shows_the_clearance_of_each_pair() -> None:
+    verdicts: set[bool] = set()
+    for state in STATES:
+        expected = clearances(state)
+        html = clearance_table(Frame(state))
+        rows = rows_of(html)
+        assert [row[0] for row in rows] == [f"{i} – {j}" for i, j in PAIRS]
+        assert [number(row[1]) for row in rows] == in_column(expected.tolist())
+        millimetres = (expected * OPTIMAL.unit_mm).tolist()
+        assert [number(row[2]) for row in rows] == in_column(millimetres)
+        collides = bool((expected < 0.0).any())
+        verdicts.add(collides)
+        assert ("Legs collide" in html) is collides
+        assert ("Legs are clear" in html) is not collides
+        lines = re.findall(r"<tr.*?</tr>", html)[1:]
+        assert ["ex-beyond" in line for line in lines] == (expected < 0.0).tolist()
+        strong = [i for i, line in enumerate(lines) if "ex-strong" in line]
+        assert strong == [int(expected.argmin())]
+    assert verdicts == {True, False}
 
 
 def test_legs_that_share_a_joint_are_called_joined() -> None:
@@ -100,7 +102,7 @@ def test_legs_that_share_a_joint_are_called_joined() -> None:
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3, 0.4])
-def test_the_last_move_is_judged_by_both_tests(radius: float) -> None:
+def test_last_move_is_judged_by_both_tests(radius: float) -> None:
     state = thick(swept(), radius)
     home = opened(OPTIMAL).pose
     exact = move_clearance(state.design, home, END)
@@ -121,32 +123,24 @@ def test_the_last_move_is_judged_by_both_tests(radius: float) -> None:
     assert f"overlap of {', '.join(named)}<" in html
 
 
-def test_a_short_move_along_z_is_free_by_both_tests() -> None:
+def test_words_of_a_move_say_whether_it_is_free() -> None:
+    # With the two lines perpendicular both carriages stand in one place.
+    turned = Pose(opened(OPTIMAL).pose.position, (1.0, 0.0, 0.0, -1.0))
+    assert "Legs touch on the way" in move_table(Frame(swept(turned)))
+    assert "Move the platform" in move_table(Frame(opened(OPTIMAL)))
     html = move_table(Frame(swept(Pose((10.0, 5.0, 8.0), opened(OPTIMAL).pose.quaternion))))
     assert "no overlap" in html
     assert "ex-within" in html
     assert "ex-beyond" not in html
 
 
-def test_legs_without_radii_that_meet_on_the_way_touch() -> None:
-    # With the two lines perpendicular both carriages stand in one place.
-    turned = Pose(opened(OPTIMAL).pose.position, (1.0, 0.0, 0.0, -1.0))
-    assert "Legs touch on the way" in move_table(Frame(swept(turned)))
-
-
-def test_without_a_move_the_panel_says_how_to_make_one() -> None:
-    assert "Move the platform" in move_table(Frame(opened(OPTIMAL)))
-
-
-def test_the_last_move_is_shown_on_request(services: Services, desk: Desk) -> None:
+def test_last_move_is_shown_on_request(services: Services, desk: Desk) -> None:
     panel = LegsPanel(services)
-    checkboxes: list[Any] = []
-    for handle, name, value in panel.updates(Frame(desk.state)):
-        setattr(handle, name, value)
-        if isinstance(handle, viser.GuiCheckboxHandle):
-            checkboxes.append(handle)
-    checkbox, _ = checkboxes
-    assert checkbox.value is False
+    checkbox: Any = next(
+        handle
+        for handle, _, _ in panel.updates(Frame(desk.state))
+        if isinstance(handle, viser.GuiCheckboxHandle)
+    )
     for on in (True, False):
         desk.use(checkbox, on)
         assert desk.state.view.swept is on
@@ -159,21 +153,21 @@ def test_the_last_move_is_shown_on_request(services: Services, desk: Desk) -> No
 # The scene
 
 
-@pytest.mark.parametrize("state", random_states(12))
-def test_legs_that_collide_are_coloured(services: Services, state: State) -> None:
-    drawn = by_name(Legs(services).updates(Placed(Frame(state))))
-    tubes = drawn["/legs/actuators"]["batched_colors"][:4].tolist()
-    beyond = [pair for pair, c in zip(PAIRS, clearances(state).tolist(), strict=True) if c < 0.0]
-    for leg, colour in zip((1, 2, 3, 4), tubes, strict=True):
-        assert tuple(colour) == (OUTLINE if any(leg in pair for pair in beyond) else TUBE)
+def test_legs_that_collide_are_coloured(services: Services) -> None:
+    legs = Legs(services)
+    for state in STATES:
+        colours = by_name(legs.updates(Placed(Frame(state))))["/legs/actuators"]["batched_colors"]
+        pairs = zip(PAIRS, clearances(state).tolist(), strict=True)
+        beyond = {leg for pair, clearance in pairs if clearance < 0.0 for leg in pair}
+        expected = [OUTLINE if leg in beyond else TUBE for leg in (1, 2, 3, 4)]
+        assert [tuple(colour) for colour in colours[:4].tolist()] == expected
 
 
-def test_the_closest_pair_is_marked_wherever_the_platform_goes(services: Services) -> None:
+def test_closest_pair_is_marked_wherever_the_platform_goes(services: Services) -> None:
     scene = ClearanceScene(services)
     marked: set[tuple[int, int]] = set()
-    for state in random_states(12):
-        shown = viewed(state, clearance=True)
-        placed = Placed(Frame(shown))
+    for state in STATES:
+        placed = Placed(Frame(viewed(state, clearance=True)))
         drawn = by_name(scene.updates(placed))
         found = leg_clearances(state.design, state.pose.position, state.pose.rotation)
         pair = int(found.clearance.argmin())
@@ -196,18 +190,8 @@ def test_the_closest_pair_is_marked_wherever_the_platform_goes(services: Service
     assert len(marked) > 1
 
 
-@pytest.mark.parametrize("view", [{}, {"clearance": True, "drawn_as": "6-4 twin"}])
-def test_the_closest_pair_is_marked_on_request_and_not_on_the_twin(
-    services: Services, view: dict[str, Any]
-) -> None:
-    state = opened(OPTIMAL)
-    shown = viewed(state, **view)
-    drawn = by_name(ClearanceScene(services).updates(Placed(Frame(shown))))
-    assert drawn["/clearance/line"] == drawn["/clearance/label"] == {"visible": False}
-
-
-@pytest.mark.parametrize("state", random_states(4))
-def test_legs_with_radii_are_drawn_as_capsules(services: Services, state: State) -> None:
+def test_legs_with_radii_are_drawn_as_capsules(services: Services) -> None:
+    state = STATES[0]
     placed = Placed(Frame(state))
     drawn = by_name(ClearanceScene(services).updates(placed))
     rods, ends = drawn["/clearance/rods"], drawn["/clearance/ends"]
@@ -223,18 +207,24 @@ def test_legs_with_radii_are_drawn_as_capsules(services: Services, state: State)
 
 
 @pytest.mark.parametrize(
-    ("radius", "view"), [(0.0, {}), (0.3, {"drawn_as": "6-4 twin"}), (0.3, {"legs": False})]
+    ("radius", "view", "hidden"),
+    [
+        (0.0, {}, ("line", "label", "rods", "ends")),
+        (0.0, {"clearance": True, "drawn_as": "6-4 twin"}, ("line", "label")),
+        (0.3, {"drawn_as": "6-4 twin"}, ("rods", "ends")),
+        (0.3, {"legs": False}, ("rods", "ends")),
+    ],
 )
-def test_there_are_no_capsules_without_radii_or_without_legs(
-    services: Services, radius: float, view: dict[str, Any]
+def test_clearances_and_capsules_are_hidden_where_they_are_not_wanted(
+    services: Services, radius: float, view: dict[str, Any], hidden: tuple[str, ...]
 ) -> None:
-    state = thick(opened(OPTIMAL), radius)
-    shown = viewed(state, **view)
+    shown = viewed(thick(opened(OPTIMAL), radius), **view)
     drawn = by_name(ClearanceScene(services).updates(Placed(Frame(shown))))
-    assert drawn["/clearance/rods"] == drawn["/clearance/ends"] == {"visible": False}
+    for name in hidden:
+        assert drawn[f"/clearance/{name}"] == {"visible": False}
 
 
-def test_the_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
+def test_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
     state, home = swept(), opened(OPTIMAL).pose
     placed = Placed(Frame(state))
     drawn = by_name(SweptTetrahedra(services).updates(placed))
@@ -285,17 +275,14 @@ def test_each_face_of_a_swept_body_is_drawn_once(services: Services) -> None:
             assert len(corners) == 4
 
 
-@pytest.mark.parametrize("view", [{"swept": False}, {"swept": True, "drawn_as": "6-4 twin"}])
-def test_what_is_not_shown_costs_nothing(services: Services, view: dict[str, Any]) -> None:
-    state = swept()
-    frame = Frame(viewed(state, **view))
-    drawn = by_name(SweptTetrahedra(services).updates(Placed(frame)))
-    assert list(drawn.values()) == [{"visible": False}] * 6
-    assert "last_move" not in vars(frame)
-
-
-def test_nothing_is_drawn_where_nothing_moved(services: Services) -> None:
+def test_swept_tetrahedra_are_hidden_and_cost_nothing_where_they_are_not_wanted(
+    services: Services,
+) -> None:
     scene = SweptTetrahedra(services)
+    for view in ({"swept": False}, {"swept": True, "drawn_as": "6-4 twin"}):
+        frame = Frame(viewed(swept(), **view))
+        assert list(by_name(scene.updates(Placed(frame))).values()) == [{"visible": False}] * 6
+        assert "last_move" not in vars(frame)
     back = UserAction(SetPosition(0, 10.0), "x", 0.1)
     there = UserAction(SetPosition(0, 12.0), "x", 0.0)
     shown = viewed(opened(OPTIMAL), swept=True)
@@ -307,22 +294,18 @@ def test_nothing_is_drawn_where_nothing_moved(services: Services) -> None:
 # The order of the carriages
 
 
-def test_a_checkbox_says_whether_the_carriages_keep_their_order(
+def test_checkbox_says_whether_the_carriages_keep_their_order(
     services: Services, desk: Desk
 ) -> None:
     panel = DesignPanel(services)
-    found: list[Any] = []
-    for handle, name, value in panel.updates(Frame(desk.state)):
-        setattr(handle, name, value)
-        is_box = isinstance(handle, viser.GuiCheckboxHandle)
-        if is_box and handle.label == "Carriages keep their order" and handle not in found:
-            found.append(handle)
-    (checkbox,) = found
-    assert checkbox.value is True
+    boxes = {
+        handle.label: handle
+        for handle, _, _ in panel.updates(Frame(desk.state))
+        if isinstance(handle, viser.GuiCheckboxHandle)
+    }
     for on, order in ((False, "any"), (True, "home")):
-        desk.use(checkbox, on)
+        desk.use(boxes["Carriages keep their order"], on)
         assert desk.state.design.limits.carriage_order == order
-        assert checkbox.value is on
     assert desk.complaints == []
 
 
@@ -354,7 +337,7 @@ def test_each_radius_has_a_slider_that_sets_it_alone(services: Services, desk: D
 
 
 @pytest.mark.parametrize("radius", [-0.5, float("nan")])
-def test_a_radius_that_cannot_be_is_refused_and_changes_nothing(
+def test_radius_that_cannot_be_is_refused_and_changes_nothing(
     services: Services, desk: Desk, radius: float
 ) -> None:
     before = desk.state
