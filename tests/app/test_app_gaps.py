@@ -7,7 +7,6 @@ import functools
 import itertools
 import math
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,8 +31,8 @@ from explorer.app.features.mechanism.tetrahedra import INSET, Tetrahedra
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum
 from explorer.app.features.singularity.distance import DistancePanel, distance_table
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import dashes, linear_colour, of_one_colour, torus
-from explorer.app.state.actions import Open, SetPose
+from explorer.app.scene.shapes import linear_colour, of_one_colour
+from explorer.app.state.actions import Open, SetJoint, SetPose
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.widgets.colours import SINGULAR, proximity_colour
@@ -137,21 +136,6 @@ def test_dashes_go_from_end_to_end_of_each_gap_in_the_colour_of_its_danger(gaps:
             assert_allclose(points[-1, 1], platform, atol=1e-4)
             colour = linear_colour(proximity_colour(shown[index].level))
             assert np.unique(node["colors"][rows].reshape(-1, 3), axis=0).tolist() == [list(colour)]
-
-
-@pytest.mark.parametrize("length", [0.0, 1e-9, 0.1, 0.3, 1.0, 7.7, 1e3])
-def test_dashes_cover_their_share_from_end_to_end(length: float) -> None:
-    start, way = np.array([1.0, 2.0, 3.0]), np.array([0.6, 0.0, 0.8])
-    line = np.stack([start, start + length * way])
-    segments = dashes(line[None], 20, 0.5, 0.6)
-    assert segments.shape == (20, 2, 3)
-    along = (segments - start) @ way
-    assert_allclose(segments, start + along[..., None] * way, atol=1e-12 * (1.0 + length))
-    assert along.min() == pytest.approx(0.0)
-    assert along.max() == pytest.approx(length)
-    assert (np.diff(along.reshape(-1)) >= -1e-12 * (1.0 + length)).all()
-    total = float((along[:, 1] - along[:, 0]).sum())
-    assert 0.6 * length <= total <= length + 1e-12
 
 
 def test_contacts_are_marked_where_the_pose_is_singular_and_nowhere_else(gaps: Gaps) -> None:
@@ -385,38 +369,14 @@ def test_names_of_tetrahedra_stand_at_their_centres_and_go_with_the_labels(
         assert_allclose(name["position"], np.mean([placed.points[p] for p in names], axis=0))
 
 
-def test_shared_edges_of_tetrahedra_lie_beside_each_other(tetrahedra: Tetrahedra) -> None:
-    nodes = draw(tetrahedra, opened(OPTIMAL))
-    placed = Placed(Frame(opened(OPTIMAL)))
-    starts: dict[frozenset[str], list[FloatArray]] = {}
-    for incidence, names in enumerate(TETRAHEDRA, start=1):
-        points = nodes[f"/tetrahedra/{incidence}/edges"]["points"]
-        each = len(points) // 6
-        for edge, (a, b) in enumerate(itertools.combinations(names, 2)):
-            # Ends of the edge in the order of the names.
-            ends = np.stack([points[edge * each, 0], points[(edge + 1) * each - 1, 1]])
-            order = slice(None) if a < b else slice(None, None, -1)
-            starts.setdefault(frozenset((a, b)), []).append(ends[order])
-            way = placed.points[b] - placed.points[a]
-            assert_allclose(np.cross(ends[1] - ends[0], way), 0.0, atol=1e-3)
-    shared = [ends for ends in starts.values() if len(ends) == 2]
-    assert len(shared) == 4
-    for one, other in shared:
-        way = (one[1] - one[0]) / np.linalg.norm(one[1] - one[0])
-        apart = other - one
-        assert np.linalg.norm(apart - (apart @ way)[:, None] * way, axis=1).min() > 0.05
-
-
-@pytest.mark.parametrize("failing", [(0,), (1, 2)])
 def test_tetrahedron_that_fails_is_outlined_even_if_it_is_switched_off(
-    tetrahedra: Tetrahedra, failing: tuple[int, ...]
+    tetrahedra: Tetrahedra,
 ) -> None:
-    state: Any = SimpleNamespace(failing=failing)
-    placed = Placed(Frame(viewed(opened(OPTIMAL), tetrahedra=(False, False, False))))
-    object.__setattr__(placed.frame.state, "unclosed", state)
-    nodes = by_name(tetrahedra.updates(placed))
-    shown = {i for i in range(3) if nodes[f"/tetrahedra/{i + 1}/edges"]["visible"]}
-    assert shown == set(failing)
+    state = SetJoint(0, 1000.0).apply(opened(OPTIMAL))
+    assert state.unclosed is not None
+    nodes = draw(tetrahedra, viewed(state, tetrahedra=(False, False, False)))
+    outlined = {i for i in range(3) if nodes[f"/tetrahedra/{i + 1}/edges"]["visible"]}
+    assert outlined == {*state.unclosed.failing} != set()
 
 
 # The gizmo
@@ -474,15 +434,3 @@ def test_linear_colours_are_those_of_the_srgb_standard(colour: tuple[int, int, i
     assert np.unique(of_one_colour(colour, 4).reshape(-1, 3), axis=0).tolist() == [
         list(linear_colour(colour))
     ]
-
-
-def test_torus_is_closed_faces_outward_and_has_its_volume() -> None:
-    vertices, faces = torus(0.85, 0.09)
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    there = {(int(a), int(b)) for a, b in edges}
-    assert len(there) == len(edges)
-    assert there == {(b, a) for a, b in there}
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    volume = float((np.cross(a, b) * c).sum()) / 6.0
-    # A little less than that of the round ring.
-    assert 0.85 < volume / (2.0 * math.pi**2 * 0.85 * 0.09**2) < 1.0

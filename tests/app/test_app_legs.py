@@ -249,32 +249,6 @@ def test_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
     np.testing.assert_allclose(drawn["/swept/starts"]["points"], starts, rtol=1e-5, atol=1e-5)
 
 
-def test_each_face_of_a_swept_body_is_drawn_once(services: Services) -> None:
-    scene = SweptTetrahedra(services)
-    drawn = {
-        handle.name: handle
-        for handle, _, _ in scene.updates(Placed(Frame(swept())))
-        if isinstance(handle, viser.MeshHandle)
-    }
-    bodies = swept_tetrahedra(
-        OPTIMAL,
-        *(np.array(opened(OPTIMAL).pose.position), opened(OPTIMAL).pose.rotation),
-        *(np.array(END.position), END.rotation),
-    )
-    for leg, body in zip((1, 2, 3, 4), bodies, strict=True):
-        corners = body[np.asarray(drawn[f"/swept/{leg}"].faces)]
-        a, b, c = np.moveaxis(corners, 1, 0)
-        normals = np.cross(b - a, c - a)
-        area = float(np.linalg.norm(normals, axis=1).sum()) / 2.0
-        if leg in (1, 4):
-            u, v = body[2] - body[0], body[3] - body[0]
-            assert area == pytest.approx(float(np.linalg.norm(np.cross(u, v))) / 2.0)
-        else:
-            # A closed surface: the faces' normals add up to nothing.
-            np.testing.assert_allclose(normals.sum(axis=0), 0.0, atol=1e-9 * area)
-            assert len(corners) == 4
-
-
 def test_swept_tetrahedra_are_hidden_and_cost_nothing_where_they_are_not_wanted(
     services: Services,
 ) -> None:

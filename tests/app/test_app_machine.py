@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from explorer.app.features.feature import Services
 from explorer.app.features.machine.actions import SetToolAngle
 from explorer.app.features.machine.panel import MachinePanel
-from explorer.app.features.machine.scene import PayloadScene, ToolScene, ball_radius
+from explorer.app.features.machine.scene import PayloadScene, ToolScene
 from explorer.app.features.machine.words import machine_words
 from explorer.app.scene.part import HALF_JOINT
 from explorer.app.scene.placing import Placed
@@ -424,17 +424,3 @@ def test_tool_and_payload_hang_on_the_platform_and_are_in_the_picture(services: 
         ball = payload.corners(scene)
         assert np.allclose(ball.mean(axis=0), in_base(scene, PRESS.payload.centre))
         assert np.allclose(np.ptp(ball, axis=0), 2.0 * nodes["/platform/payload"]["scale"])
-
-
-def test_tool_at_b4_has_axes_and_no_line(services: Services) -> None:
-    scene = placed(design_with(tool=Tool(quaternion=TURNED.quaternion)))
-    nodes = by_name(ToolScene(services).updates(scene))
-    assert visible(nodes) == {f"/platform/tool{part}" for part in ("", "/axes", "-label")}
-
-
-def test_volume_of_the_ball_is_in_proportion_to_the_mass() -> None:
-    rng = np.random.default_rng(5)
-    for mass, factor in rng.uniform((0.2, 0.2), (2.0, 5.0), (100, 2)):
-        ratio = (ball_radius(factor * mass) / ball_radius(mass)) ** 3
-        assert ratio == pytest.approx(factor)
-    assert 0.0 < ball_radius(1e-9) < ball_radius(0.1) < ball_radius(10.0) < ball_radius(1e9) < 3.0

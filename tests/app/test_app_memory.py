@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import platform
 import threading
 import weakref
 
@@ -12,14 +11,6 @@ import pytest
 from explorer.app.session import memory
 from explorer.app.session.memory import freeze_objects
 from explorer.numerics.compiled import warm_in_background
-
-
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="for glibc alone")
-def test_system_takes_back_freed_memory() -> None:
-    # Too small to be mapped one by one; those that stay lie between those that go.
-    kept = [bytearray(3000) for _ in range(70_000)][::70]
-    assert memory.trim()
-    assert len(kept) == 1000
 
 
 def test_memory_is_trimmed_repeatedly_within_the_context(
