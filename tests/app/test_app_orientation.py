@@ -290,8 +290,8 @@ def test_tilt_at_any_torsion_is_between_those_of_its_neighbours(by_torsion: Tilt
 
 
 def test_share_of_none_or_all_names_the_number_of_orientations() -> None:
-    assert share_words(OrientationShare(0.0, 0.0, 100_000)) == "none of 100,000"
-    assert share_words(OrientationShare(1.0, 0.0, 100_000)) == "all of 100,000"
+    for share, words in ((0.0, "none of 100,000"), (1.0, "all of 100,000")):
+        assert share_words(OrientationShare(share, 0.0, 100_000)) == words
     assert share_words(OrientationShare(0.125, 0.0002, 100_000)) == "12.50 % ± 0.02 %"
 
 
