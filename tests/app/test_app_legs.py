@@ -286,37 +286,27 @@ def test_checkbox_says_whether_the_carriages_keep_their_order(
 # The radii
 
 
-def radius_sliders(services: Services, desk: Desk) -> list[Any]:
-    """Return the four sliders of a new Design panel, showing the state."""
-    panel = DesignPanel(services)
-    handles: dict[str, Any] = {}
-    for handle, name, value in panel.updates(Frame(desk.state)):
+def test_each_radius_has_a_slider_that_sets_it_alone_and_refuses_what_cannot_be(
+    services: Services, desk: Desk
+) -> None:
+    sliders: dict[str, Any] = {}
+    for handle, name, value in DesignPanel(services).updates(Frame(desk.state)):
         setattr(handle, name, value)
         if isinstance(handle, viser.GuiSliderHandle):
-            handles[handle.label] = handle
-    return [handles[f"leg {leg}"] for leg in (1, 2, 3, 4)]
-
-
-def test_each_radius_has_a_slider_that_sets_it_alone(services: Services, desk: Desk) -> None:
-    expected = [0.0] * 4
-    span = radius_span(desk.state)
-    for leg, slider in enumerate(radius_sliders(services, desk)):
+            sliders[handle.label] = handle
+    expected, span = [0.0] * 4, radius_span(desk.state)
+    for leg in range(4):
+        slider = sliders[f"leg {leg + 1}"]
         assert (slider.min, slider.max, slider.value) == (0.0, span.high, 0.0)
         expected[leg] = 0.1 * (leg + 1)
         desk.use(slider, expected[leg])
         assert desk.state.design.limits.leg_radii == pytest.approx(expected)
     assert desk.complaints == []
-    sums = [expected[i - 1] + expected[j - 1] for i, j in PAIRS]
-    np.testing.assert_allclose(clearances(desk.state), clearances(opened(OPTIMAL)) - sums)
-
-
-@pytest.mark.parametrize("radius", [-0.5, float("nan")])
-def test_radius_that_cannot_be_is_refused_and_changes_nothing(
-    services: Services, desk: Desk, radius: float
-) -> None:
     before = desk.state
+    sums = [expected[i - 1] + expected[j - 1] for i, j in PAIRS]
+    np.testing.assert_allclose(clearances(before), clearances(opened(OPTIMAL)) - sums)
     # What no slider offers may still be typed, or sent by anyone.
-    desk.use(radius_sliders(services, desk)[2], radius)
-    assert desk.state == before
-    (complaint,) = desk.complaints
-    assert complaint.startswith("The radius of a leg must ")
+    for radius in (-0.5, float("nan")):
+        desk.use(sliders["leg 3"], radius)
+        assert desk.state == before
+        assert desk.complaints.pop().startswith("The radius of a leg must ")

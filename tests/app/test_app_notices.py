@@ -29,9 +29,9 @@ def explorer_with(data: UserData) -> Generator[Running]:
         running.stop()
 
 
-def notices_of(client: Client, messages: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the notices among these messages and those that follow until it is quiet."""
-    messages = [*messages, *client.read_until_quiet(0.5)]
+def notices_of(client: Client) -> list[dict[str, Any]]:
+    """Return the notices of a client until it is quiet."""
+    messages = client.read_until_quiet(0.5)
     return [m["props"] for m in messages if m["type"] == "NotificationShowMessage"]
 
 
@@ -72,19 +72,11 @@ def test_data_folder_unwritable_from_the_start_stands_in_the_bar_until_it_can_be
             assert "EXPLORER_DATA" in bar
             # A press shows the whole reason.
             client.update(*press_update(running, UNSAVED))
-            (notice,) = notices_of(client, [])
+            (notice,) = notices_of(client)
             assert "a file lies where a folder is meant" in notice["body"]
         folder.unlink()
         assert page.autosaver.flush()
         wait_for(lambda: not has_warning(running))
-
-
-def test_session_that_is_saved_has_no_warning(tmp_path: Path) -> None:
-    with explorer_with(data_in(tmp_path)) as running:
-        assert running.page.autosaver is not None
-        assert running.page.autosaver.flush()
-        assert running.page.session.wait_until_idle()
-        assert not has_warning(running)
 
 
 def test_notice_before_any_browser_is_shown_to_the_first_one_alone(tmp_path: Path) -> None:
@@ -92,7 +84,7 @@ def test_notice_before_any_browser_is_shown_to_the_first_one_alone(tmp_path: Pat
     with explorer_with(replace(data_in(tmp_path), messages=messages)) as running:
         running.page.services.tell("the study has ended")
         with client_of(running) as client:
-            notices = notices_of(client, [])
+            notices = notices_of(client)
             assert [notice["body"] for notice in notices] == [
                 *(f"File {number} is damaged." for number in range(3)),
                 "the study has ended",
@@ -100,7 +92,7 @@ def test_notice_before_any_browser_is_shown_to_the_first_one_alone(tmp_path: Pat
             # They stay until they are closed, since the page may still be loading.
             assert {notice["auto_close_seconds"] for notice in notices} == {None}
         with client_of(running) as other:
-            assert notices_of(other, []) == []
+            assert notices_of(other) == []
 
 
 def test_notices_without_a_browser_keep_the_newest(tmp_path: Path) -> None:
@@ -108,7 +100,7 @@ def test_notices_without_a_browser_keep_the_newest(tmp_path: Path) -> None:
         for number in range(100):
             running.page.services.tell(f"notice {number}")
         with client_of(running) as client:
-            bodies = [notice["body"] for notice in notices_of(client, [])]
+            bodies = [notice["body"] for notice in notices_of(client)]
         assert 0 < len(bodies) <= 20
         assert bodies == [f"notice {number}" for number in range(100 - len(bodies), 100)]
 
@@ -120,5 +112,5 @@ def test_damaged_session_is_shown_to_the_first_browser(
     (tmp_path / "sessions").mkdir()
     (tmp_path / "sessions" / "one.json").write_bytes(b"damaged")
     with explorer_with(open_user_data(resume=True)) as running, client_of(running) as client:
-        (notice,) = notices_of(client, [])
+        (notice,) = notices_of(client)
         assert "'one.json.broken'" in notice["body"]

@@ -21,6 +21,8 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 
 PATIENCE_SECONDS = 120.0
+# Each example draws the whole page several times.
+few = settings(max_examples=settings().max_examples // 5)
 MINUS_ZERO = re.compile(r"(?<![\w.])[-−]0(\.0+)?(?![\d.])")
 EXPONENT = re.compile(r"\d[eE][+-]?\d")
 NO_COMMAS = re.compile(r"(?<![\d.,])(\d{5,}|\d{4,}\.\d)")
@@ -60,7 +62,7 @@ def check_numbers(running: Running) -> None:
             assert not pattern.search(text), f"{place}: {text}"
 
 
-@settings(max_examples=15)
+@few
 @given(samples(10))
 def test_numbers_of_all_texts_are_written_alike_after_random_actions(
     running: Running, actions: list[Sample]
@@ -70,7 +72,7 @@ def test_numbers_of_all_texts_are_written_alike_after_random_actions(
         check_numbers(running)
 
 
-@settings(max_examples=25)
+@few
 @given(st.tuples(SHORT, SHORT, SHORT), st.tuples(SHORT, SHORT, SHORT), st.sampled_from("xyz"))
 def test_rounding_is_zero_in_all_texts(
     running: Running, position: Triple, angles: Triple, axis: str
@@ -84,13 +86,14 @@ def test_rounding_is_zero_in_all_texts(
 
 
 def test_numbers_of_computed_drawings_are_written_alike(running: Running) -> None:
-    for design in PRESETS.values():
-        do(running, Open(design))
-        do(running, Set("view.workspace.solid", True))
-        do(running, Set("view.workspace.region", "accessible"))
-        do(running, Set("view.workspace.cut", "y"))
-        do(running, Set("view.radius_curve", True))
-        do(running, Set("view.drawn_as", "prototype"))
-        do(running, Set("compared.pinned", (*PRESETS.values(), None)[:3]))
-        assert running.page.wait_until_drawn(PATIENCE_SECONDS)
-        check_numbers(running)
+    for path, value in (
+        ("view.workspace.solid", True),
+        ("view.workspace.region", "accessible"),
+        ("view.workspace.cut", "y"),
+        ("view.radius_curve", True),
+        ("view.drawn_as", "prototype"),
+        ("compared.pinned", (*PRESETS.values(), None)[:3]),
+    ):
+        do(running, Set(path, value))
+    assert running.page.wait_until_drawn(PATIENCE_SECONDS)
+    check_numbers(running)
