@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
+from long_cases import long_after
 from reference import read_reference
 
-from explorer import PRESETS, Actuators, Design, Limits, Payload, Struts, Tool
+from explorer import PRESETS, Actuators, Limits, Payload, Struts, Tool
 from explorer.mechanism.design_file import decode_design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins, mode_of, signs_of
@@ -52,14 +54,16 @@ def check_none_is_nearer(loaded: LoadedPose) -> None:
     distance = float(np.linalg.norm(np.subtract(found.position, loaded.pose.position)))
     assert len(distances_held(loaded, np.array([found.position]))) == 1
     rng = np.random.default_rng(5)
-    ball = rng.normal(size=(80_000, 3))
+    ball = rng.normal(size=(20_000, 3))
     radii = distance * rng.uniform(size=len(ball)) ** (1 / 3)
     ball *= (radii / np.linalg.norm(ball, axis=1))[:, None]
     nearer = distances_held(loaded, np.array(loaded.pose.position) + ball)
     assert (nearer >= distance - 1e-5 * loaded.design.reach).all()
 
 
-@pytest.mark.parametrize("at", [(10.0, 5.0, 9.0), (10.0, 5.0, 2.0), (4.0, 2.0, 3.0), (12, -3, 5)])
+@pytest.mark.parametrize(
+    "at", long_after(2, [(10.0, 5.0, 9.0), (12, -3, 5), (10.0, 5.0, 2.0), (4.0, 2.0, 3.0)])
+)
 def test_no_random_position_that_holds_the_load_is_nearer(at: tuple[float, float, float]) -> None:
     check_none_is_nearer(LoadedPose(LIMITED, Pose(at, HOME.quaternion), LOAD))
 
@@ -76,7 +80,7 @@ def test_small_part_far_from_the_pose_is_found() -> None:
     assert np.linalg.norm(np.subtract(found.position, case["start"])) <= far
 
 
-@pytest.mark.parametrize("margin", [None, 0.0, 0.5])
+@pytest.mark.parametrize("margin", [None, 0.5])
 def test_mode_of_the_pose_counts_in_another_mode_than_home(margin: float | None) -> None:
     design = msgspec.structs.replace(LIMITED, limits=Limits(margin=margin))
     pose = Pose((10.0, 5.0, -2.0), HOME.quaternion)
@@ -90,17 +94,15 @@ def test_a_position_that_holds_the_load_is_its_own_nearest() -> None:
     assert found.position == pytest.approx(HOME.position, abs=1e-12)
 
 
-def test_none_is_found_where_no_position_holds_the_load() -> None:
-    weak = msgspec.structs.replace(LIMITED, actuators=Actuators(push_n=(1, 1, 1, 1, 1, 1)))
-    assert nearest_held(LoadedPose(weak, HOME, (0.0, 0.0, -100.0, 0.0, 0.0, 0.0))) is None
-
-
-def test_none_is_found_where_the_limits_leave_no_position() -> None:
-    def boxed(design: Design) -> Design:
-        far = Limits(box=((90.0, 90.0, 90.0), (91.0, 91.0, 91.0)))
-        return msgspec.structs.replace(design, limits=far)
-
-    assert nearest_held(LoadedPose(boxed(LIMITED), HOME, LOAD)) is None
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"actuators": Actuators(push_n=(0.1, 0.1, 0.1, 0.1, 0.1, 0.1))},
+        {"limits": Limits(box=((90.0, 90.0, 90.0), (91.0, 91.0, 91.0)))},
+    ],
+)
+def test_none_is_found_where_limits_or_actuators_leave_none(change: dict[str, Any]) -> None:
+    assert nearest_held(LoadedPose(msgspec.structs.replace(LIMITED, **change), HOME, LOAD)) is None
 
 
 def test_from_a_singular_pose_it_is_in_the_mode_of_home() -> None:
