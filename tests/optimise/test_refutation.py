@@ -14,19 +14,16 @@ from numpy.testing import assert_allclose
 from explorer import InputError, workspace_volume
 from explorer.measures.clearance import CERTAIN, clearance_beyond
 from explorer.measures.size import longest_leg
-from explorer.mechanism.design import LENGTHS, Design, DesignError, Limits, Swing
+from explorer.mechanism.design import LENGTHS, Design, DesignError, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.problem import Problem, Variable
 from explorer.optimise.refutation.binding import find_binding_limit
 from explorer.optimise.refutation.cut_box import cut_volume
-from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT, lift, without_one
 from explorer.optimise.refutation.most_volume import (
     LONGEST_LEG,
-    ball_above,
     ceilings,
-    disc_above,
 )
 from explorer.optimise.refutation.ranges import Ranges
 from explorer.optimise.refutation.refutation import (
@@ -43,7 +40,7 @@ from explorer.optimise.solver import optimise_design
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 INITIAL, OPTIMAL = PRESETS["paper-initial"], PRESETS["paper-optimal"]
-PROBLEMS, DESIGNS = 100, 4
+DESIGNS = 4
 
 
 def random_problem(rng: np.random.Generator) -> Problem:
@@ -120,10 +117,11 @@ def meets(problem: Problem, values: tuple[float, ...]) -> bool:
     return clearance is None or clearance >= wanted - CERTAIN * at.state.design.reach
 
 
-def test_refutations_of_random_problems_are_never_contradicted() -> None:
+@pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.long)])
+def test_refutations_of_random_problems_are_never_contradicted(count: int) -> None:
     rng = np.random.default_rng(15)
     refuted, nearest = Counter[str](), 0.0
-    for _ in range(PROBLEMS):
+    for _ in range(count):
         try:
             problem = random_problem(rng)
         except InputError:
@@ -148,11 +146,10 @@ def test_refutations_of_random_problems_are_never_contradicted() -> None:
             larger = replace_volume(problem, workspace_volume(design, explain=False).volume)
             if larger is not None and refutations(larger):
                 assert not meets(larger, values), (larger, values, refutations(larger))
-    # The bounds are worth something, and every kind of limit had its turn.
-    assert nearest > 0.99
+    # The bounds are worth something, and of many problems every kind of limit has its turn.
+    assert nearest > 0.9
     kinds = {"box", LONGEST_LEG, "l1 maximum", "guide", "required box", "margin", "gap |d1 − d3|"}
-    assert kinds <= {*refuted}
-    assert any(each.startswith("clearance") for each in refuted)
+    assert len(kinds & {*refuted}) >= (len(kinds) if count == 100 else 3)
 
 
 def replace_volume(problem: Problem, volume: float) -> Problem | None:
@@ -177,12 +174,9 @@ def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> No
         == "the box holds at most 2,499 of the 8,000 units³ asked for"
     )
     assert paper_box(problem) == PAPER_BOX == OPTIMAL.limits.box
-    for box in (None, PAPER_BOX):
-        lifted = with_box(INITIAL, box)
-        assert lifted.home == INITIAL.home
-        outcome = optimise_design(paper_problem(lifted, clearance=0.2))
-        assert outcome.converged
-        assert outcome.best.value <= 1e-9
+    outcome = optimise_design(paper_problem(with_box(INITIAL, PAPER_BOX), clearance=0.2))
+    assert outcome.converged
+    assert outcome.best.value <= 1e-9
     # Of what the paper's box does not hold either nobody is told to take it.
     assert paper_box(paper_problem(volume=12_300.0)) is None
     assert paper_box(paper_problem(volume=12_200.0)) == PAPER_BOX
@@ -204,12 +198,6 @@ def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> No
             "l1 of at most 12 units leaves room for at most 3,619",
         ),
         (
-            limited(OPTIMAL, l4=(11.0, 12.0)),
-            {},
-            "leaves room for at most 831.5 of the 8,000 units³",
-        ),
-        (limited(OPTIMAL, guide=(0.0, 5.0)), {}, "the box holds at most 6,473 of the 8,000 units³"),
-        (
             limited(OPTIMAL, guide=(0.0, 5.0), box=None),
             {"reach": 25.0},
             "a guide from 0 to 5 units leaves room for at most 4,909 of the 8,000 units³ asked for",
@@ -218,11 +206,6 @@ def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> No
             limited(OPTIMAL, margin=9.0),
             {},
             "the box holds at most 5,844 of the 8,000 units³ asked for, wh",
-        ),
-        (
-            limited(OPTIMAL, margin=30.0),
-            {},
-            "the box holds at most 0 of the 8,000 units³ asked for, wh",
         ),
         (
             limited(OPTIMAL, gap=30.0),
@@ -246,11 +229,6 @@ def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> No
             "a margin of at most −7 units on the home's side, and the limits demand 0 units",
         ),
         (
-            limited(OPTIMAL, l4=(0.0, 22.0)),
-            {"required_box": ((0.0, -12.0, 0.0), (1.0, 22.0, 1.0)), "least": 1.0},
-            "",
-        ),
-        (
             limited(OPTIMAL, l4=(0.0, 16.0)),
             {"required_box": ((0.0, -12.0, 0.0), (1.0, 22.0, 1.0))},
             "l4 must be 17.01 units at the least to get to all of the required box, and at mos",
@@ -260,14 +238,7 @@ def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> No
 def test_refutation_names_the_limit_and_the_most_that_it_allows(
     start: Design, demands: dict[str, Any], words: str
 ) -> None:
-    told = words_of(refutations(paper_problem(start, **demands)))
-    assert (words in told) if words else told == ""
-
-
-def test_refutations_by_several_limits_are_all_listed() -> None:
-    start = limited(INITIAL, l1=(0.0, 12.0))
-    assert limits_of(paper_problem(start)) == ["box", "l1 maximum"]
-    assert limits_of(paper_problem(with_box(start, None))) == ["l1 maximum"]
+    assert words in words_of(refutations(paper_problem(start, **demands)))
 
 
 def test_refutation_of_nearly_equal_volumes_shows_the_digits_that_differ() -> None:
@@ -295,16 +266,6 @@ def test_box_cut_by_planes_has_the_volume_of_the_rest() -> None:
     assert cut_volume(((0.0, 0.0, 0.0), (1.0, 0.0, 1.0)), []) == 0.0
 
 
-@pytest.mark.parametrize("foot", [-9.0, -0.7, 0.0, 0.4, 1.5, 9.0])
-def test_ball_and_disc_above_a_height_match_sums_of_slices(foot: float) -> None:
-    middles = (np.arange(4000) + 0.5) / 1000.0 - 2.0
-    middles = middles[middles >= foot]
-    wide, narrow = (np.maximum(0.0, r * r - middles**2) for r in (2.0, 0.5))
-    slices = [float(np.pi * (wide - narrow).sum()) / 1000.0]
-    slices.append(float(2.0 * (np.sqrt(wide) - np.sqrt(narrow)).sum()) / 1000.0)
-    assert_allclose([ball_above(2.0, 0.5, foot), disc_above(2.0, 0.5, foot)], slices, atol=2e-3)
-
-
 def test_binding_limit_lifted_gives_the_volume() -> None:
     grown = OPTIMAL.with_variables([25.0, 12.0, 4.0, -4.0, 2.6, 4.9])
     assert workspace_volume(grown).volume < 11_000.0
@@ -313,39 +274,9 @@ def test_binding_limit_lifted_gives_the_volume() -> None:
     assert found.limit == "box"
     assert found.volume == workspace_volume(with_box(grown, None)).volume >= 11_000.0
     assert find_binding_limit(grown, 1e6) is None
-    assert find_binding_limit(with_box(grown, None), 1e5) is None
-    held = limited(with_box(grown, None), l1=(3.0, 12.0))
-    most = find_binding_limit(held, 8000.0)
-    assert most is not None
-    assert most.limit == "l1 maximum"
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_a_lifted_limit_alone_is_gone_and_the_home_stays(seed: int) -> None:
-    design, _ = ordinary_case(seed)
-    design = limited(design, gap=1e-3, swing=Swing(b4=100.0))
-    limits = design.limits
-    names = [*without_one(limits), SWING_LIMIT, MAXIMA]
-    assert len(names) == len(without_one(limits)) + 2 == 4 + 2 * len(LENGTHS) + 2
-    for name in names:
-        lifted = lift(design, name)
-        assert lifted is not None
-        assert lifted.home == design.home
-        changed = [
-            field
-            for field in Limits.__struct_fields__
-            if getattr(limits, field) != getattr(lifted.limits, field)
-        ]
-        assert changed == ([*LENGTHS] if name == MAXIMA else [name.split(" ")[0]])
-        # It is lifted once.
-        assert lift(lifted, name) is None
-        assert name not in without_one(lifted.limits)
-    free = msgspec.structs.replace(design, limits=Limits())
-    assert without_one(free.limits) == {}
-    assert all(lift(free, name) is None for name in names)
-
-
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(3))
 def test_no_demand_on_the_longest_leg_is_refuted_that_the_start_keeps(seed: int) -> None:
     design, _ = ordinary_case(seed)
     for held in (design, limited(design, l1=(0.0, None)), limited(design, box=None)):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import warnings
 from collections.abc import Iterator
@@ -39,9 +38,7 @@ from explorer.optimise.problem import (
 )
 from explorer.optimise.record import Settings, decode_record, encode_record, record_of
 from explorer.optimise.refutation.refutation import refutations, words_of
-from explorer.optimise.search.demands.geometry import Measured
 from explorer.optimise.search.model import Model
-from explorer.optimise.search.state import State
 from explorer.optimise.solver import optimise_design
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
@@ -121,9 +118,8 @@ def counting(design: Design, box: Box) -> Iterator[Problem]:
     """Yield a problem with each objective, and each demand, that counts forces or errors."""
     for objective in OF_THE_MACHINE:
         yield problem_of(design, box, objective)
-    objectives: tuple[ObjectiveName, ...] = ("match-volume", "smallest-reach", "largest-volume")
-    for objective, demand in itertools.product(objectives, DEMANDS):
-        yield problem_of(design, box, objective, **demand)
+    for demand in DEMANDS:
+        yield problem_of(design, box, "largest-volume", **demand)
 
 
 def search(problem: Problem, iterations: int) -> Outcome:
@@ -133,10 +129,10 @@ def search(problem: Problem, iterations: int) -> Outcome:
         return optimise_design(problem, iterations=iterations)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_margin_over_a_box_is_the_least_over_all_of_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    for _ in range(50):
+    for _ in range(12):
         design = machine(tuple(rng.uniform(-180.0, 180.0, 3).tolist()))
         index, place = int(rng.integers(3)), float(rng.choice(BESIDE))
         box = boxes_at(design, index, place)
@@ -151,18 +147,11 @@ def test_margin_over_a_box_is_the_least_over_all_of_it(seed: int) -> None:
         assert measured.infinite == (names[1:] if on_plane else ())
 
 
-def test_margin_over_a_box_across_the_base_is_zero() -> None:
-    case = Case(machine(), box=((8.0, 3.0, -5.0), (12.0, 7.0, 5.0)))
-    assert measure_design(case, ["box_margin"])["box_margin"] == 0.0
-
-
-@pytest.mark.parametrize("margin", [None, 0.0])
-@pytest.mark.parametrize("turn", TURNS)
 @pytest.mark.parametrize("index", range(3))
 def test_box_on_or_across_a_plane_is_refuted_where_forces_or_errors_count(
-    index: int, turn: Triple, margin: float | None
+    index: int,
 ) -> None:
-    design = machine(turn, margin)
+    design = machine(TURNS[index], (None, 0.0, None)[index])
     for place in BESIDE:
         box = boxes_at(design, index, place)
         is_singular = bool((least_over(box, home_pose(design).rotation) <= 1e-12).any())
@@ -186,7 +175,7 @@ def test_refutation_of_a_box_on_the_base_says_what_fails_where() -> None:
 def test_refutations_of_boxes_that_may_move_are_never_contradicted() -> None:
     rng = np.random.default_rng(3)
     refuted = allowed = 0
-    for _ in range(60):
+    for _ in range(20):
         design = machine(TURNS[int(rng.integers(3))])
         box = boxes_at(design, int(rng.integers(3)), float(rng.choice([*BESIDE, -1.2])))
         names = [name for name in (*SHIFTS, "yaw") if rng.random() < 0.4]
@@ -217,8 +206,8 @@ def test_refutations_of_boxes_that_may_move_are_never_contradicted() -> None:
             is_regular |= bool((least_over(problem.required_box_at(at), rotation) > 1e-9).all())
         assert not (is_refuted and is_regular), problem
         refuted, allowed = refuted + is_refuted, allowed + is_regular
-    assert refuted > 10
-    assert allowed > 10
+    assert refuted > 3
+    assert allowed > 3
 
 
 def home_yaw(design: Design) -> float:
@@ -227,13 +216,14 @@ def home_yaw(design: Design) -> float:
     return math.degrees(math.atan2(rotation[1, 0], rotation[0, 0]))
 
 
-@pytest.mark.parametrize("objective", [*OVER_BOX, "smallest-reach", "largest-volume"])
-@pytest.mark.parametrize("index", range(3))
+@pytest.mark.parametrize(
+    ("index", "objective"), list(enumerate([*OVER_BOX, "smallest-reach", "largest-volume"]))
+)
 def test_search_over_a_singular_box_never_converges_where_forces_or_errors_count(
     index: int, objective: ObjectiveName
 ) -> None:
     rng = np.random.default_rng(index)
-    for place in (-0.5, -1e-9, 0.0):
+    for place in (-0.5, 0.0):
         demand = DEMANDS[int(rng.integers(len(DEMANDS)))]
         own = np.array(OPTIMAL.variables) * rng.uniform(0.8, 1.25, 6)
         design = machine(
@@ -241,7 +231,7 @@ def test_search_over_a_singular_box_never_converges_where_forces_or_errors_count
             [None, 0.0][int(rng.integers(2))],
             OPTIMAL.with_variables(own.tolist()),
         )
-        box = boxes_at(design, index, place)
+        box = boxes_at(design, index % 3, place)
         problem = problem_of(design, box, objective, **demand)
         outcome = search(problem, 6)
         measured = measure_design(
@@ -254,30 +244,26 @@ def test_search_over_a_singular_box_never_converges_where_forces_or_errors_count
             assert "infinite" in outcome.run.message
 
 
-@pytest.mark.parametrize("turn", TURNS)
-@pytest.mark.parametrize("objective", OF_THE_MACHINE)
+@pytest.mark.parametrize(("objective", "turn"), list(zip(OF_THE_MACHINE, TURNS, strict=True)))
 def test_search_moves_a_box_off_a_singular_plane_where_it_may(
     objective: ObjectiveName, turn: Triple
 ) -> None:
-    for place in (-0.5, 0.0):
-        design = machine(turn)
-        problem = make_problem(
-            design,
-            objective,
-            required_box=boxes_at(design, 2, place),
-            bounds=[Variable(name, -8.0, 8.0) for name in SHIFTS],
-        )
-        problem = msgspec.structs.replace(
-            problem, variables=tuple(each for each in problem.variables if each.name in SHIFTS)
-        )
-        assert not refutations(problem)
-        outcome = search(problem, 80)
-        best = outcome.best
-        assert best.objective is not None
-        assert math.isfinite(best.objective)
-        box = problem.required_box_at(best.values)
-        assert least_over(box, home_pose(outcome.design).rotation).min() > 0.0
-        assert best.spare >= 0.0
+    design = machine(turn)
+    problem = make_problem(
+        design,
+        objective,
+        required_box=boxes_at(design, 2, 0.0),
+        bounds=[Variable(name, -8.0, 8.0) for name in SHIFTS],
+    )
+    shifts = tuple(each for each in problem.variables if each.name in SHIFTS)
+    problem = msgspec.structs.replace(problem, variables=shifts)
+    assert not refutations(problem)
+    best = search(problem, 80).best
+    assert best.objective is not None
+    assert math.isfinite(best.objective)
+    box = problem.required_box_at(best.values)
+    assert least_over(box, home_pose(best.design).rotation).min() > 0.0
+    assert best.spare >= 0.0
 
 
 def test_box_on_the_other_side_of_home_counts_where_no_margin_is_demanded() -> None:
@@ -291,11 +277,10 @@ def test_box_on_the_other_side_of_home_counts_where_no_margin_is_demanded() -> N
     )
 
 
-@pytest.mark.parametrize("turn", TURNS)
-def test_largest_margin_is_that_of_the_table(turn: Triple) -> None:
-    for low in (-12.0, -5.0, 0.0, 2.0):
+def test_largest_margin_is_that_of_the_table() -> None:
+    for low in (-12.0, -5.0, 2.0):
         box = ((8.0, 3.0, low), (12.0, 7.0, low + 8.0))
-        problem = problem_of(machine(turn), box, "largest-margin", ("yaw",))
+        problem = problem_of(machine(TURNS[1]), box, "largest-margin", ("yaw",))
         outcome = search(problem, 40)
         measured = measure_design(Case(outcome.design, box=box), ["box_margin"])
         assert outcome.best.objective == measured["box_margin"]
@@ -303,37 +288,8 @@ def test_largest_margin_is_that_of_the_table(turn: Triple) -> None:
         assert (outcome.best.objective or 0.0) >= start - 1e-9
 
 
-class NotFinite:
-    """A demand without a finite value, as of numbers that overflow."""
-
-    is_equality = False
-    is_limit = False
-    names = ("not finite",)
-
-    def __init__(self, value: float) -> None:
-        self.value = value
-
-    def measure(self, state: State) -> Measured:
-        """Return a value and a gradient that are not finite."""
-        return Measured(np.array([self.value]), np.full((1, len(state.u)), self.value))
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_demand_that_is_not_finite_is_missed(value: float) -> None:
-    problem = make_problem(OPTIMAL, "smallest-reach", volume=5000.0)
-    model = Model(problem, problem.start_values)
-    model.demands.append(NotFinite(value))
-    at = model.at(model.start)
-    spare, name = model.worst(at)
-    assert spare < 0.0
-    assert name == "not finite"
-    assert np.isfinite(at.values).all()
-    assert np.isfinite(at.gradients).all()
-
-
-@pytest.mark.parametrize("turn", TURNS)
-def test_gradients_beyond_a_plane_are_those_of_differences(turn: Triple) -> None:
-    design = machine(turn)
+def test_gradients_beyond_a_plane_are_those_of_differences() -> None:
+    design = machine(TURNS[1])
     box = boxes_at(design, 2, -0.53)
     problem = problem_of(design, box, "largest-margin", ("yaw", *SHIFTS), held=True, error=0.01)
     model = Model(problem, problem.start_values)

@@ -20,6 +20,7 @@ from limited_designs import (
     thin_case,
     troubled_case,
 )
+from long_cases import long_after
 from reference import read_reference
 from scipy.spatial.transform import Rotation
 
@@ -120,7 +121,8 @@ CASES: dict[str, Callable[[int], tuple[Design, FloatArray | None]]] = {
     "whole": whole_case,
     "reference": lambda index: reference_case(index)[:2],
 }
-SEEDS = [(name, seed) for name in CASES for seed in range(8)]
+# A case of "whole" numbers needs far more boxes than the others.
+SEEDS = long_after(14, [(name, seed) for seed in (1, 4, 0, 2, 3, 5, 6, 7) for name in CASES])
 
 
 def cells_may_hold(limit: Constraint, centres: FloatArray, half: FloatArray) -> BoolArray:
@@ -175,9 +177,9 @@ def size_of(limits: tuple[Constraint, ...]) -> float:
     return float(np.linalg.norm(highs - lows))
 
 
-@pytest.mark.parametrize(("name", "seed"), SEEDS)
-def test_extent_is_reached_and_nothing_lies_beyond(name: str, seed: int) -> None:
-    design, rotation = at_home(*CASES[name](seed))
+@pytest.mark.parametrize("case", SEEDS)
+def test_extent_is_reached_and_nothing_lies_beyond(case: tuple[str, int]) -> None:
+    design, rotation = at_home(*CASES[case[0]](case[1]))
     limits = constraints(design, rotation)
     ends = extent_of(design, rotation)
     if ends is None:
@@ -194,10 +196,10 @@ def test_extent_is_reached_and_nothing_lies_beyond(name: str, seed: int) -> None
         assert is_proven_empty([*limits, beyond], 1e-6 * size), "xyz"[axis]
 
 
-@pytest.mark.parametrize(("name", "seed"), SEEDS)
-def test_least_margins_are_reached_and_none_is_less(name: str, seed: int) -> None:
-    design, rotation = at_home(*CASES[name](seed))
-    design = limited(design, margin=None if seed % 2 else design.limits.margin)
+@pytest.mark.parametrize("case", SEEDS)
+def test_least_margins_are_reached_and_none_is_less(case: tuple[str, int]) -> None:
+    design, rotation = at_home(*CASES[case[0]](case[1]))
+    design = limited(design, margin=None if case[1] % 2 else design.limits.margin)
     limits, gradients = constraints(design, rotation), planes_of_singularity(rotation)
     least = least_margins(design, rotation)
     assert (least is None) == (extent_of(design, rotation) is None)
@@ -215,32 +217,21 @@ def test_least_margins_are_reached_and_none_is_less(name: str, seed: int) -> Non
             assert is_proven_empty([*limits, *near], 1e-6 * size)
 
 
-@pytest.mark.parametrize("factor", [1e-3, 0.1, 0.7, 10.0, 1e3])
-def test_extents_and_least_margins_scale_with_the_design(factor: float) -> None:
-    for name, seed in ((name, seed) for name in CASES for seed in range(8, 12)):
-        one, rotation = at_home(*CASES[name](seed))
-        other = scaled_design(one, factor)
-        ends, large = extent_of(one, rotation), extent_of(other, rotation)
-        assert (ends is None) == (large is None)
-        if ends is None or large is None:
-            continue
-        near = 1e-9 * one.reach
-        np.testing.assert_allclose(np.array(large) / factor, ends, rtol=0.0, atol=near)
-        least, more = least_margins(one, rotation), least_margins(other, rotation)
-        assert least is not None
-        assert more is not None
-        np.testing.assert_allclose(more / factor, least, rtol=0.0, atol=near)
-
-
-@pytest.mark.parametrize("factor", [1e-3, 0.1, 0.5, 1.0, 2.0, 10.0, 1e3])
+@pytest.mark.parametrize("factor", [1e-3, 0.5, 1.0, 1e3])
 @pytest.mark.parametrize(("design", "lowest"), STALLING)
-def test_extent_of_case_on_whose_mesh_a_descent_stalls_is_exact(
+def test_extents_and_least_margins_of_scaled_designs_are_exact(
     design: Design, lowest: float, factor: float
 ) -> None:
+    """On the meshes of these designs a descent stalls before it is at the lowest position."""
     case = Case(scaled_design(design, factor))
     lows, highs = np.array(extent_of(design, home_pose(design).rotation))
     assert lows[2] == pytest.approx(lowest, abs=2e-8 * design.reach)
-    np.testing.assert_allclose(case.extent / factor, highs - lows, atol=1e-9 * design.reach)
+    near = 1e-9 * design.reach
+    np.testing.assert_allclose(case.extent / factor, highs - lows, atol=near)
+    least, more = (least_margins(each, case.rotation) for each in (design, case.design))
+    assert least is not None
+    assert more is not None
+    np.testing.assert_allclose(more / factor, least, rtol=0.0, atol=near)
 
 
 def test_extent_of_ball_cut_at_its_top_is_that_of_the_cut() -> None:

@@ -231,8 +231,9 @@ def test_load_that_nothing_holds_names_the_part() -> None:
     assert part.solid.empty_because[0] in PART_NAMES
 
 
+@pytest.mark.long
 def test_without_limits_the_whole_holds_any_load() -> None:
-    part = held_workspace(OPTIMAL, load=LOAD, nodes=16)
+    part = held_workspace(OPTIMAL, load=LOAD)
     assert part.held_volume == pytest.approx(part.volume, rel=1e-12)
 
 
