@@ -11,14 +11,13 @@ from limited_designs import limited
 from reference import read_reference
 from strategies import Case, ordinary_cases, uniform_rotations
 
-from explorer import PAIRS, PRESETS, Design, home_pose, leg_clearances
+from explorer import PAIRS, Design, leg_clearances
 from explorer.legs.clearance import joined_pairs, leg_axes, pair_rows
 from explorer.mechanism.kinematics import platform_points
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 
-OPTIMAL = PRESETS["paper-optimal"]
-SCALES = (1e-30, 1e-3, 1.0, 1e5, 1e30)
+SCALES = (1e-3, 1.0, 1e5)
 
 
 def closest_points(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -110,16 +109,6 @@ def test_closest_points_nearly_parallel_crossing_segments_meet(size: float) -> N
     for share in np.linspace(-0.9, 0.9, 7):
         b = np.array([[-1.0, size * (-1.0 - share), 0.0], [1.0, size * (1.0 - share), 0.0]])
         assert closest_points(a[None], b[None])[0] < 1e-15
-
-
-def test_closest_points_swapped_or_moved_segments_keep_the_distance() -> None:
-    a, b = random_segments(3)
-    distance, _ = closest_points(a, b)
-    swapped, _ = closest_points(b, a[:, ::-1])
-    np.testing.assert_allclose(distance, swapped, atol=1e-14)
-    turn = home_pose(OPTIMAL).rotation
-    moved, _ = closest_points(a @ turn.T + [1.0, -2.0, 3.0], b @ turn.T + [1.0, -2.0, 3.0])
-    np.testing.assert_allclose(distance, moved, atol=1e-14)
 
 
 def test_closest_points_few_and_many_pairs_agree() -> None:

@@ -69,43 +69,28 @@ def arrays(start: Pose, end: Pose) -> tuple[ArrayLike, ArrayLike, ArrayLike, Arr
     return start.position, start.rotation, end.position, end.rotation
 
 
-def sampled(design: Design, start: Pose, end: Pose, count: int = 1001) -> FloatArray:
-    """Return the least clearance of each pair among many poses of a move, shape (6,)."""
-    poses = poses_between(start, end, np.linspace(0.0, 1.0, count))
-    return leg_clearances(design, *poses).clearance.min(axis=0)
-
-
-@given(moves(), st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.integers(0, 3))
+@given(moves(), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_swept_tetrahedra_constant_orientation_hold_the_legs(
-    move: tuple[Design, Pose, Pose], share: float, along: float, leg: int
+    move: tuple[Design, Pose, Pose], share: float, along: float
 ) -> None:
     design, start, end = move
     end = Pose(end.position, start.quaternion)
     swept = swept_tetrahedra(design, *arrays(start, end))
     assert swept.shape == (4, 4, 3)
-    axis = leg_axes(design, *poses_between(start, end, share))[leg]
-    point = axis[0] + along * (axis[1] - axis[0])
-    assert tetrahedra_overlap(swept[leg], np.tile(point, (4, 1)))
+    axes = leg_axes(design, *poses_between(start, end, share))
+    points = axes[:, 0] + along * (axes[:, 1] - axes[:, 0])
+    assert tetrahedra_overlap(swept, np.repeat(points[:, None], 4, axis=1)).all()
+    overlaps = step_overlaps(design, *arrays(start, end))
+    assert bool(step_is_free(design, *arrays(start, end))) is not bool(overlaps.any())
+    # Legs within disjoint tetrahedra are apart.
+    poses = poses_between(start, end, np.linspace(0.0, 1.0, 101))
+    assert (leg_clearances(design, *poses).clearance.min(axis=0)[~overlaps] > 0.0).all()
 
 
 def test_swept_tetrahedra_legs_with_fixed_base_ends_are_flat() -> None:
     swept = swept_tetrahedra(OPTIMAL, *random_moves(1, 10))
     for leg in (0, 3):
         np.testing.assert_array_equal(swept[:, leg, 0], swept[:, leg, 1])
-
-
-@given(moves())
-def test_step_is_free_constant_orientation_has_no_crossing(
-    move: tuple[Design, Pose, Pose],
-) -> None:
-    design, start, end = move
-    end = Pose(end.position, start.quaternion)
-    overlaps = step_overlaps(design, *arrays(start, end))
-    free = step_is_free(design, *arrays(start, end))
-    assert bool(free) is not bool(overlaps.any())
-    least = sampled(design, start, end, 101)
-    # Legs within disjoint tetrahedra are apart.
-    assert (least[~overlaps] > 0.0).all()
 
 
 def test_step_overlaps_batch_matches_its_moves() -> None:
@@ -160,66 +145,34 @@ def test_move_clearance_legs_that_cross_fail_both_tests() -> None:
     assert not step_is_free(design, *arrays(start, end))
 
 
-@given(moves(), st.sampled_from((None, 1e-2, 1e-6)))
+@given(moves(), st.sampled_from((None, 1e-2, 1e-6)), st.none() | positions())
 def test_move_clearance_bound_holds_and_is_nearly_attained(
-    move: tuple[Design, Pose, Pose], share: float | None
+    move: tuple[Design, Pose, Pose], share: float | None, place: FloatArray | None
 ) -> None:
+    """The move is that of b4, or of a tool."""
     design, start, end = move
+    tool = np.zeros(3) if place is None else design.reach * place
+    x, y, z = tool.tolist()
     radii = (0.1, 0.2, 0.3, 0.4)
     design = limited(design, leg_radii=radii)
     longest = 10.0 * design.reach
     tolerance = None if share is None else share * longest
-    found = move_clearance(design, start, end, tolerance=tolerance)
+    found = move_clearance(design, start, end, tolerance=tolerance, tool=(x, y, z))
     pairs = ~joined_pairs(design)
-    least = sampled(design, start, end)[pairs]
+    poses = tool_move(start, end, np.linspace(0.0, 1.0, 501), tool)
+    least = leg_clearances(design, *poses).clearance.min(axis=0)[pairs]
     rounding = 1e-12 * longest
     bound, clearance = found.bound[pairs], found.clearance[pairs]
     assert (bound <= least + rounding).all()
     assert (bound <= clearance).all()
     assert (clearance <= bound + found.tolerance * (1.0 + 1e-9)).all()
     assert (clearance <= least + found.tolerance).all()
-    at = leg_clearances(design, *poses_between(start, end, found.share))
+    at = leg_clearances(design, *tool_move(start, end, found.share, tool))
     attained = at.clearance[np.arange(6), np.arange(6)][pairs]
     np.testing.assert_allclose(attained, clearance, atol=rounding)
     apart = np.linalg.norm(found.points[:, 0] - found.points[:, 1], axis=-1)[pairs]
     sums = np.array([radii[i - 1] + radii[j - 1] for i, j in PAIRS])[pairs]
     np.testing.assert_allclose(apart - sums, clearance, atol=rounding)
-
-
-def test_move_clearances_batch_meets_the_tolerance() -> None:
-    many = random_moves(3, 2000)
-    first, turn, last, turned = many
-    for tolerance in (1e-2, 1e-4, 1e-6):
-        found = move_clearances(OPTIMAL, *many, tolerance=tolerance)
-        assert found.bound.shape == (2000, 6)
-        assert float((found.clearance - found.bound).max()) <= tolerance
-        assert float((found.clearance - found.bound).min()) >= 0.0
-        for row in range(0, 2000, 100):
-            start, end = Pose.of(first[row], turn[row]), Pose.of(last[row], turned[row])
-            least = sampled(OPTIMAL, start, end)
-            assert (found.bound[row] <= least + 1e-12).all()
-            assert (found.clearance[row] <= least + tolerance).all()
-
-
-@given(moves(), positions(), st.sampled_from((None, 1e-2)))
-def test_move_clearance_of_the_tool_bounds_the_move_that_it_makes(
-    move: tuple[Design, Pose, Pose], tool: FloatArray, share: float | None
-) -> None:
-    design, start, end = move
-    tool = design.reach * tool
-    tolerance = None if share is None else share * 10.0 * design.reach
-    x, y, z = tool.tolist()
-    found = move_clearance(design, start, end, tolerance=tolerance, tool=(x, y, z))
-    pairs = ~joined_pairs(design)
-    poses = tool_move(start, end, np.linspace(0.0, 1.0, 1001), tool)
-    least = leg_clearances(design, *poses).clearance.min(axis=0)[pairs]
-    bound, clearance = found.bound[pairs], found.clearance[pairs]
-    assert (bound <= least + 1e-11 * design.reach).all()
-    assert (clearance <= least + found.tolerance).all()
-    assert (clearance <= bound + found.tolerance * (1.0 + 1e-9)).all()
-    at = leg_clearances(design, *tool_move(start, end, found.share, tool))
-    attained = at.clearance[np.arange(6), np.arange(6)][pairs]
-    np.testing.assert_allclose(attained, clearance, atol=1e-11 * design.reach)
 
 
 def test_move_clearances_of_a_tool_at_b4_are_those_of_b4() -> None:
@@ -238,9 +191,9 @@ def test_move_clearances_of_a_tool_at_b4_are_those_of_b4() -> None:
 
 def test_moves_are_clear_any_clearance_agrees_with_the_least() -> None:
     design = limited(OPTIMAL, leg_radii=(0.1, 0.2, 0.2, 0.3))
-    many = random_moves(4, 2000)
+    many = random_moves(4, 500)
     least = move_clearances(design, *many).bound.min(axis=-1)
-    for clearance in (-0.2, 0.0, 0.5):
+    for clearance in (-0.2, 0.5):
         clear = moves_are_clear(design, *many, clearance=clearance)
         decided = np.abs(least - clearance) > 1e-4
         np.testing.assert_array_equal(clear[decided], least[decided] > clearance)

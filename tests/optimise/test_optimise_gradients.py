@@ -20,7 +20,6 @@ from explorer import (
     Struts,
     Tool,
     make_problem,
-    workspace_volume,
 )
 from explorer.errors import DesignError
 from explorer.mechanism.design import Range
@@ -29,7 +28,6 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.optimise.problem import OBJECTIVES, OVER_BOX, ObjectiveName, Problem
 from explorer.optimise.search.model import Evaluation, Model
-from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace
 
 # Places at which gradients are compared: one each day, twelve with all tests.
 POINTS = settings().max_examples // 25
@@ -149,29 +147,6 @@ def test_slopes_of_objectives_match_central_differences(
     for u in points(model, POINTS, 5):
         slope = [(a.objective - b.objective) / (2.0 * STEP) for a, b in around(model, u)]
         assert_allclose(model.at(u).slope, slope, rtol=0, atol=TOLERANCE)
-
-
-def test_volume_demand_at_its_volume_is_zero() -> None:
-    problem = make_problem(OPTIMAL, "match-volume", volume=workspace_volume(OPTIMAL).volume)
-    model = Model(problem, problem.start_values)
-    at = model.at(model.start)
-    assert model.reported(at) == 0.0
-    assert at.values[0] == pytest.approx(0.0, abs=1e-15)
-    assert model.equalities.tolist() == [True, False, False, False]
-
-
-def test_slack_of_state_matches_its_limit() -> None:
-    problem = next(problems("many limits"))
-    model = Model(problem, problem.start_values)
-    state = model.at(model.start).state
-    p = np.random.default_rng(0).normal(size=(20, 3)) * 10.0
-    for limit in state.limits:
-        assert isinstance(limit, BallOrCylinder | HalfSpace)
-        slack, _, by_p = state.slack(limit, p)
-        assert_allclose(slack, limit.slack(p), rtol=0, atol=1e-12)
-        for axis, unit in enumerate(np.eye(3)):
-            ahead, behind = (limit.slack(p + h * unit) for h in (1e-5, -1e-5))
-            assert_allclose(by_p[:, axis], (ahead - behind) / 2e-5, rtol=0, atol=1e-7)
 
 
 def test_required_box_demand_agrees_with_all_positions_of_the_box() -> None:

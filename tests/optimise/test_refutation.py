@@ -9,7 +9,6 @@ import msgspec
 import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case
-from numpy.testing import assert_allclose
 
 from explorer import InputError, workspace_volume
 from explorer.measures.clearance import CERTAIN, clearance_beyond
@@ -19,8 +18,6 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.problem import Problem, Variable
-from explorer.optimise.refutation.binding import find_binding_limit
-from explorer.optimise.refutation.cut_box import cut_volume
 from explorer.optimise.refutation.most_volume import (
     LONGEST_LEG,
     ceilings,
@@ -252,28 +249,6 @@ def test_free_yaw_refutes_nothing_that_another_yaw_gives() -> None:
     start = msgspec.structs.replace(limited(OPTIMAL, margin=7.0), home=tilted)
     assert "box" in limits_of(paper_problem(start, 5000.0))
     assert limits_of(paper_problem(start, 5000.0, free=("yaw",))) == []
-
-
-def test_box_cut_by_planes_has_the_volume_of_the_rest() -> None:
-    box = ((-1.0, 0.0, 2.0), (3.0, 2.0, 5.0))
-    x, z = np.eye(3)[[0, 2]]
-    assert_allclose(cut_volume(box, []), 24.0)
-    assert_allclose(cut_volume(box, [(z, 3.0), (z, 2.0)]), 16.0)
-    assert_allclose(cut_volume(box, [(-x, -0.0), (2.0 * z, 7.0)]), 3.0)
-    corner = np.array([1.0, 1.0, 1.0])
-    assert_allclose(cut_volume(box, [(-corner, -2.0)]), 1.0 / 6.0)
-    assert cut_volume(box, [(z, 5.0)]) == cut_volume(box, [(z, 9.0)]) == 0.0
-    assert cut_volume(((0.0, 0.0, 0.0), (1.0, 0.0, 1.0)), []) == 0.0
-
-
-def test_binding_limit_lifted_gives_the_volume() -> None:
-    grown = OPTIMAL.with_variables([25.0, 12.0, 4.0, -4.0, 2.6, 4.9])
-    assert workspace_volume(grown).volume < 11_000.0
-    found = find_binding_limit(grown, 11_000.0)
-    assert found is not None
-    assert found.limit == "box"
-    assert found.volume == workspace_volume(with_box(grown, None)).volume >= 11_000.0
-    assert find_binding_limit(grown, 1e6) is None
 
 
 @pytest.mark.parametrize("seed", range(3))

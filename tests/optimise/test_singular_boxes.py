@@ -11,7 +11,6 @@ from xml.etree.ElementTree import tostring
 import msgspec
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 
 from explorer import Actuators, Design, Payload, Struts
 from explorer.export.report.drawings.history import charts
@@ -38,7 +37,6 @@ from explorer.optimise.problem import (
 )
 from explorer.optimise.record import Settings, decode_record, encode_record, record_of
 from explorer.optimise.refutation.refutation import refutations, words_of
-from explorer.optimise.search.model import Model
 from explorer.optimise.solver import optimise_design
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
@@ -172,50 +170,6 @@ def test_refutation_of_a_box_on_the_base_says_what_fails_where() -> None:
     assert not refutations(problem_of(machine(), box, "largest-volume"))
 
 
-def test_refutations_of_boxes_that_may_move_are_never_contradicted() -> None:
-    rng = np.random.default_rng(3)
-    refuted = allowed = 0
-    for _ in range(20):
-        design = machine(TURNS[int(rng.integers(3))])
-        box = boxes_at(design, int(rng.integers(3)), float(rng.choice([*BESIDE, -1.2])))
-        names = [name for name in (*SHIFTS, "yaw") if rng.random() < 0.4]
-        yaw = home_yaw(design)
-        bounds = {
-            name: (yaw - 20.0, yaw + rng.uniform(0.0, 20.0))
-            if name == "yaw"
-            else (-float(rng.uniform(0.0, 2.0)), float(rng.uniform(0.0, 2.0)))
-            for name in names
-        }
-        problem = make_problem(
-            design,
-            "smallest-error",
-            required_box=box,
-            bounds=[Variable(name, *pair) for name, pair in bounds.items()],
-        )
-        is_refuted = bool(refutations(problem))
-        shares = rng.random((40, len(names)))
-        shares[::2] = np.round(shares[::2])
-        values = dict(zip(problem.names, problem.start_values, strict=True))
-        is_regular = False
-        for row in shares.tolist():
-            given = {
-                n: lo + s * (hi - lo) for (n, (lo, hi)), s in zip(bounds.items(), row, strict=True)
-            }
-            at = {**values, **given}.values()
-            rotation = home_pose(problem.design_at(at)).rotation
-            is_regular |= bool((least_over(problem.required_box_at(at), rotation) > 1e-9).all())
-        assert not (is_refuted and is_regular), problem
-        refuted, allowed = refuted + is_refuted, allowed + is_regular
-    assert refuted > 3
-    assert allowed > 3
-
-
-def home_yaw(design: Design) -> float:
-    """Return the yaw of home in degrees."""
-    rotation = home_pose(design).rotation
-    return math.degrees(math.atan2(rotation[1, 0], rotation[0, 0]))
-
-
 @pytest.mark.parametrize(
     ("index", "objective"), list(enumerate([*OVER_BOX, "smallest-reach", "largest-volume"]))
 )
@@ -264,45 +218,6 @@ def test_search_moves_a_box_off_a_singular_plane_where_it_may(
     box = problem.required_box_at(best.values)
     assert least_over(box, home_pose(best.design).rotation).min() > 0.0
     assert best.spare >= 0.0
-
-
-def test_box_on_the_other_side_of_home_counts_where_no_margin_is_demanded() -> None:
-    box = ((8.0, 3.0, -12.0), (12.0, 7.0, -9.0))
-    outcome = search(problem_of(machine(), box, "smallest-error"), 100)
-    measured = measure_design(Case(outcome.design, box=box), ["worst_error", "box_margin"])
-    assert outcome.best.spare >= 0.0
-    assert outcome.best.objective == measured["worst_error"]
-    assert measured["box_margin"] == pytest.approx(
-        least_over(box, home_pose(OPTIMAL).rotation).min(), rel=0.2
-    )
-
-
-def test_largest_margin_is_that_of_the_table() -> None:
-    for low in (-12.0, -5.0, 2.0):
-        box = ((8.0, 3.0, low), (12.0, 7.0, low + 8.0))
-        problem = problem_of(machine(TURNS[1]), box, "largest-margin", ("yaw",))
-        outcome = search(problem, 40)
-        measured = measure_design(Case(outcome.design, box=box), ["box_margin"])
-        assert outcome.best.objective == measured["box_margin"]
-        start = least_over(box, home_pose(problem.start).rotation).min()
-        assert (outcome.best.objective or 0.0) >= start - 1e-9
-
-
-def test_gradients_beyond_a_plane_are_those_of_differences() -> None:
-    design = machine(TURNS[1])
-    box = boxes_at(design, 2, -0.53)
-    problem = problem_of(design, box, "largest-margin", ("yaw", *SHIFTS), held=True, error=0.01)
-    model = Model(problem, problem.start_values)
-    step = 1e-6
-    ahead, behind = (
-        np.array(
-            [model.at(model.start + side * step * unit).values for unit in np.eye(len(model.start))]
-        )
-        for side in (1.0, -1.0)
-    )
-    slopes = (ahead - behind).T / (2.0 * step)
-    smooth = [index for index, name in enumerate(model.names) if "volume" not in name]
-    assert_allclose(model.at(model.start).gradients[smooth], slopes[smooth], atol=1e-5)
 
 
 def test_record_of_infinite_objectives_is_read_back() -> None:

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 from scipy.spatial.transform import Rotation
-from strategies import WAYS, Case, cases, ordinary_cases, singular_cases
+from strategies import WAYS, Case, cases, singular_cases
 from tool_moves import tool_move
 
 from explorer import PRESETS, InputError, Pose, forward, home_pose, inverse, margins, poses_between
 from explorer.mechanism.margins import mode_of
-from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -24,34 +23,14 @@ def random_pose(rng: np.random.Generator, size: float = 5.0) -> Pose:
     return Pose.of(size * rng.uniform(-1, 1, 3), Rotation.random(random_state=rng).as_matrix())
 
 
-def sign_changes(start: Pose, end: Pose, samples: int = 4001) -> FloatArray:
-    """Return the number of changes of sign of each margin between samples, shape (3,)."""
-    shares = np.linspace(0.0, 1.0, samples)
-    signs = margins(*poses_between(start, end, shares)) > 0.0
-    return (signs[1:] != signs[:-1]).sum(axis=0).astype(np.float64)
-
-
-@given(st.integers(0, 2**32))
-def test_path_margins_random_move_has_all_crossings(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    start, end = random_pose(rng), random_pose(rng)
-    found = path_margins([start, end])
-    assert found.lies_in == ()
-    shares = [each.share for each in found.crossings]
-    assert shares == sorted(shares)
-    for each in found.crossings:
-        position, rotation = poses_between(start, end, each.share)
-        assert abs(margins(position, rotation)[each.incidence - 1]) < 1e-13
-        np.testing.assert_allclose(each.pose.rotation, rotation, atol=1e-12)
-    crossed = [sum(c.incidence == k for c in found.crossings) for k in (1, 2, 3)]
-    assert crossed == sign_changes(start, end).tolist()
-
-
-@given(st.integers(0, 2**32), st.sampled_from((0.1, 3.0, 20.0)))
-def test_path_margins_move_of_the_tool_has_all_crossings(seed: int, size: float) -> None:
+@given(st.integers(0, 2**32), st.sampled_from((0.0, 3.0, 20.0)))
+def test_path_margins_move_of_b4_or_a_tool_has_all_crossings(seed: int, size: float) -> None:
     rng = np.random.default_rng(seed)
     start, end, tool = random_pose(rng), random_pose(rng), size * rng.uniform(-1.0, 1.0, 3)
     found = path_margins([start, end], tool=tool)
+    assert found.lies_in == ()
+    shares = [each.share for each in found.crossings]
+    assert shares == sorted(shares)
     for each in found.crossings:
         position, rotation = tool_move(start, end, each.share, tool)
         assert abs(margins(position, rotation)[0, each.incidence - 1]) < 1e-12 * (5.0 + size)
@@ -74,15 +53,6 @@ def test_path_margins_of_the_tool_can_touch_the_base_plane_twice() -> None:
     crossings = path_margins([start, end], tool=tool).crossings
     assert [c.incidence for c in crossings].count(3) == 2
     assert [c.incidence for c in path_margins([start, end]).crossings].count(3) == 0
-
-
-def test_path_margins_one_move_can_cross_a_margin_twice() -> None:
-    rng = np.random.default_rng(1)
-    paths = [path_margins([random_pose(rng), random_pose(rng)], samples=2) for _ in range(100)]
-    crossings = [[c.incidence for c in path.crossings] for path in paths]
-    assert max(own.count(1) for own in crossings) >= 2
-    assert max(own.count(2) for own in crossings) >= 2
-    assert max(own.count(3) for own in crossings) == 1
 
 
 @given(cases(), st.integers(0, 4), st.integers(0, 2**32))
@@ -111,48 +81,15 @@ def test_path_margins_between_modes_cross_the_margins_that_differ(
         assert crossed % 2 == int(incidence in expected)
 
 
-@given(ordinary_cases(), st.integers(0, 2**32))
-def test_margins_smooth_path_between_modes_change_sign(case: Case, seed: int) -> None:
-    modes = forward(case.design, inverse(case.design, case.position, case.rotation))
-    assume(bool(np.abs(margins(case.position, case.rotation)).min() > 1e-6 * case.size))
-    rng = np.random.default_rng(seed)
-    first, last = rng.choice(8, 2, replace=False).tolist()
-    t = np.linspace(0.0, 1.0, 2001)
-    quaternions = Rotation.from_matrix(modes.rotation[[first, last]]).as_quat()
-    waves = np.sin(np.pi * t[:, None] * np.arange(1.0, 6.0))
-    share = t[:, None]
-    p = (1.0 - share) * modes.position[first] + share * modes.position[last]
-    q = (1.0 - share) * quaternions[0] + share * quaternions[1]
-    p += case.size * waves @ rng.normal(size=(5, 3))
-    q += waves @ rng.normal(size=(5, 4))
-    signs = margins(p, Rotation.from_quat(q).as_matrix()) > 0.0
-    changes = (signs[1:] != signs[:-1]).sum(axis=0)
-    assert (changes % 2 == (signs[0] != signs[-1])).all()
-    assert changes.sum() >= 1
-
-
-@pytest.mark.parametrize("last", range(8))
-def test_path_margins_straight_move_between_modes_has_its_crossings(last: int) -> None:
-    joints = inverse(OPTIMAL, HOME.position, HOME.rotation)
-    first, modes = 3, forward(OPTIMAL, joints)
-    ends = [Pose.of(modes.position[mode], modes.rotation[mode]) for mode in (first, last)]
-    found = path_margins(ends)
-    assert found.margins.shape == (len(found.at), 3)
-    differ = {k for k, bit in ((1, 4), (2, 2), (3, 1)) if (first ^ last) & bit}
-    assert {c.incidence for c in found.crossings if c.changes_sign} >= differ
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_path_margins_singular_start_is_a_crossing(way: tuple[int, ...]) -> None:
-    @given(singular_cases(way, st.just(OPTIMAL)))
-    def law(case: Case) -> None:
-        start = Pose.of(case.position, case.rotation)
-        found = path_margins([start, HOME])
-        for incidence in way:
-            own = [c for c in found.crossings if c.incidence == incidence]
-            assert incidence in found.lies_in or (own and own[0].share < 1e-6)
-
-    law()
+@given(st.data(), st.sampled_from(WAYS))
+def test_path_margins_singular_start_is_a_crossing(
+    data: st.DataObject, way: tuple[int, ...]
+) -> None:
+    case = data.draw(singular_cases(way, st.just(OPTIMAL)))
+    found = path_margins([Pose.of(case.position, case.rotation), HOME])
+    for incidence in way:
+        own = [c for c in found.crossings if c.incidence == incidence]
+        assert incidence in found.lies_in or (own and own[0].share < 1e-6)
 
 
 def test_path_margins_move_in_the_base_plane_lies_in_incidence_3() -> None:

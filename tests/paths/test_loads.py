@@ -9,17 +9,18 @@ import msgspec
 import numpy as np
 import pytest
 from loaded_designs import random_machine, random_move, random_weights
+from long_cases import long_after
 from tool_moves import tool_move
 
 from explorer import PRESETS, Design, InputError, Pose, home_pose, margins
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
 from explorer.paths.loads import TOLERANCE, DemandedLoad, path_loads
-from explorer.statics.reactions import LIMITED, PART_NAMES, limit_shares, reactions
+from explorer.statics.reactions import limit_shares, reactions
 from explorer.statics.weights import Weights, design_weights
 
 OPTIMAL = PRESETS["paper-optimal"]
-DENSE = np.linspace(0.0, 1.0, 4001)
+DENSE = np.linspace(0.0, 1.0, 1001)
 
 
 def dense_shares(
@@ -35,11 +36,7 @@ def dense_shares(
     return limit_shares(design, reactions(*given, weights or design_weights(design)))
 
 
-def test_every_part_has_a_name() -> None:
-    assert len(PART_NAMES) == len(LIMITED) == len(set(PART_NAMES))
-
-
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", long_after(8, range(40)))
 def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
     rng = np.random.default_rng([3, seed])
     design = random_machine(OPTIMAL, seed)
@@ -67,7 +64,7 @@ def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
     assert here[along.largest.part] == here.max() == pytest.approx(along.largest.share, rel=1e-10)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_path_loads_of_moves_near_singular_poses_bound_dense_samples(seed: int) -> None:
     rng = np.random.default_rng([4, seed])
     design = random_machine(OPTIMAL, seed)
@@ -132,17 +129,6 @@ def test_path_loads_without_limit_or_load_has_no_part() -> None:
     assert (along.largest.share, along.largest.part) == (0.0, None)
 
 
-def test_path_loads_of_standing_path_has_the_share_of_its_pose() -> None:
-    design = random_machine(OPTIMAL, 3)
-    pose = home_pose(design)
-    load = np.arange(6.0)
-    along = path_loads(design, (pose, pose), load)
-    given = design, pose.position, pose.rotation, load, design.tool.position
-    shares = limit_shares(design, reactions(*given, design_weights(design)))
-    assert along.largest.share == pytest.approx(float(shares.max()), rel=1e-12)
-    assert along.largest.part == int(shares.argmax())
-
-
 @pytest.mark.parametrize("load", [[1.0, 2.0], [math.nan] * 6, [math.inf] * 6])
 def test_path_loads_bad_load_is_refused(load: list[float]) -> None:
     pose = home_pose(OPTIMAL)
@@ -152,7 +138,7 @@ def test_path_loads_bad_load_is_refused(load: list[float]) -> None:
         path_loads(OPTIMAL, (pose,), np.zeros(6))
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(4))
 def test_holds_along_agrees_with_the_largest_share(seed: int) -> None:
     rng = np.random.default_rng([5, seed])
     design = random_machine(OPTIMAL, seed)

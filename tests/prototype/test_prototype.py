@@ -74,11 +74,6 @@ def parts_named(prototype: Prototype, *names: str) -> list[Part]:
     return [part for part in prototype.parts if part.name in names]
 
 
-def pose_overlaps(prototype: Prototype, position: FloatArray, rotation: FloatArray) -> list[Any]:
-    places = prototype.chains.places_at(position, rotation)
-    return list(overlaps(prototype.parts, places))
-
-
 def pose_of(prototype: Prototype) -> tuple[FloatArray, FloatArray]:
     home = home_pose(prototype.design)
     return np.array(home.position), home.rotation
@@ -89,34 +84,27 @@ def at_home(prototype: Prototype) -> Places:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_parts_are_closed_and_of_one_piece(name: str) -> None:
-    parts = PROTOTYPES[name].parts
+def test_parts_are_closed_and_of_one_piece_and_have_their_masses(name: str) -> None:
+    prototype = PROTOTYPES[name]
+    parts, unit = prototype.parts, prototype.design.unit_mm
     assert [part.name for part in parts] == [*BODIES, "ball 1", "ball 2", "ball 3", "ball 4"]
     for part in parts:
         assert part.solid.is_watertight, part.name
         assert part.solid.volume > 0.0
-        shape = trimesh.Trimesh(part.vertices, part.faces, process=False)
+        assert part.body in BODIES
+        shape: Any = trimesh.Trimesh(1e-3 * unit * part.vertices, part.faces, process=False)
         assert shape.is_watertight
         assert shape.is_winding_consistent
         assert shape.body_count == 1, part.name
-        assert part.body in BODIES
-
-
-@pytest.mark.parametrize("name", [OPTIMAL.name, LARGE.name])
-def test_masses_agree_with_trimesh(name: str) -> None:
-    prototype = PROTOTYPES[name]
-    metres = 1e-3 * prototype.design.unit_mm
-    for part in prototype.parts:
-        shape: Any = trimesh.Trimesh(part.vertices * metres, part.faces, process=False)
         shape.density = 2700.0
-        mass = part.mass(2700.0, prototype.design.unit_mm)
+        mass = part.mass(2700.0, unit)
         assert mass.mass == pytest.approx(float(shape.mass), rel=1e-9)
         np.testing.assert_allclose(mass.centre, shape.center_mass, atol=1e-9 * shape.scale)
         size = np.abs(mass.inertia).max()
         np.testing.assert_allclose(mass.inertia, shape.moment_inertia, atol=1e-6 * size)
     bodies = prototype.masses(2700.0)
     assert list(bodies) == list(BODIES[1:])
-    total = sum(part.mass(2700.0, prototype.design.unit_mm).mass for part in prototype.parts[1:])
+    total = sum(part.mass(2700.0, unit).mass for part in parts[1:])
     assert sum(mass.mass for mass in bodies.values()) == pytest.approx(total, rel=1e-12)
 
 
@@ -132,18 +120,6 @@ def test_parts_of_turned_frames_are_those_of_the_same_mechanism(design: Design) 
         for p in (plain, other)
     )
     np.testing.assert_allclose(np.sort(one @ turn.T, axis=1), np.sort(two, axis=1), atol=0.02)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_parts_keep_their_clearance_at_home(name: str) -> None:
-    prototype = PROTOTYPES[name]
-    assert prototype.broken_joint_limits(*pose_of(prototype)) == ()
-    places = at_home(prototype)
-    assert list(overlaps(prototype.parts, places)) == []
-    unit = prototype.design.unit_mm
-    gap, one, two = least_gap(prototype.parts, places, 2.0 * CLEARANCE / unit)
-    assert gap * unit > 0.99 * CLEARANCE, (one, two)
-    assert gap * unit < 1.1 * CLEARANCE
 
 
 def motion(prototype: Prototype, many: int) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -169,11 +145,16 @@ def motion(prototype: Prototype, many: int) -> Iterator[tuple[FloatArray, FloatA
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_parts_stay_clear_along_a_motion(name: str) -> None:
+def test_parts_keep_their_clearance_at_home_and_stay_clear_along_a_motion(name: str) -> None:
     prototype = PROTOTYPES[name]
+    unit, places = prototype.design.unit_mm, at_home(prototype)
+    assert prototype.broken_joint_limits(*pose_of(prototype)) == ()
+    gap, one, two = least_gap(prototype.parts, places, 2.0 * CLEARANCE / unit)
+    assert 0.99 * CLEARANCE < gap * unit < 1.1 * CLEARANCE, (one, two)
     far = 0.0
-    for position, rotation in motion(prototype, 12):
-        assert pose_overlaps(prototype, position, rotation) == []
+    for position, rotation in motion(prototype, 5):
+        places = prototype.chains.places_at(position, rotation)
+        assert list(overlaps(prototype.parts, places)) == []
         far = max(far, float(np.linalg.norm(position - pose_of(prototype)[0])))
     assert far > 0.03 * prototype.design.reach
 
@@ -208,7 +189,7 @@ def test_legs_whose_parts_meet_are_named_though_their_capsules_are_clear() -> No
     assert "the axes of legs 3 and 4 are 8.817 mm apart and need" in problem
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_legs_keep_the_clearance_of_parts_up_to_the_first_broken_limit(seed: int) -> None:
     rng = np.random.default_rng(seed)
     design, position, rotation = close_legs()
@@ -264,12 +245,12 @@ def test_parts_of_legs_lie_within_their_capsules(name: str) -> None:
         assert np.min(excess, axis=0).max() <= 1e-9 * unit, part.name
 
 
-@pytest.mark.parametrize("name", [OPTIMAL.name, BELOW.name, LARGE.name])
+@pytest.mark.parametrize("name", [BELOW.name, LARGE.name])
 def test_universal_joints_within_their_swings_are_clear(name: str) -> None:
     prototype = PROTOTYPES[name]
     chains, (position, rotation) = prototype.chains, pose_of(prototype)
     home = chains.joints(position, rotation)
-    swings = (np.linspace(-most, most, 5) for most in (FIRST_SWING, SECOND_SWING))
+    swings = (np.linspace(-most, most, 3) for most in (FIRST_SWING, SECOND_SWING))
     for leg, swing in itertools.product((1, 4), itertools.product(*swings)):
         joints = home.copy()
         joints_of_leg(joints, leg)[:2] = swing
@@ -278,7 +259,7 @@ def test_universal_joints_within_their_swings_are_clear(name: str) -> None:
         assert list(overlaps(own, places)) == [], (leg, swing)
 
 
-@pytest.mark.parametrize("name", [OPTIMAL.name, UPSIDE_DOWN.name, LARGE.name])
+@pytest.mark.parametrize("name", [UPSIDE_DOWN.name, LARGE.name])
 def test_ball_joints_up_to_nearly_a_right_angle_are_clear(name: str) -> None:
     prototype = PROTOTYPES[name]
     places = at_home(prototype)
@@ -286,7 +267,7 @@ def test_ball_joints_up_to_nearly_a_right_angle_are_clear(name: str) -> None:
         own = parts_named(prototype, f"rod {leg}", "platform", f"ball {leg}")
         index = BODIES.index(f"rod {leg}")
         normal = -prototype.chains.platform_side * places.rotation[-1][:, 2]
-        for azimuth in np.linspace(0.0, 2.0 * math.pi, 6):
+        for azimuth in np.linspace(0.0, 2.0 * math.pi, 4):
             tangent = places.rotation[-1] @ [math.cos(azimuth), math.sin(azimuth), 0.0]
             for lean, fits in ((math.radians(85.0), True), (math.radians(130.0), False)):
                 along = math.cos(lean) * normal + math.sin(lean) * tangent
@@ -336,14 +317,9 @@ def test_strokes_of_random_legs_hold_home_and_fit_one_rod(
     assert required.shortest - slack <= found.shortest <= at_home + slack
     assert at_home - slack <= found.longest <= required.longest + slack
     assert found.longest <= 2.0 * found.shortest - own.dead + slack
+    # A stroke that fits one rod is that of the limits.
     if required.longest <= 2.0 * required.shortest - own.dead:
         assert found == pytest.approx(required, rel=1e-9)
-
-
-def test_stroke_that_fits_one_rod_is_that_of_the_limits() -> None:
-    sizes = PROTOTYPES[LARGE.name].sizes
-    assert sizes.strokes[0] == pytest.approx((7.5 * 40.0, 12.0 * 40.0))
-    assert sizes.strokes[3] == pytest.approx((9.0 * 40.0, 16.0 * 40.0))
 
 
 def test_carriages_too_close_overlap_and_are_named() -> None:
@@ -352,7 +328,8 @@ def test_carriages_too_close_overlap_and_are_named() -> None:
     # At a yaw of −90° both legs are at the same place of the guide.
     turn = Rotation.from_euler("Z", -15.0, degrees=True).as_matrix() @ rotation
     assert "carriages 2 and 3 are" in " ".join(prototype.broken_joint_limits(position, turn))
-    pairs = {frozenset(pair[:2]) for pair in pose_overlaps(prototype, position, turn)}
+    places = prototype.chains.places_at(position, turn)
+    pairs = {frozenset(pair[:2]) for pair in overlaps(prototype.parts, places)}
     assert frozenset(("carriage 2", "carriage 3")) in pairs
 
 
@@ -401,7 +378,6 @@ def test_places_of_random_poses_lie_along_the_legs(name: str) -> None:
 
 TIGHT = (
     (limited(OPTIMAL, leg_radii=(0.4,) * 4), "carriages 2 and 3 at home are 6.69 mm apart"),
-    (limited(OPTIMAL, leg_radii=(0.05,) * 4), "the radius of leg 1 is 0.5 mm"),
     (msgspec.structs.replace(OPTIMAL, unit_mm=2.0), "too thin: the radius of leg 1"),
     (
         msgspec.structs.replace(

@@ -24,7 +24,6 @@ from explorer import (
     evaluate,
     home_pose,
     inverse,
-    orientation_share,
     poses_are_valid,
     workspace_nodes,
     workspace_volume,
@@ -41,13 +40,13 @@ OPTIMAL = PRESETS["paper-optimal"]
 MIRRORED = np.diag([-1.0, -1.0, 1.0]) @ home_pose(OPTIMAL).rotation
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_order_with_d3_less_d1_of_the_other_sign_than_at_home_is_a_violation(
     seed: int,
 ) -> None:
     design, _ = ordinary_case(seed)
     home = home_pose(design)
-    rotations = Rotation.random(40, random_state=np.random.default_rng(seed)).as_matrix()
+    rotations = Rotation.random(20, random_state=np.random.default_rng(seed)).as_matrix()
     joints = inverse(design, home.position, rotations)
     at_home = evaluate(design, home).joints
     other = (joints[:, 3] - joints[:, 1]) * (at_home[3] - at_home[1]) < 0.0
@@ -146,11 +145,3 @@ def test_design_file_without_the_order_demands_that_of_home() -> None:
         untyped: Any = word
         with pytest.raises(DesignError, match='carriage_order must be "home" or "any"'):
             Limits(carriage_order=untyped)
-
-
-def test_orientation_share_with_the_order_at_the_paper_s_home_is_half() -> None:
-    home = home_pose(OPTIMAL)
-    kept = orientation_share(OPTIMAL, home.position)
-    plain = orientation_share(limited(OPTIMAL, carriage_order="any"), home.position)
-    assert plain.share == pytest.approx(0.25, abs=0.005)
-    assert kept.share == pytest.approx(0.125, abs=0.005)

@@ -13,7 +13,6 @@ from explorer import PRESETS
 from explorer.mechanism.design import Design, Swing
 from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray, dot
-from explorer.workspace.faces.divide import divide, find_roots
 from explorer.workspace.faces.faces import Faces, workspace_faces
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
@@ -43,8 +42,8 @@ PRESET_CASES = tuple(at_home(design) for design in PRESETS.values())
 CASES = (
     *PRESET_CASES,
     at_home(coned()),
-    *(ordinary_case(seed) for seed in range(6)),
-    *(thin_case(seed) for seed in range(3)),
+    *(ordinary_case(seed) for seed in range(3)),
+    thin_case(0),
 )
 
 
@@ -84,11 +83,21 @@ def outward(limit: Constraint, points: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_vertices_lie_on_the_surfaces_of_their_limits_and_within_all_others(
+def test_vertices_and_edges_lie_on_their_surfaces_and_faces_have_the_areas_of_a_boolean(
     case: tuple[Design, FloatArray],
 ) -> None:
-    faces, limits, _ = faces_of(*case)
+    faces, limits, solid = faces_of(*case)
     size = size_of(faces)
+    ends = faces.edges.reshape(-1, 3)
+    assert len(ends) > 0
+    off = np.sort([limit.distance(ends) for limit in limits], axis=0)
+    # Surfaces that nearly touch leave little to tell on which of their curves a point is.
+    assert float(np.quantile(off[1], 0.99)) < 1e-8 * size
+    assert float(off[1].max()) < 0.5 * size / PIXELS
+    found, expected = areas(faces), areas(solid)
+    total = sum(expected.values())
+    assert sum(found.values()) == pytest.approx(total, rel=5e-3)
+    assert max(abs(found[name] - expected[name]) for name in expected) < 0.01 * total
     for index, limit in enumerate(limits):
         own = np.unique(faces.triangles[faces.limit_of_triangle == index])
         assert (limit.distance(faces.vertices[own]) < 1e-9 * size).all()
@@ -97,20 +106,17 @@ def test_vertices_lie_on_the_surfaces_of_their_limits_and_within_all_others(
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_faces_have_the_areas_of_a_boolean(case: tuple[Design, FloatArray]) -> None:
-    faces, _, solid = faces_of(*case)
-    found, expected = areas(faces), areas(solid)
-    total = sum(expected.values())
-    assert sum(found.values()) == pytest.approx(total, rel=5e-3)
-    assert max(abs(found[name] - expected[name]) for name in expected) < 0.01 * total
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_triangles_are_within_half_a_pixel_of_the_surface_and_face_outwards(
+def test_triangles_are_within_half_a_pixel_of_the_surface_and_shaded_as_it_is(
     case: tuple[Design, FloatArray],
 ) -> None:
+    """A browser takes the sum of the normals about a vertex, weighted by areas."""
     faces, limits, _ = faces_of(*case)
     corners, normals = faces.vertices[faces.triangles], normals_of(faces)
+    sums = np.zeros_like(faces.vertices)
+    for k in range(3):
+        np.add.at(sums, faces.triangles[:, k], normals)
+    sums /= np.linalg.norm(sums, axis=1, keepdims=True)
+    angles: list[float] = []
     for index, limit in enumerate(limits):
         own = faces.limit_of_triangle == index
         middles = corners[own].mean(axis=1)
@@ -120,52 +126,12 @@ def test_triangles_are_within_half_a_pixel_of_the_surface_and_face_outwards(
         off = np.concatenate([limit.distance(middles), limit.distance(sides)])
         assert off.max() < 0.5 * size_of(faces) / PIXELS
         assert (dot(normals[own], outward(limit, middles)) > 0.0).all()
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_normals_that_a_browser_computes_are_those_of_the_surface(
-    case: tuple[Design, FloatArray],
-) -> None:
-    """A browser takes the sum of the normals about a vertex, weighted by areas."""
-    faces, limits, _ = faces_of(*case)
-    sums, normals = np.zeros_like(faces.vertices), normals_of(faces)
-    for k in range(3):
-        np.add.at(sums, faces.triangles[:, k], normals)
-    sums /= np.linalg.norm(sums, axis=1, keepdims=True)
-    angles: list[float] = []
-    for index, limit in enumerate(limits):
-        own = np.unique(faces.triangles[faces.limit_of_triangle == index])
-        if len(own):
-            cosine = dot(sums[own], outward(limit, faces.vertices[own]))
-            angles.extend(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).tolist())
+        vertices = np.unique(faces.triangles[own])
+        cosine = dot(sums[vertices], outward(limit, faces.vertices[vertices]))
+        angles.extend(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).tolist())
     # Beside the narrow ends of faces a vertex may have no triangle but slivers.
     assert float(np.quantile(angles, 0.99)) < 5.0
     assert float(np.median(angles)) < 1.0
-
-
-@pytest.mark.parametrize("case", PRESET_CASES)
-def test_no_vertex_of_the_presets_is_shaded_wrong(case: tuple[Design, FloatArray]) -> None:
-    faces, limits, _ = faces_of(*case)
-    sums, normals = np.zeros_like(faces.vertices), normals_of(faces)
-    for k in range(3):
-        np.add.at(sums, faces.triangles[:, k], normals)
-    sums /= np.linalg.norm(sums, axis=1, keepdims=True)
-    for index, limit in enumerate(limits):
-        own = np.unique(faces.triangles[faces.limit_of_triangle == index])
-        if len(own):
-            cosine = dot(sums[own], outward(limit, faces.vertices[own]))
-            assert float(cosine.min()) > np.cos(np.radians(8.0))
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_edges_lie_on_two_surfaces(case: tuple[Design, FloatArray]) -> None:
-    faces, limits, _ = faces_of(*case)
-    ends = faces.edges.reshape(-1, 3)
-    assert len(ends) > 0
-    off = np.sort([limit.distance(ends) for limit in limits], axis=0)
-    # Surfaces that nearly touch leave little to tell on which of their curves a point is.
-    assert float(np.quantile(off[1], 0.99)) < 1e-8 * size_of(faces)
-    assert float(off[1].max()) < 0.5 * size_of(faces) / PIXELS
 
 
 def test_a_limit_that_coincides_with_others_has_edges_only_where_surfaces_cross() -> None:
@@ -214,13 +180,13 @@ def test_cone_of_a_joint_has_a_face(half_angle: float, flat: bool) -> None:
     assert found["ball"] == pytest.approx(16.0 * np.pi * share, rel=5e-3)
 
 
-@pytest.mark.parametrize("size", [1e-1, 1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize("size", [1e-1, 1e-5])
 @pytest.mark.parametrize("kind", ["ball", "cylinder", "cone", "wedge"])
 def test_surface_in_a_small_cube_far_from_its_centre_has_the_area_of_its_tangent_plane(
     kind: str, size: float
 ) -> None:
     rng = np.random.default_rng(7)
-    for _ in range(10):
+    for _ in range(3):
         limit, middle, normal = curved_limit(kind, rng)
         cube = [
             HalfSpace(f"side {axis} {sign}", sign * axis, float(sign * axis @ middle) + 0.5 * size)
@@ -267,40 +233,3 @@ def section_of_unit_cube(normal: FloatArray) -> float:
     # The density at zero of the sum of three uniform variables.
     parts = signs.prod(axis=1) * np.maximum(0.5 * signs @ n, 0.0) ** 2
     return float(parts.sum() / (2.0 * n.prod()))
-
-
-def test_division_keeps_areas_and_separates_values() -> None:
-    rng = np.random.default_rng(7)
-    vertices = rng.normal(size=(60, 3))
-    triangles = rng.integers(0, 60, (400, 3))
-    triangles = triangles[(np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)]
-    values = vertices @ [0.3, -1.0, 0.5] - 0.2
-    division = divide(triangles, values >= 0.0)
-    a, b = division.ends.T
-    assert (values[a] < 0.0).all()
-    assert (values[b] >= 0.0).all()
-    share = find_roots(lambda at: values[a] + at * (values[b] - values[a]), values[a], values[b], 0)
-    points = np.concatenate([vertices, vertices[a] + share[:, None] * (vertices[b] - vertices[a])])
-    off = points @ [0.3, -1.0, 0.5] - 0.2
-    assert (off[division.faces[division.is_high]] > -1e-12).all()
-    assert (off[division.faces[~division.is_high]] < 1e-12).all()
-
-    def normals(each: FloatArray) -> FloatArray:
-        return np.cross(each[:, 1] - each[:, 0], each[:, 2] - each[:, 0])
-
-    # Parts keep the orientation of the whole, and together its area.
-    sums = np.zeros((len(triangles), 3))
-    np.add.at(sums, division.origin, normals(points[division.faces]))
-    np.testing.assert_allclose(sums, normals(vertices[triangles]), atol=1e-12)
-
-
-def test_roots_are_found_between_ends_of_any_slope() -> None:
-    power = np.array([1.0, 3.0, 9.0, 0.2, 0.5])
-    root = np.array([0.5, 0.9, 0.3, 0.01, 0.7])
-
-    def value(at: FloatArray) -> FloatArray:
-        return at**power - root**power
-
-    found = find_roots(value, value(np.zeros(5)), value(np.ones(5)), 1e-12)
-    np.testing.assert_allclose(value(found), 0.0, atol=1e-4)
-    assert len(find_roots(value, np.zeros(0), np.zeros(0), 1.0)) == 0

@@ -25,7 +25,6 @@ from explorer import (
     Payload,
     Pose,
     Struts,
-    Tool,
     limit_shares,
     reactions,
     workspace_solid,
@@ -81,22 +80,20 @@ def test_volume_is_that_of_reference_cases(case: dict[str, Any]) -> None:
     assert part.held_volume == pytest.approx(case["held_volume"], abs=error)
 
 
-@pytest.mark.parametrize("seed", long_after(2, range(20)))
+@pytest.mark.parametrize("seed", long_after(5, range(20)))
 def test_volume_at_any_orientation_is_that_of_positions_in_the_mode_of_home(seed: int) -> None:
-    """The load acts at b4 without moment in every second case: some forces are bounded there."""
+    """In every fifth case only a force acts at b4, for which some forces are bounded."""
     rng = np.random.default_rng(seed)
-    load, tool, payload = np.zeros(6), Tool(), Payload()
-    load[:3] = rng.normal(size=3) * 20.0
-    if seed % 2:
-        load[3:] = rng.normal(size=3) * 30.0
-        tool = Tool((1.0, -1.0, 2.0))
-        payload = Payload(rng.uniform(0.0, 1.0), (1.0, 2.0, 3.0), rng.uniform(0.0, 5.0))
+    load = rng.normal(size=6) * (5.0, 5.0, 5.0, 10.0, 10.0, 10.0)
     design = msgspec.structs.replace(
-        OPTIMAL,
-        limits=msgspec.structs.replace(OPTIMAL.limits, margin=0.0),
-        tool=tool,
-        payload=payload,
-        actuators=Actuators(push_n=six(rng.uniform(100.0, 300.0, 6))),
+        OPTIMAL, actuators=Actuators(push_n=six(rng.uniform(30.0, 100.0, 6)))
+    )
+    if seed % 5:
+        design = list(CASES.values())[seed % 5 - 1]
+    else:
+        load[3:] = 0.0
+    design = msgspec.structs.replace(
+        design, limits=msgspec.structs.replace(design.limits, margin=0.0)
     )
     home, rotation, whole = home_pose(OPTIMAL), np.eye(3), None
     while whole is None or whole.volume < 100.0:
@@ -115,34 +112,8 @@ def test_volume_at_any_orientation_is_that_of_positions_in_the_mode_of_home(seed
     share = float((largest_shares(design, at, load, rotation) <= 1.0).mean())
     sampling = 3.0 * math.sqrt(share * (1.0 - share) / len(at))
     assert part.held_volume / part.volume == pytest.approx(share, abs=sampling + 0.005 * share)
-
-
-@pytest.mark.parametrize(
-    ("name", "load"),
-    [("bending", (0.0,) * 6), ("actuators", LOAD), ("all parts", LOAD), ("strong", (0.0,) * 6)],
-)
-def test_volume_is_that_of_positions_which_hold_the_load(
-    name: str, load: tuple[float, ...]
-) -> None:
-    design = CASES[name]
-    part = held_workspace(design, load=load)
-    signed = msgspec.structs.replace(design.limits, margin=0.0)
-    limits = constraints(msgspec.structs.replace(design, limits=signed), home_pose(design).rotation)
-    random = np.random.default_rng(3)
-    at = random.uniform((0.0, -12.0, 0.0), (20.0, 22.0, 18.0), (60_000, 3))
-    at = at[satisfies(design, limits, at).all(axis=-1)]
-    share = float((largest_shares(design, at, load) <= 1.0).mean())
-    error = np.sqrt(share * (1.0 - share) / len(at))
-    assert part.held_volume / part.volume == pytest.approx(share, abs=4.0 * error + 0.005 * share)
     assert part.solid.is_empty or part.solid.is_watertight
     assert len(set(part.solid.limits)) == len(part.solid.limits)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", ["bending", "actuators", "all parts"])
-def test_volume_error_is_below_half_a_percent(name: str) -> None:
-    coarse, fine = (held_workspace(CASES[name], nodes=count).held_volume for count in (20, 50))
-    assert coarse == pytest.approx(fine, rel=5e-3)
 
 
 @pytest.mark.parametrize("name", ["bending", "all parts"])

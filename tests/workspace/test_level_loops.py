@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.workspace.slices.level_loops import level_loops
@@ -29,7 +29,6 @@ def winding(polygons: list[FloatArray], points: FloatArray) -> IntArray:
 GRIDS = st.tuples(st.integers(2, 7), st.integers(2, 7), st.integers(0, 2**31))
 
 
-@settings(max_examples=200)
 @given(GRIDS)
 def test_outlines_enclose_the_nodes_above_the_level_once_and_no_others(
     grid: tuple[int, int, int],
@@ -55,15 +54,15 @@ def test_outlines_enclose_the_nodes_above_the_level_once_and_no_others(
 @given(st.floats(0.3, 0.9), st.floats(-0.3, 0.3))
 def test_outline_of_a_ring_has_its_area_to_the_square_of_the_step(radius: float, u: float) -> None:
     areas: list[float] = []
-    for steps in (80, 160):
+    for steps in (40, 80):
         x = np.linspace(-1.5, 1.5, steps + 1)
         away = np.hypot(x[None, :] - u, x[:, None])
         outer, hole = sorted(level_loops(x, x, -np.abs(away - radius), -0.15), key=area)[::-1]
         assert area(hole) < 0.0 < area(outer)
         areas.append(area(outer) + area(hole))
     exact = np.pi * ((radius + 0.15) ** 2 - (radius - 0.15) ** 2)
-    assert areas[0] == pytest.approx(exact, rel=1e-2)
-    assert areas[1] == pytest.approx(exact, rel=3e-3)
+    assert areas[0] == pytest.approx(exact, rel=4e-2)
+    assert areas[1] == pytest.approx(exact, rel=1.2e-2)
 
 
 def test_outline_lies_at_the_level_and_on_the_ends_of_the_grid() -> None:

@@ -40,43 +40,46 @@ def ranges(low: float, high: float) -> st.SearchStrategy[tuple[float, float]]:
     return ends.map(lambda pair: (min(pair), max(pair)))
 
 
-@given(ordinary_cases(), st.tuples(*[ranges(0.0, 20.0)] * 4))
-def test_length_outside_its_range_is_a_violation(
-    case: Case, bounds: tuple[tuple[float, float], ...]
+@given(
+    ordinary_cases(),
+    st.tuples(*[ranges(0.0, 20.0)] * 4),
+    ranges(-20.0, 50.0),
+    st.tuples(*[ranges(-30.0, 30.0)] * 3),
+)
+def test_length_carriage_or_coordinate_outside_its_range_is_a_violation(
+    case: Case,
+    lengths: tuple[tuple[float, float], ...],
+    guide: tuple[float, float],
+    sides: tuple[tuple[float, float], ...],
 ) -> None:
-    design = limited(case.design, **dict(zip(LENGTHS, bounds, strict=True)))
+    lows, highs = zip(*sides, strict=True)
+    limits: dict[str, Any] = dict(zip(LENGTHS, lengths, strict=True))
+    design = limited(case.design, **limits, guide=guide, box=(lows, highs))
     joints = dict(zip(JOINTS, inverse(design, case.position, case.rotation).tolist(), strict=True))
     found = {v.limit: v for v in broken(design, case.position, case.rotation)}
-    for name, (low, high) in zip(LENGTHS, bounds, strict=True):
-        if not low - 1e-9 <= joints[name] <= high + 1e-9:
-            above = joints[name] > high
-            assert found[name] == Violation(name, joints[name], high if above else low, above)
-        elif low <= joints[name] <= high:
+    values = joints | dict(zip(("box x", "box y", "box z"), case.position.tolist(), strict=True))
+    for name, (low, high) in zip(
+        (*LENGTHS, "d1", "d3", "box x", "box y", "box z"),
+        (*lengths, guide, guide, *sides),
+        strict=True,
+    ):
+        value = values[name]
+        if not low - 1e-9 <= value <= high + 1e-9:
+            above = value > high
+            assert found[name] == Violation(name, value, high if above else low, above)
+        elif low <= value <= high:
             assert name not in found
 
 
 @given(ordinary_cases())
-def test_maximum_of_none_is_the_reach(case: Case) -> None:
+def test_maximum_of_none_is_the_reach_and_a_margin_of_none_demands_nothing(case: Case) -> None:
     design = limited(case.design, l1=(0.0, None))
     reach = math.hypot(*case.design.a3)
     l1 = float(inverse(design, case.position, case.rotation)[0])
-    found = broken(design, case.position, case.rotation)
-    assert [v.limit for v in found] == (["l1"] if l1 > reach * (1.0 + 1e-12) else [])
-    assert all(v.bound == reach for v in found)
-
-
-@given(ordinary_cases(), ranges(-20.0, 50.0))
-def test_carriage_beyond_the_guide_is_a_violation(case: Case, guide: tuple[float, float]) -> None:
-    design, (low, high) = limited(case.design, guide=guide), guide
-    joints = inverse(design, case.position, case.rotation).tolist()
-    found = {v.limit for v in broken(design, case.position, case.rotation)}
-    assert found <= {"d1", "d3"}
-    for name in ("d1", "d3"):
-        value = joints[JOINTS.index(name)]
-        if not low - 1e-9 <= value <= high + 1e-9:
-            assert name in found
-        elif low <= value <= high:
-            assert name not in found
+    for mode in (0, 7):
+        found = broken(design, case.position, case.rotation, signs_of(mode))
+        assert [v.limit for v in found] == (["l1"] if l1 > reach * (1.0 + 1e-12) else [])
+        assert all(v.bound == reach for v in found)
 
 
 @given(ordinary_cases(), st.floats(0.0, 20.0))
@@ -93,21 +96,6 @@ def test_carriages_closer_than_the_gap_are_a_violation(case: Case, gap: float) -
         assert found == ()
 
 
-@given(ordinary_cases(), st.tuples(*[ranges(-30.0, 30.0)] * 3))
-def test_coordinate_outside_the_box_is_a_violation(
-    case: Case, sides: tuple[tuple[float, float], ...]
-) -> None:
-    lows, highs = zip(*sides, strict=True)
-    design = limited(case.design, box=(lows, highs))
-    found = {v.limit: v for v in broken(design, case.position, case.rotation)}
-    assert set(found) <= {"box x", "box y", "box z"}
-    for axis, value, low, high in zip("xyz", case.position.tolist(), lows, highs, strict=True):
-        if value < low - 1e-9 or value > high + 1e-9:
-            assert found[f"box {axis}"].above == (value > high)
-        elif low <= value <= high:
-            assert f"box {axis}" not in found
-
-
 @given(ordinary_cases(), st.floats(0.0, 10.0), st.integers(0, 7))
 def test_margin_of_another_sign_or_too_small_is_a_violation(
     case: Case, least: float, mode: int
@@ -122,13 +110,6 @@ def test_margin_of_another_sign_or_too_small_is_a_violation(
             assert found[name] == Violation(name, value, sign * least, sign < 0)
         elif sign * value >= least:
             assert name not in found
-
-
-@given(ordinary_cases())
-def test_margin_of_none_demands_nothing(case: Case) -> None:
-    design = limited(case.design, margin=None)
-    for mode in range(8):
-        assert broken(design, case.position, case.rotation, signs_of(mode)) == ()
 
 
 @given(ordinary_cases())

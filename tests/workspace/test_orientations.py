@@ -38,14 +38,11 @@ def test_yaw_pitch_roll_range_is_a_grid_with_its_ends() -> None:
     angles = yaw_pitch_roll_from_rotation(found)
     expected = [(yaw, pitch, -5.0) for yaw in (-80.0, -70.0, -60.0) for pitch in (0.0, 10.0)]
     np.testing.assert_allclose(angles, expected, atol=1e-9)
+    middle = yaw_pitch_roll_range([-80.0, 0.0, 0.0], [-60.0, 10.0, 0.0], [1, 1, 1])
+    np.testing.assert_allclose(yaw_pitch_roll_from_rotation(middle), [(-70, 5, 0)], atol=1e-9)
 
 
-def test_yaw_pitch_roll_range_of_one_value_is_its_middle() -> None:
-    found = yaw_pitch_roll_range([-80.0, 0.0, 0.0], [-60.0, 10.0, 0.0], [1, 1, 1])
-    np.testing.assert_allclose(yaw_pitch_roll_from_rotation(found), [(-70.0, 5.0, 0.0)], atol=1e-9)
-
-
-@pytest.mark.parametrize("half_angle", [0.0, 5.0, 60.0, 180.0])
+@pytest.mark.parametrize("half_angle", [0.0, 60.0, 180.0])
 def test_cone_of_directions_is_even_and_has_no_torsion(half_angle: float) -> None:
     count = 2000
     found = cone_of_directions(HOME.rotation, half_angle, count)
@@ -68,11 +65,11 @@ def within_one_by_one(position: FloatArray, rotations: FloatArray, **limits: Any
     return [not evaluate(design, Pose.of(position, r)).violations for r in rotations]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_orientation_capability_agrees_with_single_poses(seed: int) -> None:
     rng = np.random.default_rng(seed)
     position = np.array(HOME.position) + rng.normal(scale=2.0, size=3)
-    turns = Rotation.from_rotvec(rng.normal(scale=0.5, size=(300, 3))).as_matrix()
+    turns = Rotation.from_rotvec(rng.normal(scale=0.5, size=(80, 3))).as_matrix()
     rotations = turns @ HOME.rotation
     for limits in ({}, EVERY_LIMIT, {"margin": None, "box": None}):
         expected = within_one_by_one(position, rotations, **limits)
@@ -123,26 +120,21 @@ def test_orientations_without_a_margin_keep_no_mode() -> None:
     assert not orientations_within(OPTIMAL, HOME.position, over[None]).any()
 
 
-def test_orientation_capability_out_of_the_box_is_zero() -> None:
-    assert orientation_capability(OPTIMAL, [30.0, 5.0, 9.0], 100) == 0.0
-
-
 def test_orientation_capability_with_more_orientations_converges() -> None:
-    shares = [orientation_capability(OPTIMAL, HOME.position, n) for n in (1000, 10_000, 100_000)]
+    shares = [orientation_capability(OPTIMAL, HOME.position, n) for n in (1000, 10_000, 50_000)]
     assert shares[0] == pytest.approx(shares[2], abs=0.01)
     assert shares[1] == pytest.approx(shares[2], abs=0.003)
 
 
-@pytest.mark.parametrize("seed", range(3))
 def test_orientations_within_interpreted_and_compiled_agree(
-    monkeypatch: pytest.MonkeyPatch, seed: int
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     warm()
     untyped: Any = valid_rows
     assert untyped.ready
-    design, rotation = ordinary_case(seed)
+    design, rotation = ordinary_case(0)
     design = limited(design, swing=Swing(a1=40.0, b3=70.0))
-    turns = Rotation.from_rotvec(np.random.default_rng(seed).normal(scale=0.2, size=(400, 3)))
+    turns = Rotation.from_rotvec(np.random.default_rng(0).normal(scale=0.2, size=(400, 3)))
     rotations = turns.as_matrix() @ rotation
     position = home_pose(design).position
     compiled = orientations_within(design, position, rotations)

@@ -9,7 +9,6 @@ import msgspec
 import numpy as np
 import pytest
 from machines import FULL, six
-from scipy.spatial.transform import Rotation
 
 from explorer import (
     PRESETS,
@@ -20,7 +19,6 @@ from explorer import (
     Tool,
     inverse,
     limit_shares,
-    margins,
     reactions,
 )
 from explorer.export.report.drawings.slices import Slices
@@ -29,7 +27,7 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.statics.weights import design_weights, payload_wrench
+from explorer.statics.weights import design_weights
 from explorer.workspace.position_bands import (
     LOAD_MEASURES,
     MEASURE_WORDS,
@@ -70,6 +68,12 @@ def near_planes(rotation: FloatArray, count: int) -> FloatArray:
         off = 10.0 ** random.uniform(-12.0, 0.0, len(points[some]))
         points[some] -= np.outer(points[some] @ normal / size - off, normal / size)
     return points
+
+
+def on_plane(normal: FloatArray) -> FloatArray:
+    """Return a position on a plane through a1 with a normal."""
+    point = np.array([10.0, 5.0, 9.0])
+    return point - (point @ normal) / (normal @ normal) * normal
 
 
 def asked(design: Design, points: FloatArray, rotation: FloatArray, measure: str) -> FloatArray:
@@ -131,14 +135,17 @@ def softness_of(design: Design, points: FloatArray, rotation: FloatArray) -> Flo
 
 
 @pytest.mark.parametrize("measure", MEASURES)
-@pytest.mark.parametrize("rotation", ORIENTATIONS)
+@pytest.mark.parametrize("rotation", ORIENTATIONS[1:])
 def test_values_are_reciprocal_to_what_reactions_ask(
     measure: PositionMeasure, rotation: FloatArray
 ) -> None:
     bands = position_bands(LOADED, rotation, measure, warn_below=1.0, load=LOAD)
-    points = near_planes(rotation, 4000)
+    points = near_planes(rotation, 1000)
+    # The last ones lie on the singular planes.
+    points[-3:] = [on_plane(normal) for normal in planes_of_singularity(rotation)]
     expected = asked(LOADED, points, rotation, measure)
-    assert (expected > 1e6).any()
+    expected[-3:] = np.inf
+    assert (expected[:-3] > 1e6).any()
     highest, lowest = bands.levels[1], bands.levels[-1]
     values = bands.values(points)
     np.testing.assert_allclose(
@@ -151,48 +158,6 @@ def test_values_are_reciprocal_to_what_reactions_ask(
     assert (expected >= levels[index + 1] * (1.0 - 1e-7)).all()
 
 
-@pytest.mark.parametrize("measure", MEASURES)
-def test_value_is_zero_on_a_singular_plane(measure: PositionMeasure) -> None:
-    rotation = ORIENTATIONS[1]
-    bands = position_bands(LOADED, rotation, measure, warn_below=1.0, load=LOAD)
-    for normal in planes_of_singularity(rotation):
-        point = np.array([10.0, 5.0, 9.0])
-        on_plane = point - (point @ normal) / (normal @ normal) * normal
-        assert bands.values(on_plane[None])[0] == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize("measure", DISPLACEMENTS)
-def test_displacements_are_those_of_an_inverted_jacobian(measure: PositionMeasure) -> None:
-    """The Jacobian is of differences of the inverse kinematics, with the tool moved by each."""
-    rotation, h = ORIENTATIONS[2], 1e-5
-    points = np.random.default_rng(8).uniform((0, -12, -10), (20, 22, 18), (400, 3))
-    points = points[np.abs(margins(points, rotation)).min(axis=-1) > 1.0]
-    tool = rotation @ np.array(LOADED.tool.position)
-    columns: list[FloatArray] = []
-    for axis in np.eye(6):
-        ends: list[FloatArray] = []
-        for step in (h, -h):
-            turn = Rotation.from_rotvec(step * axis[3:]).as_matrix()
-            # A turn about the tool point moves b4.
-            moved = points + step * axis[:3] + tool - turn @ tool
-            ends.append(inverse(LOADED, moved, turn @ rotation))
-        columns.append((ends[0] - ends[1]) / (2.0 * h))
-    twists = np.linalg.inv(np.stack(columns, axis=-1))
-    if measure == "error":
-        corners = np.array(list(itertools.product((-1.0, 1.0), repeat=6))) * ERRORS
-        expected = np.linalg.norm(twists[:, None, :3] @ corners[:, :, None], axis=-2).max(axis=1)
-    else:
-        wrench = LOAD + payload_wrench(LOADED, rotation)
-        gives = (np.swapaxes(twists, 1, 2) @ wrench) * softness_of(LOADED, points, rotation)
-        expected = np.linalg.norm((twists[:, :3] @ gives[:, :, None])[..., 0], axis=-1)
-    bands = position_bands(LOADED, rotation, measure, warn_below=1.0, load=LOAD)
-    # Of positions beyond the last band only the least value is known.
-    known = expected.ravel() > bands.levels[-1]
-    assert known.sum() > 50
-    found = bands.levels[1] / bands.values(points[known])
-    np.testing.assert_allclose(found, expected.ravel()[known], rtol=1e-6)
-
-
 @pytest.mark.parametrize("measure", DISPLACEMENTS)
 def test_displacement_of_a_tool_on_the_singular_axis_is_bounded_beside_the_plane(
     measure: PositionMeasure,
@@ -202,9 +167,7 @@ def test_displacement_of_a_tool_on_the_singular_axis_is_bounded_beside_the_plane
     design = msgspec.structs.replace(LOADED, tool=Tool(), payload=Payload())
     bands = position_bands(design, rotation, measure, warn_below=1.0, load=np.eye(6)[2] * 50.0)
     normal = planes_of_singularity(rotation)[0]
-    point = np.array([10.0, 5.0, 9.0])
-    on_plane = point - (point @ normal) / (normal @ normal) * normal
-    beside = on_plane + np.outer([-1e-3, -1e-6, 0.0, 1e-6, 1e-3], normal)
+    beside = on_plane(normal) + np.outer([-1e-3, -1e-6, 0.0, 1e-6, 1e-3], normal)
     values = bands.values(beside)
     assert values[2] == 0.0
     np.testing.assert_allclose(values[[0, 1, 3, 4]], values[1], rtol=1e-2)
@@ -224,6 +187,9 @@ def test_measures_are_unstated_where_a_design_is_ideal() -> None:
     }
     point, rotation = np.array([[10.0, 5.0, 9.0]]), ORIENTATIONS[0]
     for measure in MEASURES:
+        # Nothing is asked where nothing loads.
+        empty = position_bands(OPTIMAL, rotation, measure, warn_below=1.0)
+        assert (empty.values(point) > empty.edges[-1]).all()
         needs = measure in ("share", *DISPLACEMENTS)
         assert is_unstated(OPTIMAL, measure) == needs
         bands = position_bands(OPTIMAL, rotation, measure, warn_below=1.0, load=LOAD)
@@ -237,6 +203,8 @@ def test_measures_are_unstated_where_a_design_is_ideal() -> None:
 def test_levels_of_forces_are_round_numbers_that_suit_the_load(factor: float) -> None:
     rotation = ORIENTATIONS[0]
     bands = position_bands(OPTIMAL, rotation, "force", warn_below=1.0, load=factor * LOAD)
+    shares = position_bands(LOADED, rotation, "share", warn_below=1.0, load=factor * LOAD)
+    assert shares.levels[:0:-1] == SHARES
     assert np.isinf(bands.levels[0])
     levels = bands.levels[:0:-1]
     assert len(bands.colours) == len(bands.edges) == len(levels) + 1
@@ -250,20 +218,6 @@ def test_levels_of_forces_are_round_numbers_that_suit_the_load(factor: float) ->
 def asked_force(factor: float, rotation: FloatArray) -> float:
     held = reactions(OPTIMAL, home_pose(OPTIMAL).position, rotation, factor * LOAD)
     return float(np.abs(held.actuators).max())
-
-
-def test_bands_of_shares_end_at_round_shares_for_any_load() -> None:
-    for load in (np.zeros(6), LOAD, 1e6 * LOAD):
-        bands = position_bands(LOADED, ORIENTATIONS[0], "share", warn_below=1.0, load=load)
-        assert bands.levels[:0:-1] == SHARES
-
-
-def test_nothing_is_asked_where_nothing_loads() -> None:
-    rotation = ORIENTATIONS[0]
-    for measure in MEASURES:
-        bands = position_bands(OPTIMAL, rotation, measure, warn_below=1.0)
-        values = bands.values(np.array([[10.0, 5.0, 9.0], [12.0, -3.0, 4.0]]))
-        assert (values > bands.edges[-1]).all()
 
 
 def is_within(polygons: list[Any], points: FloatArray) -> FloatArray:
@@ -280,9 +234,10 @@ def is_within(polygons: list[Any], points: FloatArray) -> FloatArray:
     return crossings % 2 == 1
 
 
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
-@pytest.mark.parametrize("rotation", ORIENTATIONS)
-@pytest.mark.parametrize("measure", MEASURES)
+@pytest.mark.parametrize(
+    ("measure", "rotation", "axis"),
+    [(each, ORIENTATIONS[k % 3], "xyz"[(k + 1) % 3]) for k, each in enumerate(MEASURES)],
+)
 def test_map_holds_positions_in_the_bands_of_what_is_asked(
     measure: PositionMeasure, rotation: FloatArray, axis: str
 ) -> None:

@@ -17,7 +17,7 @@ from explorer.workspace.slices.outline import Edge, slice_outline
 from explorer.workspace.slices.volume import bounds, workspace_volume
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
-LEVELS = 120
+LEVELS = 60
 
 
 def along(edge: Edge, shares: FloatArray) -> FloatArray:
@@ -40,8 +40,7 @@ def extent(design: explorer.Design, rotation: FloatArray, axis: str) -> tuple[fl
     return float(lows["xyz".index(axis)]), float(highs["xyz".index(axis)])
 
 
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(("seed", "axis"), [(0, "x"), (1, "y"), (2, "z"), (3, "x")])
 def test_outline_areas_over_levels_integrate_to_the_exact_volume(seed: int, axis: str) -> None:
     # Even: reference workspaces with minimum lengths, hence holes; odd: every kind of limit.
     design, rotation = reference_case(seed)[:2] if seed % 2 == 0 else ordinary_case(seed)
@@ -54,11 +53,10 @@ def test_outline_areas_over_levels_integrate_to_the_exact_volume(seed: int, axis
     assert len(areas) == LEVELS
     volume = workspace_volume(design, rotation).volume
     # The midpoint rule: an area as smooth as a root at its ends is good to step^1.5.
-    assert step * sum(areas) == pytest.approx(volume, rel=5e-3)
+    assert step * sum(areas) == pytest.approx(volume, rel=1e-2)
 
 
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("seed", "axis"), [(0, "x"), (1, "y"), (2, "z")])
 def test_outline_edges_lie_on_their_limits_and_close(seed: int, axis: str) -> None:
     design, rotation = ordinary_case(100 + seed)
     limits = constraints(design, rotation)
@@ -80,7 +78,7 @@ def test_outline_edges_lie_on_their_limits_and_close(seed: int, axis: str) -> No
     assert seen > 10
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_outline_edges_have_the_slice_on_their_left(seed: int) -> None:
     design, rotation = ordinary_case(200 + seed)
     limits = constraints(design, rotation)
@@ -110,7 +108,7 @@ def test_outline_minimum_length_leaves_a_hole() -> None:
     assert limits == {"l4 maximum", "l4 minimum"}
 
 
-@pytest.mark.parametrize("size", [1e-20, 1e-6, 1e6, 1e20])
+@pytest.mark.parametrize("size", [1e-6, 1e6])
 def test_outline_of_a_scaled_design_scales(size: float) -> None:
     rotation = explorer.home_pose(OPTIMAL).rotation
     plain = limited(OPTIMAL, box=None)

@@ -32,7 +32,7 @@ OPTIMAL = PRESETS["paper-optimal"]
 YAWS: FloatArray = rotation_from_yaw_pitch_roll([(yaw, 4.0, -3.0) for yaw in (-85.0, -73.1, -60.0)])
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(4))
 def test_cut_divides_a_solid_in_two(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     solid = workspace_solid(design, rotation)
@@ -57,26 +57,17 @@ def test_cut_divides_a_solid_in_two(seed: int) -> None:
         assert_lies_on_its_limits(kept, design, rotation)
 
 
-def test_cut_beside_a_solid_returns_all_of_it_or_nothing() -> None:
-    solid = workspace_solid(OPTIMAL)
-    up = np.array([0.0, 0.0, 1.0])
-    assert cut_solid(solid, HalfSpace("cut", up, 30.0)).volume == pytest.approx(solid.volume)
-    nothing = cut_solid(solid, HalfSpace("cut", up, -1.0))
-    assert nothing.is_empty
-    assert cut_solid(nothing, HalfSpace("cut", up, 1.0)).is_empty
-
-
 def test_hull_of_one_solid_is_the_same_each_time() -> None:
     # Of a fine mesh the threads of manifold3d share the work.
     solid = workspace_solid(OPTIMAL, home_rotation(OPTIMAL), 2e-4 * OPTIMAL.reach)
-    first, *others = (convex_hull(solid) for _ in range(10))
+    first, *others = (convex_hull(solid) for _ in range(3))
     assert len(first.faces) > 5000
     for other in others:
         np.testing.assert_array_equal(other.vertices, first.vertices)
         np.testing.assert_array_equal(other.faces, first.faces)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(3))
 def test_hull_is_convex_and_contains_the_solid(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     solid = workspace_solid(design, rotation)
@@ -95,30 +86,7 @@ def test_hull_is_convex_and_contains_the_solid(seed: int) -> None:
     assert float(heights.max()) < 1e-6 * design.reach
 
 
-def test_inclusive_and_total_solids_are_union_and_intersection() -> None:
-    tolerance = 0.1
-    each = [workspace_solid(OPTIMAL, r, tolerance) for r in YAWS]
-    inclusive = inclusive_solid(OPTIMAL, YAWS, tolerance)
-    total = total_solid(OPTIMAL, YAWS, tolerance)
-    assert inclusive.is_watertight
-    assert total.is_watertight
-    rng = np.random.default_rng(0)
-    points = rng.uniform([-1.0, -13.0, -1.0], [21.0, 23.0, 19.0], (400, 3))
-    slack = np.stack(
-        [np.min([x.slack(points) for x in constraints(OPTIMAL, r)], axis=0) for r in YAWS]
-    )
-    clear = (np.abs(slack) > 2.0 * tolerance).all(axis=0)
-    points, kept = points[clear], slack[:, clear] > 0.0
-    assert kept.any(axis=0).sum() > 50
-    for solid, expected in ((inclusive, kept.any(axis=0)), (total, kept.all(axis=0))):
-        windings = [solid.winding(point) for point in points]
-        np.testing.assert_allclose(windings, expected, atol=1e-6)
-    volumes = [solid.volume for solid in each]
-    assert inclusive.volume > max(volumes)
-    assert total.volume < min(volumes)
-
-
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_shifted_workspace_holds_the_positions_of_the_tool(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     solid = workspace_solid(design, rotation)
@@ -138,25 +106,8 @@ def test_shifted_workspace_holds_the_positions_of_the_tool(seed: int) -> None:
             assert np.min(off, axis=0).max() <= shifted.tolerance * (1.0 + 1e-6)
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_shifted_limits_have_the_slacks_and_rates_of_their_positions(seed: int) -> None:
-    design, rotation = ordinary_case(seed)
-    rng = np.random.default_rng(seed)
-    points, offset = design.reach * rng.normal(size=(20, 3)), design.reach * rng.normal(size=3)
-    for limit in constraints(design, rotation):
-        moved = limit.shifted(offset)
-        np.testing.assert_allclose(
-            moved.slack(points + offset), limit.slack(points), atol=1e-12 * design.reach
-        )
-        if isinstance(limit, HalfSpace) and isinstance(moved, HalfSpace):
-            for name, rate in limit.rates.items():
-                before = rate[3] - points @ rate[:3]
-                after = moved.rates[name][3] - (points + offset) @ moved.rates[name][:3]
-                np.testing.assert_allclose(after, before, atol=1e-10 * design.reach)
-
-
-@pytest.mark.parametrize("tool", [(0.0, 0.0, 6.0), (3.0, -2.0, -5.0)])
-def test_inclusive_and_total_solids_of_the_tool_hold_its_positions(
+@pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (3.0, -2.0, -5.0)])
+def test_inclusive_and_total_solids_are_union_and_intersection_of_those_of_the_tool(
     tool: tuple[float, float, float],
 ) -> None:
     tolerance = 0.1
@@ -164,7 +115,7 @@ def test_inclusive_and_total_solids_of_the_tool_hold_its_positions(
     inclusive = inclusive_solid(OPTIMAL, rotations, tolerance, tool)
     total = total_solid(OPTIMAL, rotations, tolerance, tool)
     low, high = inclusive.vertices.min(axis=0) - 1.0, inclusive.vertices.max(axis=0) + 1.0
-    points = np.random.default_rng(0).uniform(low, high, (1500, 3))
+    points = np.random.default_rng(0).uniform(low, high, (600, 3))
     offsets = rotations @ np.array(tool)
     # Membership from the poses themselves: those of b4 that put the tool at a point.
     poses = points[:, None] - offsets
@@ -184,13 +135,7 @@ def test_inclusive_and_total_solids_of_the_tool_hold_its_positions(
         windings = np.array([solid.winding(point) for point in points[clear]])
         np.testing.assert_allclose(windings, expected[clear], atol=1e-6)
     at_b4 = inclusive_solid(OPTIMAL, rotations, tolerance)
-    assert abs(inclusive.volume - at_b4.volume) > 0.01 * at_b4.volume
-
-
-def test_inclusive_and_total_solids_of_a_tool_at_b4_are_those_of_b4() -> None:
-    for make in (inclusive_solid, total_solid):
-        ours, b4 = make(OPTIMAL, YAWS, 0.2, (0.0, 0.0, 0.0)), make(OPTIMAL, YAWS, 0.2)
-        np.testing.assert_array_equal(ours.vertices, b4.vertices)
+    assert (abs(inclusive.volume - at_b4.volume) > 0.01 * at_b4.volume) == any(tool)
 
 
 def test_inclusive_and_total_solids_of_one_orientation_are_its_workspace() -> None:

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from limited_designs import (
     DEFECTS,
-    REFERENCE,
     defect_case,
     limited,
     ordinary_case,
@@ -23,15 +22,15 @@ from limited_designs import (
     thin_case,
     troubled_case,
 )
+from long_cases import long_after
 from meshes import assert_lies_on_its_limits, edges_are_paired, euler_characteristic
 from scipy.spatial.transform import Rotation
 
 from explorer import JOINTS, PRESETS, Design, InputError, Limits, Pose, home_pose, inverse
 from explorer.mechanism.design import Swing
-from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints, slacks
-from explorer.workspace.limits.contraction import contract_box
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import bounds, home_rotation, workspace_volume
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints
+from explorer.workspace.slices.volume import home_rotation, workspace_volume
 from explorer.workspace.solids.solids import (
     carved_solid,
     convex_hull,
@@ -51,27 +50,25 @@ def free(design: Design, **limits: Any) -> Design:
     return limited(msgspec.structs.replace(design, limits=FREE), **limits)
 
 
-@pytest.mark.parametrize("index", range(len(REFERENCE["workspaces"])))
-def test_solid_of_reference_workspaces_has_their_volumes(index: int) -> None:
-    design, rotation, volume = reference_case(index)
+# Of the defects a limit was omitted if rounding put it just beyond the end of the box.
+@pytest.mark.parametrize(
+    ("case", "error"),
+    [
+        *((defect_case(index), 1e-3) for index in range(len(DEFECTS["solids"]))),
+        *((reference_case(index), 2e-4) for index in range(8)),
+    ],
+)
+def test_solid_of_reference_workspaces_and_defects_has_their_volumes(
+    case: tuple[Design, FloatArray, float], error: float
+) -> None:
+    design, rotation, volume = case
     solid = workspace_solid(design, rotation)
     assert solid.is_watertight
-    assert solid.volume == pytest.approx(volume, rel=2e-4)
-    assert solid.volume == pytest.approx(workspace_volume(design, rotation).volume, rel=1e-4)
+    assert solid.volume == pytest.approx(volume, rel=error)
     assert_lies_on_its_limits(solid, design, rotation)
 
 
-@pytest.mark.parametrize("index", range(len(DEFECTS["solids"])))
-def test_solid_with_a_limit_at_the_end_of_its_box_ends_there(index: int) -> None:
-    """Such a limit was omitted if rounding put it just beyond the box."""
-    design, rotation, volume = defect_case(index)
-    solid = workspace_solid(design, rotation)
-    assert solid.is_watertight
-    assert solid.volume == pytest.approx(volume, rel=1e-3)
-    assert_lies_on_its_limits(solid, design, rotation)
-
-
-@pytest.mark.parametrize("seed", range(16, 22))
+@pytest.mark.parametrize("seed", [16, 19])
 def test_solid_of_quarter_turns_ends_at_its_margins(seed: int) -> None:
     """Normals that are an axis but for rounding put a plane beyond the end of the box."""
     rng = np.random.default_rng(seed)
@@ -99,7 +96,7 @@ def lens(depth: float) -> tuple[Design, float]:
     return limited(bare, l1=(0.0, r), l4=(0.0, s)), np.pi * depth**2 * around / (12.0 * apart)
 
 
-@pytest.mark.parametrize("depth", [0.1, 1e-2, 1e-3])
+@pytest.mark.parametrize("depth", [0.1, 1e-3])
 def test_solid_of_a_lens_thinner_than_the_tolerance_has_its_volume(depth: float) -> None:
     design, volume = lens(depth)
     solid = workspace_solid(design)
@@ -109,7 +106,7 @@ def test_solid_of_a_lens_thinner_than_the_tolerance_has_its_volume(depth: float)
     assert_lies_on_its_limits(solid, design, home_rotation(design))
 
 
-@pytest.mark.parametrize("depth", [0.0, -1e-9, -1e-3])
+@pytest.mark.parametrize("depth", [0.0, -1e-9])
 def test_solid_of_two_separate_balls_is_empty(depth: float) -> None:
     design, _ = lens(depth)
     solid = workspace_solid(design)
@@ -119,7 +116,7 @@ def test_solid_of_two_separate_balls_is_empty(depth: float) -> None:
 
 
 # With a tolerance of a 500th of the reach these volumes differ by 1 % to 2 %.
-@pytest.mark.parametrize("seed", [8, 10, 17, 31, 39])
+@pytest.mark.parametrize("seed", [8, 31])
 def test_solid_between_near_minima_and_maxima_has_the_exact_volume(seed: int) -> None:
     design, rotation = thin_case(seed)
     solid = workspace_solid(design, rotation)
@@ -145,29 +142,6 @@ def test_solid_not_refined_disagrees_and_so_do_its_parts(
     assert carved_solid(solid, [], middle).agrees is False
 
 
-def test_solid_with_a_known_volume_computes_none(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    exact = workspace_volume(OPTIMAL)
-    monkeypatch.delattr("explorer.workspace.solids.agreement.volume_within")
-    assert workspace_solid(OPTIMAL, volume=exact).agrees
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_contracted_box_holds_all_positions_that_satisfy_the_limits(seed: int) -> None:
-    design, rotation = ordinary_case(seed)
-    limits = constraints(design, rotation)
-    lows, highs = bounds(region_of(limits))
-    found = contract_box(limits, lows, highs)
-    assert found is not None
-    points = np.random.default_rng(seed).uniform(lows, highs, (20_000, 3))
-    within = points[(slacks(limits, points) >= 0.0).all(axis=1)]
-    assert len(within) > 20
-    assert (found[0] <= within).all()
-    assert (within <= found[1]).all()
-    assert contract_box(limits, highs + 1.0, highs + 2.0) is None
-
-
 @pytest.mark.parametrize("name", PRESETS)
 def test_solid_of_presets_is_a_topological_ball(name: str) -> None:
     solid = workspace_solid(PRESETS[name])
@@ -180,7 +154,7 @@ def test_solid_of_presets_is_a_topological_ball(name: str) -> None:
     assert solid.empty_because == ()
 
 
-@pytest.mark.parametrize("seed", range(160))
+@pytest.mark.parametrize("seed", long_after(30, range(160)))
 def test_solid_of_extreme_designs_is_closed_and_lies_on_its_limits(seed: int) -> None:
     design, given = troubled_case(seed)
     rotation = home_rotation(design) if given is None else given
@@ -200,12 +174,12 @@ def test_solid_of_extreme_designs_is_closed_and_lies_on_its_limits(seed: int) ->
     assert_lies_on_its_limits(solid, design, rotation)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(3))
 def test_solid_with_finer_tolerance_tends_to_the_exact_volume(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     exact = workspace_volume(design, rotation).volume
     largest = exact ** (1.0 / 3.0)
-    shares = np.array([0.04, 0.02, 0.01, 0.005, 0.0025])
+    shares = np.array([0.04, 0.01, 0.0025])
     solids = [workspace_solid(design, rotation, share * largest) for share in shares]
     errors = np.abs(np.array([solid.volume for solid in solids]) / exact - 1.0)
     # A bound that shrinks with the tolerance, with a constant that all cases share.
@@ -213,23 +187,8 @@ def test_solid_with_finer_tolerance_tends_to_the_exact_volume(seed: int) -> None
     assert errors[-1] < 1e-3
 
 
-@pytest.mark.parametrize("name", PRESETS)
-@pytest.mark.parametrize("a3", [(18.3, 1e7), (8.0, 1e9), (1e9, 10.26)])
-def test_solid_far_smaller_than_the_reach_has_a_tolerance_of_its_size(
-    name: str, a3: tuple[float, float]
-) -> None:
-    """Facets as coarse as a share of the reach would miss it, and come from no limit."""
-    preset = PRESETS[name]
-    design = preset.with_variables((*a3, *preset.variables[2:]))
-    rotation = home_pose(preset).rotation
-    solid = workspace_solid(design, rotation, 0.004 * design.reach)
-    assert solid.tolerance <= 0.25 * float(np.ptp(solid.vertices, axis=0).max()) * 1.1
-    assert solid.volume == pytest.approx(workspace_volume(design, rotation).volume, rel=0.1)
-    assert set(solid.limit_of_face.tolist()) <= set(range(len(solid.limits)))
-
-
 def test_solid_facets_are_within_the_tolerance_on_both_sides() -> None:
-    for tolerance in (2.0, 0.5, 0.1, 0.02):
+    for tolerance in (2.0, 0.1):
         solid = workspace_solid(OPTIMAL, tolerance=tolerance)
         assert solid.tolerance == tolerance
         assert_lies_on_its_limits(solid, OPTIMAL, home_rotation(OPTIMAL))
@@ -240,7 +199,7 @@ def test_solid_facets_are_within_the_tolerance_on_both_sides() -> None:
     assert slack[0].max() > 0.0 > slack[1].min()
 
 
-@pytest.mark.parametrize("s", [1e-9, 1e-3, 1e3, 1e9])
+@pytest.mark.parametrize("s", [1e-3, 1e9])
 def test_solid_of_a_scaled_design_scales(s: float) -> None:
     solid, scaled = workspace_solid(OPTIMAL), workspace_solid(scaled_design(OPTIMAL, s))
     assert len(solid.faces) == len(scaled.faces)
@@ -248,24 +207,24 @@ def test_solid_of_a_scaled_design_scales(s: float) -> None:
     assert scaled.tolerance == pytest.approx(s * solid.tolerance, rel=1e-12)
 
 
-def test_solid_of_a_ball_less_a_cylinder_is_a_ring() -> None:
-    design = free(OPTIMAL, l1=(0.0, 10.0), d2=(3.0, 1e3))
+@pytest.mark.parametrize(
+    ("design", "characteristic", "limits"),
+    [
+        (free(OPTIMAL, l1=(0.0, 10.0), d2=(3.0, 1e3)), 0, {"l1 maximum", "d2 minimum"}),
+        (free(OPTIMAL, l1=(5.0, 10.0)), 4, {"l1 minimum", "l1 maximum"}),
+    ],
+)
+def test_solid_with_a_minimum_length_is_a_ring_or_hollow(
+    design: Design, characteristic: int, limits: set[str]
+) -> None:
     solid = workspace_solid(design)
     assert solid.is_watertight
-    assert euler_characteristic(solid) == 0
+    assert euler_characteristic(solid) == characteristic
     assert solid.volume == pytest.approx(workspace_volume(design).volume, rel=1e-4)
+    assert {solid.limits[index] for index in solid.limit_of_face} == limits
 
 
-def test_solid_with_a_minimum_length_is_hollow() -> None:
-    design = free(OPTIMAL, l1=(5.0, 10.0))
-    solid = workspace_solid(design)
-    assert euler_characteristic(solid) == 4
-    assert solid.volume == pytest.approx(4.0 / 3.0 * np.pi * (1000.0 - 125.0), rel=1e-4)
-    assert solid.area == pytest.approx(4.0 * np.pi * (100.0 + 25.0), rel=1e-2)
-    assert {solid.limits[index] for index in solid.limit_of_face} == {"l1 minimum", "l1 maximum"}
-
-
-@pytest.mark.parametrize("thickness", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("thickness", [1e-2, 1e-5])
 def test_solid_of_a_shell_thinner_than_a_chord_has_no_holes(thickness: float) -> None:
     design = free(OPTIMAL, l1=(10.0 - thickness, 10.0))
     solid = workspace_solid(design, tolerance=0.1)
@@ -279,19 +238,6 @@ def test_solid_of_a_box_far_inside_balls_is_that_box() -> None:
     solid = workspace_solid(design)
     assert solid.volume == pytest.approx(6.0, rel=1e-12)
     assert len(solid.faces) == 12
-
-
-def test_solid_of_a_small_box_on_a_huge_ball_is_half_of_it() -> None:
-    # The ball of l4 with 1e6 times the size of the box passes through the box's middle.
-    a3 = np.array([*OPTIMAL.a3, 0.0])
-    low, high = a3 + [1e6, 0.0, 0.0] - [0.5, 0.5, 0.5], a3 + [1e6, 0.0, 0.0] + [0.5, 0.5, 0.5]
-    wide = dict.fromkeys(("l1", "d2", "d4"), (0.0, 1e8))
-    box = tuple(low.tolist()), tuple(high.tolist())
-    design = free(OPTIMAL, **wide, l4=(0.0, 1e6), box=box)
-    for tolerance in (1e-2, 1e-4, 1e-6):
-        solid = workspace_solid(design, tolerance=tolerance)
-        assert solid.is_watertight
-        assert solid.volume == pytest.approx(0.5, abs=tolerance)
 
 
 def test_solid_of_coincident_limits_is_closed() -> None:
@@ -309,7 +255,7 @@ def test_solid_of_coincident_limits_is_closed() -> None:
 
 def test_solid_of_nearly_coincident_cylinders_is_closed() -> None:
     # Near the identity the axes of both cylinders nearly coincide.
-    for angle in 10.0 ** -np.arange(1.0, 14.0):
+    for angle in 10.0 ** -np.arange(1.0, 14.0, 4.0):
         rotation = Rotation.from_rotvec([0.0, angle, angle]).as_matrix()
         design = limited(OPTIMAL, margin=None)
         solid = workspace_solid(design, rotation)
@@ -318,8 +264,10 @@ def test_solid_of_nearly_coincident_cylinders_is_closed() -> None:
         assert solid.volume == pytest.approx(exact, rel=1e-4)
 
 
-@pytest.mark.parametrize("joint", ["a1", "a3", "b1", "b2", "b3", "b4"])
-@pytest.mark.parametrize("angle", [25.0, 60.0, 89.99, 90.0, 91.0, 150.0])
+@pytest.mark.parametrize(
+    ("joint", "angle"),
+    [("a1", 25.0), ("a3", 60.0), ("b1", 89.99), ("b2", 90.0), ("b3", 91.0), ("b4", 150.0)],
+)
 def test_solid_with_a_cone_has_the_volume_of_columns(joint: str, angle: float) -> None:
     tilted = Rotation.from_rotvec([0.3, -0.2, 0.4]).as_matrix() @ home_rotation(OPTIMAL)
     design = limited(OPTIMAL, swing=Swing(**{joint: angle}))
@@ -331,12 +279,6 @@ def test_solid_with_a_cone_has_the_volume_of_columns(joint: str, angle: float) -
     assert solid.volume <= workspace_solid(OPTIMAL, tilted).volume * (1.0 + 1e-4)
 
 
-def test_solid_with_cones_of_180_degrees_is_unchanged() -> None:
-    everything = Swing(a1=180.0, a3=180.0, b1=180.0, b2=180.0, b3=180.0, b4=180.0)
-    solid = workspace_solid(limited(OPTIMAL, swing=everything))
-    assert solid.volume == pytest.approx(workspace_solid(OPTIMAL).volume, rel=1e-9)
-
-
 def test_solid_empty_names_the_limits_that_empty_it() -> None:
     solid = workspace_solid(limited(OPTIMAL, gap=50.0))
     assert solid.is_empty
@@ -346,13 +288,10 @@ def test_solid_empty_names_the_limits_that_empty_it() -> None:
     assert workspace_solid(OPTIMAL, np.eye(3)).empty_because == ("margin δ2",)
 
 
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")])
-def test_solid_with_an_unusable_tolerance_is_refused(tolerance: float) -> None:
-    with pytest.raises(InputError, match="tolerance must be positive"):
-        workspace_solid(OPTIMAL, tolerance=tolerance)
-
-
-def test_solid_of_too_many_faces_error_names_a_tolerance() -> None:
+def test_solid_with_an_unusable_tolerance_is_refused() -> None:
+    for tolerance in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match="tolerance must be positive"):
+            workspace_solid(OPTIMAL, tolerance=tolerance)
     with pytest.raises(InputError, match="at least about") as refusal:
         workspace_solid(OPTIMAL, tolerance=1e-7)
     allowed = float(str(refusal.value).rpartition(" ")[2])
@@ -361,14 +300,9 @@ def test_solid_of_too_many_faces_error_names_a_tolerance() -> None:
         inclusive_solid(OPTIMAL, np.array([home_rotation(OPTIMAL)] * 2), 1e-6)
 
 
-def test_solid_with_a_huge_tolerance_is_not_empty() -> None:
-    solid = workspace_solid(OPTIMAL, tolerance=1e3)
-    assert solid.is_watertight
-    assert solid.volume == pytest.approx(workspace_volume(OPTIMAL).volume, rel=0.02)
-
-
-@pytest.mark.parametrize("half", [1e-9, 1e-12, 1e-14, 1e-15])
-@pytest.mark.parametrize("joint", ["l1", "d2", "d4", "l4"])
+@pytest.mark.parametrize(
+    ("joint", "half"), [("l1", 1e-9), ("d2", 1e-12), ("d4", 1e-14), ("l4", 1e-15)]
+)
 def test_solid_of_a_box_of_the_size_of_rounding_is_within_it(joint: str, half: float) -> None:
     home = home_pose(OPTIMAL)
     middle = np.array(home.position)

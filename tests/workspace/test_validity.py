@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, strategies as st
 from limited_designs import limited, ordinary_case, troubled_case
 from scipy.spatial.transform import Rotation
-from strategies import positions, uniform_rotations
 from tool_moves import tool_move
 
 from explorer import (
@@ -19,26 +18,16 @@ from explorer import (
     Design,
     InputError,
     Pose,
-    attachment_points,
     evaluate,
     home_pose,
-    margins,
     moves_are_clear,
     poses_between,
 )
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
-from explorer.workspace.limits.safe_shares import (
-    BOX_SPEEDS,
-    GAP_SPEED,
-    LEG_SPEEDS,
-    MARGIN_SPEEDS,
-    SPEEDS,
-    write_speeds,
-)
-from explorer.workspace.limits.valid_moves import moves_are_valid, write_pose_at, write_turn
-from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
+from explorer.workspace.limits.valid_moves import moves_are_valid
+from explorer.workspace.limits.valid_poses import poses_are_valid
 
 OPTIMAL = PRESETS["paper-optimal"]
 RADIUS = 0.2
@@ -78,17 +67,12 @@ def test_pose_without_violations_or_collisions_is_valid(seed: int) -> None:
     ordinary = ordinary_case(seed)[0]
     designs = troubled_case(seed)[0], ordinary, with_swing(ordinary, seed), THICK
     design = designs[seed % 4]
-    poses = poses_about(design, seed, 12)
+    poses = poses_about(design, seed, 6)
     found = poses_are_valid(design, *arrays_of(poses))
     for pose, valid in zip(poses, found.tolist(), strict=True):
         expected, nearness = verdict_of(design, pose)
         if nearness > 1e-12 * design.reach:
             assert valid == expected, (design, pose)
-
-
-def test_random_poses_are_valid_and_invalid() -> None:
-    found = poses_are_valid(THICK, *arrays_of(poses_about(THICK, 1, 400)))
-    assert 40 < found.sum() < 360
 
 
 @pytest.mark.parametrize("bound", ["l1", "d2", "d4", "l4"])
@@ -128,33 +112,14 @@ def random_moves(seed: int, count: int, share: float) -> tuple[FloatArray, ...]:
     return p[:-1], r[:-1], p[:-1] + share * (p[1:] - p[:-1]), end_rotations
 
 
-@pytest.mark.parametrize("share", [1.0, 0.2, 0.0])
-def test_move_valid_has_valid_poses_all_along(share: float) -> None:
-    moves = random_moves(7, 300, share)
-    found = moves_are_valid(THICK, *moves)
-    assert moves_are_clear(THICK, *moves)[found].all()
-    agree = 0
-    for index, valid in enumerate(found.tolist()):
-        start, end = (Pose.of(moves[k][index], moves[k + 1][index]) for k in (0, 2))
-        along = poses_are_valid(THICK, *poses_between(start, end, np.linspace(0.0, 1.0, 200)))
-        # Limits have a tolerance on the way, which random moves do not come into.
-        assert along.all() or not valid
-        agree += int(along.all()) == valid
-    # What is refused for being too near to a collision or a singularity is rare.
-    assert agree >= 0.98 * len(found)
-    assert found.any()
-
-
-TOOLS = [(0.0, 0.0, 4.0), (3.0, -2.0, -1.0), (0.0, 0.0, 30.0)]
-
-
 @pytest.mark.parametrize("share", [1.0, 0.2])
-@pytest.mark.parametrize("tool", TOOLS)
-def test_move_of_the_tool_valid_has_valid_poses_all_along(
+@pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (3.0, -2.0, -1.0), (0.0, 0.0, 30.0)])
+def test_move_valid_has_valid_poses_all_along(
     tool: tuple[float, float, float], share: float
 ) -> None:
+    """Moves are those of a tool, at b4 or elsewhere, between valid poses or a share of each."""
     point = np.array(tool)
-    starts = random_moves(7, 300, 1.0)
+    starts = random_moves(7, 60, 1.0)
     moves: list[tuple[FloatArray, ...]] = []
     for p, r, q, s in zip(*starts, strict=True):
         position, rotation = tool_move(Pose.of(p, r), Pose.of(q, s), share, point)
@@ -163,68 +128,18 @@ def test_move_of_the_tool_valid_has_valid_poses_all_along(
     found = moves_are_valid(THICK, *arrays, tool=tool)
     agree = 0
     for valid, (p, r, q, s) in zip(found.tolist(), moves, strict=True):
-        poses = tool_move(Pose.of(p, r), Pose.of(q, s), np.linspace(0.0, 1.0, 200), point)
+        poses = tool_move(Pose.of(p, r), Pose.of(q, s), np.linspace(0.0, 1.0, 100), point)
         along = poses_are_valid(THICK, *poses)
+        # Limits have a tolerance on the way, which random moves do not come into.
         assert along.all() or not valid
         agree += int(along.all()) == valid
-    assert agree >= 0.98 * len(found)
+    # What is refused for being too near to a collision or a singularity is rare.
+    assert agree >= 0.96 * len(found)
     assert found.any()
     assert moves_are_clear(THICK, *arrays, tool=tool)[found].all()
-    # The move of b4 between the same poses is another one.
-    assert share < 1.0 or (moves_are_valid(THICK, *arrays) != found).any()
-
-
-def test_move_of_a_tool_at_b4_is_that_of_b4() -> None:
-    moves = random_moves(5, 300, 0.5)
-    found = moves_are_valid(THICK, *moves, tool=(0.0, 0.0, 0.0))
-    assert np.array_equal(found, moves_are_valid(THICK, *moves))
-
-
-@given(uniform_rotations(), uniform_rotations(), positions(), positions(), positions())
-def test_speeds_of_a_move_of_the_tool_bound_those_of_its_points(
-    r: FloatArray, s: FloatArray, first: FloatArray, last: FloatArray, tool: FloatArray
-) -> None:
-    start, end = Pose.of(9.0 * first, r), Pose.of(9.0 * last, s)
-    point = 5.0 * tool
-    row = Rules.of(THICK).row
-    c, d = (np.array(pose.position) + pose.rotation @ point for pose in (start, end))
-    axis, speeds = np.zeros(3), np.zeros(SPEEDS)
-    angle = write_turn(start.rotation, end.rotation, axis)
-    write_speeds(row, c, start.rotation, d - c, axis, angle, point, speeds)
-    shares = np.linspace(0.0, 1.0, 401)
-    p, turned = tool_move(start, end, shares, point)
-    at = attachment_points(THICK, p, turned)
-
-    def fastest(values: FloatArray) -> FloatArray:
-        return np.abs(np.diff(values, axis=0)).max(axis=0) * (len(shares) - 1)
-
-    ends = [np.linalg.norm(np.diff(b, axis=0), axis=-1).max() * 400 for b in (at.b1, at.b2, at.b3)]
-    ends.append(np.linalg.norm(np.diff(at.b4, axis=0), axis=-1).max() * 400)
-    rounding = 1e-9
-    assert (np.array(ends) <= speeds[LEG_SPEEDS : LEG_SPEEDS + 4] + rounding).all()
-    assert (
-        fastest(margins(p, turned)) <= speeds[MARGIN_SPEEDS : MARGIN_SPEEDS + 3] + rounding
-    ).all()
-    assert (fastest(p) <= speeds[BOX_SPEEDS : BOX_SPEEDS + 3] + rounding).all()
-    assert fastest((at.b3 - at.b2)[:, :1])[0] <= speeds[GAP_SPEED] + rounding
-
-
-@given(positions(), uniform_rotations(), st.sampled_from((0.0, 1e-12, 1e-6, 1.0, 3.0, 3.14159265)))
-def test_move_poses_are_those_between_its_ends(
-    axis: FloatArray, rotation: FloatArray, angle: float
-) -> None:
-    axis = axis / (float(np.linalg.norm(axis)) or 1.0)
-    end_rotation = Rotation.from_rotvec(angle * axis).as_matrix() @ rotation
-    start, end = Pose.of(np.array([1.0, 2.0, 3.0]), rotation), Pose.of(4.0 * axis, end_rotation)
-    found_axis, p, r = np.zeros(3), np.zeros(3), np.zeros((3, 3))
-    found = write_turn(start.rotation, end.rotation, found_axis)
-    step = np.array(end.position) - np.array(start.position)
-    first = np.array(start.position), start.rotation
-    for share in (0.0, 0.3, 1.0):
-        write_pose_at(share, *first, step, found_axis, found, p, r)
-        expected = poses_between(start, end, share)
-        np.testing.assert_allclose(p, expected[0], atol=1e-14)
-        np.testing.assert_allclose(r, expected[1], atol=1e-9)
+    # The move of b4 between the same poses is another one, unless the tool is at b4.
+    differs = (moves_are_valid(THICK, *arrays) != found).any()
+    assert differs == point.any() or share < 1.0
 
 
 def test_move_along_a_limit_is_valid_to_the_tolerance() -> None:
@@ -258,13 +173,6 @@ def test_move_to_another_mode_is_invalid() -> None:
     free = limited(OPTIMAL, box=None)
     x, y, z = home.position
     assert not moves_are_valid(free, (x, y, z), home.rotation, (x, y, -z), home.rotation)
-
-
-def test_rules_given_or_computed_have_the_same_answers() -> None:
-    rules = Rules.of(THICK)
-    moves = random_moves(2, 5, 1.0)
-    for check, arrays in ((moves_are_valid, moves), (poses_are_valid, moves[:2])):
-        assert (check(THICK, *arrays, rules=rules) == check(THICK, *arrays)).all()
 
 
 def test_poses_and_moves_few_or_many_have_the_same_answers() -> None:
