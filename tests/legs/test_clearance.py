@@ -17,8 +17,6 @@ from explorer.mechanism.kinematics import platform_points
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 
-SCALES = (1e-3, 1.0, 1e5)
-
 
 def closest_points(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return distances (n,) and closest points (n, 2, 3) of segments as axes of legs 1 and 2."""
@@ -52,39 +50,12 @@ def random_segments(seed: int, count: int = 2000) -> tuple[FloatArray, FloatArra
     return a, b
 
 
-def searched_distance(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the distance by ternary search over the first: to the second it is convex."""
-    u, v = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0]
-    square = np.maximum(np.einsum("ni,ni->n", v, v), 1e-300)
-
-    def to_second(s: FloatArray) -> FloatArray:
-        point = a[:, 0] + s[:, None] * u
-        share = np.clip(np.einsum("ni,ni->n", point - b[:, 0], v) / square, 0.0, 1.0)
-        return np.asarray(np.linalg.norm(point - b[:, 0] - share[:, None] * v, axis=-1))
-
-    low, high = np.zeros(len(a)), np.ones(len(a))
-    for _ in range(100):
-        third = (high - low) / 3.0
-        rises = to_second(low + third) < to_second(high - third)
-        high = np.where(rises, high - third, high)
-        low = np.where(rises, low, low + third)
-    ends = np.minimum(to_second(np.zeros(len(a))), to_second(np.ones(len(a))))
-    return np.minimum(ends, to_second(0.5 * (low + high)))
-
-
 def test_closest_points_reference_segments_have_its_distances() -> None:
     cases = read_reference("interference")["segments"]
     assert len(cases) == 200
     a, b = (np.array([case[key] for case in cases]) for key in "ab")
     expected = np.array([case["distance"] for case in cases])
     np.testing.assert_allclose(closest_points(a, b)[0], expected, rtol=1e-9)
-
-
-@pytest.mark.parametrize("scale", SCALES)
-def test_closest_points_any_segments_match_a_search(scale: float) -> None:
-    a, b = random_segments(1)
-    found = closest_points(scale * a, scale * b)[0] / scale
-    np.testing.assert_allclose(found, searched_distance(a, b), atol=1e-9)
 
 
 def test_closest_points_any_segments_lie_on_them_with_nothing_closer() -> None:

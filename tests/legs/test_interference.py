@@ -87,12 +87,6 @@ def test_swept_tetrahedra_constant_orientation_hold_the_legs(
     assert (leg_clearances(design, *poses).clearance.min(axis=0)[~overlaps] > 0.0).all()
 
 
-def test_swept_tetrahedra_legs_with_fixed_base_ends_are_flat() -> None:
-    swept = swept_tetrahedra(OPTIMAL, *random_moves(1, 10))
-    for leg in (0, 3):
-        np.testing.assert_array_equal(swept[:, leg, 0], swept[:, leg, 1])
-
-
 def test_step_overlaps_batch_matches_its_moves() -> None:
     many = random_moves(2, 300)
     found = step_overlaps(OPTIMAL, *many)
@@ -175,20 +169,6 @@ def test_move_clearance_bound_holds_and_is_nearly_attained(
     np.testing.assert_allclose(apart - sums, clearance, atol=rounding)
 
 
-def test_move_clearances_of_a_tool_at_b4_are_those_of_b4() -> None:
-    many = random_moves(3, 300)
-    at_b4, same = (move_clearances(OPTIMAL, *many, tool=t) for t in (None, (0.0, 0.0, 0.0)))
-    np.testing.assert_array_equal(at_b4.bound, same.bound)
-    # Elsewhere a turn moves the legs in another way.
-    far = move_clearances(OPTIMAL, *many, tool=(0.0, 0.0, 9.0))
-    turned = np.arange(300) % 3 > 0
-    assert (np.abs(far.clearance - at_b4.clearance)[turned].max(axis=-1) > 1e-3).mean() > 0.5
-    np.testing.assert_allclose(far.clearance[~turned], at_b4.clearance[~turned], atol=3e-5)
-    clear = moves_are_clear(OPTIMAL, *many, tool=(0.0, 0.0, 9.0), clearance=0.3)
-    decided = np.abs(far.bound.min(axis=-1) - 0.3) > 1e-4
-    np.testing.assert_array_equal(clear[decided], far.bound.min(axis=-1)[decided] > 0.3)
-
-
 def test_moves_are_clear_any_clearance_agrees_with_the_least() -> None:
     design = limited(OPTIMAL, leg_radii=(0.1, 0.2, 0.2, 0.3))
     many = random_moves(4, 500)
@@ -211,26 +191,6 @@ def test_move_clearance_clear_move_is_free_at_fine_steps() -> None:
     assert [PAIRS[k] for k in np.flatnonzero(coarse.overlaps)] == [(2, 3)]
     assert fine.is_free
     np.testing.assert_allclose(coarse.bound, fine.bound)
-
-
-def test_move_clearances_reversed_moves_are_unchanged() -> None:
-    first, turn, last, turned = random_moves(5, 300)
-    there = move_clearances(OPTIMAL, first, turn, last, turned, tolerance=1e-6)
-    back = move_clearances(OPTIMAL, last, turned, first, turn, tolerance=1e-6)
-    np.testing.assert_allclose(there.clearance, back.clearance, atol=2e-6)
-
-
-@given(moves(), positions())
-def test_poses_between_move_the_tool_straight(
-    move: tuple[Design, Pose, Pose], tool: FloatArray
-) -> None:
-    _, start, end = move
-    shares = np.linspace(0.0, 1.0, 7)
-    found, expected = poses_between(start, end, shares, tool), tool_move(start, end, shares, tool)
-    np.testing.assert_allclose(found[0], expected[0], atol=1e-9 * (1.0 + np.abs(found[0]).max()))
-    tools = found[0] + found[1] @ tool
-    line = tools[0] + shares[:, None] * (tools[-1] - tools[0])
-    np.testing.assert_allclose(tools, line, atol=1e-12 * (1.0 + np.abs(tools).max()))
 
 
 def test_poses_between_shares_zero_and_one_are_the_ends() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -192,9 +193,6 @@ def test_start_outdone_even_without_the_clearance_ends_there() -> None:
     assert (first.status, second.status) == ("converged", "outdone")
     margin = problem.demands.clearance_margin
     assert least_clearance_by_sampling(first.best.design, margin, 40_000) >= 0.2
-    # The second comes to what it comes to without the demand, which is worse than the first.
-    alone = optimise_design(started_at(reach_problem(), second.start))
-    assert second.best.value == pytest.approx(alone.best.value, rel=1e-9)
     assert second.best.value > first.best.value
     # Its iterates say that the legs are too near.
     assert least_clearance_by_sampling(second.best.design, margin, 40_000) < 0.2
@@ -351,32 +349,27 @@ def test_search_that_stop_ends_is_cancelled(after: int) -> None:
         assert outcome.best.spare >= -1e-8
 
 
-def test_watch_receives_each_iterate() -> None:
+def test_watch_receives_each_iterate_and_ends_the_search_if_it_raises() -> None:
+    def fail(_: Iterate) -> None:
+        raise RuntimeError("the pipe is gone")
+
+    with pytest.raises(RuntimeError, match="the pipe is gone"):
+        optimise_design(paper_problem(), watch=fail)
     seen: list[Iterate] = []
-    outcome = optimise_design(reach_problem(), starts=2, watch=seen.append)
+    outcome = optimise_design(reach_problem(), watch=seen.append)
     assert tuple(seen) == outcome.history
     for each in seen:
         assert each.volume == workspace_volume(each.design).volume
 
 
-def test_watch_that_raises_ends_the_search() -> None:
-    def watch(_: Iterate) -> None:
-        raise RuntimeError("the pipe is gone")
-
-    with pytest.raises(RuntimeError, match="the pipe is gone"):
-        optimise_design(paper_problem(), watch=watch)
-
-
 @pytest.mark.parametrize("seed", long_after(4, [1, 4, 5, 6, 0, 2, 3, *range(7, 12)]))
 def test_search_from_random_design_of_any_size_ends_with_a_message(seed: int) -> None:
     random = np.random.default_rng(seed)
-    size = float(random.choice([1e-20, 1e-6, 1.0, 1e6, 1e20]))
+    size = float(random.choice([1e-6, 1.0, 1e6]))
     a3x, a3y, b1x, b1y, b2, b3 = (size * random.uniform(-1.0, 1.0, 6)).tolist()
     limits: dict[str, Any] = {
-        "l1": (float(random.choice([0.0, 0.3])) * size, None),
         "d4": (0.0, None if seed % 3 else size),
         "guide": None if seed % 2 else (-size, size),
-        "gap": float(random.choice([0.0, 0.02])) * size,
         "margin": None if seed % 5 == 0 else 0.01 * size,
         "leg_radii": [0.01 * size] * 4,
     }
@@ -392,9 +385,6 @@ def test_search_from_random_design_of_any_size_ends_with_a_message(seed: int) ->
     assert_is_sound(outcome)
     record = record_of(outcome, Settings())
     assert decode_record(encode_record(record), "here") == record
-
-
-# Where a clearance is not kept
 
 
 # Records
@@ -416,12 +406,9 @@ def test_record_read_back_repeats_the_search() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"{}", b'{"schema": 2}', b"\xff\xfe", b"[" * 10_000])
-def test_decode_record_of_other_data_is_refused(data: bytes) -> None:
+def test_record_of_other_data_or_without_a_file_is_refused(data: bytes, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="elsewhere"):
         decode_record(data, "elsewhere")
-
-
-def test_load_record_without_a_file_is_refused(tmp_path: Any) -> None:
     with pytest.raises(InputError, match="cannot read"):
         load_record(tmp_path / "nothing.json")
 
@@ -441,40 +428,48 @@ def make_from(start: Design = OPTIMAL, *, bound: Any = None, **arguments: Any) -
 
 
 @pytest.mark.parametrize(
-    ("objective", "arguments", "words"),
+    ("arguments", "words"),
     [
-        ("match-volume", VOLUME | {"bound": ("b2", 5.0, 3.0)}, "bounds of b2 cross: low 5, high 3"),
-        ("match-volume", VOLUME | {"bound": ("b2", 5.0, 9.0)}, "b2 = 2.6067, outside its bounds"),
-        ("match-volume", VOLUME | {"bound": ("b2", 0.0, math.inf)}, "b2 must be a finite number"),
-        ("match-volume", VOLUME | {"bound": ("b4", 0.0, 1.0)}, "no variable 'b4'"),
-        ("match-volume", {}, "match-volume needs a volume"),
-        ("match-volume", {"volume": -1.0}, "must be a positive, finite number; got -1"),
-        ("match-volume", VOLUME | {"clearance": math.nan}, "clearance demanded must be a finite"),
+        (VOLUME | {"bound": ("b2", 5.0, 3.0)}, "bounds of b2 cross: low 5, high 3"),
+        (VOLUME | {"bound": ("b2", 5.0, 9.0)}, "b2 = 2.6067, outside its bounds"),
+        (VOLUME | {"bound": ("b2", 0.0, math.inf)}, "b2 must be a finite number"),
+        (VOLUME | {"bound": ("b4", 0.0, 1.0)}, "no variable 'b4'"),
+        ({}, "match-volume needs a volume"),
+        ({"volume": -1.0}, "must be a positive, finite number; got -1"),
+        (VOLUME | {"clearance": math.nan}, "clearance demanded must be a finite"),
         (
-            "match-volume",
             VOLUME | {"clearance": 0.1, "clearance_margin": 0.0},
             "positive clearance",
         ),
-        ("match-volume", VOLUME | {"least": 5.0}, "below the least allowed 5"),
-        ("match-volume", VOLUME | {"stroke_ratio": 1.0}, "stroke ratio is longest over shortest"),
-        ("largest-margin", {"free": ["yaw"]}, "needs a required box"),
-        ("largest-margin", {"required_box": UNIT_BOX}, "do not depend on the design variables"),
+        (VOLUME | {"least": 5.0}, "below the least allowed 5"),
+        (VOLUME | {"stroke_ratio": 1.0}, "stroke ratio is longest over shortest"),
+        ({"objective": "largest-margin", "free": ["yaw"]}, "needs a required box"),
         (
-            "match-volume",
+            {"objective": "largest-margin", "required_box": UNIT_BOX},
+            "do not depend on the design variables",
+        ),
+        (
             VOLUME | {"required_box": ((0.0, 0.0, 5.0), (1.0, -1.0, 6.0))},
             "required box y: the low end 0 exceeds the high end -1",
         ),
-        ("match-volume", VOLUME | {"free": ["shift-x"]}, "shift-x shifts the required box"),
-        ("smallest-reach", {"start": limited(OPTIMAL, l1=(0.0, 20.0))}, "let the reach change"),
-        ("largest-volume", {"start": SWING}, "swing"),
-        ("smallest-reach", {"start": EMPTY, "free": ["yaw"]}, "the start has an empty workspace"),
+        (VOLUME | {"free": ["shift-x"]}, "shift-x shifts the required box"),
+        (
+            {"objective": "smallest-reach", "start": limited(OPTIMAL, l1=(0.0, 20.0))},
+            "let the reach change",
+        ),
+        ({"objective": "largest-volume", "start": SWING}, "swing"),
+        (
+            {"objective": "smallest-reach", "start": EMPTY, "free": ["yaw"]},
+            "the start has an empty workspace",
+        ),
     ],
 )
 def test_make_problem_with_bad_input_says_what_would_work(
-    objective: ObjectiveName, arguments: dict[str, Any], words: str
+    arguments: dict[str, Any], words: str
 ) -> None:
+    given: dict[str, Any] = {"objective": "match-volume", **arguments}
     with pytest.raises(InputError) as caught:
-        make_from(objective=objective, **arguments)
+        make_from(**given)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -577,14 +572,9 @@ def test_demand_of_a_tilt_is_kept_in_its_azimuths() -> None:
     ("objective", "field", "others", "factor"),
     [
         ("smallest-reach", "reach", {"volume": 5000.0}, 0.98),
-        *(
-            pytest.param(*case, marks=pytest.mark.long)
-            for case in (
-                ("smallest-error", "error", {}, 0.9),
-                ("smallest-deflection", "deflection", {}, 0.9),
-                ("largest-volume", "volume", {"reach": 20.0}, 1.02),
-            )
-        ),
+        pytest.param("smallest-error", "error", {}, 0.9, marks=pytest.mark.long),
+        pytest.param("smallest-deflection", "deflection", {}, 0.9, marks=pytest.mark.long),
+        pytest.param("largest-volume", "volume", {"reach": 20.0}, 1.02, marks=pytest.mark.long),
     ],
 )
 def test_demand_about_what_the_objective_improves_is_kept_too(

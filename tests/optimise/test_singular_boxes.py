@@ -146,9 +146,7 @@ def test_margin_over_a_box_is_the_least_over_all_of_it(seed: int) -> None:
 
 
 @pytest.mark.parametrize("index", range(3))
-def test_box_on_or_across_a_plane_is_refuted_where_forces_or_errors_count(
-    index: int,
-) -> None:
+def test_box_on_or_across_a_plane_is_refuted_where_forces_or_errors_count(index: int) -> None:
     design = machine(TURNS[index], (None, 0.0, None)[index])
     for place in BESIDE:
         box = boxes_at(design, index, place)

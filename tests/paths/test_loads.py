@@ -156,30 +156,9 @@ def test_holds_along_agrees_with_the_largest_share(seed: int) -> None:
     index = int(np.flatnonzero(regular)[seed % int(regular.sum())])
     one = tuple(each[index : index + 1] for each in given)
     for factor, holds in ((1.0 + 1e-5, True), (1.0 - 1e-5, False)):
-        at_limit = DemandedLoad.of(
-            scaled_limits(design, factor * float(share[index])), demanded.load
-        )
+        scaled = random_machine(OPTIMAL, seed, strength=factor * float(share[index]))
+        at_limit = DemandedLoad.of(scaled, demanded.load)
         assert at_limit.holds_along(one[0], one[1], one[2], one[3]) == [holds]
     crossed = np.array([bool(path_margins(move).crossings) for move in moves])
     assert not demanded.holds_along(*given)[crossed].any()
     assert (np.abs(margins(ends[0], turns[0])) > 0.0).all()
-
-
-def scaled_limits(design: Design, factor: float) -> Design:
-    """Return a design with all limits of its machine times a factor."""
-    actuators, guide = design.actuators, design.guide
-    assert actuators.push_n is not None
-    assert actuators.pull_n is not None
-    push, pull = (tuple(factor * each for each in e) for e in (actuators.push_n, actuators.pull_n))
-    return msgspec.structs.replace(
-        design,
-        actuators=msgspec.structs.replace(actuators, push_n=push, pull_n=pull),
-        struts=msgspec.structs.replace(
-            design.struts, moment_nm=factor * (design.struts.moment_nm or 0.0)
-        ),
-        guide=msgspec.structs.replace(
-            guide,
-            force_n=factor * (guide.force_n or 0.0),
-            moment_nm=factor * (guide.moment_nm or 0.0),
-        ),
-    )

@@ -164,23 +164,6 @@ def test_plan_path_other_carriage_order_names_both_orders(demanded: str) -> None
     assert least < -0.39
 
 
-def test_rules_with_room_demand_more_margin_and_clearance() -> None:
-    rules = Rules.of(DESIGN)
-    position, rotation = HOME.position, HOME.rotation
-    snapshot = evaluate(DESIGN, HOME)
-    margin = float(abs(snapshot.margins).min())
-    clearance = float(snapshot.clearances.clearance.min())
-    for room, valid in (
-        ((0.99 * margin, 0.99 * clearance), True),
-        ((1.01 * margin, 0.0), False),
-        ((0.0, 1.01 * clearance), False),
-    ):
-        demanding = rules.tighten(*room)
-        assert poses_are_valid(DESIGN, position, rotation, rules=demanding) == valid
-    free = Rules.of(limited(DESIGN, margin=None))
-    assert poses_are_valid(DESIGN, position, rotation, rules=free.tighten(2.0 * margin, 0.0))
-
-
 @needs_ompl
 def test_plan_path_too_little_time_names_it() -> None:
     with pytest.raises(NoPathError, match="1e-09 s") as caught:

@@ -254,22 +254,3 @@ def test_extent_of_ball_cut_at_its_top_is_that_of_the_cut() -> None:
         np.testing.assert_allclose(ends[0], [-wide, 5.0 - wide, 1.0 - height], atol=1e-8)
         np.testing.assert_allclose(ends[1], [wide, 5.0 + wide, 1.0], atol=1e-8)
     assert extent_of(limited(design, box=((-2.0, 3.0, 1.1), (2.0, 7.0, 2.0))), quarter) is None
-
-
-def test_extent_of_workspace_cut_in_two_spans_both_parts() -> None:
-    design, rotation = ordinary_case(0)
-    assert design.limits.box is not None
-    whole = extent_of(limited(design, margin=None, box=None), rotation)
-    assert whole is not None
-    parts = [
-        extent_of(limited(design, margin=None, box=box), rotation)
-        for middle in (0.5 * (whole[0] + whole[1]),)
-        for box in (
-            (tuple(whole[0] - 1.0), (*(whole[1][:2] + 1.0), float(middle[2]))),
-            ((*(whole[0][:2] - 1.0), float(middle[2])), tuple(whole[1] + 1.0)),
-        )
-    ]
-    assert all(part is not None for part in parts)
-    lows, highs = np.swapaxes(np.array(parts), 0, 1)
-    np.testing.assert_allclose(lows.min(axis=0), whole[0], atol=1e-9)
-    np.testing.assert_allclose(highs.max(axis=0), whole[1], atol=1e-9)

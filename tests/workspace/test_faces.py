@@ -181,7 +181,7 @@ def test_cone_of_a_joint_has_a_face(half_angle: float, flat: bool) -> None:
 
 
 @pytest.mark.parametrize("size", [1e-1, 1e-5])
-@pytest.mark.parametrize("kind", ["ball", "cylinder", "cone", "wedge"])
+@pytest.mark.parametrize("kind", ["ball", "cylinder"])
 def test_surface_in_a_small_cube_far_from_its_centre_has_the_area_of_its_tangent_plane(
     kind: str, size: float
 ) -> None:
@@ -203,25 +203,10 @@ def test_surface_in_a_small_cube_far_from_its_centre_has_the_area_of_its_tangent
 
 def curved_limit(kind: str, rng: np.random.Generator) -> tuple[Constraint, FloatArray, FloatArray]:
     """Return a limit with a point of its surface 20 from its centre, and the normal there."""
-    outward = rng.normal(size=3)
-    if kind in ("cylinder", "wedge"):
-        outward[0] = 0.0
+    outward = rng.normal(size=3) * (1.0 if kind == "ball" else np.array([0.0, 1.0, 1.0]))
     outward /= np.linalg.norm(outward)
-    if kind in ("ball", "cylinder"):
-        return (
-            BallOrCylinder("curved", np.zeros(3), 20.0, is_ball=kind == "ball", inside=True),
-            20.0 * outward,
-            outward,
-        )
-    half_angle = rng.uniform(0.3, 1.2)
-    across = np.cross(outward, (1.0, 0.0, 0.0) if kind == "wedge" else rng.normal(size=3))
-    across /= np.linalg.norm(across)
-    cosine, sine = np.cos(half_angle), np.sin(half_angle)
-    return (
-        Cone("curved", np.zeros(3), outward, half_angle, flat=kind == "wedge"),
-        20.0 * (cosine * outward + sine * across),
-        cosine * across - sine * outward,
-    )
+    limit = BallOrCylinder("curved", np.zeros(3), 20.0, is_ball=kind == "ball", inside=True)
+    return limit, 20.0 * outward, outward
 
 
 def section_of_unit_cube(normal: FloatArray) -> float:

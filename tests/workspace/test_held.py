@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from limited_designs import scaled_design
 from long_cases import long_after
 from machines import FULL, PRESS, six
 from reference import read_reference
@@ -40,10 +41,9 @@ from explorer.workspace.held import held_workspace
 from explorer.workspace.limits.constraints import constraints, satisfies, slacks
 
 OPTIMAL = PRESETS["paper-optimal"]
+REFERENCE: list[dict[str, Any]] = read_reference("held")["held"]
 # Those of thin sheets need many cells.
-HELD = long_after(
-    2, sorted(read_reference("held")["held"], key=lambda case: "sheet" in case["name"])
-)
+SHEETS_LAST = sorted(REFERENCE, key=lambda case: "sheet" in case["name"])
 LOAD = (4.0, -3.0, -6.0, 5.0, 10.0, -5.0)
 CASES = {
     "bending": msgspec.structs.replace(
@@ -71,7 +71,7 @@ def largest_shares(
     return np.asarray(limit_shares(design, held).max(axis=1))
 
 
-@pytest.mark.parametrize("case", HELD, ids=lambda case: case["name"])
+@pytest.mark.parametrize("case", long_after(2, SHEETS_LAST), ids=lambda case: str(case["name"]))
 def test_volume_is_that_of_reference_cases(case: dict[str, Any]) -> None:
     design = decode_design(json.dumps(case["design"]).encode(), "the reference")
     part = held_workspace(design, case["rotation"], case["load"])
@@ -210,24 +210,11 @@ def test_without_limits_the_whole_holds_any_load() -> None:
 
 def test_scale_of_a_design_does_not_matter() -> None:
     design, size = CASES["actuators"], 1e3
-
-    def scaled(vector: Iterable[float]) -> Any:
-        return tuple(size * x for x in vector)
-
-    assert design.limits.box is not None
-    home = home_pose(design)
+    x, y, z = design.payload.centre
     larger = msgspec.structs.replace(
-        design,
-        a3=scaled(design.a3),
-        b1=scaled(design.b1),
-        b2=size * design.b2,
-        b3=size * design.b3,
+        scaled_design(design, size),
         unit_mm=design.unit_mm / size,
-        payload=Payload(2.0, scaled(design.payload.centre)),
-        limits=msgspec.structs.replace(
-            design.limits, box=tuple(scaled(end) for end in design.limits.box)
-        ),
-        home=msgspec.structs.replace(home, position=scaled(home.position)),
+        payload=Payload(2.0, (size * x, size * y, size * z)),
     )
     ours, theirs = (held_workspace(each, nodes=16) for each in (design, larger))
     assert theirs.held_volume == pytest.approx(size**3 * ours.held_volume, rel=1e-4)

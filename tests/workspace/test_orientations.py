@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from limited_designs import limited, ordinary_case
+from limited_designs import limited
 from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, InputError, Pose, evaluate, home_pose
 from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import checked_rotation, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.compiled import warm
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.limits.valid_poses import valid_rows
 from explorer.workspace.orientations.sets import cone_of_directions, yaw_pitch_roll_range
 from explorer.workspace.orientations.share import orientation_capability, orientations_within
 from explorer.workspace.slices.volume import volume_within
@@ -124,27 +122,6 @@ def test_orientation_capability_with_more_orientations_converges() -> None:
     shares = [orientation_capability(OPTIMAL, HOME.position, n) for n in (1000, 10_000, 50_000)]
     assert shares[0] == pytest.approx(shares[2], abs=0.01)
     assert shares[1] == pytest.approx(shares[2], abs=0.003)
-
-
-def test_orientations_within_interpreted_and_compiled_agree(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    warm()
-    untyped: Any = valid_rows
-    assert untyped.ready
-    design, rotation = ordinary_case(0)
-    design = limited(design, swing=Swing(a1=40.0, b3=70.0))
-    turns = Rotation.from_rotvec(np.random.default_rng(0).normal(scale=0.2, size=(400, 3)))
-    rotations = turns.as_matrix() @ rotation
-    position = home_pose(design).position
-    compiled = orientations_within(design, position, rotations)
-
-    def interpreted(_: int, *arguments: Any) -> None:
-        untyped.__wrapped__(*arguments)
-
-    monkeypatch.setattr("explorer.workspace.orientations.share.valid_rows", interpreted)
-    np.testing.assert_array_equal(orientations_within(design, position, rotations), compiled)
-    assert 0 < compiled.sum() < len(rotations)
 
 
 def test_orientations_with_reversed_ranges_or_unusable_counts_are_refused() -> None:

@@ -95,19 +95,6 @@ def test_outline_edges_have_the_slice_on_their_left(seed: int) -> None:
         assert inside.tolist() == [True, False]
 
 
-def test_outline_minimum_length_leaves_a_hole() -> None:
-    # b4 within a ball about a3, and outside a small one about it that lies inside all else.
-    design = limited(OPTIMAL, l4=(1.0, 3.0), box=None, margin=None)
-    design = limited(design, l1=(0.0, 1e3), d2=(0.0, 1e3), d4=(0.0, 1e3))
-    rotation = explorer.home_pose(OPTIMAL).rotation
-    outline = slice_outline(design, rotation, "z", 0.0)
-    assert outline is not None
-    assert len(outline.loops) == 2
-    assert outline.area == pytest.approx(math.pi * (9.0 - 1.0), rel=1e-12)
-    limits = {edge.limit for loop in outline.loops for edge in loop}
-    assert limits == {"l4 maximum", "l4 minimum"}
-
-
 @pytest.mark.parametrize("size", [1e-6, 1e6])
 def test_outline_of_a_scaled_design_scales(size: float) -> None:
     rotation = explorer.home_pose(OPTIMAL).rotation

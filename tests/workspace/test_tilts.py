@@ -273,10 +273,9 @@ def tool_dips() -> list[tuple[Design, FloatArray, FloatArray]]:
             {"d4": (radius - to_b3 * small, 500.0)},
             {"guide": (-1e3, float(c[0]) + max(to_b2, to_b3) * small)},
         ]
-        for axis in np.eye(3):
-            high = np.where(axis > 0.0, c + arm * small, 99.0)
-            low = np.where(axis > 0.0, c - arm * small, -99.0)
-            sides += [{"box": ((-99.0,) * 3, (*high,))}, {"box": ((*low,), (99.0,) * 3)}]
+        high, low = float(c[0]) + arm * small, float(c[1]) - arm * small
+        sides += [{"box": ((-99.0,) * 3, (high, 99.0, 99.0))}]
+        sides += [{"box": ((-99.0, low, -99.0), (99.0,) * 3)}]
         cases += [(limited(free, **side), c, t) for side in sides]
     return cases
 

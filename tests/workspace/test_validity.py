@@ -186,18 +186,6 @@ def test_poses_and_moves_few_or_many_have_the_same_answers() -> None:
         assert poses_are_valid(THICK, moves[0][index], moves[1][index])
 
 
-@pytest.mark.parametrize("count", [3, MANY_ROWS])
-def test_poses_of_broadcast_arrays_have_the_same_answers(count: int) -> None:
-    p, r = arrays_of(poses_about(THICK, 5, count))
-    one = np.broadcast_to(r[0], r.shape).copy()
-    assert np.array_equal(poses_are_valid(THICK, p, r[0]), poses_are_valid(THICK, p, one))
-    same = np.broadcast_to(p[0], p.shape).copy()
-    assert np.array_equal(poses_are_valid(THICK, p[0], r), poses_are_valid(THICK, same, r))
-    # Nor need they be rows of one block.
-    back = poses_are_valid(THICK, p, r[::-1].copy())
-    assert np.array_equal(poses_are_valid(THICK, p.T.copy().T, r[::-1]), back)
-
-
 def test_poses_not_finite_are_refused() -> None:
     with pytest.raises(InputError, match="position"):
         poses_are_valid(OPTIMAL, [0.0, math.nan, 1.0], np.eye(3))

@@ -1,8 +1,7 @@
 """The constant-orientation workspace: volumes, gradients and nodes against independent methods.
 
-Volumes are compared with reference values (good to 1e-4), with a closed form in y under a
-fine quadrature in x for both rows of Table 1 (converged to 1e-9), and with the columns of
-another kernel (good to about 1e-4).
+Volumes are compared with reference values (good to 1e-4, those of Table 1 to 1e-6), with the
+columns of another kernel (good to about 1e-4) and with random positions.
 """
 
 from __future__ import annotations
@@ -24,14 +23,12 @@ from limited_designs import (
 from long_cases import long_after
 from scipy.spatial.transform import Rotation
 
-import explorer.workspace.slices.volume as volumes
 from explorer import PRESETS, Design, InputError, home_pose
 from explorer.mechanism.design import LENGTHS, VARIABLES, Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import YAW, constraints
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.integration import RESULTS, integrate_slices
-from explorer.workspace.slices.nodes import column_lengths, count_nodes
+from explorer.workspace.slices.nodes import column_lengths
 from explorer.workspace.slices.volume import (
     bounds,
     home_rotation,
@@ -50,79 +47,15 @@ def test_volume_of_reference_workspaces_is_theirs(index: int) -> None:
     assert workspace_volume(design, rotation).volume == pytest.approx(volume, rel=1e-4)
 
 
-def height_field_volume(design: Design, panels: int) -> float:
-    """Return the volume of a level workspace above z = 0 without minima, independently.
-
-    Level, every ball and cylinder has its centre in the plane z = 0, so that the height over
-    (x, y) is the least of the box and of roots of c - (y - y0)²: in y it has a closed form
-    between the places where two of them are equal, in x it is left to Gauss-Legendre.
-    """
-    u, v = home_rotation(design)[:2, 0], home_rotation(design)[:2, 1]
-    reach, (lows, highs) = design.reach, design.limits.box or pytest.fail("no box")
-    balls = [-(design.b1[0] * u + design.b1[1] * v), np.array(design.a3)]
-    nodes, weights = np.polynomial.legendre.leggauss(4)
-    edges = np.linspace(lows[0], highs[0], panels + 1)
-    width = (highs[0] - lows[0]) / panels
-    x = (edges[:-1, None] + 0.5 * width * (nodes + 1.0)).ravel()
-    rate = np.tile(0.5 * width * weights, panels)
-    # Rows (y0, c) of each root, of shape (rows, x); the box is a root that is level.
-    middles = np.array([*(ball[1] for ball in balls), -design.b2 * u[1], -design.b3 * u[1]])
-    tube = np.full_like(x, reach**2)
-    squares = np.stack([*(tube - (x - ball[0]) ** 2 for ball in balls), tube, tube])
-    top = highs[2]
-    ends = [np.full_like(x, lows[1]), np.full_like(x, highs[1])]
-    for i in range(4):
-        for level in (0.0, top * top):
-            root = np.sqrt(np.maximum(0.0, squares[i] - level))
-            ends += [middles[i] - root, middles[i] + root]
-        for j in range(i):
-            apart = middles[i] - middles[j]
-            if apart:
-                # c_i - (y - y_i)² = c_j - (y - y_j)² is linear in y.
-                middle = 0.5 * (middles[i] + middles[j])
-                ends.append(middle - 0.5 * (squares[i] - squares[j]) / apart)
-    y = np.sort(np.clip(np.stack(ends), lows[1], highs[1]), axis=0)
-    a, b = y[:-1], y[1:]
-    heights = squares[:, None] - (0.5 * (a + b)[None] - middles[:, None, None]) ** 2
-    lowest = heights.argmin(axis=0)
-    least = np.take_along_axis(heights, lowest[None], axis=0)[0]
-    y0, c = middles[lowest], np.take_along_axis(squares, lowest, axis=0)
-    inner = _root_integral(b - y0, c) - _root_integral(a - y0, c)
-    inner = np.where(least > top * top, top * (b - a), np.where(least > 0.0, inner, 0.0))
-    return float((rate * inner.sum(axis=0)).sum())
-
-
-def _root_integral(t: FloatArray, c: FloatArray) -> FloatArray:
-    """Return the integral of sqrt(c - t²) from 0."""
-    r = np.sqrt(np.maximum(c, 1e-300))
-    t = np.clip(t, -r, r)
-    return 0.5 * (t * np.sqrt(np.maximum(0.0, c - t * t)) + c * np.arcsin(t / r))
-
-
 @pytest.mark.parametrize("row", REFERENCE["table1"], ids=lambda row: str(row["name"]))
-def test_volume_of_table_1_rows_is_that_of_a_height_field(row: dict[str, Any]) -> None:
-    design = PRESETS[row["name"]]
-    independent = height_field_volume(design, 2000)
-    found = workspace_volume(design).volume
-    assert found == pytest.approx(independent, rel=1e-7)
-    assert found == pytest.approx(row["exact_volume"], rel=1e-6)
-
-
-@pytest.mark.parametrize("row", REFERENCE["table1"], ids=lambda row: str(row["name"]))
-def test_nodes_of_table_1_rows_are_the_reference_ones(row: dict[str, Any]) -> None:
+def test_volume_and_nodes_of_table_1_rows_are_the_reference_ones(row: dict[str, Any]) -> None:
     nodes = workspace_nodes(PRESETS[row["name"]])
+    found = workspace_volume(PRESETS[row["name"]]).volume
+    assert found == pytest.approx(row["exact_volume"], rel=1e-6)
     assert nodes.count == row["node_count"]
     assert nodes.step == pytest.approx(row["step"], rel=1e-12)
     assert nodes.volume == pytest.approx(row["node_volume"], rel=1e-12)
     np.testing.assert_allclose(nodes.extent or (), row["extent"], rtol=1e-12, atol=1e-12)
-
-
-def test_node_volume_of_the_optimum_is_the_paper_s() -> None:
-    assert workspace_nodes(OPTIMAL).volume == 7992.0
-    # The printed extents of the initial row, to their digits.
-    lows, highs = workspace_nodes(PRESETS["paper-initial"]).extent or pytest.fail("empty")
-    assert [round(end, 3) for end in highs] == [10.052, 10.770, 9.334]
-    assert [round(end, 3) for end in lows] == [0.0, -5.026, 0.0]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -196,36 +129,6 @@ def test_volume_gradient_by_a3_includes_maxima_at_the_reach(name: str) -> None:
     rate, step = workspace_volume(design).gradient[name], 1e-4
     ahead, behind = (workspace_volume(with_added(design, name, by)) for by in (step, -step))
     assert rate == pytest.approx((ahead.volume - behind.volume) / (2.0 * step), rel=1e-6)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_kernels_interpreted_and_compiled_have_the_same_results(seed: int) -> None:
-    design, rotation = ordinary_case(seed)
-    region = region_of(constraints(limited(design, swing=Swing(a1=50.0, b2=60.0)), rotation))
-    lows, highs = bounds(region)
-    step = float((highs - lows).max()) / 12.0
-    first = np.ceil(lows / step)
-    counts = (np.floor(highs / step) - first + 1).astype(np.int64)
-
-    def run(*, compiled: bool) -> list[FloatArray]:
-        volume, grid, lengths = np.zeros(RESULTS), np.zeros(7, dtype=np.int64), np.zeros(1)
-        rates = np.zeros((len(region.circles) + len(region.planes), 4))
-        ends = (region.low, region.high)
-        calls: list[tuple[Any, tuple[Any, ...]]] = [
-            (integrate_slices, (*region.rows[:2], *ends, volumes.quadrature(), volume, rates)),
-            (count_nodes, (*region.rows, np.array(ends), 1e-9, first, counts, step, grid)),
-            (column_lengths, (*region.rows, lows, highs, 12, lengths)),
-        ]
-        for kernel, arguments in calls:
-            if compiled:
-                assert kernel.ready
-                kernel(1, *arguments)
-            else:
-                kernel.__wrapped__(*arguments)
-        return [volume, rates, grid.astype(np.float64), lengths]
-
-    for one, other in zip(run(compiled=True), run(compiled=False), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(one).max())
 
 
 @pytest.mark.parametrize(("seed", "s"), [(0, 1e-9), (1, 1e3)])
@@ -305,12 +208,9 @@ def test_volume_of_extreme_designs_is_that_of_random_positions(seed: int) -> Non
 
 
 @pytest.mark.parametrize("step", [0.0, math.nan, 1e-3])
-def test_nodes_with_an_unusable_step_are_refused(step: float) -> None:
+def test_nodes_with_an_unusable_step_or_rotation_are_refused(step: float) -> None:
     with pytest.raises(InputError, match="node"):
         workspace_nodes(OPTIMAL, step=step)
-
-
-def test_workspace_with_an_invalid_rotation_is_refused() -> None:
     for measure in (workspace_volume, workspace_nodes):
         with pytest.raises(InputError, match="rotation"):
             measure(OPTIMAL, 2.0 * np.eye(3))
