@@ -129,14 +129,6 @@ def test_search_enclosed_by_crossing_legs_restarts_elsewhere() -> None:
     assert all(outcome.converged for outcome in tried)
 
 
-def test_search_for_the_start_volume_takes_no_step() -> None:
-    problem = make_problem(OPTIMAL, "match-volume", volume=workspace_volume(OPTIMAL).volume)
-    outcome = optimise_design(problem)
-    assert outcome.converged
-    assert outcome.iterations == 0
-    assert outcome.design.variables == OPTIMAL.variables
-
-
 def test_search_for_impossible_volume_names_the_largest_found() -> None:
     bounds = [Variable("a3x", 5.0, 12.0), Variable("a3y", 1.0, 6.0)]
     problem = make_problem(paper_start(), "match-volume", volume=8000.0, bounds=bounds)
@@ -479,14 +471,6 @@ def test_search_with_bad_settings_is_refused(option: str, value: int) -> None:
     options: dict[str, Any] = {option: value}
     with pytest.raises(InputError, match=option):
         optimise_design(paper_problem(), **options)
-
-
-def test_default_bounds_hold_every_start_and_keep_lines_apart() -> None:
-    for values in more_starts(paper_problem(), 10, seed=2):
-        design = paper_problem().design_at(values)
-        problem = make_problem(design, "match-volume", volume=9.0, free=["yaw", "reach"])
-        yaw = problem.variables[problem.names.index("yaw")]
-        assert math.sin(math.radians(yaw.low)) * math.sin(math.radians(yaw.high)) > 0.0
 
 
 ROTATION = home_pose(OPTIMAL).rotation

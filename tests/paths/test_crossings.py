@@ -43,18 +43,6 @@ def test_path_margins_move_of_b4_or_a_tool_has_all_crossings(seed: int, size: fl
     assert crossed == changes
 
 
-def test_path_margins_of_the_tool_can_touch_the_base_plane_twice() -> None:
-    # The tool stays while the platform turns by 160° about it: b4 dips below the base and returns.
-    low, high = (Pose.of_yaw_pitch_roll((0, 0, 0), (10.0, pitch, 0.0)) for pitch in (-80.0, 80.0))
-    tool = (0.0, 0.0, 4.0)
-    start, end = (
-        Pose.of(np.array([9.0, 5.0, 2.0]) - r @ tool, r) for r in (low.rotation, high.rotation)
-    )
-    crossings = path_margins([start, end], tool=tool).crossings
-    assert [c.incidence for c in crossings].count(3) == 2
-    assert [c.incidence for c in path_margins([start, end]).crossings].count(3) == 0
-
-
 @given(cases(), st.integers(0, 4), st.integers(0, 2**32))
 def test_path_margins_between_modes_cross_the_margins_that_differ(
     case: Case, corners: int, seed: int

@@ -25,7 +25,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import Prototype, make_prototype
 from explorer.prototype.bill import bill_of_materials
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, Places, joints_of_leg
-from explorer.prototype.dimensions import CLEARANCE, FIRST_SWING, SECOND_SWING, LegSizes, Stroke
+from explorer.prototype.dimensions import CLEARANCE, LegSizes, Stroke
 from explorer.prototype.part import Part
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
@@ -243,20 +243,6 @@ def test_parts_of_legs_lie_within_their_capsules(name: str) -> None:
             for low, high, radius in spans
         ]
         assert np.min(excess, axis=0).max() <= 1e-9 * unit, part.name
-
-
-@pytest.mark.parametrize("name", [BELOW.name, LARGE.name])
-def test_universal_joints_within_their_swings_are_clear(name: str) -> None:
-    prototype = PROTOTYPES[name]
-    chains, (position, rotation) = prototype.chains, pose_of(prototype)
-    home = chains.joints(position, rotation)
-    swings = (np.linspace(-most, most, 3) for most in (FIRST_SWING, SECOND_SWING))
-    for leg, swing in itertools.product((1, 4), itertools.product(*swings)):
-        joints = home.copy()
-        joints_of_leg(joints, leg)[:2] = swing
-        places = chains.places(joints, position, rotation)
-        own = parts_named(prototype, "base", f"cross {leg}", f"cylinder {leg}")
-        assert list(overlaps(own, places)) == [], (leg, swing)
 
 
 @pytest.mark.parametrize("name", [UPSIDE_DOWN.name, LARGE.name])

@@ -168,18 +168,6 @@ def test_accessible_workspace_within_empty_limits_is_empty() -> None:
     assert radius_curve(limited(OPTIMAL, l1=(0.0, 1.0), l4=(0.0, 0.1))).volumes.tolist() == [0.0]
 
 
-@pytest.mark.parametrize("home_z", [8.0, 9.0])
-def test_accessible_workspace_without_volume_counts_its_nodes(home_z: float) -> None:
-    home = Pose.of((10.0, 5.0, home_z), home_rotation(OPTIMAL))
-    flat = limited(OPTIMAL, box=((0.0, -12.0, 8.0), (20.0, 22.0, 8.0)))
-    design = msgspec.structs.replace(flat, home=home)
-    found, count = accessible_workspace(design), workspace_nodes(design).count
-    assert found.solid.is_empty
-    assert found.node_count == count > 0
-    # Nothing is accessible from a home that breaks a limit.
-    assert found.accessible_node_count == (count if home_z == 8.0 else 0)
-
-
 HUNDREDTH = 0.01 * OPTIMAL.reach
 
 

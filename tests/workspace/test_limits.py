@@ -11,10 +11,9 @@ import pytest
 from hypothesis import given, strategies as st
 from strategies import Case, ordinary_cases
 
-from explorer import JOINTS, PRESETS, Design, Limits, evaluate, home_pose, inverse, margins
+from explorer import JOINTS, PRESETS, Design, Limits, inverse, margins
 from explorer.mechanism.design import LENGTHS
 from explorer.mechanism.margins import mode_of, signs_of
-from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.broken import Violation, violations
 
@@ -159,16 +158,3 @@ def test_violations_are_in_the_order_of_the_design_file() -> None:
         *("box x", "box y", "box z"),
         *("margin δ1", "margin δ2", "margin δ3"),
     ]
-
-
-@pytest.mark.parametrize("name", list(PRESETS))
-def test_snapshot_violations_use_the_sign_triple_of_home(name: str) -> None:
-    design = PRESETS[name]
-    home = home_pose(design)
-    assert evaluate(design, home).violations == ()
-    x, y, z = home.position
-    below = Pose((x, y, -z), home.quaternion)
-    found = [v.limit for v in evaluate(design, below).violations]
-    # Mirrored in the base plane only b4 has changed sides, and left the box.
-    assert "box z" in found
-    assert "margin δ3" in found

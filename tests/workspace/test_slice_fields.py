@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from limited_designs import ordinary_case
 from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, InputError, Pose, evaluate, home_pose, nearest_singularities
@@ -36,16 +35,6 @@ def test_slice_field_has_the_value_of_each_position(field: Field, axis: str) -> 
         assert result.values[i, j] == pytest.approx(expected, abs=1e-9)
         if not any(str(each).startswith("margin") for each in snapshot.violations):
             assert result.inside[i, j] == (not snapshot.violations)
-
-
-def test_slice_field_of_any_box_and_orientation_has_its_extent() -> None:
-    design, rotation = ordinary_case(3)
-    result = slice_field(
-        design, rotation, "margin", level=2.0, steps=20, extent=([-1, -2, 0], [3, 6, 9])
-    )
-    assert result.columns[[0, -1]].tolist() == [-1.0, 3.0]
-    assert result.rows[[0, -1]].tolist() == [-2.0, 6.0]
-    assert result.values.shape == (20, 10)
 
 
 def test_field_of_a_batch_equals_that_of_its_poses() -> None:

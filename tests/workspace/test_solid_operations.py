@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +11,8 @@ from meshes import assert_lies_on_its_limits, corners_of, euler_characteristic
 
 from explorer import PRESETS, ExplorerError, InputError, poses_are_valid
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
-from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.workspace.limits.constraints import HalfSpace, constraints_over
+from explorer.workspace.limits.constraints import HalfSpace
 from explorer.workspace.orientations.sets import cone_of_directions
 from explorer.workspace.slices.volume import home_rotation
 from explorer.workspace.solids.solids import (
@@ -86,26 +84,6 @@ def test_hull_is_convex_and_contains_the_solid(seed: int) -> None:
     assert float(heights.max()) < 1e-6 * design.reach
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_shifted_workspace_holds_the_positions_of_the_tool(seed: int) -> None:
-    design, rotation = ordinary_case(seed)
-    solid = workspace_solid(design, rotation)
-    tool = np.random.default_rng(seed).uniform(-0.5, 0.5, 3) * design.reach
-    shifted = solid.shifted(tool_offset(rotation, tool))
-    np.testing.assert_array_equal(shifted.vertices, solid.vertices + rotation @ tool)
-    assert shifted.volume == pytest.approx(solid.volume, rel=1e-12)
-    assert shifted.is_watertight
-    assert (shifted.limits, shifted.tolerance) == (solid.limits, solid.tolerance)
-    hull = convex_hull(shifted)
-    assert hull.volume == pytest.approx(convex_hull(solid).volume, rel=1e-9)
-    exact = constraints_over(design, rotation[None], tool)[0]
-    for index, name in enumerate(shifted.limits):
-        corners = shifted.vertices[shifted.faces[shifted.limit_of_face == index]]
-        if len(corners):
-            off = [x.distance(corners).max(axis=1) for x in exact if x.name == name]
-            assert np.min(off, axis=0).max() <= shifted.tolerance * (1.0 + 1e-6)
-
-
 @pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (3.0, -2.0, -5.0)])
 def test_inclusive_and_total_solids_are_union_and_intersection_of_those_of_the_tool(
     tool: tuple[float, float, float],
@@ -146,14 +124,6 @@ def test_inclusive_and_total_solids_of_one_orientation_are_its_workspace() -> No
         assert {family.limits[k] for k in family.limit_of_face} == {
             one.limits[k] for k in one.limit_of_face
         }
-
-
-def test_inclusive_solid_of_many_orientations_has_few_faces() -> None:
-    tilts = (-8.0, 0.0, 8.0)
-    angles = list(itertools.product((-81.0, -73.0, -65.0), tilts, tilts))
-    solid = inclusive_solid(OPTIMAL, rotation_from_yaw_pitch_roll(angles), 0.2)
-    assert solid.is_watertight
-    assert len(solid.faces) < 2000
 
 
 def test_inclusive_and_total_solids_empty_name_limits() -> None:

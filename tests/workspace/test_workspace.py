@@ -122,15 +122,6 @@ def test_volume_gradient_is_that_of_central_differences(seed: int) -> None:
         assert rate == pytest.approx((ahead - behind) / 2e-5, abs=1e-5 * largest), name
 
 
-@pytest.mark.parametrize("name", ["a3x", "a3y"])
-def test_volume_gradient_by_a3_includes_maxima_at_the_reach(name: str) -> None:
-    home = home_pose(OPTIMAL)
-    design = msgspec.structs.replace(OPTIMAL, home=home)
-    rate, step = workspace_volume(design).gradient[name], 1e-4
-    ahead, behind = (workspace_volume(with_added(design, name, by)) for by in (step, -step))
-    assert rate == pytest.approx((ahead.volume - behind.volume) / (2.0 * step), rel=1e-6)
-
-
 @pytest.mark.parametrize(("seed", "s"), [(0, 1e-9), (1, 1e3)])
 def test_volume_of_a_scaled_design_scales_with_the_cube(seed: int, s: float) -> None:
     design, rotation = ordinary_case(seed)
