@@ -190,6 +190,7 @@ def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> No
             {"reach": 25.0},
             "a guide from 0 to 5 units leaves room for at most 4,909 of the 8,000 units³ asked for",
         ),
+        ({"guide": (0.0, 5.0)}, {}, "the box holds at most 6,473 of the 8,000 units³ asked for"),
         ({"margin": 9.0}, {}, "the box holds at most 5,844 of the 8,000 units³ asked for, wh"),
         ({"gap": 30.0}, {}, "the carriages are at most 11.15 units apart within the b"),
         ({}, {"clearance": 12.0}, "legs 2 and 3 keep at most 11.15 of the clearance of 12"),
