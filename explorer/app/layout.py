@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-import time
-
 import viser
 
 from explorer.app.browser.browser_facts import BrowserFacts, ask_browser
@@ -12,6 +9,7 @@ from explorer.app.browser.viser_gaps import dock_above_in, panel_in, run_script
 from explorer.app.features.feature import Place, Tab
 from explorer.app.look import read_script
 from explorer.app.scene.camera import Cameras
+from explorer.app.session.clock import start_timer
 from explorer.app.widgets.theme import Theme
 
 # Seconds until the panels of a new page are laid out.
@@ -119,24 +117,23 @@ class Layout:
         ask_browser(client, lambda facts: self._answered(client, facts))
 
     def _answered(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
-        # A thread of its own waits until the page is laid out.
-        threading.Thread(
-            target=self._adapt, args=(client, facts), name="layout", daemon=True
-        ).start()
-
-    def _adapt(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
         self._make_room(client, facts)
         self._theme.follow_browser(dark=facts.dark)
-        # Some browsers report the size of the scene before its panels are laid out, and not again
-        # before the camera moves; slow ones miss where it is put. Each attempt makes them report.
-        pause = SETTLE_SECONDS
-        for attempt in range(MOST_ATTEMPTS):
-            time.sleep(pause)
-            # The camera of a browser that has disconnected counts as placed too.
-            if attempt > 0 and self._cameras.stands(client):
-                return
-            self._cameras.look_again(client)
+        start_timer(SETTLE_SECONDS, self._place_camera, client, 0)
+
+    def _place_camera(self, client: viser.ClientHandle, attempt: int) -> None:
+        """Put the camera of a new browser where it belongs, again and again until it is there.
+
+        Some browsers report the size of the scene before its panels are laid out, and not again
+        before the camera moves; slow ones miss where it is put. Each attempt makes them report.
+        """
+        # The camera of a browser that has disconnected counts as placed too.
+        if attempt > 0 and self._cameras.stands(client):
+            return
+        self._cameras.look_again(client)
+        if attempt + 1 < MOST_ATTEMPTS:
             pause = min((1.0 + attempt) * SETTLE_SECONDS, LONGEST_PAUSE_SECONDS)
+            start_timer(pause, self._place_camera, client, attempt + 1)
 
 
 def is_narrow(facts: BrowserFacts) -> bool:

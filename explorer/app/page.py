@@ -20,9 +20,9 @@ from explorer.app.layout import Layout, Panels
 from explorer.app.look import read_script, read_stylesheet
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
+from explorer.app.session import clock
 from explorer.app.session.history import History
 from explorer.app.session.jobs import Worker
-from explorer.app.session.latest import start_timer
 from explorer.app.session.session import Session, Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Presses
@@ -101,12 +101,12 @@ class Page:
         self._pending: list[tuple[str, str]] = []
         self._pending_lock = threading.Lock()
         self._panels_updated = 0.0
-        self._redraw_timer: threading.Timer | None = None
-        # Looks after the cameras once nothing has been drawn for a while.
-        self._camera_timer: threading.Timer | None = None
+        self._redraw_timer: clock.Timer | None = None
+        # Looks after the cameras once nothing has been drawn for a while, or at a release.
+        self._camera_timer: clock.Timer | None = None
+        self._follows_at_release = False
         # Held while a timer is started, so that it is known before it is over.
         self._timer_lock = threading.Lock()
-        self._drawn_at = 0.0
         # Other threads may ask for a frame before the last panel is there.
         self._is_complete = False
         self._frame = Frame(state)
@@ -174,8 +174,8 @@ class Page:
         server.on_client_connect(self._show_pending)
         server.on_client_connect(self.services.cameras.connected)
         server.on_client_disconnect(self.services.cameras.disconnected)
-        server.on_client_connect(lambda client: listen(client, presses))
-        server.on_client_disconnect(lambda client: presses.forget(client.client_id))
+        server.on_client_connect(lambda client: listen(client, presses, self._released))
+        server.on_client_disconnect(lambda client: self._forget(client.client_id))
         self._is_complete = True
         self.session.redraw()
         self.session.wait_until_idle()
@@ -213,10 +213,28 @@ class Page:
             idle = idle and self.worker.wait_until_idle(deadline - time.monotonic())
         return idle and self.session.wait_until_idle(deadline - time.monotonic())
 
+    def settle(self, timeout: float) -> bool:
+        """Wait until all is drawn and no pause is pending; return whether that is so.
+
+        Cameras follow at once what was drawn, rather than after a pause.
+        """
+        deadline = time.monotonic() + timeout
+        while self.wait_until_drawn(deadline - time.monotonic()):
+            timer = self._camera_timer
+            if timer is not None:
+                timer.finish()
+            if not clock.wait_until_quiet(deadline - time.monotonic()):
+                return False
+            # What happened after a pause may have changed more.
+            if not self.session.has_more and clock.wait_until_quiet(0.0):
+                return True
+        return False
+
     @property
     def may_follow(self) -> bool:
         """Whether cameras may still follow what was drawn last."""
-        return self._camera_timer is not None
+        timer = self._camera_timer
+        return self._follows_at_release or (timer is not None and not timer.is_over)
 
     def point_cameras(self, view: ViewName) -> None:
         """Point the camera of every open browser."""
@@ -268,28 +286,37 @@ class Page:
                 self.palette.offer(feature.name, feature.passing(self.services))
         if self._assigner.settle():
             self._schedule_redraw()
-        self._drawn_at = time.monotonic()
-        with self._timer_lock:
-            if self._camera_timer is None:
-                self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow)
+        self._follow_soon()
 
     def _schedule_redraw(self) -> None:
         """Schedule one more frame for when no control is moved, unless one is scheduled."""
         with self._timer_lock:
             if self._redraw_timer is None:
-                self._redraw_timer = start_timer(QUIET_SECONDS, self._redraw)
+                self._redraw_timer = clock.start_timer(QUIET_SECONDS, self._redraw)
 
     def _follow(self) -> None:
         """Have the cameras follow what was drawn, once a user holds nothing and nothing changes."""
-        clients, now = self._server.get_clients(), time.time()
-        held = [number for number in clients if self._presses.at(number, now) is not None]
-        waits = time.monotonic() - self._drawn_at < 0.9 * FOLLOW_SECONDS
-        with self._timer_lock:
-            again = waits or held
-            self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow) if again else None
-        if again:
+        clients, now = self._server.get_clients(), clock.moment_of(time.time())
+        # A release that comes meanwhile calls this again.
+        self._follows_at_release = True
+        if any(self._presses.at(number, now) is not None for number in clients):
             return
+        self._follows_at_release = False
         self.services.cameras.follow(clients.values())
+
+    def _follow_soon(self) -> None:
+        with self._timer_lock:
+            timer = self._camera_timer
+            if timer is None or not timer.postpone(FOLLOW_SECONDS):
+                self._camera_timer = clock.start_timer(FOLLOW_SECONDS, self._follow)
+
+    def _forget(self, who: int) -> None:
+        self._presses.forget(who)
+        self._released()
+
+    def _released(self) -> None:
+        if self._follows_at_release:
+            self._follow_soon()
 
     def _redraw(self) -> None:
         with self._timer_lock:
@@ -344,7 +371,7 @@ class Page:
         self._notify("Something went wrong", f"In the explorer itself: {error}", None)
 
     def _notify(self, title: str, message: str, who: Who) -> None:
-        now = time.monotonic()
+        now = clock.now()
         if now - self._notified.get(message, -NOTICE_SECONDS) < NOTICE_SECONDS:
             return
         self._notified = {m: t for m, t in self._notified.items() if now - t < NOTICE_SECONDS}

@@ -29,10 +29,11 @@ if TYPE_CHECKING:
 PATIENCE_SECONDS = 60.0
 # Selector of the canvas with the scene: charts have canvases too, but three.js marks its own.
 SCENE_CANVAS = "canvas[data-engine]"
-HAS_ARRIVED = "mark => window.explorer?.mark >= mark && window.explorer.ownMark >= mark"
+# Waits until a page has come to rest after a mark, see `look/clock.js`.
+SETTLED = "mark => window.explorer?.settled?.(mark)"
+# Has a page report its camera, and with it the size of the canvas.
+REPORT_CAMERA = "() => window.__viserMutable.sendCamera?.()"
 _marks = itertools.count(1)
-# Seconds after which the camera is moved a little if the size of the canvas is not known.
-NUDGE_SECONDS = 2.0
 # Relative difference of aspect ratios that count as equal; a panel that docks changes the shape
 # of the canvas by far more.
 SAME_SHAPE = 0.01
@@ -229,23 +230,25 @@ def settle(page: Page, client: ClientHandle) -> None:
     Raises:
         PictureError: it does not draw in time.
     """
+    from playwright.sync_api import TimeoutError as BrowserTimeoutError
+
     from explorer.app.browser.viser_gaps import mark_broadcasts, run_script_in
 
     deadline = time.monotonic() + PATIENCE_SECONDS
-    nudged = time.monotonic()
     mark = next(_marks)
     mark_broadcasts(client, mark)
     # What is sent to this browser alone takes a way of its own.
     run_script_in(client, f"(window.explorer ??= {{}}).ownMark = {mark};")
-    while not (_is_size_known(page, client) and page.evaluate(HAS_ARRIVED, mark)):
-        now = time.monotonic()
-        if now > deadline:
-            raise PictureError("the page did not come to rest in time")
-        if now > nudged + NUDGE_SECONDS:
-            # A browser may report its size before it has changed; any move makes it report again.
-            client.camera.position = client.camera.position * (1.0 + 1e-4)
-            nudged = now
-        page.wait_for_timeout(50)
+    try:
+        page.wait_for_function(SETTLED, arg=mark, timeout=1000.0 * PATIENCE_SECONDS)
+    except BrowserTimeoutError:
+        raise PictureError("the page did not come to rest in time") from None
+    if not _is_size_known(page, client):
+        page.evaluate(REPORT_CAMERA)
+        while not _is_size_known(page, client):
+            if time.monotonic() > deadline:
+                raise PictureError("the size of the scene did not become known in time")
+            page.wait_for_timeout(10)
     # A frame that has begun may show what was before.
     page.evaluate(AWAIT_FRAMES, 2)
 

@@ -1,7 +1,11 @@
-"""A browser, an explorer and a tab of it for the whole run, begun anew for each test."""
+"""A browser, and tabs of two explorers for the whole run, begun anew for each test.
+
+A tab draws its scene only in tests with the mark `draws`, which read pixels or frames.
+"""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 
 import pytest
@@ -10,11 +14,30 @@ from kept_tab import KeptTab, OpenTab
 from playwright.sync_api import Browser, expect
 from tab import Tab
 
+from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.server import Running, start
+from explorer.app.storage.library import Library
+from explorer.app.storage.session_file import SessionFile
+from explorer.app.storage.study_folders import StudyFolders
+from explorer.app.storage.user_data import UserData
 from explorer.mechanism.design_file import PRESETS
 
+OPTIMAL = PRESETS["paper-optimal"]
+
 expect.set_options(timeout=1000 * PATIENCE_SECONDS)
+
+
+DRAWS = "draws: the page draws its scene all the time, see Tab"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", DRAWS)
+
+
+def draws(request: pytest.FixtureRequest) -> bool:
+    """Whether a test is marked as one in which the page draws its scene all the time."""
+    return request.node.get_closest_marker("draws") is not None
 
 
 @pytest.fixture(scope="session")
@@ -27,7 +50,7 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture(scope="session")
 def kept_tab(browser: Browser) -> Iterator[KeptTab]:
     """The tab that tests hand on."""
-    kept = KeptTab(lambda: Tab(browser, start(PRESETS["paper-optimal"], port=0)))
+    kept = KeptTab(lambda: Tab(browser, start(OPTIMAL, port=0), draws=True))
     yield kept
     kept.close()
 
@@ -35,10 +58,31 @@ def kept_tab(browser: Browser) -> Iterator[KeptTab]:
 @pytest.fixture
 def running(capfd: pytest.CaptureFixture[str]) -> Iterator[Running]:
     """An explorer with the paper's optimum; none of its threads may have failed in the end."""
-    running = start(PRESETS["paper-optimal"], port=0)
+    running = start(OPTIMAL, port=0)
     yield running
     running.stop()
     assert capfd.readouterr().err == ""
+
+
+@pytest.fixture(scope="session")
+def kept_data_tab(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[KeptTab]:
+    """The tab of an explorer with the user's data, which tests hand on too."""
+    home = tmp_path_factory.mktemp("user")
+    designs, studies = home / "designs", home / "studies"
+
+    def open_tab() -> Tab:
+        data = UserData(Library(designs), SessionFile(home / "sessions"))
+        folders = StudyFolders(studies)
+        return Tab(browser, start(OPTIMAL, port=0, user_data=data, studies=folders), draws=True)
+
+    def tidy(tab: Tab) -> None:
+        for folder in (designs, studies):
+            shutil.rmtree(folder, ignore_errors=True)
+        tab.running.page.services.get(SavedDesigns).refresh()
+
+    kept = KeptTab(open_tab, tidy)
+    yield kept
+    kept.close()
 
 
 @pytest.fixture
@@ -51,15 +95,28 @@ def open_tab(
     """Open tabs of one explorer, the kept one first."""
     with kept_tab.watch(request, capfd) as tabs:
 
-        def opened() -> Tab:
-            tab = Tab(browser, tabs[0].running) if tabs else kept_tab.begin()
+        def open_another() -> Tab:
+            if tabs:
+                tab = Tab(browser, tabs[0].running, draws=draws(request))
+            else:
+                tab = kept_tab.begin(draws=draws(request))
             tabs.append(tab)
             return tab
 
-        yield opened
+        yield open_another
 
 
 @pytest.fixture
 def tab(open_tab: OpenTab) -> Tab:
     """A tab of the explorer."""
     return open_tab()
+
+
+@pytest.fixture
+def data_tab(
+    request: pytest.FixtureRequest, kept_data_tab: KeptTab, capfd: pytest.CaptureFixture[str]
+) -> Iterator[Tab]:
+    """A tab of an explorer with the user's data: saved designs and studies, none at first."""
+    with kept_data_tab.watch(request, capfd) as tabs:
+        tabs.append(kept_data_tab.begin(draws=draws(request)))
+        yield tabs[0]

@@ -18,18 +18,22 @@ class KeptTab:
 
     Attributes:
         open: Function that starts an explorer and opens the tab.
+        tidy: Function that removes what a test has left, before the next one begins.
         tab: The tab; None before it is opened, and after a test that failed in it.
     """
 
     open: Callable[[], Tab]
+    tidy: Callable[[Tab], None] = lambda _: None
     tab: Tab | None = None
 
-    def begin(self) -> Tab:
-        """Return the tab as if it was opened now."""
+    def begin(self, *, draws: bool = False) -> Tab:
+        """Return the tab as if it was opened now, drawing its scene or not."""
         if self.tab is None:
             self.tab = self.open()
         else:
+            self.tidy(self.tab)
             self.tab.begin_anew()
+        self.tab.draw(draws)
         return self.tab
 
     def close(self) -> None:

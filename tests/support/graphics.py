@@ -11,9 +11,12 @@ from contextlib import contextmanager
 
 from playwright.sync_api import Browser
 
-from explorer.app.browser.headless import headless_browser
+from explorer.app.browser.headless import SWIFTSHADER, headless_browser
 
-MESA = ("--use-angle=gl-egl", "--ignore-gpu-blocklist")
+# The page itself is drawn by the processor at once, rather than by a renderer that imitates a
+# graphics card.
+WITHOUT_COMPOSITOR = ("--disable-gpu-compositing",)
+MESA = ("--use-angle=gl-egl", "--ignore-gpu-blocklist", *WITHOUT_COMPOSITOR)
 # Its software renderer, whatever else the machine has.
 IN_SOFTWARE = {"LIBGL_ALWAYS_SOFTWARE": "1", "EGL_PLATFORM": "surfaceless"}
 RENDERER = """() => {
@@ -30,7 +33,7 @@ def quick_browser() -> Generator[Browser]:
         if "llvmpipe" in renderer_of(browser):
             yield browser
             return
-    with headless_browser() as browser:
+    with headless_browser((*SWIFTSHADER, *WITHOUT_COMPOSITOR)) as browser:
         yield browser
 
 

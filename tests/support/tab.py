@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 import viser
 from playwright.sync_api import Browser, ConsoleMessage, Download, Locator, expect
 
+from explorer.app.browser.viser_gaps import element_id
 from explorer.app.scene.camera import ViewName, framing, has_perspective
-from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, fixed_resolution_url, settle
+from explorer.app.screenshot import (
+    AWAIT_FRAMES,
+    HOLD,
+    PATIENCE_SECONDS,
+    SCENE_CANVAS,
+    fixed_resolution_url,
+    settle,
+)
 from explorer.app.server import Running
+from explorer.app.session import clock
 from explorer.app.session.history import start_history
 from explorer.app.session.session import HistoryMove
 from explorer.app.state.actions import Set
@@ -26,10 +38,12 @@ from explorer.numerics.arrays import FloatArray
 SIZE = (940, 540)
 
 # All that a console may say: what it logs, and these warnings. The first is viser's three.js
-# about itself, the second the software renderer about reading a frame back.
+# about itself, the second the software renderer about reading a frame back, the third about what
+# lights the scene in a page that draws nothing while it loads.
 TOLERATED_WARNINGS = (
     re.compile(r"^THREE\.Clock: This module has been deprecated"),
     re.compile(r"GL Driver Message .* GPU stall due to ReadPixels"),
+    re.compile(r"This browser does not support reading pixels from 1016 RenderTargets"),
 )
 TOLERATED_KINDS = ("log", "info", "debug")
 
@@ -56,14 +70,28 @@ MIDDLE_OF_BUTTON = """(words) => {
 }"""
 
 
+# Has the page draw its scene, or hold it.
+DRAW = """(draws) => {
+    window.isReleased = draws;
+    if (draws) window.__viserMutable?.requestRender();
+}"""
+# Messages by which one look at a page asks whether it has come to rest: two marks, and the number
+# that it sends back.
+OWN_MESSAGES = 3
+_numbers = itertools.count(1)
+
+
 class Tab:
-    """One page of an explorer.
+    """One page of an explorer, which draws its scene only while it is told to.
+
+    A page that draws nothing while it loads lacks the reflections of its surroundings later.
 
     Args:
         browser: In which it is opened.
         running: The explorer.
         size: Of its window, in pixels.
         dark: Whether its user prefers dark pages.
+        draws: Whether it draws its scene all the time.
     """
 
     def __init__(
@@ -73,9 +101,10 @@ class Tab:
         *,
         size: tuple[int, int] = SIZE,
         dark: bool = False,
+        draws: bool = False,
     ) -> None:
         self.running = running
-        self._size = size
+        self._size, self._draws = size, draws
         self.requests: list[str] = []
         self._complaints: list[str] = []
         self._context = browser.new_context(
@@ -87,6 +116,9 @@ class Tab:
         self._context.on("weberror", lambda error: self._complaints.append(str(error.error)))
         self._context.on("request", lambda request: self.requests.append(request.url))
         self._context.on("requestfailed", lambda request: self._complaints.append(request.url))
+        self._context.add_init_script(HOLD)
+        if draws:
+            self._context.add_init_script("window.isReleased = true")
         self.page = self._context.new_page()
         known = set(running.viser.get_clients())
         self.page.goto(fixed_resolution_url(running))
@@ -110,14 +142,55 @@ class Tab:
         # A move through the history leaves what is shown as it is.
         session.do(Set("view", View()))
         session.travel(HistoryMove(lambda _: start_history(opened(PRESETS["paper-optimal"]))))
-        assert page.wait_until_drawn(PATIENCE_SECONDS)
-        for group in self.page.get_by_role("tablist").all():
-            first = group.get_by_role("tab").first
-            if first.get_attribute("aria-selected") != "true":
-                first.click()
         page.panels.work.minimize()
         page.point_cameras("isometric")
-        settle(self.page, self.client)
+        self.draw(False)
+        self.settle()
+
+    def draw(self, draws: bool) -> None:
+        """Have the page draw its scene from now on, or not."""
+        self._draws = draws
+        self.page.evaluate(DRAW, draws)
+
+    @contextmanager
+    def drawing(self) -> Generator[None]:
+        """Have the page draw its scene meanwhile."""
+        before = self._draws
+        self.draw(True)
+        yield
+        self.draw(before)
+
+    def settle(self) -> None:
+        """Wait until server and page have come to rest: nothing waits, and no pause is pending."""
+        deadline = time.monotonic() + PATIENCE_SECONDS
+        while True:
+            assert self.running.page.settle(PATIENCE_SECONDS), "the explorer is never at rest"
+            sent = self._sent_messages()
+            settle(self.page, self.client)
+            self._hear()
+            assert self.running.page.settle(PATIENCE_SECONDS), "the explorer is never at rest"
+            # What the page had to say before may have changed something.
+            if self._sent_messages() == sent + OWN_MESSAGES:
+                return
+            assert time.monotonic() < deadline, "the page is never at rest"
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass, for the explorer and for the page, without waiting for it."""
+        self._hear()
+        self.page.evaluate("pause => window.explorer.clock.advance(pause)", 1000.0 * seconds)
+        self._hear()
+        clock.advance(seconds)
+
+    def _hear(self) -> None:
+        """Wait until the explorer has received all that the page has sent."""
+        number = next(_numbers)
+        self.page.evaluate("values => window.explorer.send(...values)", [self._echo_id, number])
+        self.wait_for(lambda: self._echo.value == number, "an echo")
+
+    def _sent_messages(self) -> int:
+        """Return the number of messages to all pages and to this one so far."""
+        guis: tuple[Any, ...] = (self.running.viser.gui, self.client.gui)
+        return sum(each._websock_interface.get_message_buffer().message_counter for each in guis)
 
     def complaints(self) -> list[str]:
         """Return what the console said that is not tolerated, errors and failed requests."""
@@ -252,7 +325,7 @@ class Tab:
 
     def look_from(self, view: ViewName) -> None:
         """Push the button of a view and wait until the camera stands where it should."""
-        settle(self.page, self.client)
+        self.settle()
         self.push(view.capitalize())
 
         def is_there() -> bool:
@@ -261,14 +334,14 @@ class Tab:
             return bool(np.allclose(camera.position, eye, atol=1e-3))
 
         self.wait_for(is_there, f"the {view} view")
-        settle(self.page, self.client)
+        self.settle()
 
     def picture(self) -> bytes:
         """Return a picture of the scene, drawn after all that has been asked for."""
-        assert self.running.page.session.wait_until_idle()
-        self.wait_for(lambda: not self.running.page.may_follow, "cameras that follow no more")
-        settle(self.page, self.client)
-        return self.page.locator(SCENE_CANVAS).screenshot()
+        self.settle()
+        with self.drawing():
+            self.page.evaluate(AWAIT_FRAMES, 2)
+            return self.page.locator(SCENE_CANVAS).screenshot()
 
     def on_screen(self, point: FloatArray) -> tuple[float, float]:
         """Return where a point of the scene (3,) is in the page."""
@@ -293,6 +366,9 @@ class Tab:
         self.label("l1 leg 1").wait_for()
         self.wait_for(lambda: bool(self._new(known)), "a connection")
         (self._client_id,) = self._new(known)
+        self._echo = self.client.gui.add_number("Echo", 0, visible=False)
+        self._echo_id = element_id(self._echo)
+        self.draw(self._draws)
 
     def _new(self, known: set[int]) -> set[int]:
         return set(self.running.viser.get_clients()) - known

@@ -7,20 +7,32 @@ from the press during which it arrives.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import viser
 
 from explorer.app.browser.viser_gaps import element_id, run_script_in
 from explorer.app.look import read_script
+from explorer.app.session.clock import moment_of
 from explorer.app.state.presses import Presses
 
 
-def listen(client: viser.ClientHandle, presses: Presses) -> None:
-    """Record the presses of a browser that has connected."""
+def listen(client: viser.ClientHandle, presses: Presses, released: Callable[[], None]) -> None:
+    """Record the presses of a browser that has connected.
+
+    Args:
+        client: The browser.
+        presses: Where to record them.
+        released: Called after each release.
+    """
     field = client.gui.add_number("Press", 0, visible=False)
 
     # On the thread that reads the browser's messages, one after the other.
     @field.on_update
     async def _(event: viser.GuiEvent[viser.GuiNumberHandle[int]]) -> None:
-        presses.record(client.client_id, event.target.value, event.target.update_timestamp)
+        number, stamp = event.target.value, event.target.update_timestamp
+        presses.record(client.client_id, number, moment_of(stamp))
+        if number <= 0:
+            released()
 
     run_script_in(client, read_script("holds", element_id(field)))

@@ -21,7 +21,7 @@ def read_script(name: str, *arguments: object) -> str:
         arguments: Values of JSON for the function that the script sets.
     """
     # Scripts come to a page in any order, so that each brings what all of them use.
-    source = read_file("base.js") + read_file(f"{name}.js")
+    source = read_file("base.js") + read_file("clock.js") + read_file(f"{name}.js")
     if not arguments:
         return source
     values = ", ".join(msgspec.json.encode(each).decode() for each in arguments)

@@ -74,7 +74,7 @@ window.explorer.buttons ??= (() => {
   };
   const hover = (element) => {
     hovered = element ? { name: element.dataset.hover, value: element.dataset.value ?? "" } : null;
-    timer ??= setTimeout(reportHovered, HOVER_PAUSE);
+    timer ??= window.explorer.clock.after(HOVER_PAUSE, reportHovered);
   };
   const hoverAt = (target) => hover(target?.closest?.("[data-hover]"));
   addEventListener("pointerover", ({ target }) => hoverAt(target));

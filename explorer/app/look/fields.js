@@ -2,6 +2,7 @@
 // again, and sends keys where a user expects them.
 window.explorer.fields ??= (() => {
   const PAUSE = 700;
+  const { clock } = window.explorer;
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   const isField = (it) => it instanceof HTMLInputElement && it.inputMode === "decimal";
   // The field that is typed into, what it held at first, and what the page last knew of.
@@ -39,7 +40,7 @@ window.explorer.fields ??= (() => {
       giveUp();
       return;
     }
-    clearTimeout(typing.pause);
+    clock.cancel(typing.pause);
     typing.isPending = false;
     typing.before = plainText(value);
     typing.isReplacing = true;
@@ -74,11 +75,11 @@ window.explorer.fields ??= (() => {
     if (value !== null && plainText(value) === typing.field.value) enter();
   };
   const wait = () => {
-    clearTimeout(typing.pause);
-    typing.pause = setTimeout(rest, PAUSE);
+    clock.cancel(typing.pause);
+    typing.pause = clock.after(PAUSE, rest);
   };
   const giveUp = () => {
-    clearTimeout(typing.pause);
+    clock.cancel(typing.pause);
     typing.isPending = false;
     write.call(typing.field, typing.before);
   };
@@ -115,7 +116,7 @@ window.explorer.fields ??= (() => {
       event.stopPropagation();
       wait();
       // Nothing may be written into the field while an input method composes text.
-      if (event.isComposing) clearTimeout(typing.pause);
+      if (event.isComposing) clock.cancel(typing.pause);
       typing.text = typing.field.value;
       choose();
       if (!typing.isPending) requestAnimationFrame(watch);
@@ -264,7 +265,7 @@ window.explorer.fields ??= (() => {
   // that was chosen with the keyboard keeps it.
   document.addEventListener("click", ({ detail, target }) => {
     if (!detail || !target.closest("input[type=checkbox], [role=option]")) return;
-    setTimeout(() => document.activeElement?.blur());
+    clock.after(0, () => document.activeElement?.blur());
   });
 
   // This listener runs after the page's own and before viser's, which turns the camera.

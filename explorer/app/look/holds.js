@@ -2,6 +2,7 @@
 // control sends its last value up to 50 ms after the frame that follows its release, which is
 // reported after that.
 window.explorer.holds ??= (() => {
+  const { clock } = window.explorer;
   // Time from that frame to the report.
   const LATE_MILLISECONDS = 100;
   // Id of the number field of this tab, which a new connection replaces.
@@ -28,7 +29,7 @@ window.explorer.holds ??= (() => {
     const endIfStill = () => {
       if (changes === before) end();
     };
-    requestAnimationFrame(() => setTimeout(endIfStill, LATE_MILLISECONDS));
+    clock.atFrame(() => clock.after(LATE_MILLISECONDS, endIfStill));
   };
   const release = () => {
     isHeld = false;

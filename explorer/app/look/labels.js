@@ -372,10 +372,10 @@ window.explorer.labels ??= (() => {
   };
   let timer = null;
   const lookSoon = () => {
-    timer ??= setTimeout(() => {
+    timer ??= window.explorer.clock.after(LOOK, () => {
       timer = null;
       if (look()) repaint();
-    }, LOOK);
+    });
   };
 
   // Viser's own labels, which have boxes.

@@ -67,7 +67,7 @@ window.explorer.names ??= (() => {
     document.querySelectorAll(".mantine-Tooltip-tooltip:not([data-beside])").forEach(placeHint);
   };
   const nameSoon = () => {
-    if (!isDue) setTimeout(nameAll, 100);
+    if (!isDue) window.explorer.clock.after(100, nameAll);
     isDue = true;
     placeHints();
   };

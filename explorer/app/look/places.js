@@ -1,6 +1,7 @@
 // Gives each window of the page its place: the bar on top of the page, the drawer at the foot of the
 // scene, dialogs over it, and cards, which users move. The scene fills the room beside them.
 window.explorer.places ??= (() => {
+  const { clock } = window.explorer;
   // Milliseconds to wait; panels take less to glide to their places.
   const REST = 300;
   const ROOT = "[data-dock-root]",
@@ -58,8 +59,8 @@ window.explorer.places ??= (() => {
     if (!isOut) return;
     // The page moves its windows into a root that shrinks.
     root.style.height = "calc(100% - 1px)";
-    requestAnimationFrame(() =>
-      requestAnimationFrame(() => {
+    clock.atFrame(() =>
+      clock.atFrame(() => {
         root.style.height = "100%";
       }),
     );
@@ -67,12 +68,12 @@ window.explorer.places ??= (() => {
   let rest;
   const look = () => {
     fitDrawer();
-    clearTimeout(rest);
-    rest = setTimeout(() => {
+    clock.cancel(rest);
+    rest = clock.after(REST, () => {
       fitDrawer();
       fitScene();
       fitCards();
-    }, REST);
+    });
   };
   const sizes = new ResizeObserver(look),
     watched = new WeakSet();

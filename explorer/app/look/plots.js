@@ -73,13 +73,25 @@ window.explorer.plots ??= (() => {
       });
     },
   };
-  // Plots come and go with their tab, and searching the page for them is cheap.
-  return setInterval(() => {
+  // Milliseconds after which a plot that is not drawn yet is looked at again.
+  const AGAIN = 150;
+  let timer = null;
+  const look = () => {
     for (const plot of document.querySelectorAll(".js-plotly-plot")) {
-      const meta = plot.layout && plot.layout.meta;
-      if (plot.explorerListens || !meta || !listen[meta.explorer] || !plot.on) continue;
-      plot.explorerListens = true;
-      listen[meta.explorer](plot);
+      const meta = plot.layout?.meta;
+      if (!plot.on) timer ??= window.explorer.clock.after(AGAIN, lookAgain);
+      else if (!plot.explorerListens && listen[meta?.explorer]) {
+        plot.explorerListens = true;
+        listen[meta.explorer](plot);
+      }
     }
-  }, 150);
+  };
+  const lookAgain = () => {
+    timer = null;
+    look();
+  };
+  // Plots come and go with their tab, and searching the page for them is cheap.
+  new MutationObserver(look).observe(document.body, { childList: true, subtree: true });
+  look();
+  return true;
 })();

@@ -54,7 +54,7 @@ window.explorer.projection ??= (() => {
     const scene = page()?.scene,
       raycaster = scene?.__r3f?.root.getState().raycaster;
     if (!raycaster || !page().cameraControl) {
-      requestAnimationFrame(hook);
+      window.explorer.clock.atFrame(hook);
       return;
     }
     scene.onBeforeRender = ({ info }, _, camera) => {

@@ -2,6 +2,7 @@
 // panel share a throttle of viser that keeps the newest message only, so that the last value of a
 // control would be lost if another control is used within the throttle's time.
 window.explorer.throttles ??= (() => {
+  const { clock } = window.explorer;
   // The throttle's time in milliseconds, by which its timer is known.
   const PAUSE = 50;
   const EVENTS = ["pointerdown", "pointerup", "click", "keydown", "input", "focusout"];
@@ -10,15 +11,18 @@ window.explorer.throttles ??= (() => {
   const startTimer = window.setTimeout.bind(window);
   let send = null,
     hasSent = false;
-  // A throttle starts its timer right after it has sent a message.
+  // A throttle starts its timer right after it has sent a message; the camera's is shorter. It may
+  // be stopped by the number that it gets here, but then has nothing left to send anyway.
   window.setTimeout = (run, ...rest) => {
-    if (!hasSent || rest[0] !== PAUSE) return startTimer(run, ...rest);
+    const [pause] = rest;
+    if (!hasSent || !(pause <= PAUSE)) return startTimer(run, ...rest);
     hasSent = false;
+    if (pause < PAUSE) return clock.after(pause, run);
     const end = () => {
       waiting.delete(timer);
       run();
     };
-    const timer = startTimer(end, ...rest);
+    const timer = clock.after(pause, end);
     waiting.set(timer, end);
     return timer;
   };
@@ -32,7 +36,7 @@ window.explorer.throttles ??= (() => {
   const watch = () => {
     const viser = window.__viserMutable;
     if (!viser) {
-      requestAnimationFrame(watch);
+      clock.atFrame(watch);
       return;
     }
     // The page sets this anew with each connection.
@@ -47,7 +51,7 @@ window.explorer.throttles ??= (() => {
   const flush = () => {
     // A throttle that still had something to send starts a new timer, which this loop ends too.
     for (const [timer, end] of waiting) {
-      clearTimeout(timer);
+      clock.cancel(timer);
       end();
     }
   };

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar, cast
 
+from explorer.app.session.clock import Timer, now, start_timer
 from explorer.app.session.jobs import LONG_SECONDS, Worker
-from explorer.app.session.latest import start_timer
 from explorer.app.session.worker import CANCELLED, Channel
 from explorer.app.state.frame import Frame
 from explorer.numerics.stages import Watch, unwatched
@@ -109,6 +108,8 @@ class Feed(Generic[Request, Drawing]):
         self._request_of = request_of
         self._redraw = redraw
         self._lock = threading.RLock()
+        # Shows the first stage of a drawing that takes long.
+        self._stage_timer: Timer | None = None
         self._status = cast("_Status[Request, Drawing]", _Status())
 
     @property
@@ -141,7 +142,7 @@ class Feed(Generic[Request, Drawing]):
     def stage(self) -> Stage | None:
         """The stage of a drawing that takes long; None if none does, or before the first stage."""
         status = self._status
-        is_long = time.monotonic() - status.submitted >= LONG_SECONDS
+        is_long = now() - status.submitted >= LONG_SECONDS
         return status.stage if is_long and not self.is_settled else None
 
     @property
@@ -200,7 +201,7 @@ class Feed(Generic[Request, Drawing]):
         if request is None:
             return
         count = self._status.count + 1
-        self._set(count=count, submitted=time.monotonic(), stage=None)
+        self._set(count=count, submitted=now(), stage=None)
 
         def failed(problem: str) -> None:
             self._show_problem(count, problem)
@@ -235,11 +236,15 @@ class Feed(Generic[Request, Drawing]):
             self._redraw()
         elif is_first:
             # The stage of a drawing that is done by then is not shown.
-            start_timer(LONG_SECONDS, self._show_stage, count)
+            self._stage_timer = start_timer(LONG_SECONDS, self._show_stage, count)
 
     def _show_stage(self, count: int) -> None:
         if count == self._status.count and not self.is_settled:
             self._redraw()
+
+    def _stop_timer(self) -> None:
+        if self._stage_timer is not None:
+            self._stage_timer.cancel()
 
     def _show_part(self, part: object) -> None:
         self._set(part=part)
@@ -251,6 +256,7 @@ class Feed(Generic[Request, Drawing]):
             self._set(drawing=drawing, part=None)
             if self.is_current:
                 self._set(problem=None, order=None)
+                self._stop_timer()
         self._redraw()
 
     def _show_problem(self, count: int, problem: str) -> None:
@@ -259,4 +265,5 @@ class Feed(Generic[Request, Drawing]):
             if not is_newest or self.is_cancelled:
                 return
             self._set(drawing=None, part=None, problem=problem, order=None)
+            self._stop_timer()
         self._redraw()

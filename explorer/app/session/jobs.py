@@ -12,13 +12,13 @@ import pickle
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import IO, Any, cast
 
+from explorer.app.session.clock import Timer, now, start_timer
 from explorer.app.session.faults import Fault, Faults, log_fault
-from explorer.app.session.latest import LatestWins, start_timer
+from explorer.app.session.latest import LatestWins
 from explorer.app.session.worker import (
     Cancel,
     Message,
@@ -86,7 +86,7 @@ class Worker:
         self._current: _Request | None = None
         self._current_since = 0.0
         self._cancelled: set[int] = set()
-        self._deadlines: dict[int, threading.Timer] = {}
+        self._deadlines: dict[int, Timer] = {}
         # Order of the drawing that is to be cancelled since a newer one waits.
         self._outdated = -1
         self._queue: LatestWins[_Request] = LatestWins(self._serve_all, "worker")
@@ -167,8 +167,10 @@ class Worker:
         number = current.order.number
         if number != self._outdated and self._queue.is_waiting(key):
             self._outdated = number
-            delay = max(0.0, since + LONG_SECONDS - time.monotonic())
-            start_timer(delay, self._cancel_if_current, number)
+            # One that was cancelled ends by itself, or at its deadline.
+            if number not in self._deadlines:
+                delay = max(0.0, since + LONG_SECONDS - now())
+                self._deadlines[number] = start_timer(delay, self._cancel_if_current, number)
 
     def _cancel_if_current(self, number: int) -> None:
         with self._writing:
@@ -267,7 +269,7 @@ class Worker:
             # `Popen` was called with pipes.
             stream = cast("IO[bytes]", process.stdin)
             write_frame(stream, order)
-            self._current_since = time.monotonic()
+            self._current_since = now()
             self._current = request
             if is_cancelled:
                 write_frame(stream, Cancel(order.number))

@@ -13,14 +13,6 @@ from typing import Generic, TypeVar
 Item = TypeVar("Item")
 
 
-def start_timer(seconds: float, call: Callable[..., None], *arguments: object) -> threading.Timer:
-    """Call a function after a time, unless the program ends before; return the timer."""
-    timer = threading.Timer(seconds, call, arguments)
-    timer.daemon = True
-    timer.start()
-    return timer
-
-
 class LatestWins(Generic[Item]):
     """A thread that handles what is posted, the newest item of each key only.
 

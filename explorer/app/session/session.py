@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from explorer.app.session.clock import moment_of
 from explorer.app.session.field_words import message_of
 from explorer.app.session.gestures import UserAction
 from explorer.app.session.history import History, restore, start_history
@@ -106,10 +107,10 @@ class Session:
         Args:
             key: Key of the change, for instance its slider.
             change: Makes the action from the state at the time, or moves through the history.
-            stamp: Time of the event, in seconds; now if None.
+            stamp: Time of the event by the clock of the machine, in seconds; now if None.
             who: The client to tell if the change is not possible.
         """
-        at = time.time() if stamp is None else stamp
+        at = moment_of(time.time() if stamp is None else stamp)
         self._jobs.post(key, at, _Posted(change, key, at, who))
 
     def do(self, action: Action | Change, *, who: Who = None) -> None:

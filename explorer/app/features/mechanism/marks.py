@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import threading
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -19,7 +17,7 @@ from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import NO_POINTS, ScenePart, around
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent
-from explorer.app.session.latest import start_timer
+from explorer.app.session.clock import Timer, now, start_timer
 from explorer.app.state.actions import SetPose
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
@@ -143,7 +141,7 @@ class DragHandle(ScenePart):
         )
         self._session = services.session
         self._moved_at = -math.inf
-        self._timer: threading.Timer | None = None
+        self._timer: Timer | None = None
         self.handle.on_update(self._move_platform)
         services.at_end(self._forget_timer)
 
@@ -182,7 +180,7 @@ class DragHandle(ScenePart):
         present = self.handle.scale, self.handle.opacity
         wanted = FAINT_HANDLE if hides_a_gap(placed) else CLEAR_HANDLE
         # viser's client forgets the movement that it has yet to send when the gizmo's look changes.
-        if wanted == present or time.monotonic() - self._moved_at > PAUSE:
+        if wanted == present or now() - self._moved_at > PAUSE:
             return wanted
         if self._timer is None:
             self._timer = start_timer(PAUSE, self._look_again)
@@ -198,7 +196,7 @@ class DragHandle(ScenePart):
 
     async def _move_platform(self, event: viser.TransformControlsEvent) -> None:
         if event.client_id is not None:
-            self._moved_at = time.monotonic()
+            self._moved_at = now()
             self._session.post(
                 "drag",
                 lambda state: SetPose(self.pose(state)),

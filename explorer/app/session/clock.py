@@ -1,0 +1,106 @@
+"""The clock of the server's pauses: what still waits for it is known, and it can be advanced.
+
+Whatever happens after a pause is timed here, so that a test need not sleep: it advances the clock.
+Times that viser and the browsers state are those of the machine; `moment_of` turns one into a
+time of this clock.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+# Guards all below; notified when the clock is advanced and when a timer is over.
+_condition = threading.Condition()
+# Seconds by which the clock was advanced.
+_advance = 0.0
+_timers: set[Timer] = set()
+
+
+class Timer:
+    """A call after a pause, on a thread of its own, unless the program ends before.
+
+    Args:
+        seconds: The pause.
+        call: Function to call.
+        arguments: Its arguments.
+    """
+
+    def __init__(self, seconds: float, call: Callable[..., None], arguments: tuple[object, ...]):
+        self._call, self._arguments = call, arguments
+        self._due = now() + seconds
+        self._is_waiting = True
+        with _condition:
+            _timers.add(self)
+        threading.Thread(target=self._run, name="timer", daemon=True).start()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the call is done, or cancelled."""
+        return self not in _timers
+
+    def postpone(self, seconds: float) -> bool:
+        """Start the pause again; return whether it was not over yet."""
+        with _condition:
+            self._due = now() + seconds
+            return self._is_waiting
+
+    def finish(self) -> None:
+        """End the pause at once."""
+        with _condition:
+            self._due = now()
+            _condition.notify_all()
+
+    def cancel(self) -> None:
+        """Call nothing, unless the pause is over."""
+        with _condition:
+            if self._is_waiting:
+                self._is_waiting = False
+                self._forget()
+
+    def _run(self) -> None:
+        with _condition:
+            while self._is_waiting and (left := self._due - now()) > 0.0:
+                _condition.wait(left)
+            if not self._is_waiting:
+                return
+            self._is_waiting = False
+        try:
+            self._call(*self._arguments)
+        finally:
+            with _condition:
+                self._forget()
+
+    def _forget(self) -> None:
+        _timers.discard(self)
+        _condition.notify_all()
+
+
+def start_timer(seconds: float, call: Callable[..., None], *arguments: object) -> Timer:
+    """Call a function after a pause, unless the program ends before; return the timer."""
+    return Timer(seconds, call, arguments)
+
+
+def now() -> float:
+    """Return the time in seconds since some moment; it goes on, and only a test advances it."""
+    return time.monotonic() + _advance
+
+
+def moment_of(stamp: float) -> float:
+    """Return the time of this clock, in seconds since 1970, for a stamp of the machine's clock."""
+    return stamp + _advance
+
+
+def advance(seconds: float) -> None:
+    """Advance the clock, which ends the pauses that are over by then."""
+    global _advance  # noqa: PLW0603 - the clock is one for the whole process
+    with _condition:
+        _advance += seconds
+        _condition.notify_all()
+
+
+def wait_until_quiet(timeout: float) -> bool:
+    """Wait until no timer is pending or at work; return whether none is."""
+    with _condition:
+        return _condition.wait_for(lambda: not _timers, timeout)
