@@ -45,6 +45,7 @@ TASKS = tuple({task.__module__: None for feature in FEATURES for task in feature
 # Scripts of the whole page.
 SCRIPTS = (
     "throttles",
+    "markup",
     "frames",
     "fields",
     "names",

@@ -31,6 +31,11 @@ PATIENCE_SECONDS = 60.0
 SCENE_CANVAS = "canvas[data-engine]"
 # Waits until a page has come to rest after a mark, see `look/clock.js`.
 SETTLED = "mark => window.explorer?.settled?.(mark)"
+# Whether nothing fades or glides any more; what turns without an end, such as a sign that something
+# is loading, is left out.
+IS_STILL = """() => document.getAnimations().every(
+    ({ playState, effect }) => playState !== "running" || effect.getTiming().iterations === Infinity
+)"""
 # Has a page report its camera, and with it the size of the canvas.
 REPORT_CAMERA = "() => window.__viserMutable.sendCamera?.()"
 _marks = itertools.count(1)
@@ -265,18 +270,16 @@ def _is_size_known(page: Page, client: ClientHandle) -> bool:
 
 
 def stable_picture(page: Page) -> bytes:
-    """Return a PNG of the page once two in a row are the same.
+    """Return a PNG of a page that has settled, once what fades in or glides has arrived.
 
     Raises:
         PictureError: it keeps changing.
     """
-    deadline = time.monotonic() + PATIENCE_SECONDS
-    last = page.screenshot()
-    while time.monotonic() < deadline:
-        # This is longer than any part of the page takes to fade in.
-        page.wait_for_timeout(300)
-        data = page.screenshot()
-        if data == last:
-            return data
-        last = data
-    raise PictureError("the page did not come to rest in time")
+    from playwright.sync_api import TimeoutError as BrowserTimeoutError
+
+    try:
+        page.wait_for_function(IS_STILL, timeout=1000.0 * PATIENCE_SECONDS)
+    except BrowserTimeoutError:
+        raise PictureError("the page did not come to rest in time") from None
+    page.evaluate(AWAIT_FRAMES, 2)
+    return page.screenshot()

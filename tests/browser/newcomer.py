@@ -65,7 +65,7 @@ class Newcomer:
     def press_running(self, words: str) -> None:
         """Press a button that is drawn anew again and again, where it stands."""
         self.presses += 1
-        self._tab.push_running(words)
+        self._tab.push(words)
 
     def press_at(self, x: float, y: float) -> None:
         """Press a point of the page."""

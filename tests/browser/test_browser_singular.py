@@ -76,7 +76,7 @@ def test_paths_are_gone_along_planned_and_saved(tab: Tab, monkeypatch: pytest.Mo
     tab.choose("Goal", "Mode 7: + + +")
     tab.push("Go")
     tab.wait_for(lambda: tab.state.journey is not None and tab.state.journey.at > 0.5, "playing")
-    tab.push_running("Pause")
+    tab.push("Pause")
     # Its time has numbers, though the chart was given data all along.
     assert tab.page.evaluate(SPACE_OF_NUMBERS) > 0.0
     expect(tab.page.get_by_text("Singular 2 times")).to_be_visible()

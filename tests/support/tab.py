@@ -57,24 +57,13 @@ FORGET = """() => {
     const closing = document.querySelectorAll(".mantine-Notification-closeButton");
     for (const button of closing) button.click();
 }"""
-# The middle of the first button with some words that is within the window, once one is: what runs
-# has its buttons in the bar and in its tab. One that is drawn anew may be gone between finding and
-# measuring it, unless both are done in one task of the browser.
-MIDDLE_OF_BUTTON = """(words) => {
-    const isIt = (button) => button.textContent.trim() === words && button.checkVisibility();
-    const boxes = [...document.querySelectorAll("button")].filter(isIt).map(
-        (button) => button.getBoundingClientRect());
-    const box = boxes.find(({ left, right, top, bottom }) =>
-        left >= 0 && top >= 0 && right <= innerWidth && bottom <= innerHeight);
-    return box ? [0.5 * (box.left + box.right), 0.5 * (box.top + box.bottom)] : null;
-}"""
-
-
 # Has the page draw its scene, or hold it.
 DRAW = """(draws) => {
     window.isReleased = draws;
     if (draws) window.__viserMutable?.requestRender();
 }"""
+# Seconds that pass in a second of the machine while time is slow.
+SLOW_PACE = 0.01
 # Messages by which one look at a page asks whether it has come to rest: two marks, and the number
 # that it sends back.
 OWN_MESSAGES = 3
@@ -135,6 +124,7 @@ class Tab:
         scrolling go back.
         """
         page, session = self.running.page, self.running.page.session
+        self.draw(False)
         self.page.keyboard.press("Escape")
         self.page.set_viewport_size({"width": self._size[0], "height": self._size[1]})
         self.page.mouse.move(0, 0)
@@ -144,7 +134,6 @@ class Tab:
         session.travel(HistoryMove(lambda _: start_history(opened(PRESETS["paper-optimal"]))))
         page.panels.work.minimize()
         page.point_cameras("isometric")
-        self.draw(False)
         self.settle()
 
     def draw(self, draws: bool) -> None:
@@ -180,6 +169,24 @@ class Tab:
         self.page.evaluate("pause => window.explorer.clock.advance(pause)", 1000.0 * seconds)
         self._hear()
         clock.advance(seconds)
+
+    @contextmanager
+    def slow_time(self) -> Generator[None]:
+        """Let next to no time pass meanwhile, for the explorer and for the page.
+
+        Within it pauses last, whatever the machine takes for what is done.
+        """
+        self._set_pace(SLOW_PACE)
+        try:
+            yield
+        finally:
+            # The clock is that of other explorers in this process too.
+            clock.set_pace(1.0)
+        self._set_pace(1.0)
+
+    def _set_pace(self, pace: float) -> None:
+        clock.set_pace(pace)
+        self.page.evaluate("pace => window.explorer.clock.setPace(pace)", pace)
 
     def _hear(self) -> None:
         """Wait until the explorer has received all that the page has sent."""
@@ -236,11 +243,12 @@ class Tab:
         return float(value)
 
     def type(self, words: str, text: str) -> None:
-        """Type into a number field, key by key."""
+        """Type into a number field, key by key, without a pause that would enter it."""
         field = self.field(words)
         field.click()
-        field.press("ControlOrMeta+a")
-        field.press_sequentially(text)
+        with self.slow_time():
+            field.press("ControlOrMeta+a")
+            field.press_sequentially(text)
 
     def drag(self, words: str, share: float, steps: int = 10) -> float:
         """Drag a slider to a share of its range by mouse; return the value that stands for."""
@@ -270,15 +278,8 @@ class Tab:
     def push(self, words: str) -> None:
         """Click a button."""
         # What runs stands in the bar too, with the buttons that it has in its tab.
-        self.page.get_by_role("button", name=words, exact=True).first.click()
-
-    def push_running(self, words: str) -> None:
-        """Click a button that is drawn anew with each frame, where it stands.
-
-        A hand meets it; Playwright waits until a button stays for two frames of the browser.
-        """
-        x, y = self.page.wait_for_function(MIDDLE_OF_BUTTON, arg=words).json_value()
-        self.page.mouse.click(x, y)
+        buttons = self.page.get_by_role("button", name=words, exact=True)
+        buttons.locator("visible=true").first.click()
 
     def turn_to(self, name: str) -> None:
         """Turn to another tab of the panels."""

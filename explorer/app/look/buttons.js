@@ -20,8 +20,8 @@ window.explorer.buttons ??= (() => {
   const buttonAt = (target) => target.closest?.(BUTTON) ?? null;
   const isSame = (one, other) =>
     ["press", "value", "opens"].every((key) => one.dataset[key] === other.dataset[key]);
-  // Markup is replaced when its numbers change: a press that began on the old markup counts, and
-  // the focus of the keyboard stays.
+  // Markup is replaced when more than its numbers changes: a press that began on the old markup
+  // counts, and the focus of the keyboard stays.
   let pressed = null;
   let focused = null;
   addEventListener(

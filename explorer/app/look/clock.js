@@ -1,4 +1,5 @@
-// The clock of the page's scripts: what still waits for it is known, and a test may advance it.
+// The clock of the page's scripts: what still waits for it is known, and a test may advance it, or
+// slow it down while it does what a user does within a pause.
 window.explorer.clock ??= (() => {
   const startTimer = window.setTimeout.bind(window),
     stopTimer = window.clearTimeout.bind(window);
@@ -6,9 +7,14 @@ window.explorer.clock ??= (() => {
   // numbers are negative, so that none of them is that of a timer of the browser.
   const pending = new Map();
   let count = 0,
-    advanced = 0,
     frames = 0;
-  const now = () => performance.now() + advanced;
+  // Milliseconds of this clock in one of the browser's, when that began, and by how much the clock
+  // was ahead then.
+  let pace = 1,
+    pacedAt = 0,
+    ahead = 0;
+  const shift = () => ahead + (pace - 1) * (performance.now() - pacedAt);
+  const now = () => performance.now() + shift();
   const end = (number) => {
     const { run } = pending.get(number);
     pending.delete(number);
@@ -17,7 +23,7 @@ window.explorer.clock ??= (() => {
   const wait = (number) => {
     const each = pending.get(number);
     stopTimer(each.timer);
-    each.timer = startTimer(end, Math.max(0, each.due - now()), number);
+    each.timer = startTimer(end, Math.max(0, each.due - now()) / pace, number);
   };
   // Calls a function after a pause in milliseconds; returns the number to cancel it by.
   const after = (pause, run) => {
@@ -45,15 +51,19 @@ window.explorer.clock ??= (() => {
       const due = [...pending].filter(([, each]) => each.due <= until);
       if (!due.length) break;
       const [number, each] = due.reduce((a, b) => (b[1].due < a[1].due ? b : a));
-      advanced += Math.max(0, each.due - now());
+      ahead += Math.max(0, each.due - now());
       stopTimer(each.timer);
       end(number);
     }
-    advanced += Math.max(0, until - now());
+    ahead += Math.max(0, until - now());
+    for (const number of pending.keys()) wait(number);
+  };
+  const setPace = (wanted) => {
+    [ahead, pace, pacedAt] = [shift(), wanted, performance.now()];
     for (const number of pending.keys()) wait(number);
   };
   const isQuiet = () => !pending.size && !frames;
-  return { after, cancel, atFrame, advance, isQuiet };
+  return { after, cancel, atFrame, advance, setPace, isQuiet };
 })();
 
 // Returns a promise that the page has come to rest: all that the server sent before a mark has

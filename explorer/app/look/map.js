@@ -218,13 +218,14 @@ window.explorer.map ??= (() => {
   };
   const mapAt = (target) => target.closest?.("[data-map]") ?? null;
   const readingOf = (map) => map.parentElement?.querySelector(".ex-reading");
-  // The last pointer over a map: its words stay while the map is drawn anew.
+  // The last pointer over a map: its words follow the map.
   let last = null;
   const show = () => {
     if (!last) return;
     const map = mapAt(last.target) ?? null;
     const reading = map && readingOf(map);
-    if (reading) reading.textContent = read(map, last);
+    const words = reading && read(map, last);
+    if (reading && reading.textContent !== words) reading.textContent = words;
   };
   const follow = ({ target, clientX, clientY }) => {
     const map = mapAt(target);
@@ -239,11 +240,11 @@ window.explorer.map ??= (() => {
   addEventListener("pointermove", follow);
   addEventListener("pointerdown", follow);
   new MutationObserver(() => {
-    if (!last || last.target.isConnected) return;
+    if (!last) return;
     const target = document.elementFromPoint(last.clientX, last.clientY);
     last = target && mapAt(target) ? { ...last, target } : null;
     show();
-  }).observe(document.body, { childList: true, subtree: true });
+  }).observe(document.body, { childList: true, subtree: true, attributeFilter: ["data-map"] });
   addEventListener("click", (event) => {
     const map = mapAt(event.target),
       facts = map && factsOf(map);

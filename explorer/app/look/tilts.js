@@ -40,7 +40,8 @@ window.explorer.tilts ??= (() => {
   };
   const tell = (chart, words) => {
     const reading = chart?.parentElement?.querySelector(".ex-reading");
-    if (reading) reading.textContent = words ?? reading.dataset.hint;
+    const wanted = words ?? reading?.dataset.hint;
+    if (reading && reading.textContent !== wanted) reading.textContent = wanted;
   };
   let last = null;
   const show = () => {
@@ -53,13 +54,14 @@ window.explorer.tilts ??= (() => {
     if (left && left !== (last && chartAt(target))) tell(left);
     show();
   });
-  // A chart is drawn anew while the mechanism moves; its reading stays.
+  // A chart changes while the mechanism moves, and its reading with it.
+  const CHANGES = { childList: true, subtree: true };
   new MutationObserver(() => {
-    if (!last || last.target.isConnected) return;
+    if (!last) return;
     const target = document.elementFromPoint(last.clientX, last.clientY);
     last = target && chartAt(target) ? { ...last, target } : null;
     show();
-  }).observe(document.body, { childList: true, subtree: true });
+  }).observe(document.body, { ...CHANGES, attributeFilter: ["data-tilts", "data-torsions"] });
   addEventListener("click", (event) => {
     const chart = chartAt(event.target),
       // A click tells whole pixels, other than the pointer that read the same chart.

@@ -1,6 +1,7 @@
 """The clock of the server's pauses: what still waits for it is known, and it can be advanced.
 
-Whatever happens after a pause is timed here, so that a test need not sleep: it advances the clock.
+Whatever happens after a pause is timed here, so that a test need not sleep: it advances the clock,
+or slows it down while it does what a user does within a pause.
 Times that viser and the browsers state are those of the machine; `moment_of` turns one into a
 time of this clock.
 """
@@ -13,8 +14,10 @@ from collections.abc import Callable
 
 # Guards all below; notified when the clock is advanced and when a timer is over.
 _condition = threading.Condition()
-# Seconds by which the clock was advanced.
-_advance = 0.0
+# Seconds of this clock in a second of the machine's, and when that began there.
+_pace, _paced_at = 1.0, 0.0
+# Seconds by which the clock was ahead then.
+_ahead = 0.0
 _timers: set[Timer] = set()
 
 
@@ -62,7 +65,7 @@ class Timer:
     def _run(self) -> None:
         with _condition:
             while self._is_waiting and (left := self._due - now()) > 0.0:
-                _condition.wait(left)
+                _condition.wait(left / _pace)
             if not self._is_waiting:
                 return
             self._is_waiting = False
@@ -83,21 +86,34 @@ def start_timer(seconds: float, call: Callable[..., None], *arguments: object) -
 
 
 def now() -> float:
-    """Return the time in seconds since some moment; it goes on, and only a test advances it."""
-    return time.monotonic() + _advance
+    """Return the time in seconds since some moment, that of the machine but for tests."""
+    return time.monotonic() + _shift()
 
 
 def moment_of(stamp: float) -> float:
     """Return the time of this clock, in seconds since 1970, for a stamp of the machine's clock."""
-    return stamp + _advance
+    return stamp + _shift()
 
 
 def advance(seconds: float) -> None:
     """Advance the clock, which ends the pauses that are over by then."""
-    global _advance  # noqa: PLW0603 - the clock is one for the whole process
+    global _ahead  # noqa: PLW0603 - the clock is one for the whole process
     with _condition:
-        _advance += seconds
+        _ahead += seconds
         _condition.notify_all()
+
+
+def set_pace(pace: float) -> None:
+    """Make so many seconds pass on this clock in a second of the machine's."""
+    global _ahead, _pace, _paced_at
+    with _condition:
+        _ahead, _pace, _paced_at = _shift(), pace, time.monotonic()
+        _condition.notify_all()
+
+
+def _shift() -> float:
+    """Return by how many seconds the clock is ahead of the machine's."""
+    return _ahead + (_pace - 1.0) * (time.monotonic() - _paced_at)
 
 
 def wait_until_quiet(timeout: float) -> bool:
