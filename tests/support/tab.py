@@ -50,12 +50,19 @@ TOLERATED_KINDS = ("log", "info", "debug")
 # The slider as a whole is what its label is for; its thumb moves along it.
 TRACK = "[id]:has([role=slider])"
 
-# Take away focus, scrolling and messages.
+# Take away focus, scrolling and messages, and turn to the first tab of each panel.
 FORGET = """() => {
     document.activeElement?.blur();
     for (const box of document.querySelectorAll("*")) box.scrollTop = 0;
     const closing = document.querySelectorAll(".mantine-Notification-closeButton");
     for (const button of closing) button.click();
+    const enter = { key: "Enter", code: "Enter", bubbles: true };
+    for (const group of document.querySelectorAll("[role=tablist]")) {
+        const first = group.querySelector("[role=tab]");
+        if (first && first.ariaSelected !== "true") {
+            first.dispatchEvent(new KeyboardEvent("keydown", enter));
+        }
+    }
 }"""
 # Has the page draw its scene, or hold it.
 DRAW = """(draws) => {
