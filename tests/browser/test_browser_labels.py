@@ -325,7 +325,10 @@ def test_scale_tells_how_large_things_are(wide: Tab, factor: float) -> None:
 def test_labels_axes_and_scale_are_in_pictures(wide: Tab) -> None:
     def opacity() -> FloatArray:
         wide.picture()
-        pixels = wide.client.get_render(600, 640, transport_format="png", timeout=PATIENCE_SECONDS)
+        with wide.drawing():
+            pixels = wide.client.get_render(
+                600, 640, transport_format="png", timeout=PATIENCE_SECONDS
+            )
         return pixels[..., 3].astype(np.float64)
 
     wide.look_from("top")

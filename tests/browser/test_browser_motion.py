@@ -6,6 +6,7 @@ import math
 from typing import TypedDict
 
 import numpy as np
+import pytest
 from tab import Tab
 
 from explorer.app.features.ground.ground import ground_of, shadow_outlines
@@ -18,6 +19,8 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
+
+pytestmark = pytest.mark.draws
 
 DESIGN = PRESETS["paper-optimal"]
 # Between two poses, less than a software renderer takes for a frame.

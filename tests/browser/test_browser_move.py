@@ -44,7 +44,7 @@ def values_of(state: State) -> tuple[float, ...]:
 def test_page_loads_without_a_complaint_and_asks_nobody_else(
     browser: Browser, running: Running
 ) -> None:
-    with closing(Tab(browser, running)) as tab:
+    with closing(Tab(browser, running, draws=True)) as tab:
         assert_page_shows_state(tab)
         tab.picture()
         own = (tab.running.url, f"blob:{tab.running.url}", "data:")

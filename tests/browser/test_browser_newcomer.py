@@ -43,7 +43,7 @@ def kept(
         studies = StudyFolders(home / "studies")
         user_data = open_user_data(resume=False)
         running = start(OPTIMAL, port=0, user_data=user_data, studies=studies)
-        return Tab(browser, running, size=request.param)
+        return Tab(browser, running, size=request.param, draws=True)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("EXPLORER_DATA", str(home))

@@ -27,6 +27,9 @@ from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
 from explorer.app.state.actions import Set, SetPosition
 from explorer.app.state.view import View
 
+# Pictures of the page are drawn by the page.
+pytestmark = pytest.mark.draws
+
 OpenTab = Callable[[], Tab]
 untyped: Any = imageio.v3
 

@@ -42,7 +42,7 @@ READING = re.compile(r"x ([−\d.]+), z ([−\d.]+) units: min \|δ\| ([\d.]+) \
 @pytest.fixture
 def tab(browser: Browser, running: Running) -> Iterator[Tab]:
     """A tab in a window of a small laptop."""
-    tab = Tab(browser, running, size=(1280, 720))
+    tab = Tab(browser, running, size=(1280, 720), draws=True)
     yield tab
     assert tab.complaints() == []
     tab.close()
