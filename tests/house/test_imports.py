@@ -128,138 +128,36 @@ def imports_of(tree: ast.AST, at_import: bool = True) -> Iterator[Import]:
             yield from imports_of(node, at_import and not is_function)
 
 
-def imports(module: str) -> list[Import]:
-    return list(imports_of(ast.parse(MODULES[module].read_text(encoding="utf-8"))))
-
-
-def room(module: str) -> str:
-    """Return the room of a module below `explorer`."""
-    return module.partition(".")[0]
+IMPORTS = {
+    name: list(imports_of(ast.parse(path.read_text(encoding="utf-8"))))
+    for name, path in MODULES.items()
+}
 
 
 def belongs_to(module: str, rooms: tuple[str, ...]) -> bool:
     return any(module == room or module.startswith(f"{room}.") for room in rooms)
 
 
-def test_the_reader_of_imports_sees_each_kind() -> None:
-    source = """
-import a.b
-from c import d
-if TYPE_CHECKING:
-    from e import f
-else:
-    import g
-def function():
-    import h
-class Class:
-    import i
-try:
-    import j
-except ImportError:
-    pass
-"""
-    found = {(each.name, each.at_import) for each in imports_of(ast.parse(source))}
-    assert found == {
-        ("a.b", True),
-        ("c", True),
-        ("e", False),
-        ("g", True),
-        ("h", False),
-        ("i", True),
-        ("j", True),
-    }
-
-
-def test_the_modules_of_the_mathematics_are_seen() -> None:
-    assert {"errors", "mechanism.design", "measures.snapshot"} <= set(MODULES)
-    assert "explorer.mechanism.design" in {each.name for each in imports("mechanism.kinematics")}
-
-
-def test_every_module_belongs_to_a_room() -> None:
-    assert {room(module) for module in MODULES} == set(ROOMS)
-
-
-@pytest.mark.parametrize("module", list(MODULES))
-def test_a_module_imports_only_from_its_own_room_or_those_below(module: str) -> None:
-    below = ROOMS[: ROOMS.index(room(module)) + 1]
-    for each in imports(module):
-        if each.name.startswith("explorer."):
-            assert room(each.name.removeprefix("explorer.")) in below, (
-                f"explorer.{module}, line {each.line}, imports {each.name} of a room above"
-            )
+def rank(module: str, rooms: tuple[str, ...]) -> int:
+    """Return the place of a module's room, the most specific one, among the rooms."""
+    found = [room for room in rooms if belongs_to(module, (room,))]
+    assert found, f"{module} belongs to no room"
+    return rooms.index(max(found, key=len))
 
 
 def own_imports(module: str) -> set[str]:
     """Return the other modules of the package that a module imports, whenever it does."""
-    names = {each.name.removeprefix("explorer.") for each in imports(module)}
+    names = {each.name.removeprefix("explorer.") for each in IMPORTS[module]}
     return {name for name in names if name in MODULES and name != module}
 
 
-def app_room(module: str) -> str:
-    """Return the room of a module of the page, the most specific one of `APP_ROOMS`."""
-    inner = module.removeprefix("app.")
-    rooms = [each for each in APP_ROOMS if inner == each or inner.startswith(f"{each}.")]
-    assert rooms, f"explorer.{module} belongs to no room of the page"
-    return max(rooms, key=len)
+def libraries(module: str, *, at_import: bool = False) -> set[str]:
+    """Return the top-level packages that a module imports, or only those that it always does."""
+    kept = [each for each in IMPORTS[module] if each.at_import or not at_import]
+    return {each.name.partition(".")[0] for each in kept}
 
 
-@pytest.mark.parametrize("module", [module for module in MODULES if module.startswith("app.")])
-def test_module_of_page_imports_only_from_its_own_room_or_those_below(module: str) -> None:
-    below = APP_ROOMS[: APP_ROOMS.index(app_room(module)) + 1]
-    for name in own_imports(module):
-        if name.startswith("app."):
-            assert app_room(name) in below, f"explorer.{module} imports {name} of a room above"
-
-
-def test_no_feature_imports_itself_through_others() -> None:
-    def feature(module: str) -> str | None:
-        parts = module.split(".")
-        return parts[2] if parts[:2] == ["app", "features"] and len(parts) > 3 else None
-
-    graph: dict[str, set[str]] = {}
-    for module in MODULES:
-        own = feature(module)
-        if own is not None:
-            others = {feature(name) for name in own_imports(module)} - {own, None}
-            graph.setdefault(own, set()).update(other for other in others if other)
-    assert {"compare", "workspace"} <= set(graph)
-    assert len(tuple(TopologicalSorter(graph).static_order())) == len(graph)
-
-
-def test_no_module_imports_itself_in_a_circle() -> None:
-    """Imports for type checkers, and those that run in functions, count as well."""
-    graph = {module: own_imports(module) for module in MODULES}
-    assert len(tuple(TopologicalSorter(graph).static_order())) >= len(MODULES)
-
-
-@pytest.mark.parametrize("module", list(MODULES))
-def test_only_those_that_make_solids_import_manifold3d(module: str) -> None:
-    names = {each.name.partition(".")[0] for each in imports(module)}
-    assert "manifold3d" not in names or belongs_to(module, MAKE_SOLIDS)
-
-
-@pytest.mark.parametrize("module", list(MODULES))
-def test_only_the_app_imports_viser_and_its_state_and_jobs_do_not(module: str) -> None:
-    names = {each.name.partition(".")[0] for each in imports(module)}
-    allowed = belongs_to(module, ("app",)) and not belongs_to(module, WITHOUT_VISER)
-    assert "viser" not in names or allowed
-
-
-@pytest.mark.parametrize("module", list(MODULES))
-def test_slow_libraries_are_imported_when_they_are_needed(module: str) -> None:
-    if belongs_to(module, MAY_IMPORT_SLOW):
-        return
-    early = {each.name.partition(".")[0] for each in imports(module) if each.at_import}
-    assert early.isdisjoint(SLOW)
-
-
-def test_the_package_itself_imports_nothing_of_its_own_at_once() -> None:
-    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
-    early = {each.name.partition(".")[0] for each in imports_of(tree) if each.at_import}
-    assert early == {"lazy_loader"}
-
-
-def loaded_after(statement: str) -> set[str]:
+def modules_loaded_after(statement: str) -> set[str]:
     """Return the top-level modules that a fresh interpreter has after a statement."""
     code = f"{statement}\nimport sys\nprint(*{{n.partition('.')[0] for n in sys.modules}})"
     command = [sys.executable, "-c", code]
@@ -267,36 +165,81 @@ def loaded_after(statement: str) -> set[str]:
     return set(done.stdout.split())
 
 
-def test_importing_the_package_loads_neither_numpy_nor_viser() -> None:
-    loaded = loaded_after("import explorer")
-    assert "explorer" in loaded
-    assert loaded.isdisjoint({"numpy", "scipy", "viser", "msgspec", *SLOW})
+def test_modules_import_only_from_their_own_room_or_those_below() -> None:
+    offenders: list[str] = []
+    for module in MODULES:
+        for name in own_imports(module):
+            is_above = rank(name, ROOMS) > rank(module, ROOMS)
+            if module.startswith("app.") and name.startswith("app."):
+                own, other = module.removeprefix("app."), name.removeprefix("app.")
+                is_above = rank(other, APP_ROOMS) > rank(own, APP_ROOMS)
+            if is_above:
+                offenders.append(f"explorer.{module} imports {name} of a room above")
+    assert not offenders, "\n".join(offenders)
+    assert {rank(module, ROOMS) for module in MODULES} == set(range(len(ROOMS)))
+    # What is read is the package, not nothing.
+    assert "mechanism.design" in own_imports("mechanism.kinematics")
 
 
-def test_the_mathematics_loads_no_slow_library() -> None:
-    loaded = loaded_after("import explorer.measures.snapshot, explorer.mechanism.design_file")
-    assert {"numpy", "explorer"} <= loaded
-    assert loaded.isdisjoint({"viser", *SLOW})
+def test_modules_and_features_import_themselves_in_no_circle() -> None:
+    """Imports for type checkers, and those that run in functions, count as well."""
+
+    def feature(module: str) -> str | None:
+        parts = module.split(".")
+        return parts[2] if parts[:2] == ["app", "features"] and len(parts) > 3 else None
+
+    modules_graph = {module: own_imports(module) for module in MODULES}
+    features: dict[str, set[str]] = {}
+    for module, names in modules_graph.items():
+        own = feature(module)
+        if own is not None:
+            others = {other for name in names if (other := feature(name)) not in (None, own)}
+            features.setdefault(own, set()).update(other for other in others if other)
+    assert {"compare", "workspace"} <= set(features)
+    for graph in (modules_graph, features):
+        # A circle raises an error that names its members.
+        assert len(tuple(TopologicalSorter(graph).static_order())) >= len(graph)
 
 
-@pytest.mark.parametrize("module", WITHOUT_VISER)
-def test_the_logic_of_the_app_loads_without_viser(module: str) -> None:
-    loaded = loaded_after(f"import explorer.{module}")
-    assert "explorer" in loaded
-    assert "viser" not in loaded
+def test_libraries_are_imported_only_where_they_may_be() -> None:
+    offenders: list[str] = []
+    for module in MODULES:
+        used, early = libraries(module), libraries(module, at_import=True)
+        of_page = belongs_to(module, ("app",)) and not belongs_to(module, WITHOUT_VISER)
+        if "viser" in used and not of_page:
+            offenders.append(f"explorer.{module} imports viser")
+        if "manifold3d" in used and not belongs_to(module, MAKE_SOLIDS):
+            offenders.append(f"explorer.{module} imports manifold3d")
+        if not belongs_to(module, MAY_IMPORT_SLOW) and early & set(SLOW):
+            names = ", ".join(sorted(early & set(SLOW)))
+            offenders.append(f"explorer.{module} imports {names} before it is needed")
+    assert not offenders, "\n".join(offenders)
 
 
-@pytest.mark.parametrize("name", explorer.__all__)
-def test_every_public_name_resolves_to_what_its_module_holds(name: str) -> None:
-    value = getattr(explorer, name)
-    assert value is not None
-    assert name in dir(explorer)
-    home = getattr(value, "__module__", None)
-    if isinstance(home, str) and home.startswith("explorer."):
-        assert getattr(importlib.import_module(home), name) is value
+def test_imports_load_no_library_that_they_do_not_need() -> None:
+    cases = [
+        ("explorer", {"numpy", "scipy", "viser", "msgspec", *SLOW}),
+        ("explorer.measures.snapshot, explorer.mechanism.design_file", {"viser", *SLOW}),
+        (", ".join(f"explorer.{module}" for module in WITHOUT_VISER), {"viser"}),
+    ]
+    offenders: list[str] = []
+    for names, unwanted in cases:
+        found = modules_loaded_after(f"import {names}")
+        assert "explorer" in found
+        offenders += [f"importing {names} loads {each}" for each in sorted(found & unwanted)]
+    assert not offenders, "\n".join(offenders)
 
 
-def test_public_names_are_listed_once_and_others_are_refused() -> None:
+def test_public_names_are_listed_once_and_are_those_of_their_modules() -> None:
     assert len(set(explorer.__all__)) == len(explorer.__all__)
+    assert set(explorer.__all__) <= set(dir(explorer))
+    offenders: list[str] = []
+    for name in explorer.__all__:
+        value = getattr(explorer, name)
+        home = getattr(value, "__module__", None)
+        of_package = isinstance(home, str) and home.startswith("explorer.")
+        if of_package and getattr(importlib.import_module(str(home)), name) is not value:
+            offenders.append(name)
+    assert not offenders
     with pytest.raises(AttributeError, match="nothing_of_the_kind"):
         getattr(explorer, "nothing_of_the_kind")  # noqa: B009 - no name that a checker knows
