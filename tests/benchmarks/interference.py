@@ -1,4 +1,4 @@
-"""Overlap of tetrahedra beside python-fcl, clearances of the legs, and whole moves."""
+"""Overlap of tetrahedra beside python-fcl, clearances of the legs, and moves."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ import numpy as np
 from benchmarks.samples import DESIGN, SIZE, around_home
 from benchmarks.table import Row, per_second, seconds, times
 from benchmarks.timing import best_of
-from explorer import leg_clearances, moves_are_clear, tetrahedra_overlap
+from explorer import accessible_workspace, leg_clearances, moves_are_clear, tetrahedra_overlap
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import warm
+from explorer.workspace.accessible.radii import with_radius
 
 PAIRS_COUNT = 200_000
 # Pairs of the same sample for python-fcl, which needs an object for each body.
 OBJECTS = 2_000
 POSES = 100_000
 MOVES = 20_000
+NODES, RADIUS = 40, 0.2
 ROUNDS = 20
 
 
@@ -56,6 +58,12 @@ def run() -> Iterator[Row]:
     turn = rotations[:MOVES]
     duration = best_of(ROUNDS // 4, lambda: moves_are_clear(DESIGN, start, turn, end, turn))
     yield Row("one straight move proved free of collisions", seconds(duration / MOVES))
+    thick = with_radius(DESIGN, RADIUS)
+    yield Row(
+        f"accessible workspace, {NODES} nodes an axis, its solid, legs of radius {RADIUS:g}",
+        seconds(best_of(ROUNDS // 4, lambda: accessible_workspace(thick, nodes=NODES))),
+        "1 s",
+    )
 
 
 def _fcl(p: FloatArray, q: FloatArray, overlap: BoolArray, rate: float) -> str:

@@ -7,7 +7,6 @@ unknown. The equations are written here anew, from the drawing of the mechanism.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import root
@@ -21,14 +20,6 @@ OFF_BY = 0.02
 CLOSED = 1e-9
 
 
-class Found(NamedTuple):
-    """Where a search ended."""
-
-    position: FloatArray
-    rotation: FloatArray
-    converged: bool
-
-
 class LoopEquations:
     """The loop equations of one design, as a function of a displacement from a start."""
 
@@ -38,15 +29,14 @@ class LoopEquations:
         self._b2, self._b3 = design.b2, design.b3
         self._size = max(map(abs, design.variables))
 
-    def solve(self, joints: FloatArray, position: FloatArray, rotation: FloatArray) -> Found:
-        """Search from a position (3,) and a rotation (3, 3) for the pose of the joints (6,)."""
+    def finds_pose(self, joints: FloatArray, position: FloatArray, rotation: FloatArray) -> bool:
+        """Return whether a search from a position (3,) and a rotation (3, 3) closes the loops."""
 
         def residual(pose: FloatArray) -> FloatArray:
-            return self._lengths(pose[:3], turned(pose[3:]) @ rotation) - joints
+            return self._lengths(pose[:3], turn_by(pose[3:]) @ rotation) - joints
 
         found = root(residual, np.concatenate([position, np.zeros(3)]))
-        closed = float(np.abs(found.fun).max()) <= CLOSED * self._size
-        return Found(found.x[:3], turned(found.x[3:]) @ rotation, bool(found.success) and closed)
+        return bool(found.success) and float(np.abs(found.fun).max()) <= CLOSED * self._size
 
     def _lengths(self, p: FloatArray, r: FloatArray) -> FloatArray:
         x = r[:, 0]
@@ -63,7 +53,7 @@ class LoopEquations:
         )
 
 
-def turned(vector: FloatArray) -> FloatArray:
+def turn_by(vector: FloatArray) -> FloatArray:
     """Return the rotation (3, 3) about a vector by its length, after Rodrigues."""
     angle = math.hypot(*vector)
     x, y, z = vector.tolist()
@@ -74,11 +64,11 @@ def turned(vector: FloatArray) -> FloatArray:
     return np.eye(3) + first * cross + second * (cross @ cross)
 
 
-def nearby(
+def pose_near(
     position: FloatArray, rotation: FloatArray, size: float, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
     """Return a pose somewhat off the given one, for a search to start from."""
     return (
         position + OFF_BY * size * rng.uniform(-1.0, 1.0, 3),
-        turned(OFF_BY * rng.uniform(-1.0, 1.0, 3)) @ rotation,
+        turn_by(OFF_BY * rng.uniform(-1.0, 1.0, 3)) @ rotation,
     )

@@ -5,14 +5,11 @@ from __future__ import annotations
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
-import time
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from urllib.parse import urlsplit
 
 ROOT = Path(__file__).resolve().parents[2]
 EXPLORER = (sys.executable, "-m", "explorer")
@@ -35,14 +32,6 @@ def fresh_home(folder: Path) -> dict[str, str]:
         "LOCALAPPDATA": str(folder / "cache"),
         "EXPLORER_DATA": str(folder / "data"),
     }
-
-
-def first_byte(environment: Mapping[str, str] = os.environ) -> float:
-    """Return the seconds from starting the explorer to the first byte of its page."""
-    start = time.perf_counter()
-    with served(environment) as address:
-        _get_first_byte(address)
-        return time.perf_counter() - start
 
 
 @contextmanager
@@ -69,16 +58,6 @@ def _address(line: str) -> str:
     if found is None:
         raise RuntimeError(f"the explorer names no address but says {line!r}")
     return found[0]
-
-
-def _get_first_byte(address: str) -> None:
-    parts = urlsplit(address)
-    assert parts.hostname is not None
-    assert parts.port is not None
-    with socket.create_connection((parts.hostname, parts.port), timeout=60) as connection:
-        connection.sendall(f"GET / HTTP/1.1\r\nHost: {parts.netloc}\r\n\r\n".encode())
-        if not connection.recv(1):
-            raise RuntimeError("the explorer closed the connection without an answer")
 
 
 def _end(process: subprocess.Popen[str]) -> None:

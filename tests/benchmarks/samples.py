@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.numeric_root import LoopEquations, nearby, turned
+from benchmarks.numeric_root import LoopEquations, pose_near, turn_by
 from benchmarks.timing import best_of
 from explorer import PRESETS, home_pose, inverse
 from explorer.numerics.arrays import FloatArray
@@ -30,7 +29,7 @@ def around_home(count: int) -> Samples:
     rng = np.random.default_rng(1)
     home = home_pose(DESIGN)
     positions = np.array(home.position) + 0.1 * SIZE * rng.uniform(-1.0, 1.0, (count, 3))
-    turns = np.stack([turned(v) for v in rng.uniform(-0.1, 0.1, (min(count, 1000), 3))])
+    turns = np.stack([turn_by(v) for v in rng.uniform(-0.1, 0.1, (min(count, 1000), 3))])
     rotations = np.resize(turns, (count, 3, 3)) @ home.rotation
     return Samples(positions, rotations, inverse(DESIGN, positions, rotations))
 
@@ -50,18 +49,17 @@ class Searches(NamedTuple):
         return f"{self.converged} of {SEARCHES} converged, 1 mode of 8"
 
 
-@functools.cache
 def searches() -> Searches:
     """Search for one mode of each sample, one after the other, from a nearby pose."""
     rng = np.random.default_rng(2)
     equations = LoopEquations(DESIGN)
     questions = [
-        (joints, *nearby(position, rotation, SIZE, rng))
+        (joints, *pose_near(position, rotation, SIZE, rng))
         for position, rotation, joints in zip(*around_home(SEARCHES), strict=True)
     ]
 
     def search() -> int:
-        return sum(equations.solve(*question).converged for question in questions)
+        return sum(equations.finds_pose(*question) for question in questions)
 
     converged = search()
     return Searches(converged, best_of(ROUNDS, search))

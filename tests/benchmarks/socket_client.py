@@ -30,9 +30,6 @@ EVENTS_PER_SECOND = 30.0
 QUIET_SECONDS = 1.0
 PATIENCE_SECONDS = 120.0
 
-# The scene node that moves whenever the platform does.
-PLATFORM = "/platform"
-
 
 @dataclass(frozen=True)
 class SliderDrag:
@@ -66,42 +63,33 @@ class Seen:
         sent: When its last event was sent.
         drawn: When the last message about the scene came.
         positions: Of the scene nodes that were moved, the last.
-        events: When each of its events was sent.
-        arrivals: When each position of the platform came.
-        bytes_read: All that came.
     """
 
     sent: float = 0.0
     drawn: float = 0.0
     positions: dict[str, Triple] = field(default_factory=dict[str, Triple])
-    events: list[float] = field(default_factory=list[float])
-    arrivals: dict[Triple, float] = field(default_factory=dict[Triple, float])
-    bytes_read: int = 0
 
 
 @contextmanager
-def dragging_process(
-    rate: float = EVENTS_PER_SECOND,
-) -> Generator[Callable[[str, Sequence[Drag]], list[Seen]]]:
+def dragging_process() -> Generator[Callable[[str, Sequence[Drag]], list[Seen]]]:
     """Start a process; what is yielded makes it drag as `drag_at_once` and waits for it."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, mp_context=context) as pool:
-        yield lambda url, drags: pool.submit(drag_at_once, url, drags, rate).result()
+        yield lambda url, drags: pool.submit(drag_at_once, url, drags).result()
 
 
-def drag_at_once(url: str, drags: Sequence[Drag], rate: float = EVENTS_PER_SECOND) -> list[Seen]:
+def drag_at_once(url: str, drags: Sequence[Drag]) -> list[Seen]:
     """Connect a client for each drag, drag in all of them at once, and wait for quiet."""
-    return asyncio.run(_drag_at_once(url, drags, rate))
+    return asyncio.run(_drag_at_once(url, drags))
 
 
-async def _drag_at_once(url: str, drags: Sequence[Drag], rate: float) -> list[Seen]:
+async def _drag_at_once(url: str, drags: Sequence[Drag]) -> list[Seen]:
     clients = [await _Client.connected(url) for _ in drags]
     readers = [asyncio.create_task(client.read()) for client in clients]
     # Users do not move in step.
-    starts = [time.monotonic() + 0.1 + k / (rate * len(drags)) for k in range(len(drags))]
-    await asyncio.gather(
-        *(c.drag(d, s, rate) for c, d, s in zip(clients, drags, starts, strict=True))
-    )
+    step = 1.0 / (EVENTS_PER_SECOND * len(drags))
+    starts = [time.monotonic() + 0.1 + k * step for k in range(len(drags))]
+    await asyncio.gather(*(c.drag(d, s) for c, d, s in zip(clients, drags, starts, strict=True)))
     deadline = time.monotonic() + PATIENCE_SECONDS
     while time.monotonic() < deadline:
         latest = max(max(client.seen.drawn, client.seen.sent) for client in clients)
@@ -151,12 +139,11 @@ class _Client:
             if any(not message["type"].startswith("Gui") for message in messages):
                 self.seen.drawn = now
 
-    async def drag(self, drag: Drag, start: float, rate: float) -> None:
+    async def drag(self, drag: Drag, start: float) -> None:
         """Send the events of a drag at an even pace from a time on."""
         for count, message in enumerate(self._events(drag)):
-            await asyncio.sleep(start + count / rate - time.monotonic())
+            await asyncio.sleep(start + count / EVENTS_PER_SECOND - time.monotonic())
             self.seen.sent = time.monotonic()
-            self.seen.events.append(self.seen.sent)
             await self._send(message)
 
     def _events(self, drag: Drag) -> list[dict[str, Any]]:
@@ -181,8 +168,6 @@ class _Client:
 
     async def _receive(self) -> list[dict[str, Any]]:
         window = await self._connection.recv(decode=False)
-        now = time.monotonic()
-        self.seen.bytes_read += len(window)
         size, compressed = (int.from_bytes(window[i : i + 8], "little") for i in (0, 8))
         packed = self._decompressor.decompress(window[16 : 16 + compressed], size)
         messages: list[dict[str, Any]] = msgspec.msgpack.decode(packed)["messages"]
@@ -192,6 +177,4 @@ class _Client:
             elif message["type"] == "SetPositionMessage":
                 x, y, z = message["position"]
                 self.seen.positions[message["name"]] = (x, y, z)
-                if message["name"] == PLATFORM:
-                    self.seen.arrivals.setdefault((x, y, z), now)
         return messages
