@@ -11,14 +11,14 @@ import socket
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable, Iterator
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
+from sweep_faults import HereWorkers
 
 import explorer
 from explorer.cli import COMMANDS, run
@@ -29,7 +29,10 @@ from explorer.optimise.problem import OBJECTIVES
 
 ROOT = Path(__file__).resolve().parents[2]
 MANUAL = Path(explorer.__file__).parents[1] / "assets" / "manual"
-DOCUMENTS = {"README.md": ROOT / "README.md", **{p.name: p for p in sorted(MANUAL.iterdir())}}
+DOCUMENTS = {
+    **{name: ROOT / name for name in ("README.md", "CONTRIBUTING.md")},
+    **{p.name: p for p in sorted(MANUAL.iterdir())},
+}
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -37,6 +40,8 @@ INLINE = re.compile(r"`(explorer(?: [^`]+)?)`")
 NO_ANSWER = "# ends with status 1"
 # The address of the scheduler that the manual names, which is another machine's.
 SCHEDULER = "10.0.0.1:8786"
+# Documents whose claims are measured, and compared with the page, in tests/reproduce.
+MEASURED = ("README.md", "claims.md")
 
 
 def read(name: str) -> str:
@@ -64,9 +69,10 @@ def test_manual_unknown_page_is_refused_with_the_names(name: str) -> None:
         read_page(name)
 
 
-def test_readme_is_short_and_names_the_test_command() -> None:
+def test_readme_is_short_and_names_the_test_command_and_the_contributors_page() -> None:
     assert len(read("README.md").encode()) <= 10_000
     assert "```sh\nbash tests/run\n```" in read("README.md")
+    assert "(CONTRIBUTING.md)" in read("README.md")
 
 
 def test_citation_names_the_project_as_it_is() -> None:
@@ -88,23 +94,29 @@ def test_document_commands_in_sentences_can_be_read(name: str) -> None:
         _, *argv = shlex.split(text)
         # A name by itself stands for the command, and an option by itself for what it needs.
         if len(argv) > 1 and argv[-1].startswith("--") and argv[0] in COMMANDS:
-            assert argv[-1] in _options(argv[0]), text
+            assert argv[-1] in options_of(argv[0]), text
         elif argv:
-            assert _is_readable(argv), text
+            assert is_readable(argv), text
 
 
-def _options(command: str) -> str:
+def options_of(command: str) -> str:
     shown = io.StringIO()
     with redirect_stdout(shown):
         assert run([command, "--help"]) == 0
     return shown.getvalue()
 
 
-def _is_readable(argv: list[str]) -> bool:
+def is_readable(argv: list[str]) -> bool:
     if len(argv) == 1:
         return argv[0] in COMMANDS
     command, *options = argv if argv[0] in COMMANDS else ["serve", *argv]
     return parse(command, load_command(command, COMMANDS), options) is not None
+
+
+def find_port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
 
 
 @dataclass
@@ -113,53 +125,65 @@ class Reader:
 
     Attributes:
         name: Name of the document.
-        stack: Where what is started is ended.
-        output: What the last shell block printed.
+        stack: Where processes are ended.
+        as_processes: Whether each command is a process, as for a user; else it runs in this one.
+        output: What the last shell block printed; None if it was only parsed.
         names: The names of the Python blocks.
         port: The port that stands for the scheduler's.
     """
 
     name: str
     stack: ExitStack
-    output: str
-    names: dict[str, Any]
-    port: int
+    as_processes: bool
+    output: str | None = ""
+    names: dict[str, Any] = field(default_factory=dict[str, Any])
+    port: int = field(default_factory=find_port)
 
     def follow(self, kind: str, text: str, before: str) -> None:
         """Run a block of a kind, given the text before it."""
         if kind == "sh":
-            self.output = "".join(map(self.enter, text.replace("\\\n", " ").splitlines()))
+            printed = [self.enter(line) for line in text.replace("\\\n", " ").splitlines()]
+            self.output = None if None in printed else "".join(map(str, printed))
         elif kind == "python":
             exec(compile(text, f"{self.name}, a block", "exec"), self.names)
         elif kind == "text":
-            for line in text.splitlines():
-                assert line in self.output.splitlines(), line
+            for line in text.splitlines() if self.output is not None else ():
+                assert line in str(self.output).splitlines(), line
         else:
             assert kind == "json", f"no way to run {kind}"
             file = re.findall(r"`([\w-]+\.json)`", before)[-1]
             msgspec.json.decode(text)
             Path(file).write_text(text, encoding="utf-8")
 
-    def enter(self, line: str) -> str:
+    def enter(self, line: str) -> str | None:
         """Run a line of a shell and return what it printed."""
         here = line.replace(SCHEDULER, f"127.0.0.1:{self.port}").replace("8786", str(self.port))
         words = shlex.split(here, comments=True)
-        parts = [list(group) for end, group in itertools.groupby(words, "&&".__eq__) if not end]
-        return "".join(self.execute(part, NO_ANSWER in line) for part in parts)
+        printed: str | None = ""
+        for is_end, group in itertools.groupby(words, "&&".__eq__):
+            if not is_end:
+                printed = self.execute(list(group), int(NO_ANSWER in line))
+        return printed
 
-    def execute(self, words: list[str], is_without_answer: bool) -> str:
-        """Run a simple command and return what it printed."""
+    def execute(self, words: list[str], status: int) -> str | None:
+        """Run a simple command, which ends with a status, and return what it printed."""
         program, *argv = words
         match Path(program).name:
+            case "explorer" if not argv or (argv[0].startswith("-") and argv[0] != "--help"):
+                return serve_page(argv) if self.as_processes else check_serving(argv)
+            case "explorer" if self.as_processes:
+                return run_process(argv, status)
             case "explorer":
-                return _explorer(argv, is_without_answer)
-            case "dask":
+                return self.run_here(argv, status)
+            case "dask" if self.as_processes:
                 command = [sys.executable, "-m", "dask", *argv]
                 if argv[0] == "scheduler":
                     command += ["--host", "127.0.0.1", "--no-dashboard", "--no-show"]
-                self.stack.callback(_end, subprocess.Popen(command, stderr=subprocess.DEVNULL))
+                self.stack.callback(end, subprocess.Popen(command, stderr=subprocess.DEVNULL))
+            case "dask":
+                assert argv[0] in ("scheduler", "worker")
             case "pip":
-                _check_installation(argv)
+                check_installation(argv)
             case "bash":
                 assert (ROOT / argv[0]).is_file()
             case _:
@@ -167,23 +191,39 @@ class Reader:
                 assert argv == ["-m", "venv", ".venv"], words
         return ""
 
+    def run_here(self, argv: list[str], status: int) -> str | None:
+        """Run a command in this process and return what it printed, None if it is only parsed."""
+        if argv[0] == "reproduce" and self.name in MEASURED:
+            assert is_readable(argv)
+            return None
+        if "--scheduler" in argv:
+            assert is_readable(argv)
+            argv = argv[: argv.index("--scheduler")]
+        printed, target = io.StringIO(), None
+        if ">" in argv:
+            argv, target = argv[:-2], Path(argv[-1])
+        with redirect_stdout(printed), redirect_stderr(io.StringIO() if target else printed):
+            found = run(argv)
+        assert found == status, f"explorer {shlex.join(argv)}: {printed.getvalue()}"
+        if target is not None:
+            target.write_text(printed.getvalue(), encoding="utf-8")
+        return printed.getvalue()
 
-def _explorer(argv: list[str], is_without_answer: bool) -> str:
-    if not argv or (argv[0].startswith("-") and argv[0] != "--help"):
-        return _serve(argv)
-    printed = io.StringIO()
+
+def run_process(argv: list[str], status: int) -> str:
+    """Run a command as a process and return what it printed."""
     target = None
     if ">" in argv:
         argv, target = argv[:-2], Path(argv[-1])
-    with redirect_stdout(printed), redirect_stderr(io.StringIO() if target else printed):
-        status = run(argv)
-    assert status == is_without_answer, f"explorer {shlex.join(argv)}: {printed.getvalue()}"
+    command = [sys.executable, "-m", "explorer", *argv]
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
+    assert done.returncode == status, f"explorer {shlex.join(argv)}: {done.stderr}"
     if target is not None:
-        target.write_text(printed.getvalue(), encoding="utf-8")
-    return printed.getvalue()
+        target.write_text(done.stdout, encoding="utf-8")
+    return done.stdout + done.stderr
 
 
-def _serve(argv: list[str]) -> str:
+def serve_page(argv: list[str]) -> str:
     """Serve the page on any free port until it says where, and return what it says."""
     elsewhere = [] if "--port" in argv else ["--port", "0"]
     quiet = [] if "--no-open" in argv else ["--no-open"]
@@ -201,7 +241,21 @@ def _serve(argv: list[str]) -> str:
     return "".join(said)
 
 
-def _check_installation(argv: list[str]) -> None:
+def check_serving(argv: list[str]) -> str:
+    """Check that a page would be served with these options, its design and studies loaded."""
+    served: list[object] = []
+
+    def serve(design: object, **_: object) -> None:
+        served.append(design)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("explorer.app.server.serve", serve)
+        assert run(["serve", *argv]) == 0
+    assert len(served) == 1
+    return ""
+
+
+def check_installation(argv: list[str]) -> None:
     """Check that what pip is given is this project with extras that it has."""
     assert "explorer" in PROJECT["scripts"]
     for wanted in (word for word in argv[1:] if not word.startswith("-")):
@@ -211,31 +265,25 @@ def _check_installation(argv: list[str]) -> None:
         assert set(extras) <= set(PROJECT["optional-dependencies"])
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def end(process: subprocess.Popen[bytes]) -> None:
     process.terminate()
-    process.wait(timeout=30)
-
-
-def _free_port() -> int:
-    with socket.socket() as made:
-        made.bind(("127.0.0.1", 0))
-        return made.getsockname()[1]
-
-
-@pytest.fixture
-def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], Reader]]:
-    """Return what makes the reader of a document, in a folder and with data of its own."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path / "data"))
-    with ExitStack() as stack:
-        yield lambda name: Reader(name, stack, "", {}, _free_port())
+    process.wait()
 
 
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", DOCUMENTS)
-def test_document_examples_run(name: str, reader: Callable[[str], Reader]) -> None:
-    follows, text, end = reader(name), read(name), 0
-    for block in BLOCK.finditer(text):
-        follows.follow(block[1], block[2], text[end : block.start()])
-        end = block.end()
+@pytest.mark.parametrize("as_processes", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_document_examples_run(
+    name: str, as_processes: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path / "data"))
+    if not as_processes:
+        monkeypatch.setattr("explorer.sweep.workers.LocalWorkers", HereWorkers)
+    text, last = read(name), 0
+    with ExitStack() as stack:
+        reader = Reader(name, stack, as_processes)
+        for block in BLOCK.finditer(text):
+            reader.follow(block[1], block[2], text[last : block.start()])
+            last = block.end()
     assert text.count("```") == 2 * len(BLOCK.findall(text))

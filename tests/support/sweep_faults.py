@@ -15,9 +15,12 @@ DEADLY = 13
 
 
 class HereWorkers(Workers):
-    """Workers that do each task at once in this process, and keep the pieces of all."""
+    """Workers that do each task at once in this process, and keep the pieces of all.
 
-    def __init__(self) -> None:
+    They take the number of processes of those that they stand for.
+    """
+
+    def __init__(self, _: int | None = None) -> None:
         self.tasks: list[list[range]] = []
 
     @property
