@@ -22,11 +22,10 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.reproduce import comparison, flags, interference, kinematics, singularities
-from explorer.reproduce.claim import VERDICTS, Result
+from explorer.reproduce.claim import VERDICTS, Measurement, Result
 from explorer.reproduce.claims import measure_claims
 from explorer.reproduce.interference import Interference
 from explorer.reproduce.mode_paths import Paths, judge_paths, least_condition_on, random_paths
-from explorer.reproduce.simplicity import Parts, simplicity
 from explorer.reproduce.six_legs import SixLegs, octahedral, six_four_twin
 from explorer.singularity.uncoupled import UNCOUPLED
 from explorer.workspace.accessible.radii import with_radius
@@ -54,13 +53,6 @@ def test_verdict_within_has_a_condition_and_others_have_none(results: dict[str, 
         measurement = result.measurement
         assert measurement.verdict in VERDICTS
         assert bool(measurement.condition) == (measurement.verdict == "confirmed within")
-
-
-def test_values_are_the_same_each_time(results: dict[str, Result]) -> None:
-    again = {result.claim.name: result for result in measure_claims()}
-    assert {name: result.measurement for name, result in again.items()} == {
-        name: result.measurement for name, result in results.items()
-    }
 
 
 def test_every_mode_is_found_and_nothing_else(results: dict[str, Result]) -> None:
@@ -126,7 +118,7 @@ def least_distance(one: FloatArray, two: FloatArray) -> float:
     return float(np.sqrt(min(found)))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_clearances_of_the_twin_are_distances_of_its_legs(seed: int) -> None:
     random = np.random.default_rng(seed)
     twin = six_four_twin(OPTIMAL, float(random.uniform(4.0, 20.0)))
@@ -166,17 +158,9 @@ def test_determinant_is_that_of_the_rates_of_the_lengths(mechanism: SixLegs) -> 
     assert found == pytest.approx(expected, rel=1e-5, abs=1e-6)
 
 
-def test_octahedral_platform_has_the_areas_of_the_design() -> None:
-    other = octahedral(OPTIMAL)
-    area = 0.5 * np.linalg.norm(
-        np.cross(other.base[1] - other.base[0], other.base[3] - other.base[0])
-    )
-    assert area == pytest.approx(0.5 * OPTIMAL.a2x * OPTIMAL.a3[1], rel=1e-12)
-
-
 def test_compared_mechanisms_have_actuators_of_one_stroke() -> None:
     reach, random = OPTIMAL.reach, np.random.default_rng(3)
-    position = random.uniform(-2.0 * reach, 2.0 * reach, (200_000, 3))
+    position = random.uniform(-2.0 * reach, 2.0 * reach, (20_000, 3))
     for rotation in (
         home_pose(OPTIMAL).rotation,
         np.asarray(Rotation.random(rng=random).as_matrix()),
@@ -198,7 +182,7 @@ def test_share_of_the_four_four_is_that_of_its_own_measure() -> None:
 @pytest.mark.parametrize("mechanism", [six_four_twin(OPTIMAL, 12.0), octahedral(OPTIMAL)])
 def test_box_holds_the_workspace_and_is_the_least_one_for_the_lengths(mechanism: SixLegs) -> None:
     reach, rotation = OPTIMAL.reach, mechanism.home[1]
-    points = np.random.default_rng(0).uniform(-2.0 * reach, 2.0 * reach, (100_000, 3))
+    points = np.random.default_rng(0).uniform(-2.0 * reach, 2.0 * reach, (20_000, 3))
     kept = points[(mechanism.lengths(points, rotation) <= mechanism.longest).all(axis=1)]
     lows, highs = mechanism.box
     assert (kept >= lows).all()
@@ -213,16 +197,11 @@ def test_volume_of_the_twin_is_that_of_a_plain_count(results: dict[str, Result])
         strict=True,
     ):
         lows, highs = mechanism.box
-        axes = [np.arange(low + 0.2, high, 0.4) for low, high in zip(lows, highs, strict=True)]
+        axes = [np.arange(low + 0.4, high, 0.8) for low, high in zip(lows, highs, strict=True)]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         count = int(mechanism.holds(grid, mechanism.home[1]).sum())
-        assert told["volume"] == pytest.approx(count * 0.4**3 / OPTIMAL.reach**3, rel=0.01)
+        assert told["volume"] == pytest.approx(count * 0.8**3 / OPTIMAL.reach**3, rel=0.02)
         assert 0.0 < told["error"] < 2e-3
-
-
-def test_mobility_by_the_joints_of_the_legs_is_six() -> None:
-    values: Any = simplicity().values
-    assert [Parts(**parts).mobility for parts in values["mechanisms"]] == [6, 6, 6]
 
 
 def test_legs_2_and_3_are_as_far_apart_as_their_carriages(results: dict[str, Result]) -> None:
@@ -253,75 +232,72 @@ def interference_of(**changes: Any) -> Interference:
     return replace(plain, **changes)
 
 
-def test_verdict_on_interference_follows_from_free_positions() -> None:
-    twin, apart = interference_of(name="6-4", clearer=0.4, free=(0.5,) * 7), 0.65
-    thick = (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
-
-    def verdict(ours: Interference) -> str:
-        return interference.judge_risk(ours, [twin], twin, apart).verdict
-
-    assert verdict(interference_of()) == "confirmed"
-    assert verdict(interference_of(free=thick)) == "confirmed within"
-    assert verdict(interference_of(free=(0.4, *thick[1:]))) == "not confirmed"
+TWIN = interference_of(name="6-4", clearer=0.4, free=(0.5,) * 7)
+THICK = (1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 
 
-def test_verdict_on_the_optimum_follows_from_the_steps() -> None:
-    def verdict(*shares: float) -> str:
-        return interference.judge_optimum(tuple((x, 0.0, 0.0) for x in shares), 0.6).verdict
-
-    assert verdict(0.0, 0.0, 0.0) == "confirmed"
-    assert verdict(0.0005, 1.0, 1.0) == "not testable from the paper"
-    assert verdict(0.1, 1.0, 1.0) == "not confirmed"
+def judge_risk(**changes: Any) -> Measurement:
+    return interference.judge_risk(interference_of(**changes), [TWIN], TWIN, 0.65)
 
 
-def test_verdict_on_the_workspace_follows_from_the_volumes() -> None:
-    def verdict(ours: float, *others: float) -> str:
-        found = [comparison.Workspace(str(volume), volume, 0.0) for volume in others]
-        return comparison.judge_workspace(comparison.Workspace("4-4", ours, 0.0), found).verdict
-
-    assert verdict(1.0, 0.5, 0.9) == "confirmed"
-    assert verdict(1.0, 0.5, 0.999) == "confirmed within"
-    assert verdict(1.0, 0.5, 1.1) == "not confirmed"
-    assert verdict(1.0, 1.0, 1.001) == "not confirmed"
+def judge_optimum(*shares: float) -> Measurement:
+    return interference.judge_optimum(tuple((x, 0.0, 0.0) for x in shares), 0.6)
 
 
-def test_verdict_on_orientations_needs_more_than_the_error() -> None:
-    def abilities(share: float, tilt: float) -> comparison.Abilities:
-        return comparison.Abilities("", share, 0.01, tilt, 1.0)
-
-    def verdict(share: float, tilt: float) -> str:
-        return comparison.judge_orientations(abilities(share, tilt), [abilities(0.1, 20)]).verdict
-
-    assert verdict(0.2, 40.0) == "confirmed"
-    assert verdict(0.2, 20.0) == "confirmed within"
-    assert verdict(0.11, 21.0) == "not confirmed"
+def judge_workspace(ours: float, *others: float) -> Measurement:
+    found = [comparison.Workspace(str(volume), volume, 0.0) for volume in others]
+    return comparison.judge_workspace(comparison.Workspace("4-4", ours, 0.0), found)
 
 
-def test_verdicts_on_laws_fail_with_any_large_error() -> None:
-    good = singularities.Errors(1e-16, 1e-16, 1e-15, 1e-3)
-    assert singularities.judge_flat(good).verdict == "confirmed"
-    for name, value in (
-        ("volumes", 1e-6),
-        ("identity", 1e-6),
-        ("on_planes", 1e-6),
-        ("off_planes", 1e-9),
-    ):
-        assert singularities.judge_flat(replace(good, **{name: value})).verdict == "not confirmed"
-    assert flags.judge_strata(24, 0, is_bruhat=True).verdict == "confirmed"
-    for case in ((23, 0, True), (24, 1, True), (24, 0, False)):
-        assert flags.judge_strata(*case).verdict == "not confirmed"
-    assert flags.judge_uncoupled(0.1, 1e-16, {}).verdict == "confirmed"
-    assert flags.judge_uncoupled(0.0, 1e-16, {}).verdict == "not confirmed"
-    assert flags.judge_uncoupled(0.1, 1e-3, {}).verdict == "not confirmed"
-    assert flags.judge_chart(None).verdict == "not testable from the paper"
-    assert kinematics.judge_same_kinematics(1e-15, 1e-15).verdict == "confirmed"
-    assert kinematics.judge_same_kinematics(1e-3, 1e-15).verdict == "not confirmed"
-    assert judge_paths(np.array([1e-12, 1e-10])).verdict == "confirmed"
-    assert judge_paths(np.array([1e-12, 1e-3])).verdict == "not confirmed"
-    every = kinematics.Search(10, 9, 8, 8, 0)
-    assert kinematics.judge_closed_form(1e-15, every, every, 1).verdict == "confirmed"
-    for search in (replace(every, found=7), replace(every, others=1)):
-        assert kinematics.judge_closed_form(1e-15, every, search, 1).verdict == "not confirmed"
+def judge_orientations(share: float, tilt: float) -> Measurement:
+    ours, other = (comparison.Abilities("", s, 0.01, t, 1.0) for s, t in ((share, tilt), (0.1, 20)))
+    return comparison.judge_orientations(ours, [other])
+
+
+EXACT = singularities.Errors(1e-16, 1e-16, 1e-15, 1e-3)
+EVERY = kinematics.Search(10, 9, 8, 8, 0)
+VERDICTS_OF_VALUES = [
+    ("confirmed", judge_risk()),
+    ("confirmed within", judge_risk(free=THICK)),
+    ("not confirmed", judge_risk(free=(0.4, *THICK[1:]))),
+    ("confirmed", judge_optimum(0.0, 0.0, 0.0)),
+    ("not testable from the paper", judge_optimum(0.0005, 1.0, 1.0)),
+    ("not confirmed", judge_optimum(0.1, 1.0, 1.0)),
+    ("confirmed", judge_workspace(1.0, 0.5, 0.9)),
+    ("confirmed within", judge_workspace(1.0, 0.5, 0.999)),
+    ("not confirmed", judge_workspace(1.0, 0.5, 1.1)),
+    ("not confirmed", judge_workspace(1.0, 1.0, 1.001)),
+    # More than the error is needed.
+    ("confirmed", judge_orientations(0.2, 40.0)),
+    ("confirmed within", judge_orientations(0.2, 20.0)),
+    ("not confirmed", judge_orientations(0.11, 21.0)),
+    # Any large error refutes a law.
+    ("confirmed", singularities.judge_flat(EXACT)),
+    ("not confirmed", singularities.judge_flat(replace(EXACT, volumes=1e-6))),
+    ("not confirmed", singularities.judge_flat(replace(EXACT, identity=1e-6))),
+    ("not confirmed", singularities.judge_flat(replace(EXACT, on_planes=1e-6))),
+    ("not confirmed", singularities.judge_flat(replace(EXACT, off_planes=1e-9))),
+    ("confirmed", flags.judge_strata(24, 0, is_bruhat=True)),
+    ("not confirmed", flags.judge_strata(23, 0, is_bruhat=True)),
+    ("not confirmed", flags.judge_strata(24, 1, is_bruhat=True)),
+    ("not confirmed", flags.judge_strata(24, 0, is_bruhat=False)),
+    ("confirmed", flags.judge_uncoupled(0.1, 1e-16, {})),
+    ("not confirmed", flags.judge_uncoupled(0.0, 1e-16, {})),
+    ("not confirmed", flags.judge_uncoupled(0.1, 1e-3, {})),
+    ("not testable from the paper", flags.judge_chart(None)),
+    ("confirmed", kinematics.judge_same_kinematics(1e-15, 1e-15)),
+    ("not confirmed", kinematics.judge_same_kinematics(1e-3, 1e-15)),
+    ("confirmed", judge_paths(np.array([1e-12, 1e-10]))),
+    ("not confirmed", judge_paths(np.array([1e-12, 1e-3]))),
+    ("confirmed", kinematics.judge_closed_form(1e-15, EVERY, EVERY, 1)),
+    ("not confirmed", kinematics.judge_closed_form(1e-15, EVERY, replace(EVERY, found=7), 1)),
+    ("not confirmed", kinematics.judge_closed_form(1e-15, EVERY, replace(EVERY, others=1), 1)),
+]
+
+
+@pytest.mark.parametrize(("verdict", "measurement"), VERDICTS_OF_VALUES)
+def test_verdict_follows_from_the_values(verdict: str, measurement: Measurement) -> None:
+    assert measurement.verdict == verdict
 
 
 def test_paths_join_two_modes_of_the_same_joints() -> None:
@@ -351,8 +327,7 @@ def test_unknown_claim_is_refused() -> None:
 
 def test_command_writes_the_keys_of_the_contract(capsys: pytest.CaptureFixture[str]) -> None:
     cli = CommandLine(capsys, has_progress=True)
-    found = cli.answer("reproduce", "--claim", "simpler", "cheaper")
+    found = cli.answer("reproduce", "--claim", "strata", "table-1")
     keys = {"claim", "reading", "paper", "measured", "verdict", "command"}
     assert [keys <= claim.keys() for claim in found["claims"]] == [True, True]
-    text = cli.text("reproduce", "--claim", "cheaper")
-    assert text.startswith("NOT TESTABLE FROM THE PAPER: It is cheaper")
+    assert cli.text("reproduce", "--claim", "strata").startswith("CONFIRMED")

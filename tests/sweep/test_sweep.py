@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 from limited_designs import ordinary_case, troubled_case
 
@@ -43,14 +43,12 @@ from explorer.sweep.machine import MACHINE
 from explorer.sweep.rows import (
     Value,
     check_study,
-    columns_of,
     design_of,
     end_values,
     evaluate,
     problem_of,
-    rows_of_dead_workers,
 )
-from explorer.sweep.sampling import ROUNDS, permuted, samples
+from explorer.sweep.sampling import samples
 from explorer.sweep.study import (
     NAMES,
     STUDIES,
@@ -98,6 +96,16 @@ def test_study_encoded_and_decoded_is_unchanged() -> None:
     assert study_hash(again) == study_hash(study)
     assert study.base.home == home_pose(OPTIMAL)
     assert study.varied == ("a3y", "yaw", "radius")
+    # So it is of one that is made in Python, whose design is checked too.
+    made = Study(
+        design=OPTIMAL,
+        variables={"b2": (1.0, 2.0)},
+        sampling=Sampling(count=4),
+        polish=Polish(objective="largest-volume"),
+    )
+    assert decode_study(encode_study(made), "it") == made
+    with pytest.raises(InputError, match="no preset"):
+        Study(design="nothing", variables={"b2": (1.0, 2.0)}, sampling=Sampling(count=4))
 
 
 def test_study_hash_differs_for_every_change() -> None:
@@ -125,13 +133,11 @@ def test_packaged_studies_can_be_run() -> None:
         ({"variables": {"a4": [1, 2]}}, "no variable 'a4'; there are a3x"),
         ({"variables": {}}, "must name at least one of"),
         ({"variables": {"a3y": [4, 4]}}, "the range of a3y is empty: 4 to 4"),
-        ({"variables": {"a3y": [8, 4]}}, "the range of a3y is empty"),
         ({"variables": {"a3y": [4]}}, "variables"),
         ({"variables": {"a3y": [4, 1e99]}}, "must not exceed 1e+40"),
         ({"variables": {"radius": [-1, 1]}}, "must not be negative"),
         ({"variables": {"reach": [0, 1]}}, "above every minimum length"),
         ({"sampling": {"method": "sobol", "count": 0}}, "sampling.count must lie within 1 to"),
-        ({"sampling": {"method": "sobol", "count": 2**31}}, "sampling.count must lie within"),
         ({"sampling": {"method": "sobol", "count": 8, "seed": -1}}, "sampling.seed"),
         ({"sampling": {"method": "sobol", "count": {"a3y": 2}}}, "only a grid takes one for each"),
         ({"sampling": {"method": "grid", "count": {"a3y": 2}}}, "must name the variables"),
@@ -141,9 +147,7 @@ def test_packaged_studies_can_be_run() -> None:
         ({"measures": []}, "measures must name at least one"),
         ({"measures": ["volume", "volume"]}, "may name each once"),
         ({"objectives": [{"measure": "mass", "sense": "min"}]}, "neither measured nor a variable"),
-        ({"objectives": [{"measure": "volume", "sense": "best"}]}, "Invalid enum value 'best'"),
         ({"variables": {"reach": [9, 12]}, "measures": ["reach"]}, "leave it out of the measures"),
-        ({"polish": {"objective": "cheapest"}}, "Invalid enum value"),
         (
             {"polish": {"objective": "largest-volume", "variables": {"radius": [0, 1]}}},
             "no variable 'radius'",
@@ -205,8 +209,7 @@ def test_study_without_any_valid_design_is_refused() -> None:
 
 
 @pytest.mark.parametrize("method", ["grid", "sobol", "latin-hypercube"])
-@pytest.mark.parametrize("order", [1, -1])
-@pytest.mark.parametrize("many", [2, 3, 8, 16])
+@pytest.mark.parametrize(("order", "many"), [(1, 2), (-1, 3), (1, 16)])
 def test_study_with_few_valid_designs_is_accepted(method: Method, order: int, many: int) -> None:
     # Only near its upper end is a3y not below the least allowed.
     variables = [("a3y", [0.01, 1.0]), ("a3x", [12, 20])][::order]
@@ -221,7 +224,6 @@ def test_study_with_few_valid_designs_is_accepted(method: Method, order: int, ma
 
 
 @pytest.mark.parametrize("method", ["sobol", "latin-hypercube", "grid"])
-@settings(max_examples=25)
 @given(seed=st.integers(0, 2**31 - 1), size=st.integers(5, 40), count=st.integers(1, 200))
 def test_samples_by_chunks_equal_all_at_once(
     method: Method, seed: int, size: int, count: int
@@ -247,12 +249,6 @@ def test_latin_hypercube_has_one_design_in_every_slice(count: int, seed: int) ->
     assert (slices == np.arange(count)[:, None]).mean() > 0.99
 
 
-@given(st.integers(1, 5000), st.lists(st.integers(0, 2**64 - 1), min_size=ROUNDS, max_size=ROUNDS))
-def test_permuted_numbers_are_a_permutation(count: int, keys: list[int]) -> None:
-    found = permuted(np.arange(count, dtype=np.uint64), count, np.array(keys, dtype=np.uint64))
-    assert np.array_equal(np.sort(found), np.arange(count))
-
-
 def test_latin_hypercube_variables_are_uncorrelated() -> None:
     study = sampled("latin-hypercube", 4000, 5)
     found = np.corrcoef(samples(study, range(4000)).T) - np.eye(3)
@@ -264,6 +260,9 @@ def test_sobol_samples_match_scipy() -> None:
     from scipy.stats import qmc
 
     study = sampled("sobol", 64, 9)
+    # Those of the last chunk need no others.
+    large = sampled("sobol", 2**26 - 1)
+    assert samples(large, large.rows_of(large.chunks - 1)).shape == (63, 3)
     ends = np.array(list(study.variables.values()))
     expected = qmc.scale(qmc.Sobol(3, rng=9).random(64), ends[:, 0], ends[:, 1])
     assert samples(study, range(64)) == pytest.approx(expected, rel=1e-15)
@@ -277,12 +276,6 @@ def test_grid_has_every_combination_once() -> None:
         (a3y, -70.0, radius) for a3y in (4.0, 5.0, 6.0, 7.0, 8.0) for radius in (0.0, 0.15, 0.3)
     }
     assert {tuple(row) for row in found.tolist()} == expected
-
-
-def test_samples_of_the_last_chunk_need_no_others() -> None:
-    for method in ("sobol", "latin-hypercube"):
-        study = sampled(method, 2**26 - 1)
-        assert samples(study, study.rows_of(study.chunks - 1)).shape == (63, 3)
 
 
 def test_design_of_values_has_these_values() -> None:
@@ -322,7 +315,7 @@ def nodes_of(design: Any, rotation: Any, count: int) -> Any:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(4))
 def test_node_measures_match_each_position(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     design = msgspec.structs.replace(
@@ -353,7 +346,7 @@ def test_node_measures_match_each_position(seed: int) -> None:
     assert found.clearances == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(10))
 def test_nodes_of_any_design_lie_in_a_workspace(seed: int) -> None:
     design, rotation = troubled_case(seed)
     found = node_measures(design, rotation, nodes=12)
@@ -422,9 +415,9 @@ LOADS = [
 
 def test_study_over_machine_and_geometry_measures_loads_as_statics_does() -> None:
     study = decoded(variables={"a3y": [4, 8], **MACHINE_RANGES}, measures=LOADS)
-    rows = columns(study, 0, 5)
-    assert rows["status"] == ["done"] * 5
-    for k in range(5):
+    rows = columns(study, 0, 2)
+    assert rows["status"] == ["done"] * 2
+    for k in range(2):
         values = {name: float(rows[name][k] or 0.0) for name in study.variables}
         limit, tool = values["actuator_limit"], [values[f"tool_{axis}"] for axis in "xyz"]
         # The machine is made anew, without the study's way to change a design.
@@ -473,10 +466,7 @@ def test_machine_variable_is_read_as_it_is_set(name: str) -> None:
         MACHINE[other].value_in(design) for other in others
     ]
     assert changed.variables == design.variables
-
-
-def test_machine_of_a_plain_design_has_no_values() -> None:
-    assert {variable.value_in(OPTIMAL) for variable in MACHINE.values()} == {None}
+    assert MACHINE[name].value_in(OPTIMAL) is None
 
 
 @pytest.mark.parametrize(
@@ -598,16 +588,6 @@ def test_home_that_collides_has_no_accessible_volume_and_a_reason() -> None:
     assert "legs" in str(rows["reason"][1])
 
 
-def test_lost_designs_are_rows() -> None:
-    study = decoded(polish={"objective": "largest-volume"})
-    rows = rows_of_dead_workers(study, range(7, 9), "2 workers died")
-    assert list(rows.columns) == list(columns_of(study))
-    assert rows.columns["index"] == [7, 8]
-    assert rows.columns["status"] == ["worker died"] * 2
-    assert rows.columns["sample_a3y"] == samples(study, range(7, 9))[:, 0].tolist()
-    assert rows.columns["volume"] == [None, None]
-
-
 def test_polished_designs_meet_the_demand_within_the_ranges() -> None:
     study = sampled(
         "sobol",
@@ -632,7 +612,7 @@ def test_polished_designs_meet_the_demand_within_the_ranges() -> None:
     assert any(rows["a3x"][row] != rows["sample_a3x"][row] for row in done)
 
 
-@pytest.mark.parametrize("ends", [(170.0, 190.0), (270.0, 300.0), (-460.0, -400.0), (-85.0, -60.0)])
+@pytest.mark.parametrize("ends", [(170.0, 190.0), (-460.0, -400.0)])
 @pytest.mark.parametrize("is_sampled", [True, False])
 def test_polished_yaw_of_any_turn_stays_in_its_range(
     ends: tuple[float, float], is_sampled: bool
@@ -743,15 +723,3 @@ def test_front_has_only_complete_rows_that_are_done() -> None:
 
 def test_variables_and_measures_share_no_column() -> None:
     assert not {*NAMES} & ({*MEASURES} - {"reach"})
-
-
-def test_study_made_in_python_is_encoded_and_decoded() -> None:
-    study = Study(
-        design=OPTIMAL,
-        variables={"b2": (1.0, 2.0)},
-        sampling=Sampling(count=4),
-        polish=Polish(objective="largest-volume"),
-    )
-    assert decode_study(encode_study(study), "it") == study
-    with pytest.raises(InputError, match="no preset"):
-        Study(design="nothing", variables={"b2": (1.0, 2.0)}, sampling=Sampling(count=4))
