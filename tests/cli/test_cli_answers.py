@@ -26,21 +26,21 @@ def snapshot() -> explorer.Snapshot:
     return explorer.evaluate(PRESET, explorer.Pose.of_yaw_pitch_roll(POSITION, ANGLES))
 
 
-def test_inverse_json_has_joints_in_order(cli: CommandLine) -> None:
+def test_inverse_has_joints_in_order_and_text_their_millimetres(cli: CommandLine) -> None:
     found = cli.answer("inverse", *POSE)
     expected = snapshot()
     assert set(found) == {"joints", "within_limits", "violations"}
     assert found["joints"] == expected.joints.tolist()
     assert found["violations"] == [str(each) for each in expected.violations]
     assert found["within_limits"] is (not expected.violations)
-
-
-def test_inverse_pose_outside_limits_names_them(
-    cli: CommandLine,
-) -> None:
-    found = cli.answer("inverse", "--position", "30", "5", "9")
-    assert found["within_limits"] is False
-    assert any("box x" in each for each in found["violations"])
+    lines = cli.text("inverse", *POSE).splitlines()
+    for name, value in zip(explorer.JOINTS, expected.joints.tolist(), strict=True):
+        (row,) = [line.split() for line in lines if line.startswith(f"{name} ")]
+        assert float(row[1]) == pytest.approx(value, rel=1e-5)
+        assert float(row[2]) == pytest.approx(value * PRESET.unit_mm, rel=1e-5)
+    outside = cli.answer("inverse", "--position", "30", "5", "9")
+    assert outside["within_limits"] is False
+    assert any("box x" in each for each in outside["violations"])
 
 
 def test_inverse_swapped_carriages_names_their_order(cli: CommandLine, tmp_path: Path) -> None:
@@ -103,35 +103,27 @@ def test_singularity_singular_pose_names_its_incidence(cli: CommandLine) -> None
     assert [float(word) for word in row.split()[3:7]] == [0.0, 0.0, 10.0, 5.0]
 
 
-def test_forward_joints_of_inverse_give_the_pose_in_its_mode(
-    cli: CommandLine,
-) -> None:
+def test_forward_joints_of_inverse_give_the_pose_in_its_mode(cli: CommandLine) -> None:
     expected = snapshot()
-    found = cli.answer("forward", "--joints", *map(repr, expected.joints.tolist()))
+    argv = ["forward", "--joints", *map(repr, expected.joints.tolist())]
+    found = cli.answer(*argv)
     assert set(found) == {"feasible", "discriminants", "modes"}
     assert found["feasible"] is True
     np.testing.assert_allclose(found["discriminants"], expected.margins**2, rtol=1e-9)
     assert [mode["mode"] for mode in found["modes"]] == list(range(8))
+    for mode in found["modes"]:
+        rotation = explorer.rotation_from_quaternion(mode["quaternion"])
+        margins = explorer.margins(mode["position"], rotation)
+        np.testing.assert_allclose(mode["margins"], margins, atol=1e-12)
+        assert np.sign(mode["margins"]).tolist() == mode["signs"]
     mode = found["modes"][expected.mode]
     assert set(mode) == {"mode", "signs", "position", "quaternion", "tilt_torsion", "margins"}
     np.testing.assert_allclose(mode["position"], POSITION, rtol=1e-9)
-    np.testing.assert_allclose(
-        explorer.rotation_from_quaternion(mode["quaternion"]), expected.rotation, atol=1e-9
-    )
-
-
-def test_forward_modes_have_margins_of_their_signs(
-    cli: CommandLine,
-) -> None:
-    found = cli.answer("forward", "--joints", *map(repr, snapshot().joints.tolist()))
-    for mode in found["modes"]:
-        rotation = explorer.rotation_from_quaternion(mode["quaternion"])
-        np.testing.assert_allclose(
-            mode["margins"], explorer.margins(mode["position"], rotation), atol=1e-12
-        )
-        assert np.sign(mode["margins"]).tolist() == mode["signs"]
-        bits = [mode["mode"] >> bit & 1 for bit in (2, 1, 0)]
-        assert bits == [sign > 0 for sign in mode["signs"]]
+    rotation = explorer.rotation_from_quaternion(mode["quaternion"])
+    np.testing.assert_allclose(rotation, expected.rotation, atol=1e-9)
+    rows = [line.split() for line in cli.text(*argv).splitlines()[-8:]]
+    assert [row[0] for row in rows] == list("01234567")
+    assert [float(value) for value in rows[expected.mode][4:7]] == pytest.approx(POSITION)
 
 
 def test_forward_infeasible_joints_have_status_1(
@@ -146,19 +138,15 @@ def test_forward_infeasible_joints_have_status_1(
     assert found["discriminants"][0] < 0.0
 
 
-@pytest.mark.parametrize("joint", range(6))
-def test_forward_infeasible_joints_suggested_value_is_feasible(
-    cli: CommandLine, joint: int
-) -> None:
-    joints = snapshot().joints.copy()
-    intervals = feasible_intervals(PRESET, joints)[joint]
-    joints[joint] = intervals[-1][1] + 0.25
-    refused = cli.refusal("forward", "--joints", *map(repr, joints.tolist()), status=1)
-    assert "tetrahedron" in refused
-    advice = refused.strip().rpartition(" is ")[2].split()
-    name, _, _, _, closing = advice
-    joints[explorer.JOINTS.index(name)] = float(closing)
-    assert explorer.forward(PRESET, joints).feasible
+def test_forward_infeasible_joints_suggested_value_is_feasible(cli: CommandLine) -> None:
+    for joint in range(6):
+        joints = snapshot().joints.copy()
+        joints[joint] = feasible_intervals(PRESET, joints)[joint][-1][1] + 0.25
+        refused = cli.refusal("forward", "--joints", *map(repr, joints.tolist()), status=1)
+        assert "tetrahedron" in refused
+        name, *_, closing = refused.strip().rpartition(" is ")[2].split()
+        joints[explorer.JOINTS.index(name)] = float(closing)
+        assert explorer.forward(PRESET, joints).feasible
 
 
 def test_forward_infeasible_joints_name_the_tetrahedron(
@@ -175,37 +163,19 @@ def test_forward_infeasible_joints_name_the_tetrahedron(
     assert "l4 from 60 to " in message
 
 
-def test_pose_options_none_give_the_home_pose(cli: CommandLine) -> None:
-    home = explorer.evaluate(PRESET, explorer.home_pose(PRESET))
-    assert cli.answer("inverse")["joints"] == home.joints.tolist()
-
-
-def test_pose_options_position_keeps_the_home_orientation(
-    cli: CommandLine,
-) -> None:
-    home = explorer.home_pose(PRESET)
-    found = cli.answer("inverse", *POSE[:4])
-    assert found["joints"] == explorer.inverse(PRESET, POSITION, home.rotation).tolist()
-
-
-def test_pose_options_orientation_keeps_the_home_position(
-    cli: CommandLine,
-) -> None:
+def test_pose_options_are_completed_from_the_home_pose(cli: CommandLine) -> None:
     home = explorer.home_pose(PRESET)
     rotation = explorer.rotation_from_yaw_pitch_roll(ANGLES)
-    found = cli.answer("inverse", *POSE[4:])
-    np.testing.assert_allclose(
-        found["joints"], explorer.inverse(PRESET, home.position, rotation), rtol=1e-12
-    )
-
-
-def test_pose_options_quaternion_and_angles_agree(cli: CommandLine) -> None:
-    quaternion = explorer.quaternion_from_rotation(explorer.rotation_from_yaw_pitch_roll(ANGLES))
     # Of any length, and -q is the same rotation as q.
-    words = map(repr, (-3.0 * quaternion).tolist())
-    by_quaternion = cli.answer("inverse", *POSE[:4], "--quaternion", *words)
-    by_angles = cli.answer("inverse", *POSE)
-    np.testing.assert_allclose(by_quaternion["joints"], by_angles["joints"], rtol=1e-12)
+    quaternion = (-3.0 * explorer.quaternion_from_rotation(rotation)).tolist()
+    for argv, *pose in (
+        ([], home.position, home.rotation),
+        (POSE[:4], POSITION, home.rotation),
+        (POSE[4:], home.position, rotation),
+        ([*POSE[:4], "--quaternion", *map(repr, quaternion)], POSITION, rotation),
+    ):
+        expected = explorer.inverse(PRESET, *pose)
+        np.testing.assert_allclose(cli.answer("inverse", *argv)["joints"], expected, rtol=1e-12)
 
 
 def test_design_option_file_equals_its_preset(cli: CommandLine, tmp_path: Path) -> None:
@@ -214,31 +184,6 @@ def test_design_option_file_equals_its_preset(cli: CommandLine, tmp_path: Path) 
     by_file = cli.answer("inverse", "--design", file, *POSE)
     assert by_file == cli.answer("inverse", "--design", "paper-initial", *POSE)
     assert by_file != cli.answer("inverse", *POSE)
-
-
-def test_text_answers_show_units_and_millimetres(cli: CommandLine) -> None:
-    text = cli.text("inverse", *POSE)
-    joints = snapshot().joints
-    for name, value in zip(explorer.JOINTS, joints.tolist(), strict=True):
-        (row,) = [line.split() for line in text.splitlines() if line.startswith(f"{name} ")]
-        assert float(row[1]) == pytest.approx(value, rel=1e-5)
-        assert float(row[2]) == pytest.approx(value * PRESET.unit_mm, rel=1e-5)
-
-
-@pytest.mark.parametrize("command", ["inverse", "singularity"])
-def test_text_answers_have_no_colour_and_no_trailing_spaces(cli: CommandLine, command: str) -> None:
-    assert cli.text(command, *POSE)
-
-
-def test_forward_text_has_a_row_per_mode(cli: CommandLine) -> None:
-    rows = [
-        line.split()
-        for line in cli.text(
-            "forward", "--joints", *map(repr, snapshot().joints.tolist())
-        ).splitlines()
-    ]
-    assert [row[0] for row in rows[-8:]] == list("01234567")
-    assert [float(value) for value in rows[-8 + snapshot().mode][4:7]] == pytest.approx(POSITION)
 
 
 def test_answers_are_free_of_messages_of_libraries(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import msgspec
-import numpy as np
 import pytest
 from command_line import CommandLine
 from numpy.testing import assert_allclose
@@ -191,12 +190,3 @@ def test_budget_about_singular_positions_has_no_answer(cli: CommandLine, tmp_pat
     limits = msgspec.structs.replace(OPTIMAL.limits, box=None)
     path.write_bytes(explorer.encode_design(msgspec.structs.replace(OPTIMAL, limits=limits)))
     assert "need a box" in cli.refusal("budget", "--over", "box", "--design", path)
-
-
-def test_budget_worst_direction_is_reached_by_signs(cli: CommandLine, stated: Path) -> None:
-    found = cli.answer("budget", "--design", stated, *OVER_BOX)
-    by_source = explorer.pose_error_by_source(STATED, found["position"], HOME.rotation)
-    bounds = explorer.source_errors(STATED)
-    signs = explorer.largest_error(by_source, bounds).signs[0]
-    moved = STATED.unit_mm * np.linalg.norm(by_source[:3] @ (signs * bounds))
-    assert moved == pytest.approx(found["worst_displacement"])

@@ -65,11 +65,6 @@ def test_interference_pose_has_clearances_of_pairs(
     assert found["within_limits"] is (not expected.violations)
 
 
-def test_interference_default_is_the_home_pose(cli: CommandLine) -> None:
-    legs = explorer.evaluate(OPTIMAL, HOME).clearances
-    assert column(cli.answer(), "clearance") == legs.clearance.tolist()
-
-
 def test_interference_one_radius_is_for_all_legs(cli: CommandLine, tmp_path: Path) -> None:
     thick = cli.answer("--radii", "0.4")
     assert thick["radii"] == [0.4] * 4
@@ -90,6 +85,12 @@ def test_interference_pose_outside_limits_names_them(cli: CommandLine) -> None:
     assert "outside the limits" in shown
     assert all(each in shown for each in found["violations"])
     assert "the pose is within the limits" in cli.text()
+    moved = cli.answer("--to", *words[1:])
+    assert moved["within_limits"] is moved["end"]["within_limits"] is False
+    assert moved["start"]["within_limits"] is True
+    shown = cli.text("--to", *words[1:])
+    assert "the start is within the limits" in shown
+    assert "the end is outside the limits" in shown
 
 
 def test_interference_move_has_exact_and_swept_tests(cli: CommandLine) -> None:
@@ -121,13 +122,12 @@ def test_interference_move_clearance_is_that_of_its_pose(
         np.testing.assert_allclose(pair["points"], there["points"], atol=1e-6)
 
 
-@pytest.mark.parametrize("preset", ["paper-initial", "paper-optimal"])
 @pytest.mark.parametrize("words", [MOVE, MOVE[:4], ["--to-quaternion", "1", "0.5", "-0.2", "0"]])
 def test_interference_default_steps_are_within_the_node_step(
-    cli: CommandLine, preset: str, words: list[str]
+    cli: CommandLine, words: list[str]
 ) -> None:
-    design = explorer.PRESETS[preset]
-    found = cli.answer("--design", preset, *words)
+    design = OPTIMAL
+    found = cli.answer(*words)
     start, end = (
         explorer.Pose(tuple(found[key]["position"]), tuple(found[key]["quaternion"]))
         for key in ("start", "end")
@@ -145,9 +145,11 @@ def test_interference_default_steps_are_within_the_node_step(
         assert farthest(found["steps"] - 1) > step
 
 
-def test_interference_orientation_only_rotates_in_place(
+def test_interference_move_keeps_what_is_not_given(
     cli: CommandLine,
 ) -> None:
+    straight = cli.answer(*POSE, "--to", "14", "-2", "6")
+    assert straight["end"]["quaternion"] == straight["start"]["quaternion"]
     by_angles = cli.answer("--to-yaw-pitch-roll", "-20", "0", "15")
     assert by_angles["start"]["position"] == by_angles["end"]["position"] == list(HOME.position)
     quaternion = map(repr, END.quaternion)
@@ -155,25 +157,6 @@ def test_interference_orientation_only_rotates_in_place(
     np.testing.assert_allclose(
         column(by_angles, "clearance"), column(by_quaternion, "clearance"), rtol=1e-9
     )
-
-
-def test_interference_position_only_keeps_the_orientation(
-    cli: CommandLine,
-) -> None:
-    found = cli.answer(*POSE, "--to", "14", "-2", "6")
-    assert found["end"]["quaternion"] == found["start"]["quaternion"]
-
-
-def test_interference_move_outside_limits_names_the_end(
-    cli: CommandLine,
-) -> None:
-    found = cli.answer("--to", "30", "5", "9")
-    assert found["within_limits"] is found["end"]["within_limits"] is False
-    assert found["start"]["within_limits"] is True
-    assert any("box x" in each for each in found["end"]["violations"])
-    shown = cli.text("--to", "30", "5", "9")
-    assert "the start is within the limits" in shown
-    assert "the end is outside the limits" in shown
 
 
 def test_interference_joined_legs_are_null_and_in_words(cli: CommandLine, joined: str) -> None:
@@ -231,7 +214,6 @@ def test_interference_verdict_separates_clear_touching_and_colliding(
         (["--to-quaternion", "0", "0", "0", "0"], "quaternion"),
         (["--to", "1", "2"], "--to needs three numbers in the order x y z; got 2"),
         (["--to", "1e9", "2", "3"], "give their number with --steps"),
-        (["--radii", "0.1", "-1", "0", "0"], "leg_radii must not be negative; got -1"),
         (["--radii", "-0.5"], "leg_radii must not be negative; got -0.5"),
         (["--radii", "1", "2"], "--radii needs four numbers in the order r1 r2 r3 r4, or one"),
         (["--radii", "nan"], "finite"),
@@ -242,9 +224,3 @@ def test_interference_bad_input_is_refused_with_advice(
     cli: CommandLine, words: list[str], reason: str
 ) -> None:
     assert reason in cli.refusal(*words)
-
-
-def test_interference_many_steps_are_accepted(
-    cli: CommandLine,
-) -> None:
-    assert cli.answer("--to", "1e9", "2", "3", "--steps", "7")["steps"] == 7

@@ -32,21 +32,21 @@ def run(cli: CommandLine, *argv: object, status: int) -> tuple[str, list[str]]:
     return out, [line for line in err.splitlines() if not PROGRESS.fullmatch(line)]
 
 
+def fail_for_space(*_: object) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
 @pytest.mark.parametrize("name", WITH_FILES)
-@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EIO])
 def test_answer_is_printed_though_the_disk_is_full(
-    cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, code: int
+    cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     argv, options = WITH_FILES[name]
     files = [(option, tmp_path / f"{option[2:]}.x") for option in options]
     given = [*argv, *(word for pair in files for word in pair)]
 
-    def fail(_: int) -> None:
-        raise OSError(code, os.strerror(code))
-
     whole = cli_answer(cli, *argv)
     text, _ = run(cli, *argv, status=0)
-    monkeypatch.setattr(os, "fsync", fail)
+    monkeypatch.setattr(os, "fsync", fail_for_space)
     found = cli_answer(cli, *given, status=1)
     ignored = {"seconds", "trajectory"}
     assert {key: found[key] for key in whole if key not in ignored} == {
@@ -59,7 +59,7 @@ def test_answer_is_printed_though_the_disk_is_full(
     (line,) = complaints
     assert line.startswith("explorer: cannot write ")
     assert all(str(path) in line for _, path in files)
-    assert os.strerror(code) in line
+    assert os.strerror(errno.ENOSPC) in line
     assert list(tmp_path.iterdir()) == []
 
 
@@ -91,10 +91,7 @@ def test_optimise_writes_each_file_that_it_can(
 def test_optimise_without_convergence_and_disk_reports_both_in_a_line(
     cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(_: int) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(os, "fsync", fail)
+    monkeypatch.setattr(os, "fsync", fail_for_space)
     argv = [*PAPER[:3], "--target-volume", "2000", "--iterations", "1"]
     out, complaints = run(cli, *argv, "--record", tmp_path / "run.json", status=1)
     assert "best so far" in out

@@ -45,6 +45,9 @@ def test_path_json_has_poses_and_trajectory(cli: CommandLine, tmp_path: Path) ->
     assert len(rows) == len(course["time"]) == 21
     assert [float(row["l4 [10 mm]"]) for row in rows] == [q[5] for q in course["joints"]]
     assert found["file"] == str(file)
+    text = cli.text(*words[:4])
+    assert "moves       1, each proved to keep limits and clearances" in text
+    assert "least |δ|" in text
 
 
 @pytest.mark.parametrize(
@@ -68,16 +71,6 @@ def test_path_forms_of_a_pose_agree(cli: CommandLine, words: list[str]) -> None:
             rotation,
             atol=1e-12,
         )
-
-
-def test_path_quaternion_after_position_is_used(cli: CommandLine) -> None:
-    words = [*map(repr, HOME.quaternion)]
-    found = cli.answer("--to", "11", "6", "8", *words)
-    assert found["poses"][-1] == {
-        "position": [11.0, 6.0, 8.0],
-        "quaternion": list(HOME.quaternion),
-        "tilt_torsion": list(tilt_torsion_of(HOME.rotation)),
-    }
 
 
 def test_path_without_solution_has_status_1_and_reason(
@@ -108,16 +101,6 @@ def test_path_bad_input_is_one_line_and_status_2(
     cli: CommandLine, words: list[str], message: str
 ) -> None:
     assert message in cli.refusal(*words)
-    assert message in cli.refusal(*words, "--json")
-
-
-def test_path_text_has_ends_length_and_margins(
-    cli: CommandLine,
-) -> None:
-    text = cli.text("--to", "12", "8", "7")
-    assert "moves       1, each proved to keep limits and clearances" in text
-    assert "least |δ|" in text
-    assert all(line == line.rstrip() for line in text.splitlines())
 
 
 LIMITED_DESIGN = {
@@ -179,18 +162,6 @@ def test_path_with_load_holds_it_and_tells_the_largest_share(
     text = cli.text(*press, *up)
     share = f"{100.0 * straight['largest_share']:.1f}"
     assert f"load        held, with {share} % of a limit at most: " in text
-
-
-def test_path_with_load_at_the_tool_holds_it(cli: CommandLine, press: tuple[str, str]) -> None:
-    up = ("--to", "11", "5", "11", "-70", "5", "5", "--at", "tool", "--load", "0", "0", "-10")
-    found = cli.answer(*press, *up)
-    design = explorer.load_design(press[1])
-    poses = [
-        explorer.Pose(tuple(each["position"]), tuple(each["quaternion"])) for each in found["poses"]
-    ]
-    load = [0.0, 0.0, -10.0, 0.0, 0.0, 0.0]
-    largest = explorer.path_loads(design, poses, load, tool=design.tool.position).largest
-    assert found["largest_share"] == pytest.approx(largest.share, abs=1e-6)
 
 
 def test_path_end_that_does_not_hold_the_load_has_status_2(

@@ -20,19 +20,9 @@ from explorer.cli.parsing import load_command
 PROGRAM = [sys.executable, "-m", "explorer"]
 
 
-def process(*argv: str, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*PROGRAM, *argv],
-        capture_output=True,
-        encoding="utf-8",
-        env={**os.environ, **(env or {})},
-        timeout=60,
-        check=False,
-    )
-
-
 def test_process_answer_is_one_json_object_and_status_0() -> None:
-    done = process("inverse", "--position", "10", "5", "9", "--json")
+    argv = [*PROGRAM, "inverse", "--position", "10", "5", "9", "--json"]
+    done = subprocess.run(argv, capture_output=True, encoding="utf-8", check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert set(json.loads(done.stdout)) == {"joints", "within_limits", "violations"}
 
@@ -53,6 +43,7 @@ def test_main_without_answer_exits_with_status_and_one_line(
     assert captured.err.count("\n") == 1
 
 
+@pytest.mark.long
 def test_installed_script_runs_the_module() -> None:
     script = Path(sys.executable).parent / "explorer"
     if not script.exists():
@@ -71,21 +62,14 @@ def test_help_lists_every_command(cli: CommandLine, flag: str) -> None:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_help_of_a_command_describes_every_option(cli: CommandLine, name: str) -> None:
-    page = cli.text(name, "--help")
+    page, command = cli.text(name, "--help"), load_command(name, COMMANDS)
     assert page.startswith(f"usage: explorer {name} ")
     assert COMMANDS[name] in page
-    for field in dataclasses.fields(load_command(name, COMMANDS)):
+    assert (inspect.getdoc(command) or "").splitlines()[0] == COMMANDS[name]
+    for field in dataclasses.fields(command):
         option = f"--{field.name.replace('_', '-')}"
         is_placed = field.default is dataclasses.MISSING or f"[{field.name.upper()}]" in page
-        has_place = is_placed and "positional" in page
-        assert option in page or has_place
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_summary_of_a_command_is_its_first_line(name: str) -> None:
-    doc = inspect.getdoc(load_command(name, COMMANDS))
-    assert doc is not None
-    assert doc.splitlines()[0] == COMMANDS[name]
+        assert option in page or (is_placed and "positional" in page)
 
 
 def test_version_is_that_of_the_package(cli: CommandLine) -> None:
@@ -153,31 +137,22 @@ def test_full_disk_is_one_line() -> None:
     assert done.stderr.count(b"\n") == 1
 
 
-def test_ascii_terminal_gets_text_with_replacements() -> None:
-    done = process("singularity", env={"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"})
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "delta1" in done.stdout
-    assert "?" not in done.stdout
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
 @pytest.mark.parametrize(
     ("argv", "status"),
     [
         (("inverse", "--json"), 0),
         (("inverse", "--design", "nowhere"), 2),
-        (("optimise", "--design", "paper-initial", "--target-volume", "900", "--json"), 0),
     ],
 )
 def test_full_standard_error_keeps_answer_and_status(argv: tuple[str, ...], status: int) -> None:
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run(
-            [*PROGRAM, *argv], stdout=subprocess.PIPE, stderr=full, check=False, timeout=60
-        )
+        done = subprocess.run([*PROGRAM, *argv], stdout=subprocess.PIPE, stderr=full, check=False)
     assert done.returncode == status
     assert done.stdout.count(b"\n") == (status == 0)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 def test_record_that_no_longer_fits_on_the_disk_keeps_design_and_answer(tmp_path: Path) -> None:
     argv = ("optimise", "--design", "paper-initial", "--target-volume", "900", "--json")
@@ -188,7 +163,6 @@ def test_record_that_no_longer_fits_on_the_disk_keeps_design_and_answer(tmp_path
         [sys.executable, "-c", code, *argv, "--out", str(tmp_path / "best.json")],
         capture_output=True,
         encoding="utf-8",
-        timeout=60,
         check=False,
     )
     assert done.returncode == 1
@@ -213,7 +187,7 @@ def encodes(letter: str, encoding: str) -> bool:
         return False
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "cp437", "latin-1", "shift-jis", "utf-8"])
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
 def test_terminal_gets_the_characters_most_like_those_that_it_lacks(encoding: str) -> None:
     text = "−1.5 – 2×3 ≤ 4² ≥ “Größe” 漢δ 10⁻³ ±½° V′ ≠ΔøŁǿẑæµ"
     code = (

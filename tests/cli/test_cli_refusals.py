@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -90,22 +89,16 @@ def test_misspelt_option_gets_a_suggestion(cli: CommandLine) -> None:
     )
 
 
-def options() -> Iterator[tuple[str, str]]:
-    """Yield every option of every command, with the command."""
-    for name in COMMANDS:
-        for field in dataclasses.fields(load_command(name, COMMANDS)):
-            yield name, f"--{field.name.rstrip('_').replace('_', '-')}"
-
-
-@pytest.mark.parametrize(("command", "option"), [*options()])
-def test_option_given_twice_is_refused(cli: CommandLine, command: str, option: str) -> None:
-    for first, second in (
-        ([option, "1", "2", "3"], [option, "4", "5", "6"]),
-        ([f"{option}=a"], [option.replace("-", "_").replace("__", "--", 1)]),
-        ([option], [option]),
-    ):
-        message = cli.refusal(command, *first, *second)
-        assert message.startswith(f"explorer {command}: {option} is given twice; ")
+def test_option_given_twice_is_refused(cli: CommandLine) -> None:
+    for command in COMMANDS:
+        for field in dataclasses.fields(load_command(command, COMMANDS)):
+            option = f"--{field.name.rstrip('_').replace('_', '-')}"
+            for first, second in (
+                ([option, "1", "2", "3"], [option, "4", "5", "6"]),
+                ([f"{option}=a"], [option.replace("-", "_").replace("__", "--", 1)]),
+            ):
+                message = cli.refusal(command, *first, *second)
+                assert message.startswith(f"explorer {command}: {option} is given twice; ")
 
 
 def test_flag_and_its_opposite_are_refused(cli: CommandLine) -> None:

@@ -115,10 +115,13 @@ def test_a_part_with_a_limit_tells_its_share_though_nothing_loads_it(
     given = ["forces", *POSE, "--design", machine, "--payload", "0"]
     text = cli.text(*given)
     assert text.count("0.0 %") == 10
+    for words in ("force, N", "bending, N x unit", "largest payload", "worst direction"):
+        assert words in text
     assert "load acts at  b4" in text
     assert "load acts at  the tool" in cli.text(*given, "--at", "tool")
     free = cli.text("forces", *POSE)
     assert "%" not in free
+    assert "no limit" in free
 
 
 def test_all_parts_hold_the_largest_force_by_all_parts(cli: CommandLine, machine: Path) -> None:
@@ -164,22 +167,6 @@ def test_forces_json_has_what_the_process_may_add(cli: CommandLine, tmp_path: Pa
     text = cli.text("forces", *given)
     assert "process, ± N" in text
     assert not any(cli.answer("forces", *POSE)["process"].values())
-
-
-def test_forces_of_density_are_those_of_the_machines_weight(cli: CommandLine) -> None:
-    light, heavy = (
-        cli.answer("forces", *POSE, "--density", density)["actuator_forces"]
-        for density in ("1000", "3000")
-    )
-    assert_allclose(heavy, 3.0 * np.array(light))
-    assert any(light)
-
-
-def test_forces_text_names_units_and_limits(cli: CommandLine, machine: Path) -> None:
-    text = cli.text("forces", *POSE, "--load", "0", "0", "-10", "--design", machine)
-    for words in ("force, N", "bending, N x unit", "largest payload", "worst direction", " %"):
-        assert words in text
-    assert "no limit" in cli.text("forces", *POSE)
 
 
 def test_accuracy_json_has_errors_compliance_and_deflection(

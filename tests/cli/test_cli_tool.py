@@ -19,8 +19,7 @@ from tool_moves import tool_move
 
 import explorer
 from explorer.cli import COMMANDS
-from explorer.cli.options import PoseOptions
-from explorer.cli.parsing import load_command, parse
+from explorer.cli.parsing import load_command
 from explorer.export.opencascade import occ, volume_of
 from explorer.mechanism.tool_point import pose_with, position_of
 from explorer.numerics.arrays import FloatArray
@@ -94,18 +93,14 @@ def test_answers_at_b4_are_those_without_the_option(
             assert same[key] == pytest.approx(value, rel=1e-9)
 
 
-def test_forces_are_those_of_a_load_at_the_tool(cli: CommandLine, tooled: list[str]) -> None:
+def test_forces_and_accuracy_are_those_of_the_tool(cli: CommandLine, tooled: list[str]) -> None:
     load = [3.0, -2.0, -10.0, 0.0, 0.0, 0.0]
     found = cli.answer("forces", *POSE, "--load", *load, *tooled)
-    assert_allclose(
-        found["actuator_forces"], explorer.actuator_forces(TOOLED, B4, TURN, load, TOOL)
-    )
-
-
-def test_accuracy_is_that_of_the_tool(cli: CommandLine, tooled: list[str]) -> None:
+    expected = explorer.actuator_forces(TOOLED, B4, TURN, load, TOOL)
+    assert_allclose(found["actuator_forces"], expected)
     found = cli.answer("accuracy", *POSE, "--errors", "0.2", *tooled)
-    expected = explorer.worst_error(TOOLED, B4, TURN, [0.02] * 6, TOOL)
-    assert found["worst_displacement"] == pytest.approx(float(expected.displacement))
+    worst = explorer.worst_error(TOOLED, B4, TURN, [0.02] * 6, TOOL)
+    assert found["worst_displacement"] == pytest.approx(float(worst.displacement))
 
 
 def test_singularity_has_the_ellipsoids_of_the_tool(cli: CommandLine, tooled: list[str]) -> None:
@@ -294,8 +289,10 @@ def points_of(file: Path) -> FloatArray:
     return 1e3 * points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] if file.suffix == ".glb" else points
 
 
-@pytest.mark.parametrize("what", ["workspace", "hull"])
-@pytest.mark.parametrize("suffix", ["ply", "obj", "stl", "glb", "3mf"])
+@pytest.mark.parametrize(
+    ("what", "suffix"),
+    [("workspace", suffix) for suffix in ("ply", "obj", "stl", "glb", "3mf")] + [("hull", "ply")],
+)
 def test_export_of_the_workspace_is_moved_to_the_tool(
     cli: CommandLine, tooled: list[str], tmp_path: Path, what: str, suffix: str
 ) -> None:
@@ -312,14 +309,6 @@ def test_export_of_the_workspace_is_moved_to_the_tool(
     if suffix == "ply" and what == "workspace":
         assert_allclose(tool, b4 + offset, atol=1e-9)
         assert b"workspace of the tool of tooled" in files[1].read_bytes()
-
-
-def test_export_of_what_has_no_workspace_refuses_the_tool(
-    cli: CommandLine, tooled: list[str], tmp_path: Path
-) -> None:
-    for what, name in (("mechanism", "a.3mf"), ("simulation", "a.mjcf")):
-        refusal = cli.refusal("export", what, "--out", tmp_path / name, *tooled)
-        assert f"--at is not for {what}" in refusal
 
 
 def test_export_of_the_exact_workspace_is_moved_to_the_tool(
@@ -351,14 +340,6 @@ def test_every_command_that_takes_a_position_takes_the_point() -> None:
             taking.append(name)
             assert "at" in names, name
     assert {"inverse", "screenshot", "export", "path", "orientation", "workspace"} <= {*taking}
-
-
-def test_picture_at_the_tool_is_of_the_pose_of_b4() -> None:
-    parsed = parse("screenshot", load_command("screenshot", COMMANDS), [*POSE, "--at", "tool"])
-    assert isinstance(parsed, PoseOptions)
-    pose = parsed.pose(TOOLED)
-    assert_allclose(pose.position, B4)
-    assert_allclose(pose.rotation, TURN, atol=1e-12)
 
 
 def test_at_a_bad_point_or_a_tool_too_far_away_is_refused(cli: CommandLine, tmp_path: Path) -> None:

@@ -133,6 +133,11 @@ def test_workspace_ranges_and_tilts_add_two_volumes(
     assert tilted["orientations"] == 5
     volume = inclusive_solid(OPTIMAL, rotations, 0.4).volume
     assert tilted["inclusive_mesh"]["volume"] == pytest.approx(volume, rel=1e-6)
+    page = cli.text("--tilt", "8", "--samples", "5", "--hull", "--capability", 10, 5, 9, *COARSE)
+    for word in ("exact volume", "node volume", "999 nodes", "mesh", "convex hull", "inclusive"):
+        assert word in page
+    for word in ("total", "5 orientations", "watertight", "b1x", "capability"):
+        assert word in page
 
 
 def test_workspace_capability_is_over_the_given_orientations(
@@ -147,23 +152,12 @@ def test_workspace_capability_is_over_the_given_orientations(
     assert near["orientation_capability"] == 1.0
 
 
-def test_workspace_text_has_every_measure(cli: CommandLine) -> None:
-    words = ["--hull", "--tilt", "5", "--samples", "3", "--capability", "10", "5", "9", *COARSE]
-    page = cli.text(*words)
-    for word in ("exact volume", "node volume", "999 nodes", "mesh", "convex hull", "inclusive"):
-        assert word in page
-    for word in ("total", "3 orientations", "watertight", "b1x", "capability"):
-        assert word in page
-
-
 @pytest.mark.parametrize(
     ("argv", "words"),
     [
         (["--yaw-range", "5", "-5"], "yaw: the low end 5° exceeds the high end -5°"),
         (["--pitch-range", "5"], "--pitch-range needs two numbers in the order low high; got 1"),
         (["--step", "0"], "--step must be a positive number; got 0"),
-        (["--step", "-1"], "--step must be a positive number; got -1"),
-        (["--step", "nan"], "--step must be a positive number"),
         (["--step", "0.01"], "at most 50,000,000 are counted"),
         (["--tolerance", "0"], "--tolerance must be a positive number; got 0"),
         (["--tolerance", "1e-9"], "at most 2,000,000 are made"),

@@ -160,7 +160,7 @@ def test_determinant_is_that_of_the_rates_of_the_lengths(mechanism: SixLegs) -> 
 
 def test_compared_mechanisms_have_actuators_of_one_stroke() -> None:
     reach, random = OPTIMAL.reach, np.random.default_rng(3)
-    position = random.uniform(-2.0 * reach, 2.0 * reach, (20_000, 3))
+    position = random.uniform(-2.0 * reach, 2.0 * reach, (100_000, 3))
     for rotation in (
         home_pose(OPTIMAL).rotation,
         np.asarray(Rotation.random(rng=random).as_matrix()),
@@ -197,10 +197,10 @@ def test_volume_of_the_twin_is_that_of_a_plain_count(results: dict[str, Result])
         strict=True,
     ):
         lows, highs = mechanism.box
-        axes = [np.arange(low + 0.4, high, 0.8) for low, high in zip(lows, highs, strict=True)]
+        axes = [np.arange(low + 0.25, high, 0.5) for low, high in zip(lows, highs, strict=True)]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         count = int(mechanism.holds(grid, mechanism.home[1]).sum())
-        assert told["volume"] == pytest.approx(count * 0.8**3 / OPTIMAL.reach**3, rel=0.02)
+        assert told["volume"] == pytest.approx(count * 0.5**3 / OPTIMAL.reach**3, rel=0.02)
         assert 0.0 < told["error"] < 2e-3
 
 
