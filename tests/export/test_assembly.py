@@ -173,12 +173,9 @@ def test_assembly_bytes_equal_designs_give_equal_files(file_format: str) -> None
     assert len(again) < 2_000_000
 
 
-def test_assembly_bytes_unknown_format_lists_the_formats() -> None:
-    with pytest.raises(InputError, match="3mf, glb, stl-zip"):
-        assembly_bytes(PROTOTYPE, "dwg")
-
-
-def test_assembly_bytes_huge_parts_are_refused_as_3mf() -> None:
+def test_assembly_bytes_huge_parts_and_unknown_formats_are_refused() -> None:
     huge = make_prototype(msgspec.structs.replace(DESIGN, unit_mm=1e9))
     with pytest.raises(InputError, match="smaller unit"):
         assembly_bytes(huge, "3mf")
+    with pytest.raises(InputError, match="3mf, glb, stl-zip"):
+        assembly_bytes(PROTOTYPE, "dwg")

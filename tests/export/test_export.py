@@ -140,24 +140,8 @@ def comment(data: bytes, word: str) -> str:
 
 
 NAMES = [
-    *(
-        "",
-        "κ",
-        "\n\t\0",
-        "Räume 设计 😀",
-        "a\nv 0 0 0\nend_header\nf 1 2 3",
-        'o\' "quoted" <&> ]]>',
-    ),
-    *(
-        "back\\",
-        "\\" * 99,
-        "# comment",
-        "x  y" * 25,
-        "😀" * 99,
-        "long " * 2000,
-        "\ud800",
-        "solid é" * 9,
-    ),
+    *("", "\n\t\0", "Räume 设计 😀", "a\nv 0 0 0\nend_header\nf 1 2 3", 'o\' "quoted" <&> ]]>'),
+    *("\\" * 99, "# comment", "x  y" * 25, "😀" * 99, "long " * 2000, "\ud800", "solid é" * 9),
 ]
 
 
@@ -243,7 +227,7 @@ def test_mesh_bytes_empty_or_open_solid_is_refused_with_reason(file_format: str)
 
 
 @pytest.mark.parametrize("file_format", FORMATS)
-@pytest.mark.parametrize("s", [1e-6, 1e-3, 1e3, 1e6])
+@pytest.mark.parametrize("s", [1e-6, 1e6])
 def test_mesh_bytes_any_size_keeps_volume_or_is_refused(file_format: str, s: float) -> None:
     solid = replace(SOLID, vertices=s * SOLID.vertices)
     try:
@@ -266,15 +250,12 @@ def test_mesh_bytes_far_solid_is_refused_in_single_precision(file_format: str) -
     assert shape.is_watertight
 
 
-def test_mesh_bytes_huge_coordinates_are_refused() -> None:
+def test_mesh_bytes_huge_coordinates_and_unknown_formats_are_refused() -> None:
     huge = replace(SOLID, vertices=1e9 * SOLID.vertices)
     with pytest.raises(InputError, match="mm"):
         mesh_bytes(huge, "3mf", OPTIMAL, NAME)
     vast = replace(SOLID, vertices=1e40 * SOLID.vertices)
     with pytest.raises(InputError, match="double"):
         mesh_bytes(vast, "stl", OPTIMAL, NAME)
-
-
-def test_mesh_bytes_unknown_format_lists_the_formats() -> None:
     with pytest.raises(InputError, match="3mf, stl, glb, obj, ply"):
         mesh_bytes(SOLID, "step", OPTIMAL, NAME)

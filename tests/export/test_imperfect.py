@@ -104,26 +104,20 @@ def joints_read(machine: ImperfectMachine, pose: Pose) -> FloatArray:
     return np.array(joints) - [off[name] for name in JOINTS]
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_home_of_machine_reads_the_joints_of_the_design(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(5))
+def test_machine_reads_the_joints_of_the_design_and_errs_by_the_second_order(seed: int) -> None:
     machine = random_machine(seed)
     design, home = machine.design, home_pose(machine.design)
     expected = inverse(design, home.position, home.rotation)
     assert_allclose(joints_read(machine, machine.home), expected, atol=3e-12 * design.reach)
     off = np.linalg.norm(np.array(machine.home.position) - home.position)
     assert off > 1e-6 * design.reach
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_linear_error_of_tool_is_off_by_the_second_order(seed: int) -> None:
-    machine = random_machine(seed)
     rest: list[float] = []
     for share in (0.1, 0.05):
         one = ImperfectMachine(machine.design, share * machine.deviations)
         linear = one.linear_tool_error()
-        scale = np.abs(linear).max()
         rest.append(float(np.abs(one.tool_error() - linear).max()))
-        assert rest[-1] < 0.05 * scale
+        assert rest[-1] < 0.05 * np.abs(linear).max()
     assert rest[0] / rest[1] == pytest.approx(4.0, rel=0.1)
 
 
@@ -189,8 +183,7 @@ def error_of(found: tuple[FloatArray, FloatArray], pose: Pose, tool: FloatArray)
 
 
 # Deviations below a micrometre too, where MuJoCo takes a site for the frame of its body.
-@pytest.mark.parametrize("share", [1e-4, 1e-6, 1e-8])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(("seed", "share"), [(0, 1e-4), (1, 1e-6), (2, 1e-8), (3, 1e-8)])
 def test_model_of_machine_starts_closed_with_the_readings_of_home(seed: int, share: float) -> None:
     machine = random_machine(seed, share)
     design, home = machine.design, home_pose(machine.design)
@@ -316,7 +309,7 @@ def difference(
 
 def test_deflection_is_that_of_a_model_with_springs() -> None:
     model, data = springs_of(SPRINGS)
-    positions, rotations = random_poses(SPRINGS, 100, seed=4)
+    positions, rotations = random_poses(SPRINGS, 12, seed=4)
     rng = np.random.default_rng(1)
     stiffness = np.array(STIFFNESS) * SPRINGS.unit_mm
     most = 0.0
@@ -358,7 +351,7 @@ def loops_of(model: Any, data: Any) -> FloatArray:
     return np.array(data.efc_J).reshape(data.nefc, model.nv)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_inertia_of_servos_is_that_of_the_model(seed: int) -> None:
     design = msgspec.structs.replace(
         random_machine(seed).design, actuators=Actuators(stiffness_n_mm=STIFFNESS)
@@ -381,7 +374,7 @@ def test_inertia_of_servos_is_that_of_the_model(seed: int) -> None:
     assert (np.diag(rotors) >= 0.999 * np.diag(expected)).all()
 
 
-@pytest.mark.parametrize("stiffness", [1.0, 100.0, 1e4, 1e6])
+@pytest.mark.parametrize("stiffness", [1.0, 1e6])
 def test_model_of_any_stiffness_is_stable(stiffness: float) -> None:
     six: Six = (stiffness, stiffness, stiffness, stiffness, stiffness, stiffness)
     design = msgspec.structs.replace(
@@ -393,26 +386,11 @@ def test_model_of_any_stiffness_is_stable(stiffness: float) -> None:
     engine.mj_resetDataKeyframe(model, data, 0)
     data.qvel[:] = 1e-5 * np.random.default_rng(0).normal(size=15)
     start = float(np.abs(data.qvel).max())
-    steps = 10_000
+    steps = 4000
     engine.mj_step(model, data, nstep=steps)
     # An unstable model starts again from its reference.
     assert data.time == pytest.approx(steps * model.opt.timestep)
     assert np.abs(data.qvel).max() < 0.5 * start
-
-
-def test_model_with_typical_values_holds_still_under_gravity() -> None:
-    design, _ = typical_machine(IDEAL)
-    machine = ImperfectMachine.draw(design, 7)
-    model = model_of(machine)
-    data = engine.MjData(model)
-    engine.mj_resetDataKeyframe(model, data, 0)
-    engine.mj_step(model, data, nstep=int(0.5 / model.opt.timestep))
-    assert np.abs(data.qvel).max() < 1e-6
-    position, rotation = machine.home.position, machine.home.rotation
-    softness = pose_precision(design, position, rotation, TOOL).compliance
-    weight = 9.81 * float(model.body_mass.sum())
-    sag = np.linalg.norm(error_of(tool_of(design, data), machine.home, np.array(TOOL))[:3])
-    assert 0.0 < sag < weight * np.linalg.norm(softness[:3, :3]) * 2.0
 
 
 def test_model_of_a_seed_is_the_same_and_states_it() -> None:

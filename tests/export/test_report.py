@@ -103,18 +103,14 @@ def test_report_title_block_names_design_unit_and_hash() -> None:
     block = page.one(**{"class": "particulars"})
     assert "1 unit = 10 mm" in block.text
     assert explorer.__version__ in block.text
-    assert hashlib.sha256(encode_design(OPTIMAL)).hexdigest()[:16] in block.text
-    sections = ["Mechanism", "Workspace", "Singularities", "Legs", "Prototype"]
-    sections.append("The paper’s claims")
-    assert [each.text for each in page.all("h2")] == [*sections, "How to reproduce it"]
-
-
-def test_report_holds_its_design_file_and_hash() -> None:
-    page = paper_page()
     data = page.one(id="design").text.encode()
     assert data == encode_design(OPTIMAL)
     assert decode_design(data, "report") == OPTIMAL
     assert page.one(id="design-hash").text == hashlib.sha256(data).hexdigest()
+    assert hashlib.sha256(data).hexdigest()[:16] in block.text
+    sections = ["Mechanism", "Workspace", "Singularities", "Legs", "Prototype"]
+    sections.append("The paper’s claims")
+    assert [each.text for each in page.all("h2")] == [*sections, "How to reproduce it"]
 
 
 def test_report_equal_input_differs_in_date_only() -> None:
@@ -125,7 +121,7 @@ def test_report_equal_input_differs_in_date_only() -> None:
     assert later.replace(b"2026-03-10", b"2026-03-09") == first
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_report_mechanism_tables_hold_design_and_joints(seed: int) -> None:
     design, _ = ordinary_case(seed)
     page, unit = ordinary_page(seed), design.unit_mm
@@ -148,7 +144,7 @@ def test_report_mechanism_tables_hold_design_and_joints(seed: int) -> None:
         assert row.values == [value, value * unit, ends[0] * unit, ends[1] * unit]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_report_workspace_tables_hold_public_measures(seed: int) -> None:
     design, _ = ordinary_case(seed)
     rotation = explorer.home_pose(design).rotation
@@ -173,7 +169,7 @@ def test_report_workspace_tables_hold_public_measures(seed: int) -> None:
     assert shares == sorted(shares, reverse=True)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_report_singularity_and_leg_tables_hold_snapshot(seed: int) -> None:
     design, _ = ordinary_case(seed)
     home = explorer.home_pose(design)
@@ -378,7 +374,7 @@ def test_report_swing_limits_are_drawn_from_a_grid() -> None:
     assert any("clip-path" in each.attributes for each in page.all("g"))
 
 
-@pytest.mark.parametrize("seed", [3, 5, 8, 11, 14])
+@pytest.mark.parametrize("seed", [3, 8, 14])
 def test_report_troubled_designs_have_one(seed: int) -> None:
     design, _ = troubled_case(seed)
     page = page_of(design)

@@ -65,7 +65,7 @@ def reactions_at_home(design: Design) -> explorer.Reactions:
     return explorer.reactions(design, home.position, home.rotation, ZERO, tool, weights)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
     design = loaded_case(seed)
     page, held = page_of(design), reactions_at_home(design)
@@ -95,7 +95,7 @@ def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
             assert f" {k + 2}" in parts[place + k].text
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_report_loads_largest_payload_and_force_are_those_of_statics(seed: int) -> None:
     design = loaded_case(seed)
     home = explorer.home_pose(design)
@@ -117,7 +117,7 @@ def test_report_loads_largest_payload_and_force_are_those_of_statics(seed: int) 
     assert force <= float(most) * (1.0 + 1e-12)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_worst_payload_force_uses_the_share_of_any_direction(seed: int) -> None:
     design = loaded_case(seed)
     loads = ReportLoads(Case(design))
@@ -166,6 +166,23 @@ def test_report_loads_volume_is_that_of_held_workspace_beside_the_whole() -> Non
     assert "--load 0 0 0" in commands
 
 
+def test_report_of_limits_or_a_payload_alone_tells_what_follows_from_it() -> None:
+    limits = Actuators((100.0, 100.0, 100.0, 100.0, 100.0, 100.0))
+    design = msgspec.structs.replace(OPTIMAL, actuators=limits)
+    page, home = page_of(design), explorer.home_pose(design)
+    assert table_of(page, "Forces of the actuators")["d1"].values == [100.0, 100.0]
+    payload = float(explorer.largest_payload(design, home.position, home.rotation))
+    assert table_of(page, "Most that is held")["payload"].values == [payload]
+    assert "Where the payload is held" not in titles(page)
+    assert "share of its limit" not in page.text
+    design = msgspec.structs.replace(OPTIMAL, payload=Payload(1.0))
+    page, held = page_of(design), reactions_at_home(design)
+    forces = table_of(page, "Forces of the actuators")
+    assert [forces[name].values for name in JOINTS] == [[float(f)] for f in held.actuators]
+    assert "Most that is held" not in page.text
+    assert "share of its limit" not in page.text
+
+
 def test_report_without_a_machine_has_no_loads() -> None:
     for design in (OPTIMAL, msgspec.structs.replace(OPTIMAL, gravity=(1.0, 0.0, 0.0))):
         assert gather_report_data(design).loads is None
@@ -186,28 +203,6 @@ def test_report_of_a_tool_alone_tells_the_tool_and_no_forces() -> None:
     assert "Loads" in titles(page)
     assert "Where the payload is held" not in titles(page)
     assert "Forces of the actuators" not in page.text
-
-
-def test_report_of_limits_alone_tells_the_most_that_is_held() -> None:
-    design = msgspec.structs.replace(
-        OPTIMAL, actuators=Actuators((100.0, 100.0, 100.0, 100.0, 100.0, 100.0))
-    )
-    page = page_of(design)
-    assert table_of(page, "Forces of the actuators")["d1"].values == [100.0, 100.0]
-    home = explorer.home_pose(design)
-    payload = float(explorer.largest_payload(design, home.position, home.rotation))
-    assert table_of(page, "Most that is held")["payload"].values == [payload]
-    assert "Where the payload is held" not in titles(page)
-    assert "share of its limit" not in page.text
-
-
-def test_report_of_a_payload_without_limits_tells_forces_and_no_shares() -> None:
-    design = msgspec.structs.replace(OPTIMAL, payload=Payload(1.0))
-    page, held = page_of(design), reactions_at_home(design)
-    forces = table_of(page, "Forces of the actuators")
-    assert [forces[name].values for name in JOINTS] == [[float(f)] for f in held.actuators]
-    assert "Most that is held" not in page.text
-    assert "share of its limit" not in page.text
 
 
 @pytest.mark.parametrize(

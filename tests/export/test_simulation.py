@@ -23,7 +23,6 @@ from explorer import (
     forward,
     home_pose,
     inverse,
-    jacobian,
     margins,
 )
 from explorer.export.simulation import (
@@ -41,7 +40,7 @@ from explorer.prototype.mass import ball, bar, mesh_mass, total_mass
 
 engine: Any = mujoco
 OPTIMAL = PRESETS["paper-optimal"]
-POSES = 200
+POSES = 40
 
 
 def random_design(seed: int) -> Design:
@@ -61,7 +60,7 @@ def random_design(seed: int) -> Design:
     )
 
 
-DESIGNS = [OPTIMAL, PRESETS["paper-initial"], *map(random_design, range(8))]
+DESIGNS = [OPTIMAL, *map(random_design, range(3))]
 
 
 def random_poses(design: Design, many: int, seed: int = 0) -> tuple[FloatArray, FloatArray]:
@@ -114,21 +113,15 @@ def test_model_has_every_joint_and_six_servos() -> None:
 
 
 @pytest.mark.parametrize("design", DESIGNS)
-def test_model_reference_configuration_is_the_home_pose(design: Design) -> None:
+def test_model_starts_at_home_and_its_loops_close_at_our_joint_values(design: Design) -> None:
     model = model_of(design)
-    home = home_pose(design)
+    home, metres = home_pose(design), design.unit_mm * 1e-3
     expected = simulation_joints(design, np.array(home.position), home.rotation)
     assert (model.key_qpos[0] == model.qpos0).all()
     np.testing.assert_allclose(model.key_qpos[0], expected, rtol=1e-12, atol=1e-12)
-    lengths = inverse(design, home.position, home.rotation) * design.unit_mm * 1e-3
+    lengths = inverse(design, home.position, home.rotation) * metres
     np.testing.assert_allclose(model.key_ctrl[0], lengths, rtol=1e-12)
-
-
-@pytest.mark.parametrize("design", DESIGNS)
-def test_model_loops_close_at_our_joint_values(design: Design) -> None:
-    model = model_of(design)
     data = engine.MjData(model)
-    metres = design.unit_mm * 1e-3
     size = metres * max(design.reach, *map(abs, design.variables))
     positions, rotations = random_poses(design, POSES)
     for position, rotation in zip(positions, rotations, strict=True):
@@ -145,7 +138,7 @@ def test_model_loops_close_at_our_joint_values(design: Design) -> None:
     assert np.abs(equality_rows(model, data)[0]).max() > 1e-7 * size
 
 
-@pytest.mark.parametrize("design", DESIGNS[:6])
+@pytest.mark.parametrize("design", DESIGNS)
 def test_model_bodies_lie_where_the_chains_put_them(design: Design) -> None:
     model = model_of(design)
     data = engine.MjData(model)
@@ -194,19 +187,15 @@ def singular_pose(
     return position - np.linalg.pinv(rows) @ (rows @ position), rotation
 
 
-@pytest.mark.parametrize("design", DESIGNS[:5])
-@pytest.mark.parametrize("way", [way for way in WAYS if len(way) < 3])
-def test_locked_model_singular_poses_move(design: Design, way: tuple[int, ...]) -> None:
+@pytest.mark.parametrize("design", DESIGNS)
+def test_locked_model_moves_at_singular_poses_alone(design: Design) -> None:
     rng = np.random.default_rng(7)
-    for _ in range(4):
-        position, rotation = singular_pose(design, way, rng)
-        values = np.linalg.svd(locked_jacobian(design, position, rotation), compute_uv=False)
-        assert values[-1] < 1e-12 * values[0]
-
-
-@pytest.mark.parametrize("design", DESIGNS[:5])
-def test_locked_model_regular_poses_do_not_move(design: Design) -> None:
-    positions, rotations = random_poses(design, 30, seed=11)
+    for way in (way for way in WAYS if len(way) < 3):
+        for _ in range(2):
+            position, rotation = singular_pose(design, way, rng)
+            values = np.linalg.svd(locked_jacobian(design, position, rotation), compute_uv=False)
+            assert values[-1] < 1e-12 * values[0]
+    positions, rotations = random_poses(design, 10, seed=11)
     for position, rotation in zip(positions, rotations, strict=True):
         share = margins(position, rotation) / design.reach
         locked = locked_jacobian(design, position, rotation)
@@ -214,32 +203,8 @@ def test_locked_model_regular_poses_do_not_move(design: Design) -> None:
         assert values[-1] > 1e-6 * np.abs(share).min() * values[0]
 
 
-@pytest.mark.parametrize("design", DESIGNS[:5])
-def test_model_platform_velocities_match_the_jacobian(design: Design) -> None:
-    model = model_of(design)
-    data = engine.MjData(model)
-    metres = design.unit_mm * 1e-3
-    positions, rotations = random_poses(design, 10, seed=5)
-    rng = np.random.default_rng(5)
-    for position, rotation in zip(positions, rotations, strict=True):
-        set_pose(design, data, position, rotation)
-        engine.mj_forward(model, data)
-        _, loops = equality_rows(model, data)
-        velocity, spin = rng.normal(size=3), rng.normal(size=3)
-        moved, turned = np.zeros((2, 3, model.nv))
-        engine.mj_jacBody(model, data, moved, turned, model.body("platform").id)
-        rows = np.concatenate([moved, turned, loops])
-        rest = np.zeros(len(loops))
-        twist = np.concatenate([velocity * metres, spin, rest])
-        chains = np.linalg.solve(rows, twist)
-        rates = jacobian(design, position, rotation) @ np.concatenate([velocity, spin])
-        scale = np.abs(rates).max() * metres
-        np.testing.assert_allclose(chains[list(ACTUATED)], rates * metres, atol=1e-8 * scale)
-
-
-@pytest.mark.parametrize("name", ["paper-optimal", "paper-initial"])
-def test_model_servos_reach_the_pose_of_forward_kinematics(name: str) -> None:
-    design = PRESETS[name]
+def test_model_servos_reach_the_pose_of_forward_kinematics() -> None:
+    design = OPTIMAL
     model = model_of(design)
     data = engine.MjData(model)
     engine.mj_resetDataKeyframe(model, data, 0)
@@ -316,7 +281,7 @@ def test_model_carriages_keep_the_demanded_order(yaw: float) -> None:
     assert model_of(limited(design, carriage_order="any")).ntendon == 0
 
 
-@pytest.mark.parametrize("half_angle", [20.0, 60.0, 89.0])
+@pytest.mark.parametrize("half_angle", [20.0, 89.0])
 def test_model_ranges_of_hinges_hold_the_swing_cone(half_angle: float) -> None:
     design = limited(OPTIMAL, margin=None, swing=Swing(a1=half_angle, a3=half_angle))
     model = model_of(design)

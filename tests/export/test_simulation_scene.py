@@ -131,7 +131,7 @@ def loaded(seed: int) -> Design:
     )
 
 
-LOADED = [UNLIMITED, OPTIMAL, *map(loaded, range(10))]
+LOADED = [UNLIMITED, OPTIMAL, *map(loaded, range(3))]
 
 
 @pytest.mark.parametrize(("ahead", "behind"), HOSTS)
@@ -197,8 +197,10 @@ def test_model_in_a_scene_is_the_model_alone(design: Design, ahead: str, behind:
     assert np.abs(openings(data)).max() < 1e-9
 
 
-@pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("way", ["body", "model", "element", "carried"])
+@pytest.mark.parametrize(
+    ("seed", "way"),
+    [(0, "body"), (1, "model"), (2, "element"), (3, "carried"), (4, "model"), (5, "body")],
+)
 def test_model_attached_anywhere_starts_closed_with_its_tool_in_place(seed: int, way: str) -> None:
     rng = np.random.default_rng(seed)
     design = [PRESS, FULL, *map(loaded, (0, 2, 4))][seed] if seed < 5 else OPTIMAL
@@ -269,10 +271,11 @@ def test_servos_at_rest_give_the_forces_of_statics_at_home(design: Design, masse
     assert turn.magnitude() < 1e-4
 
 
-@pytest.mark.parametrize("integrator", ["EULER", "IMPLICITFAST", "IMPLICIT", "RK4"])
-@pytest.mark.parametrize("timestep", [5e-4, 4e-3])
+@pytest.mark.parametrize(
+    ("integrator", "timestep"), [("EULER", 5e-4), ("IMPLICITFAST", 4e-3), ("RK4", 4e-3)]
+)
 def test_servos_are_stable_for_time_steps_and_integrators(integrator: str, timestep: float) -> None:
-    for design in (UNLIMITED, OPTIMAL, loaded(3)):
+    for design in (UNLIMITED, loaded(3)):
         model = model_of(simulation_mjcf(design))
         model.opt.timestep = timestep
         model.opt.integrator = getattr(engine.mjtIntegrator, f"mjINT_{integrator}")
@@ -312,7 +315,7 @@ def test_commands_with_the_change_of_forces_do_not_droop_elsewhere() -> None:
     model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
     data = engine.MjData(model)
     weights = machine_weights(design, bar_masses(design, DENSITY))
-    positions, rotations = random_poses(design, 5, seed=1, margin=0.2)
+    positions, rotations = random_poses(design, 2, seed=1, margin=0.2)
     for position, rotation in zip(positions, rotations, strict=True):
         wrench = carry(design, position, rotation, weights).wrench
         forces = actuator_forces(design, position, rotation, wrench)

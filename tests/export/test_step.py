@@ -44,7 +44,7 @@ def test_step_workspace_volume_is_exact(design: Design) -> None:
         assert exact_workspace(scaled).volume == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.parametrize("index", [*range(0, 24, 3), 5, 17, 19])
+@pytest.mark.parametrize("index", [0, 5, 9, 17, 19, 21])
 def test_step_shells_slabs_and_tilted_planes_have_exact_volume(index: int) -> None:
     design, rotation, _ = reference_case(index)
     solid = exact_workspace(design, rotation)
@@ -55,11 +55,9 @@ def test_step_shells_slabs_and_tilted_planes_have_exact_volume(index: int) -> No
 @pytest.mark.parametrize(
     "swing",
     [
-        Swing(a1=30.0),
         Swing(a3=90.0),
         Swing(b1=50.0, b4=70.0),
         Swing(b2=20.0),
-        Swing(b2=120.0),
         Swing(a1=100.0, b3=30.0),
     ],
 )
@@ -138,8 +136,8 @@ def strings(data: bytes) -> list[str]:
 @pytest.mark.parametrize(
     "name",
     [
-        *("Räume κ", "it's a 'name'", "back \\ slash", "\\X2\\03B4\\X0\\", "δ😀δ", "设计" * 60),
-        *("'" * 99, "a'" * 70, "\\" * 99, "😀" * 99, "a\nb\tc\0", "; ENDSEC; /* ", "x" * 10_000),
+        *("Räume 'κ'", "\\X2\\03B4\\X0\\", "设计" * 60, "a'" * 70, "\\" * 99, "😀" * 99),
+        *("a\nb\tc\0", "; ENDSEC; /* ", "x" * 10_000),
     ],
 )
 def test_step_any_name_is_written_as_the_standard_says(name: str, tmp_path: Path) -> None:

@@ -30,25 +30,23 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.parametrize("code", REMEDIES)
 @pytest.mark.parametrize("step", ["open", "fsync", "replace"])
 def test_write_failure_leaves_the_old_file_and_names_the_remedy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, step: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
 ) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"old")
 
-    def fail(*_: object, **__: object) -> None:
-        raise OSError(code, os.strerror(code))
+    for code, remedy in REMEDIES.items():
 
-    with monkeypatch.context() as patch:
-        if step == "fsync":
-            patch.setattr(os, "fsync", fail)
-        else:
-            patch.setattr(Path, step, fail)
-        message = refusal(write_whole, path, b"new", kind=StorageError)
-    assert all(words in message for words in (REMEDIES[code], os.strerror(code), repr(str(path))))
-    assert contents(tmp_path) == {"file": b"old"}
+        def fail(*_: object, code: int = code, **__: object) -> None:
+            raise OSError(code, os.strerror(code))
+
+        with monkeypatch.context() as patch:
+            patch.setattr(os if step == "fsync" else Path, step, fail)
+            message = refusal(write_whole, path, b"new", kind=StorageError)
+        assert all(words in message for words in (remedy, os.strerror(code), repr(str(path))))
+        assert contents(tmp_path) == {"file": b"old"}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be forced to the disk there")

@@ -95,7 +95,7 @@ def test_bytes_that_are_no_text_are_refused_in_a_sentence(
     assert re.match(f"it: .*{words}", refusal(decode, data, "it"))
 
 
-def laid_out(fields: Any, rng: random.Random) -> str:
+def lay_out(fields: Any, rng: random.Random) -> str:
     """Return fields as a person or a program may have laid them out."""
     text = json.dumps(fields, indent=rng.choice([0, 2, "\t"]), ensure_ascii=rng.random() < 0.5)
     if rng.random() < 0.5:
@@ -120,11 +120,11 @@ def values(fields: Any, path: Steps = ()) -> Iterator[tuple[Steps, Any]]:
         yield from values(fields[step], (*path, step))
 
 
-def written(path: Steps) -> str:
+def path_text(path: Steps) -> str:
     return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)[1:]
 
 
-def changed(fields: Any, path: Steps, value: Any, name: str | None = None) -> Any:
+def with_value(fields: Any, path: Steps, value: Any, name: str | None = None) -> Any:
     """Return a document with another value at a path, under another name if one is given."""
     copied = copy.deepcopy(fields)
     holder = copied
@@ -147,27 +147,27 @@ DOCUMENTS: list[tuple[Decode, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize(("decode", "fields"), DOCUMENTS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_value_of_wrong_type_is_named_with_its_line_and_path(
     decode: Decode, fields: dict[str, Any], seed: int
 ) -> None:
     rng = random.Random(seed)
-    decode(laid_out(fields, rng).encode(), "mine.json")
+    decode(lay_out(fields, rng).encode(), "mine.json")
     for path, value in values(fields):
         if path in ((), ("schema",), ("design",)):
             continue
         mark = 4_444_444.5 if isinstance(value, str) else MARK
-        text = laid_out(changed(fields, path, mark), rng)
+        text = lay_out(with_value(fields, path, mark), rng)
         message = refusal(decode, text.encode(), "mine.json")
         line = line_of(text, str(mark))
-        start = f"mine.json: line {line}: {written(path)}: expected "
+        start = f"mine.json: line {line}: {path_text(path)}: expected "
         assert message.startswith(start) or "Invalid enum value" in message, message
         assert "$" not in message
         assert "`" not in message
 
 
 @pytest.mark.parametrize(("decode", "fields"), DOCUMENTS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_misspelt_field_is_named_with_its_line_and_the_nearest_name(
     decode: Decode, fields: dict[str, Any], seed: int
 ) -> None:
@@ -183,10 +183,10 @@ def test_misspelt_field_is_named_with_its_line_and_the_nearest_name(
         name = last.replace("_", "") + rng.choice("_9q")
         if rng.random() < 0.3:
             name = name.upper()
-        text = laid_out(changed(fields, path, value, name), rng)
+        text = lay_out(with_value(fields, path, value, name), rng)
         message = refusal(decode, text.encode("utf-16"), "mine.json")
         line = line_of(text, f'"{name}":')
-        of = f" of {written(tuple(outer))}" if outer else ""
+        of = f" of {path_text(tuple(outer))}" if outer else ""
         start = f"mine.json: line {line}: unknown field `{name}`{of}; "
         assert message.startswith(start)
         # Short names are similar to several.
@@ -199,10 +199,10 @@ def test_field_without_a_similar_name_is_reported_with_all_names(decode: Decode)
     assert message.startswith("it: line 3: unknown field `xyzzy`; there are schema, ")
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(15))
 def test_text_that_is_no_json_is_reported_with_line_and_text(seed: int) -> None:
     rng = random.Random(seed)
-    text = laid_out(FIELDS, rng)
+    text = lay_out(FIELDS, rng)
     tokens = [match.start() for match in re.finditer(r'"[^"]*"|[\w.-]+|[^\s"]', text)]
     at = rng.choice(tokens)
     broken = f"{text[:at]}{MARK}{text[at:]}"
@@ -245,8 +245,8 @@ def test_unusable_range_of_a_study_is_reported_with_its_line() -> None:
     ):
         fields = copy.deepcopy(STUDY_FIELDS)
         fields["polish"]["iterations"] = 10
-        text = json.dumps(changed(fields, path, value), indent=1)
-        broken = json.dumps(changed(fields, path, MARK), indent=1)
+        text = json.dumps(with_value(fields, path, value), indent=1)
+        broken = json.dumps(with_value(fields, path, MARK), indent=1)
         message = refusal(decode_study, text.encode(), "mine.json")
         # The field and its value may be on two lines.
         assert message.startswith(f"mine.json: line {line_of(broken, MARK)}: "), message
