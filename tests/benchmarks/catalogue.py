@@ -22,7 +22,6 @@ BENCHMARKS: Mapping[str, str] = {
     "planning": "paths between random poses that keep everything",
     "report": "the report of a design as HTML and as PDF, from the command to the file",
     "orientation": "shares of orientations, greatest tilts at a position and over many",
-    "drag_sockets": "lag of two long drags at once, seen by bare websocket clients",
     "frame_cost": "a frame of the scene in the software renderer, over viser's hello-world",
     "page_ready": "from the address to a page that has drawn all, over viser's hello-world",
     "first_minute": "the first searches on a machine that has never run the explorer",

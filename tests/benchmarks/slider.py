@@ -44,8 +44,7 @@ class Kind:
         drag: The drag of a number of events from a state.
         sent: The value in a message of it.
         arrived: The same value in a state.
-        is_loaded: Whether the machine has limits, and forces are drawn.
-        is_precise: Whether the machine has errors and stiffness, which are drawn.
+        is_loaded: Whether the machine has limits, errors and stiffness, and all is drawn.
     """
 
     name: str
@@ -53,7 +52,6 @@ class Kind:
     sent: Callable[[Any], float]
     arrived: Callable[[State], float]
     is_loaded: bool = False
-    is_precise: bool = False
 
 
 def _value(message: Any) -> float:
@@ -80,21 +78,8 @@ KINDS = (
         _value,
         lambda state: state.joints[0],
     ),
-    Kind(
-        "pose slider x",
-        lambda state, count: SliderDrag("x", sweep(state.pose.position[0], 2.0, count)),
-        _value,
-        lambda state: state.pose.position[0],
-    ),
-    Kind(
-        "design slider b1x",
-        lambda state, count: SliderDrag("b1x", sweep(state.design.b1[0], 1.0, count)),
-        _value,
-        lambda state: state.design.b1[0],
-    ),
     DRAG,
-    replace(DRAG, name="drag handle, forces drawn", is_loaded=True),
-    replace(DRAG, name="drag handle, precision drawn", is_precise=True),
+    replace(DRAG, name="drag handle, forces and precision drawn", is_loaded=True),
 )
 
 
@@ -193,10 +178,9 @@ def measure() -> dict[str, list[Stopwatch]]:
         # The kinds take turns, so that no disturbance falls on one alone.
         for events in (WARM_UP_EVENTS, *[EVENTS] * ROUNDS):
             for kind in KINDS:
-                design = PRESS if kind.is_loaded else DESIGN
-                session.do(Open(typical_machine(design)[0] if kind.is_precise else design))
+                session.do(Open(typical_machine(PRESS)[0] if kind.is_loaded else DESIGN))
                 session.do(Set("view.forces.shown", kind.is_loaded))
-                drawn = PrecisionView(ellipsoid=kind.is_precise, deflected=kind.is_precise)
+                drawn = PrecisionView(ellipsoid=kind.is_loaded, deflected=kind.is_loaded)
                 session.do(Set("view.precision", drawn))
                 session.wait_until_idle()
                 stopwatch = Stopwatch(kind)

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
@@ -23,7 +23,7 @@ from client import CAMERA, PROTOCOL
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from explorer.mechanism.pose import Pose, Triple
+from explorer.mechanism.pose import Pose
 
 EVENTS_PER_SECOND = 30.0
 # So long nothing must come before all is known to have come.
@@ -62,12 +62,10 @@ class Seen:
     Attributes:
         sent: When its last event was sent.
         drawn: When the last message about the scene came.
-        positions: Of the scene nodes that were moved, the last.
     """
 
     sent: float = 0.0
     drawn: float = 0.0
-    positions: dict[str, Triple] = field(default_factory=dict[str, Triple])
 
 
 @contextmanager
@@ -174,7 +172,4 @@ class _Client:
         for message in messages:
             if message["type"] == "GuiSliderMessage":
                 self._uuids[message["props"]["label"]] = message["uuid"]
-            elif message["type"] == "SetPositionMessage":
-                x, y, z = message["position"]
-                self.seen.positions[message["name"]] = (x, y, z)
         return messages

@@ -106,22 +106,6 @@ def test_interference_move_has_exact_and_swept_tests(cli: CommandLine) -> None:
     assert found["end"]["position"] == list(END.position)
 
 
-def test_interference_move_clearance_is_that_of_its_pose(
-    cli: CommandLine,
-) -> None:
-    start, end = np.array(HOME.position), np.array(END.position)
-    for index, pair in enumerate(cli.answer(*MOVE, "--radii", "0.2")["pairs"]):
-        along = start + pair["share"] * (end - start)
-        np.testing.assert_allclose(pair["position"], along, atol=1e-12)
-        there = cli.answer(
-            *("--position", *map(repr, pair["position"])),
-            *("--quaternion", *map(repr, pair["quaternion"])),
-            *("--radii", "0.2"),
-        )["pairs"][index]
-        assert pair["clearance"] == pytest.approx(there["clearance"], abs=1e-9)
-        np.testing.assert_allclose(pair["points"], there["points"], atol=1e-6)
-
-
 @pytest.mark.parametrize("words", [MOVE, MOVE[:4], ["--to-quaternion", "1", "0.5", "-0.2", "0"]])
 def test_interference_default_steps_are_within_the_node_step(
     cli: CommandLine, words: list[str]

@@ -20,7 +20,6 @@ from tool_moves import tool_move
 import explorer
 from explorer.cli import COMMANDS
 from explorer.cli.parsing import load_command
-from explorer.export.opencascade import occ, volume_of
 from explorer.mechanism.tool_point import pose_with, position_of
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import performance
@@ -309,26 +308,6 @@ def test_export_of_the_workspace_is_moved_to_the_tool(
     if suffix == "ply" and what == "workspace":
         assert_allclose(tool, b4 + offset, atol=1e-9)
         assert b"workspace of the tool of tooled" in files[1].read_bytes()
-
-
-def test_export_of_the_exact_workspace_is_moved_to_the_tool(
-    cli: CommandLine, tooled: list[str], tmp_path: Path
-) -> None:
-    pytest.importorskip("OCP")
-    boxes: list[Any] = []
-    for name, options in (("b4", tooled[:2]), ("tool", tooled)):
-        path = tmp_path / f"{name}.step"
-        answer = cli.answer("export", "workspace", "--out", path, *options)
-        reader = occ("STEPControl_Reader")()
-        reader.ReadFile(str(path))
-        reader.TransferRoots()
-        shape, box = reader.OneShape(), occ("Bnd_Box")()
-        assert volume_of(shape) == pytest.approx(answer["volume"] * 1e3, rel=1e-6)
-        occ("BRepBndLib").AddOptimal_s(shape, box, False, False)
-        corners = box.CornerMin(), box.CornerMax()
-        boxes.append(np.array([[c.X(), c.Y(), c.Z()] for c in corners]))
-    shift = 10.0 * explorer.home_pose(TOOLED).rotation @ TOOL
-    assert_allclose(boxes[1], boxes[0] + shift, atol=1e-3)
 
 
 def test_every_command_that_takes_a_position_takes_the_point() -> None:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import msgspec
-import numpy as np
 import pytest
 from command_line import CommandLine
 
@@ -79,26 +78,6 @@ def test_workspace_orientation_step_and_tolerance_are_used(
     solid = workspace_solid(OPTIMAL, rotation, 0.4)
     assert found["mesh"]["triangles"] == len(solid.faces)
     assert found["hull_volume"] == pytest.approx(convex_hull(solid).volume, rel=1e-9)
-
-
-def test_workspace_table1_has_printed_and_computed_values(
-    cli: CommandLine,
-) -> None:
-    found = cli.answer("--table1")
-    initial, optimal = found["table1"]
-    assert (initial["node_count"], optimal["node_count"]) == (2468, 999)
-    assert optimal["printed"]["node_volume"] == optimal["node_volume"] == 7992.0
-    assert initial["printed"]["node_volume"] is None
-    for row in (initial, optimal):
-        # To the three decimals that are printed.
-        np.testing.assert_allclose(row["extent"], row["printed"]["extent"], atol=5e-4)
-        assert row["volume"] < row["node_volume"]
-    assert optimal["volume"] == pytest.approx(7053.044, abs=1e-3)
-    assert "A node on the boundary counts as a whole cell" in found["note"]
-    text = cli.text("--table1")
-    for word in ("paper-initial", "paper-optimal", "10.052", "7992", "7053.04", "2468", "999"):
-        assert word in text
-    assert found["note"] in " ".join(text.split())
 
 
 def test_workspace_empty_has_status_0(cli: CommandLine, tmp_path: Path) -> None:

@@ -25,13 +25,10 @@ from explorer import (
     limit_shares,
     margins,
     reactions,
-    workspace_nodes,
     workspace_volume,
 )
 from explorer.files.json_text import LONGEST_LINE
-from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
-from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.home import home_signs
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
@@ -133,8 +130,6 @@ def test_packaged_studies_can_be_run() -> None:
         ({"variables": {"a4": [1, 2]}}, "no variable 'a4'; there are a3x"),
         ({"variables": {}}, "must name at least one of"),
         ({"variables": {"a3y": [4, 4]}}, "the range of a3y is empty: 4 to 4"),
-        ({"variables": {"a3y": [4]}}, "variables"),
-        ({"variables": {"a3y": [4, 1e99]}}, "must not exceed 1e+40"),
         ({"variables": {"radius": [-1, 1]}}, "must not be negative"),
         ({"variables": {"reach": [0, 1]}}, "above every minimum length"),
         ({"sampling": {"method": "sobol", "count": 0}}, "sampling.count must lie within 1 to"),
@@ -144,7 +139,6 @@ def test_packaged_studies_can_be_run() -> None:
         ({"sampling": {"method": "grid", "count": 10_000_000}}, "the grid has 1e+21 designs"),
         ({"sampling": {"method": "random", "count": 8}}, "Invalid enum value 'random'"),
         ({"measures": ["mass"]}, "no measure 'mass'; there are volume"),
-        ({"measures": []}, "measures must name at least one"),
         ({"measures": ["volume", "volume"]}, "may name each once"),
         ({"objectives": [{"measure": "mass", "sense": "min"}]}, "neither measured nor a variable"),
         ({"variables": {"reach": [9, 12]}, "measures": ["reach"]}, "leave it out of the measures"),
@@ -152,7 +146,6 @@ def test_packaged_studies_can_be_run() -> None:
             {"polish": {"objective": "largest-volume", "variables": {"radius": [0, 1]}}},
             "no variable 'radius'",
         ),
-        ({"nodes": 1}, "nodes must lie within 2"),
         ({"chunk": 0}, "chunk must lie within 1"),
         ({"clearance_margin": -1}, "clearance_margin must be positive"),
         ({"design": "paper"}, "no preset 'paper'"),
@@ -385,15 +378,6 @@ def test_measures_of_a_row_match_the_public_functions() -> None:
     # The nodes see no less than there is.
     assert isinstance(found["least_clearance"], float)
     assert found["least_clearance"] <= min(nodes.clearances) + 1e-3 * design.reach
-
-
-def test_extents_match_the_nodes_of_the_paper_to_a_cell() -> None:
-    case = Case(OPTIMAL, nodes=40)
-    paper = workspace_nodes(OPTIMAL, step=0.5).extent
-    assert paper is not None
-    for axis, low, high in zip("xyz", *paper, strict=True):
-        own = measure_design(case, [f"extent_{axis}"])[f"extent_{axis}"]
-        assert own == pytest.approx(high - low, abs=2.0 * (high - low) / 40.0 + 1.0)
 
 
 MACHINE_RANGES = {
