@@ -2,7 +2,7 @@
 
 They speak viser's protocol: messages to the server are MessagePack maps, those from it are
 windows of such maps, compressed, with arrays behind them. Sliders are known by their
-labels and scene nodes by their names, as in a browser.
+labels, as in a browser.
 """
 
 from __future__ import annotations

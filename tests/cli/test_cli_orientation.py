@@ -71,14 +71,6 @@ def test_tilt_torsion_gives_the_orientation(cli: CommandLine) -> None:
     )
 
 
-def test_json_of_poses_has_tilt_and_torsion(cli: CommandLine) -> None:
-    found = cli.answer("singularity", "--position", "10", "5", "9")
-    for pose in found["nearest"]:
-        rotation = explorer.rotation_from_quaternion(pose["quaternion"])
-        expected = explorer.tilt_torsion_from_rotation(rotation)
-        np.testing.assert_allclose(pose["tilt_torsion"], expected, atol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("words", "reason"),
     [

@@ -56,6 +56,7 @@ STUDY = Study(
     chunk=4,
 )
 SAMPLING = Sampling(method="latin-hypercube", count=16, seed=3)
+WEIGHTS = Weights(carriages=(0.1, 0.2, 0.3, 0.4), rods=(1.0, 2.0, 3.0, 4.0))
 
 
 def of_numpy(value: Any, *, arrays: bool) -> Any:
@@ -116,7 +117,7 @@ def test_pose_of_whole_numbers_is_that_of_floats(position: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "value", [LIMITED, PROBLEM, STUDY, SAMPLING], ids=lambda v: type(v).__name__
+    "value", [LIMITED, PROBLEM, STUDY, SAMPLING, WEIGHTS], ids=lambda v: type(v).__name__
 )
 def test_value_of_numpy_numbers_is_that_of_plain_ones(value: Any) -> None:
     check_plain(value)
@@ -124,13 +125,6 @@ def test_value_of_numpy_numbers_is_that_of_plain_ones(value: Any) -> None:
 
 def test_study_of_numpy_numbers_is_read_back_from_its_file() -> None:
     assert decode_study(encode_study(of_numpy(STUDY, arrays=True)), "file") == STUDY
-
-
-def test_weights_of_numpy_numbers_compare_with_those_of_plain_ones() -> None:
-    plain = Weights(carriages=(0.1, 0.2, 0.3, 0.4), rods=(1.0, 2.0, 3.0, 4.0))
-    made = Weights(carriages=cast("Any", np.array(plain.carriages)), rods=cast("Any", [1, 2, 3, 4]))
-    assert made == plain
-    assert hash(made) == hash(plain)
 
 
 def test_pose_of_whole_numbers_beyond_floats_is_refused() -> None:
