@@ -58,18 +58,20 @@ class Newcomer:
         return self.page.get_by_role("button", name=words, exact=True).first
 
     def press(self, words: Words, role: Role = "button") -> None:
-        """Press a button, a checkbox or a tab."""
+        """Press a button, a checkbox or a tab, once the page has drawn all that was sent."""
         self.presses += 1
+        self._tab.settle()
         self.page.get_by_role(role, name=words, exact=True).first.click()
 
     def press_running(self, words: str) -> None:
-        """Press a button that is drawn anew again and again, where it stands."""
+        """Press a button of what runs, while which the page is never at rest."""
         self.presses += 1
         self._tab.push(words)
 
     def press_at(self, x: float, y: float) -> None:
-        """Press a point of the page."""
+        """Press a point of the page, once it has drawn all that was sent."""
         self.presses += 1
+        self._tab.settle()
         self.page.mouse.click(x, y)
 
     def open(self, title: str) -> None:
@@ -181,6 +183,11 @@ class Newcomer:
         """Return how many presses there were since the last count, and begin to count anew."""
         presses, self.presses = self.presses, 0
         return presses
+
+    def resize(self, size: tuple[int, int]) -> None:
+        """Give the window another size."""
+        self.page.set_viewport_size({"width": size[0], "height": size[1]})
+        self._tab.settle()
 
     def reload(self) -> None:
         """Load the page again."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -19,22 +18,14 @@ from explorer.workspace.slices.volume import workspace_volume
 
 # Pixels that tell a surface from edges.
 MANY = 800
-# Far longer than a press takes.
-AGAIN_SECONDS = 8.0
 
 
-def press(tab: Tab, name: str, done: Callable[[], bool]) -> None:
-    """Press a button in markup, by its hint, and wait until that is done.
-
-    The words are made anew when figures arrive: a press that meets those of before is lost.
-    """
-    deadline = time.monotonic() + PATIENCE_SECONDS
-    while not done():
-        assert time.monotonic() < deadline, f"never came about: {name}"
-        tab.page.get_by_title(name).first.evaluate("button => button.click()")
-        again = time.monotonic() + AGAIN_SECONDS
-        while not done() and time.monotonic() < again:
-            tab.page.wait_for_timeout(20)
+def press(tab: Tab, name: str, is_done: Callable[[], bool]) -> None:
+    """Press a button in markup by its hint, once the page is at rest; wait until it has worked."""
+    assert tab.running.page.wait_until_drawn(PATIENCE_SECONDS)
+    tab.settle()
+    tab.page.get_by_title(name).first.click()
+    tab.wait_for(is_done, name)
 
 
 def purple_pixels(tab: Tab) -> int:
@@ -43,7 +34,7 @@ def purple_pixels(tab: Tab) -> int:
     return int(((blue > green + 0.08) & (red > green + 0.02)).sum())
 
 
-def test_designs_are_pinned_told_overlaid_and_opened(tab: Tab) -> None:
+def test_designs_are_pinned_measured_overlaid_and_opened(tab: Tab) -> None:
     tab.running.page.session.do(Set("view", View(handle=False, tetrahedra=(False, False, False))))
     tab.turn_to("Compare")
     press(tab, "Keep a copy as it is now", lambda: tab.state.compared.pinned[0] is not None)
@@ -71,12 +62,12 @@ def test_designs_are_pinned_told_overlaid_and_opened(tab: Tab) -> None:
     assert np.abs(purple_pixels(tab) - before) < MANY
 
 
-def test_button_in_markup_is_pressed_by_a_key_and_keeps_the_focus(tab: Tab) -> None:
+def test_button_in_markup_that_is_pressed_by_a_key_keeps_the_focus(tab: Tab) -> None:
     tab.turn_to("Compare")
-    session = tab.running.page.session
-    session.do(Pin(PRESETS["paper-initial"]))
+    tab.running.page.session.do(Pin(PRESETS["paper-initial"]))
     bars = tab.page.get_by_role("button", name="Bars", exact=True)
     bars.wait_for()
+    tab.settle()
     tab.page.get_by_role("button", name="Pin this design").focus()
     for _ in range(2):
         tab.page.keyboard.press("Tab")

@@ -1,4 +1,4 @@
-"""Changing the design in a real page: presets, variables, what is held, refusals, limits."""
+"""Changing the design in a real page: presets, variables, limits, the sketch."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 from tab import TRACK, Tab
 
-from explorer.app.screenshot import SCENE_CANVAS, settle
+from explorer.app.screenshot import SCENE_CANVAS
 from explorer.app.state.state import joints_of, opened
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
@@ -33,37 +33,30 @@ def assert_variables_shown(tab: Tab) -> None:
         )
 
 
-def test_a_preset_opens_in_its_home_pose(tab: Tab) -> None:
+def test_design_is_opened_changed_by_a_variable_and_reset_in_its_pose(tab: Tab) -> None:
+    card = tab.page.locator(".ex-change-card")
+    expect(card).to_have_count(0)
     tab.choose("Preset", "paper-initial")
     tab.wait_for(lambda: tab.state.design == INITIAL, "the preset")
     assert tab.state.pose == opened(INITIAL).pose
     assert_variables_shown(tab)
-    tab.turn_to("Pose")
-    for axis, name in enumerate("xyz"):
-        tab.wait_until_shown(name, tab.state.pose.position[axis])
-
-
-def test_a_variable_changes_the_legs_when_the_pose_is_held(tab: Tab) -> None:
+    tab.choose("Preset", "paper-optimal")
+    tab.wait_for(lambda: tab.state.design == OPTIMAL, "the other preset")
+    assert tab.state.pose == opened(OPTIMAL).pose
+    # The pose is held, and the legs change.
     before = tab.state
     goal = tab.drag("b1x", 0.6)
     tab.wait_for(lambda: abs(tab.state.design.b1[0] - goal) < 0.5, "the b1x dragged to")
+    assert_variables_shown(tab)
     state = tab.state
     assert state.pose == before.pose
     assert state.joints == pytest.approx(joints_of(state.design, state.pose))
     assert state.joints[0] != before.joints[0]
-    assert_variables_shown(tab)
     # It is none of the presets any more.
     expect(tab.row("Preset").get_by_role("combobox")).to_have_value("—")
-
-
-def test_differences_of_a_change_last_until_a_press_outside_of_the_scene(tab: Tab) -> None:
-    card = tab.page.locator(".ex-change-card")
-    expect(card).to_have_count(0)
-    goal = tab.drag("b1x", 0.6)
-    tab.wait_for(lambda: abs(tab.state.design.b1[0] - goal) < 0.5, "the b1x dragged to")
+    # The differences last while the camera is turned, until a press outside of the scene.
     for name in ("Volume", "Reach", "Clearance here"):
         expect(card).to_contain_text(name)
-    # The camera is turned.
     scene = tab.page.locator(SCENE_CANVAS).bounding_box()
     assert scene is not None
     x, y = scene["x"] + 0.5 * scene["width"], scene["y"] + 0.9 * scene["height"]
@@ -71,40 +64,15 @@ def test_differences_of_a_change_last_until_a_press_outside_of_the_scene(tab: Ta
     tab.page.mouse.down()
     tab.page.mouse.move(x + 20.0, y)
     tab.page.mouse.up()
-    settle(tab.page, tab.client)
+    tab.settle()
     expect(card).to_contain_text("Reach")
     tab.turn_to("Show")
     expect(card).to_have_count(0)
-
-
-def test_a_variable_changes_the_pose_when_the_legs_are_held(tab: Tab) -> None:
-    tab.choose("On a change", "hold the legs")
-    tab.wait_for(lambda: tab.state.hold == "legs", "that the legs are held")
-    before = tab.state
-    tab.type("a3x", "19.4")
-    tab.wait_for(lambda: tab.state.design.a3[0] == 19.4, "the a3x that was typed")
-    assert tab.state.joints == before.joints
-    assert tab.state.pose != before.pose
-    np.testing.assert_allclose(joints_of(tab.state.design, tab.state.pose), before.joints)
-
-
-def test_reset_returns_to_the_design_as_it_was_opened(tab: Tab) -> None:
-    tab.type("b3", "5.5")
-    tab.wait_for(lambda: tab.state.design.b3 == 5.5, "the b3 that was typed")
+    tab.turn_to("Design")
     tab.push("Reset")
     tab.wait_for(lambda: tab.state.design == OPTIMAL, "the design as it was opened")
     assert tab.state.pose == opened(OPTIMAL).pose
     assert_variables_shown(tab)
-
-
-def test_a_degenerate_value_is_refused_with_a_reason_and_the_old_one_returns(tab: Tab) -> None:
-    before = tab.state
-    tab.type("a3y", "0")
-    notice = tab.page.get_by_role("alert").filter(has_text="That is not possible")
-    notice.wait_for()
-    expect(notice).to_contain_text("degenerate design: a3y = 0")
-    assert tab.state == before
-    tab.wait_until_shown("a3y", 7.0062)
 
 
 @pytest.fixture
@@ -141,7 +109,9 @@ def drag_thumb(tab: Tab, words: str, end: int, by: float) -> None:
     tab.page.mouse.up()
 
 
-def test_an_end_that_is_typed_is_a_limit_and_the_other_end_stays(limits: Tab) -> None:
+def test_end_that_is_typed_is_a_limit_and_is_disabled_where_nothing_is_bounded(
+    limits: Tab,
+) -> None:
     type_end(limits, "l1", 1, "11")
     limits.wait_for(lambda: limits.state.design.limits.l1 == (0.0, 11.0), "the maximum")
     expect(limits.page.get_by_text("Outside the limits")).to_be_visible()
@@ -151,9 +121,18 @@ def test_an_end_that_is_typed_is_a_limit_and_the_other_end_stays(limits: Tab) ->
     assert limits.state.design.limits.l4 == (0.0, None)
     limits.switch("Maxima at the reach", on=True)
     limits.wait_for(lambda: limits.state.design.limits.l1 == (0.0, None), "at the reach")
+    field = limits.field("d1, d3 ends").first
+    expect(field).to_be_disabled()
+    limits.switch("Bounded guide", on=True)
+    limits.wait_for(lambda: limits.state.design.limits.guide is not None, "a guide")
+    expect(field).to_be_enabled()
+    type_end(limits, "d1, d3", 0, "2")
+    limits.wait_for(lambda: (limits.state.design.limits.guide or (0, 0))[0] == 2.0, "its end")
+    # The names of what is side by side tell which is which.
+    expect(limits.page.get_by_role("textbox", name="d1, d3 least", exact=True)).to_have_value("2")
 
 
-def test_a_thumb_stops_at_the_other_and_a_typed_end_pushes_it(limits: Tab) -> None:
+def test_thumb_stops_at_the_other_and_a_typed_end_pushes_it(limits: Tab) -> None:
     def x_range() -> tuple[float, float]:
         box = limits.state.design.limits.box
         assert box is not None
@@ -178,19 +157,9 @@ def test_a_thumb_stops_at_the_other_and_a_typed_end_pushes_it(limits: Tab) -> No
     assert x_range()[0] == -40.0
 
 
-def test_ends_of_what_is_unbounded_are_disabled_until_it_is(limits: Tab) -> None:
-    field = limits.field("d1, d3 ends").first
-    expect(field).to_be_disabled()
-    limits.switch("Bounded guide", on=True)
-    limits.wait_for(lambda: limits.state.design.limits.guide is not None, "a guide")
-    expect(field).to_be_enabled()
-    type_end(limits, "d1, d3", 0, "2")
-    limits.wait_for(lambda: (limits.state.design.limits.guide or (0, 0))[0] == 2.0, "its end")
-    # The names of what is side by side tell which is which.
-    expect(limits.page.get_by_role("textbox", name="d1, d3 least", exact=True)).to_have_value("2")
-
-
-def test_the_sketch_points_at_the_variable_of_the_row_in_use(tab: Tab) -> None:
+def test_row_in_use_is_marked_in_the_sketch_and_its_hint_stands_beside_the_panel(
+    tab: Tab,
+) -> None:
     dimension = tab.page.locator(".ex-sketch [data-variable=b1x] text")
     plain = dimension.evaluate("each => getComputedStyle(each).fill")
 
@@ -209,9 +178,7 @@ def test_the_sketch_points_at_the_variable_of_the_row_in_use(tab: Tab) -> None:
     tab.page.keyboard.press("ArrowUp")
     tab.wait_for(lambda: tab.state.design.b1[0] > 3.0, "another design")
     assert is_marked()
-
-
-def test_a_hint_stands_beside_its_panel(tab: Tab) -> None:
+    tab.settle()
     tab.row("b2").locator(TRACK).hover()
     hint = tab.page.get_by_role("tooltip")
     hint.wait_for()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -14,10 +14,12 @@ from tab import Tab
 from explorer.app.features.help.tour import STEPS
 from explorer.app.layout import DRAWER_HEIGHT, NARROW
 from explorer.app.scene.camera import framing
-from explorer.app.screenshot import SCENE_CANVAS, settle
-from explorer.app.server import Running, start
+from explorer.app.screenshot import SCENE_CANVAS
+from explorer.app.server import start
 from explorer.app.storage.preferences import PreferenceFile, Preferences
 from explorer.mechanism.design_file import PRESETS
+
+OpenWindow = Callable[[tuple[int, int]], Tab]
 
 # A small laptop's screen, and a tablet either way up.
 SIZES = ((1280, 720), (1024, 768), (768, 1024))
@@ -60,24 +62,29 @@ def page_with(
         running.stop()
 
 
+@pytest.fixture
+def open_window(tab: Tab, browser: Browser) -> Iterator[OpenWindow]:
+    """Open windows of a size on the explorer of the tab; none may have complained in the end."""
+    windows: list[Tab] = []
+
+    def open_one(size: tuple[int, int]) -> Tab:
+        windows.append(Tab(browser, tab.running, size=size))
+        return windows[-1]
+
+    yield open_one
+    for window in windows:
+        assert window.complaints() == []
+        window.close()
+
+
 def press(tab: Tab, key: str) -> None:
     tab.page.keyboard.press(key)
 
 
-def test_the_palette_finds_a_command_and_does_it(tab: Tab) -> None:
-    tab.page.get_by_role("button", name="Commands").click()
-    search = tab.page.get_by_placeholder("Search commands")
-    search.fill("convex hull")
-    press(tab, "Enter")
-    tab.wait_for(lambda: tab.state.view.workspace.hull, "the hull")
-    search.wait_for(state="detached")
-    press(tab, "ControlOrMeta+k")
-    search.fill("show the parts")
-    tab.page.get_by_text("Prototype › Show the parts").first.click()
-    tab.wait_for(lambda: tab.state.view.drawn_as == "prototype", "the prototype")
-
-
-def test_keys_act_on_the_page_and_not_while_one_types(tab: Tab) -> None:
+def test_command_is_run_by_the_palette_and_by_its_key_but_not_while_one_types(tab: Tab) -> None:
+    # In a smaller window the drawer lies over the end of the right panel.
+    tab.page.set_viewport_size({"width": SIZES[0][0], "height": SIZES[0][1]})
+    tab.settle()
     press(tab, "g")
     tab.wait_for(lambda: not tab.state.view.grid, "no grid")
     press(tab, "n")
@@ -94,118 +101,35 @@ def test_keys_act_on_the_page_and_not_while_one_types(tab: Tab) -> None:
     field.click()
     field.press_sequentially("glb")
     # Whatever is done by the next key is done after it would have been by these.
-    tab.switch("Singularity-free ball", on=True)
-    tab.wait_for(lambda: tab.state.view.singular.ball, "the ball")
-    assert tab.state.view.grid == before.grid
-    assert tab.state.view.labels == before.labels
-
-
-def test_a_ticked_box_or_a_chosen_option_leaves_the_keys_free(tab: Tab) -> None:
-    # Else the drawer lies over the end of the right panel.
-    tab.page.set_viewport_size({"width": SIZES[0][0], "height": SIZES[0][1]})
     ball = tab.row("Singularity-free ball").locator("input[type=checkbox]")
     ball.click()
     tab.wait_for(lambda: tab.state.view.singular.ball, "the ball")
+    assert tab.state.view.grid == before.grid
+    assert tab.state.view.labels == before.labels
+    # A ticked box and a chosen option let go of the keys.
     tab.wait_for(lambda: not ball.evaluate("e => e === document.activeElement"), "let go")
     press(tab, "g")
-    tab.wait_for(lambda: not tab.state.view.grid, "no grid")
+    tab.wait_for(lambda: tab.state.view.grid, "the grid")
     tab.choose("Arrows", "all six")
     tab.wait_for(lambda: tab.state.view.singular.arrows == "all six", "arrows")
-    tab.wait_for(lambda: _active(tab) != "INPUT", "let go")
+    active = "document.activeElement.tagName"
+    tab.wait_for(lambda: tab.page.evaluate(active) != "INPUT", "let go")
     press(tab, "g")
-    tab.wait_for(lambda: tab.state.view.grid, "the grid")
+    tab.wait_for(lambda: not tab.state.view.grid, "no grid")
+    # The palette finds commands by their words.
+    tab.page.get_by_role("button", name="Commands").click()
+    search = tab.page.get_by_placeholder("Search commands")
+    search.fill("convex hull")
+    press(tab, "Enter")
+    tab.wait_for(lambda: tab.state.view.workspace.hull, "the hull")
+    search.wait_for(state="detached")
+    press(tab, "ControlOrMeta+k")
+    search.fill("show the parts")
+    tab.page.get_by_text("Prototype › Show the parts").first.click()
+    tab.wait_for(lambda: tab.state.view.drawn_as == "prototype", "the prototype")
 
 
-def _active(tab: Tab) -> str:
-    return str(tab.page.evaluate("document.activeElement.tagName"))
-
-
-def test_the_keys_are_told_on_a_card(tab: Tab) -> None:
-    press(tab, "k")
-    card = tab.page.get_by_role("dialog")
-    card.get_by_text("Ctrl+Shift+Z").wait_for()
-    assert card.locator("kbd").count() > 40
-    press(tab, "k")
-    card.wait_for(state="detached")
-
-
-def test_card_of_keys_is_closed_by_escape_and_by_a_click_beside_it(tab: Tab) -> None:
-    card = tab.page.get_by_role("dialog")
-    for close in (lambda: press(tab, "Escape"), lambda: tab.page.mouse.click(5, 240)):
-        press(tab, "k")
-        card.get_by_text("Ctrl+Shift+Z").click()
-        # A text that is marked from the card outwards leaves it open.
-        tab.page.mouse.down()
-        tab.page.mouse.move(5, 240)
-        tab.page.mouse.up()
-        tab.page.wait_for_timeout(200)
-        assert card.is_visible()
-        close()
-        card.wait_for(state="detached")
-    # The server knows of it.
-    press(tab, "k")
-    card.wait_for()
-
-
-def drawer_of(tab: Tab) -> Locator:
-    """Return the drawer, opened."""
-    tab.turn_to("Compare")
-    drawer = tab.page.locator("[data-ex=drawer]")
-    tab.wait_for(lambda: abs(_height(drawer) - DRAWER_HEIGHT) < 2, "an open drawer")
-    return drawer
-
-
-def _box(each: Locator) -> FloatRect:
-    found = each.bounding_box()
-    assert found is not None
-    return found
-
-
-def _height(each: Locator) -> float:
-    return _box(each)["height"]
-
-
-def test_drawer_is_as_wide_as_the_scene_which_ends_above_it(
-    browser: Browser, running: Running
-) -> None:
-    width, height = SIZES[0]
-    with closing(Tab(browser, running, size=SIZES[0])) as tab:
-        drawer, scene = drawer_of(tab), tab.page.locator(SCENE_CANVAS)
-
-        def is_below_the_scene() -> bool:
-            low, high = _box(drawer), _box(scene)
-            beside = (low["x"], low["width"]) == (high["x"], high["width"])
-            touches = abs(high["y"] + high["height"] - low["y"]) < 2
-            foot = tab.page.viewport_size or {"height": 0}
-            at_the_foot = abs(low["y"] + low["height"] - foot["height"]) < 2
-            return beside and touches and at_the_foot and low["y"] > 100
-
-        tab.wait_for(is_below_the_scene, "the drawer below the scene")
-        grip = _box(drawer.locator("[data-dock-resize=top]"))
-        x, y = grip["x"] + 0.5 * grip["width"], grip["y"] + 0.5 * grip["height"]
-        for pull in (-150, 200, -400):
-            before = _height(drawer)
-            tab.page.mouse.move(x, y)
-            tab.page.mouse.down()
-            y += pull
-            tab.page.mouse.move(x, y, steps=4)
-            tab.page.mouse.up()
-            tab.wait_for(lambda before=before: _height(drawer) != before, "another height")
-            tab.wait_for(is_below_the_scene, "the drawer below the scene")
-            grip = _box(drawer.locator("[data-dock-resize=top]"))
-            y = grip["y"] + 0.5 * grip["height"]
-        for less in (150, 250):
-            tab.page.set_viewport_size({"width": width, "height": height - less})
-            tab.wait_for(is_below_the_scene, "the drawer in a smaller window")
-        tab.page.get_by_role("button", name="Minimize panel").click()
-        tab.wait_for(lambda: _height(drawer) < 50, "a closed drawer")
-        tab.wait_for(
-            lambda: abs(_box(scene)["y"] + _height(scene) - _box(drawer)["y"]) < 2, "the scene"
-        )
-        assert tab.complaints() == []
-
-
-def test_dialogs_open_from_the_bar_and_close_by_escape_beside_and_by_their_button(
+def test_dialog_and_card_of_keys_close_by_a_key_by_a_click_beside_and_by_their_buttons(
     tab: Tab,
 ) -> None:
     for name in DIALOGS:
@@ -225,30 +149,103 @@ def test_dialogs_open_from_the_bar_and_close_by_escape_beside_and_by_their_butto
     tab.open_dialog("Help")
     tab.open_dialog("Export")
     tab.page.get_by_role("dialog", name="Help").wait_for(state="hidden")
+    press(tab, "Escape")
+    card = tab.page.get_by_role("dialog")
+    for close in (
+        lambda: press(tab, "k"),
+        lambda: press(tab, "Escape"),
+        lambda: tab.page.mouse.click(5, 240),
+    ):
+        press(tab, "k")
+        card.get_by_text("Ctrl+Shift+Z").click()
+        assert card.locator("kbd").count() > 40
+        # A text that is marked from the card outwards leaves it open.
+        tab.page.mouse.down()
+        tab.page.mouse.move(5, 240)
+        tab.page.mouse.up()
+        tab.settle()
+        assert card.is_visible()
+        close()
+        card.wait_for(state="detached")
+    # The server knows of it.
+    press(tab, "k")
+    card.wait_for()
 
 
-def test_scene_keeps_beside_the_panels_where_the_page_gave_it_the_size_before_them(
-    browser: Browser, running: Running
+def open_drawer(tab: Tab) -> Locator:
+    """Open the drawer and return it."""
+    tab.turn_to("Compare")
+    drawer = tab.page.locator("[data-ex=drawer]")
+    tab.wait_for(lambda: abs(height_of(drawer) - DRAWER_HEIGHT) < 2, "an open drawer")
+    return drawer
+
+
+def box_of(each: Locator) -> FloatRect:
+    found = each.bounding_box()
+    assert found is not None
+    return found
+
+
+def height_of(each: Locator) -> float:
+    return box_of(each)["height"]
+
+
+def test_drawer_is_as_wide_as_the_scene_which_ends_above_it(
+    open_window: OpenWindow,
 ) -> None:
-    """Some first loads end so: the page measures the scene before its panels are there."""
-    with closing(Tab(browser, running, size=SIZES[0])) as tab:
-        settle(tab.page, tab.client)
-        scene = tab.page.locator(SCENE_CANVAS)
-        beside = scene.bounding_box()
-        assert beside is not None
-        assert beside["width"] < SIZES[0][0] - 500
-        tab.page.evaluate("size => window.__viserMutable.syncCanvasSize(...size)", [*SIZES[0]])
-        tab.wait_for(lambda: scene.bounding_box() == beside, "the scene beside the panels")
-        tab.wait_for(lambda: is_framed(tab), "all in the picture")
-        assert tab.complaints() == []
+    width, height = SIZES[0]
+    tab = open_window(SIZES[0])
+    drawer, scene = open_drawer(tab), tab.page.locator(SCENE_CANVAS)
+
+    def is_below_the_scene() -> bool:
+        low, high = box_of(drawer), box_of(scene)
+        beside = (low["x"], low["width"]) == (high["x"], high["width"])
+        touches = abs(high["y"] + high["height"] - low["y"]) < 2
+        foot = tab.page.viewport_size or {"height": 0}
+        at_the_foot = abs(low["y"] + low["height"] - foot["height"]) < 2
+        return beside and touches and at_the_foot and low["y"] > 100
+
+    tab.wait_for(is_below_the_scene, "the drawer below the scene")
+    grip = box_of(drawer.locator("[data-dock-resize=top]"))
+    x, y = grip["x"] + 0.5 * grip["width"], grip["y"] + 0.5 * grip["height"]
+    for pull in (-150, 200, -400):
+        before = height_of(drawer)
+        tab.page.mouse.move(x, y)
+        tab.page.mouse.down()
+        y += pull
+        tab.page.mouse.move(x, y, steps=4)
+        tab.page.mouse.up()
+        tab.wait_for(lambda before=before: height_of(drawer) != before, "another height")
+        tab.wait_for(is_below_the_scene, "the drawer below the scene")
+        grip = box_of(drawer.locator("[data-dock-resize=top]"))
+        y = grip["y"] + 0.5 * grip["height"]
+    for less in (150, 250):
+        tab.page.set_viewport_size({"width": width, "height": height - less})
+        tab.wait_for(is_below_the_scene, "the drawer in a smaller window")
+    tab.page.get_by_role("button", name="Minimize panel").click()
+    tab.wait_for(lambda: height_of(drawer) < 50, "a closed drawer")
+    tab.wait_for(
+        lambda: abs(box_of(scene)["y"] + height_of(scene) - box_of(drawer)["y"]) < 2,
+        "the scene",
+    )
 
 
-def test_camera_that_a_loading_page_moves_back_is_put_again(tab: Tab) -> None:
-    """It does so once it has drawn, after all that it was sent."""
+def test_scene_and_camera_recover_from_what_a_loading_page_does_late(
+    open_window: OpenWindow,
+) -> None:
+    tab = open_window(SIZES[0])
+    tab.settle()
+    scene = tab.page.locator(SCENE_CANVAS)
+    beside = scene.bounding_box()
+    assert beside is not None
+    assert beside["width"] < SIZES[0][0] - 500
+    # Some pages measure the scene before their panels are there.
+    tab.page.evaluate("size => window.__viserMutable.syncCanvasSize(...size)", [*SIZES[0]])
+    tab.wait_for(lambda: scene.bounding_box() == beside, "the scene beside the panels")
     tab.wait_for(lambda: is_framed(tab), "all in the picture")
+    # They move the camera back once they have drawn, after all that they were sent.
     tab.page.evaluate("window.__viserMutable.resetCameraPose(false)")
-    # Longer than it takes to hear of it.
-    tab.page.wait_for_timeout(500)
+    tab.settle()
     tab.wait_for(lambda: is_framed(tab), "all in the picture again")
 
 
@@ -262,61 +259,61 @@ def is_framed(tab: Tab) -> bool:
     return bool(np.allclose((-z, -x, y), eye, rtol=0.01))
 
 
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-def test_there_is_room_on_a_small_screen(
-    browser: Browser, running: Running, size: tuple[int, int]
+@pytest.mark.parametrize(
+    "size", [SIZES[0], pytest.param(SIZES[1], marks=pytest.mark.long), SIZES[2]], ids=str
+)
+def test_page_on_a_small_screen_has_room_and_cuts_nothing_off(
+    open_window: OpenWindow, size: tuple[int, int]
 ) -> None:
-    with closing(Tab(browser, running, size=size)) as tab:
+    tab = open_window(size)
 
-        def share() -> float:
-            box = tab.page.locator(SCENE_CANVAS).bounding_box()
-            assert box is not None
-            return box["width"] * box["height"] / (size[0] * size[1])
+    def share() -> float:
+        box = tab.page.locator(SCENE_CANVAS).bounding_box()
+        assert box is not None
+        return box["width"] * box["height"] / (size[0] * size[1])
 
-        # In a narrow window the panels are laid out once the browser has told its size.
-        tab.wait_for(lambda: LEAST_SHARE <= share() < 1.0, "room for the scene")
-        if size[0] < NARROW:
-            tab.wait_for(lambda: abs(_left(tab, "Singularity") - _left(tab, "Pose")) < 8, "a stack")
-        tabs = tab.page.get_by_role("tab")
-        names = tabs.all_inner_texts()
-        assert {name.strip() for name in names} == TABS
-        for name in names:
-            tab.turn_to(name.strip())
-            tab.page.wait_for_timeout(100)
-            assert tab.page.evaluate(CUT_OFF) == [], f"in {name}"
-        for name in DIALOGS:
-            tab.open_dialog(name)
-            assert tab.page.evaluate(CUT_OFF) == [], f"in {name}"
-        assert tab.complaints() == []
+    # In a narrow window the panels are laid out once the browser has told its size.
+    tab.wait_for(lambda: LEAST_SHARE <= share() < 1.0, "room for the scene")
+    if size[0] < NARROW:
+        tab.wait_for(lambda: abs(left_of(tab, "Singularity") - left_of(tab, "Pose")) < 8, "a stack")
+    tabs = tab.page.get_by_role("tab")
+    names = tabs.all_inner_texts()
+    assert {name.strip() for name in names} == TABS
+    for name in names:
+        tab.turn_to(name.strip())
+        tab.wait_for(lambda: tab.page.evaluate(CUT_OFF) == [], f"nothing cut off in {name}")
+    for name in DIALOGS:
+        tab.open_dialog(name)
+        tab.wait_for(lambda: tab.page.evaluate(CUT_OFF) == [], f"nothing cut off in {name}")
 
 
-def _left(tab: Tab, name: str) -> float:
+def left_of(tab: Tab, name: str) -> float:
     box = tab.page.get_by_role("tab", name=name, exact=True).bounding_box()
     assert box is not None
     return box["x"]
 
 
-def test_the_page_is_as_dark_as_its_user_prefers_until_one_chooses(
+def test_page_is_as_dark_as_its_user_prefers_until_a_theme_is_chosen(
     browser: Browser, tmp_path: Path
 ) -> None:
     preferences = PreferenceFile(tmp_path)
     preferences.choose(tour_seen=True)
     with page_with(browser, preferences, dark=True) as tab:
-        tab.wait_for(lambda: _scheme(tab) == "dark", "a dark page")
+        tab.wait_for(lambda: scheme_of(tab) == "dark", "a dark page")
         # Nobody chose, so nothing is remembered.
         assert PreferenceFile(tmp_path).chosen.dark is None
         tab.push("Theme")
-        tab.wait_for(lambda: _scheme(tab) == "light", "a light page")
+        tab.wait_for(lambda: scheme_of(tab) == "light", "a light page")
         tab.wait_for(lambda: PreferenceFile(tmp_path).chosen.dark is False, "what was chosen")
     with page_with(browser, PreferenceFile(tmp_path), dark=True) as tab:
-        assert _scheme(tab) == "light"
+        assert scheme_of(tab) == "light"
 
 
-def _scheme(tab: Tab) -> str:
+def scheme_of(tab: Tab) -> str:
     return str(tab.page.evaluate("document.documentElement.dataset.mantineColorScheme"))
 
 
-def test_the_tour_leads_through_five_steps_once(browser: Browser, tmp_path: Path) -> None:
+def test_tour_leads_through_five_steps_once(browser: Browser, tmp_path: Path) -> None:
     with page_with(browser, PreferenceFile(tmp_path)) as tab:
         card = tab.page.get_by_text("step 1 of 5")
         card.wait_for()
@@ -328,9 +325,9 @@ def test_the_tour_leads_through_five_steps_once(browser: Browser, tmp_path: Path
             tab.page.get_by_text(step.title, exact=True).wait_for()
             tab.page.get_by_text(f"step {number} of 5").wait_for()
             if number in (2, 4):
-                _words(tab, "Show me").click()
+                button_of(tab, "Show me").click()
                 tab.page.get_by_text("Done", exact=True).wait_for()
-            _words(tab, "Finish" if number == len(STEPS) else "Next").click()
+            button_of(tab, "Finish" if number == len(STEPS) else "Next").click()
         tab.page.get_by_text("step 5 of 5").wait_for(state="detached")
         assert tab.state.view.workspace.solid
         tab.wait_for(lambda: PreferenceFile(tmp_path).chosen.tour_seen, "what was seen")
@@ -340,10 +337,10 @@ def test_the_tour_leads_through_five_steps_once(browser: Browser, tmp_path: Path
         tab.open_dialog("Help")
         tab.push("Tour")
         tab.page.get_by_text("step 1 of 5").wait_for()
-        _words(tab, "Skip the tour").click()
+        button_of(tab, "Skip the tour").click()
         tab.page.get_by_text("step 1 of 5").wait_for(state="detached")
     assert PreferenceFile(tmp_path).chosen == Preferences(None, True)
 
 
-def _words(tab: Tab, words: str) -> Locator:
+def button_of(tab: Tab, words: str) -> Locator:
     return tab.page.get_by_role("button", name=words, exact=True)

@@ -16,8 +16,8 @@ from explorer.app.features.mechanism.marks import ARROW_LENGTH, HANDLE_NAME
 from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.scene.camera import VIEWS, ViewName, framing
 from explorer.app.scene.placing import Placed
-from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
-from explorer.app.state.actions import Open, Set, SetAngle, SetPosition
+from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS
+from explorer.app.state.actions import Open, Set, SetAngle, SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import PrototypeView, View
 from explorer.mechanism.design_file import PRESETS
@@ -40,8 +40,6 @@ HAS_BOXES = """() => {
     });
     return parent.visible;
 }"""
-# Longer than what hides a label waits for a look.
-LOOK = 700
 BARE = View(
     flags=False,
     bodies=False,
@@ -57,7 +55,7 @@ BARE = View(
 def wide(tab: Tab) -> Tab:
     """The tab, in a window of the usual size."""
     tab.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
-    settle(tab.page, tab.client)
+    tab.settle()
     return tab
 
 
@@ -66,11 +64,19 @@ def show(tab: Tab, view: View) -> None:
     assert tab.running.page.wait_until_drawn()
 
 
-def drawn(tab: Tab) -> dict[str, Any]:
+def labels_of(tab: Tab) -> dict[str, Any]:
     """Return the labels that are drawn, after all that has been asked for."""
-    tab.picture()
-    tab.page.wait_for_timeout(LOOK)
+    tab.settle()
     return tab.page.evaluate(DRAWN)
+
+
+def wait_for_hidden(tab: Tab, names: set[str], *, hidden: bool) -> dict[str, Any]:
+    """Wait until the points of some labels are found to be hidden or not; return the labels."""
+    tab.wait_for(
+        lambda: all(labels_of(tab)[name]["isHidden"] == hidden for name in names),
+        f"{names} {'hidden' if hidden else 'in sight'}",
+    )
+    return labels_of(tab)
 
 
 def in_scene(tab: Tab, point: FloatArray) -> FloatArray:
@@ -84,42 +90,42 @@ def overlap(one: list[float], other: list[float]) -> bool:
     return all(one[k] < other[k + 2] and other[k] < one[k + 2] for k in (0, 1))
 
 
-@pytest.mark.parametrize("design", PRESETS)
-def test_labels_lie_apart_from_each_other_and_from_the_handle(wide: Tab, design: str) -> None:
-    wide.running.page.session.do(Open(PRESETS[design]))
-    shown = {"joints": View(), "modes": View(ghosts=True)}
-    for view, (what, parts) in itertools.product(VIEWS, shown.items()):
-        show(wide, parts)
-        wide.look_from(view)
-        labels = drawn(wide)
-        assert {name.rpartition("/")[2] for name in labels} >= set(NAMES), (view, what)
-        boxes = {name: label["box"] for name, label in labels.items()}
-        centre = in_scene(wide, Placed(Frame(wide.state)).points["b4"])
-        boxes[HANDLE_NAME] = [*(centre - 8.0).tolist(), *(centre + 8.0).tolist()]
-        for (one, a), (other, b) in itertools.combinations(boxes.items(), 2):
-            assert not overlap(a, b), (view, what, one, other)
+INITIAL = pytest.param("paper-initial", marks=pytest.mark.long)
 
 
-@pytest.mark.parametrize("view", VIEWS)
-def test_labels_stand_at_their_points(wide: Tab, view: ViewName) -> None:
-    wide.look_from(view)
+@pytest.mark.parametrize("design", ["paper-optimal", INITIAL])
+def test_labels_lie_apart_and_stand_at_their_points_in_every_view(wide: Tab, design: str) -> None:
     session = wide.running.page.session
-    assert not wide.page.evaluate(HAS_BOXES)
-    for action in (SetPosition(2, 8.0), SetAngle(1, 20.0)):
-        session.do(action)
-        labels = drawn(wide)
+    session.do(Open(PRESETS[design]))
+    start = wide.state.pose
+    for view in VIEWS:
+        session.do(SetPose(start))
+        wide.look_from(view)
+        assert not wide.page.evaluate(HAS_BOXES)
+        for ghosts in (False, True):
+            show(wide, View(ghosts=ghosts))
+            labels = labels_of(wide)
+            assert {name.rpartition("/")[2] for name in labels} >= set(NAMES), (view, ghosts)
+            boxes = {name: label["box"] for name, label in labels.items()}
+            centre = in_scene(wide, Placed(Frame(wide.state)).points["b4"])
+            boxes[HANDLE_NAME] = [*(centre - 8.0).tolist(), *(centre + 8.0).tolist()]
+            for (one, a), (other, b) in itertools.combinations(boxes.items(), 2):
+                assert not overlap(a, b), (view, ghosts, one, other)
+        # They move with the mechanism.
+        session.do(SetPosition(2, 8.0))
+        session.do(SetAngle(1, 20.0))
+        labels = labels_of(wide)
         points = Placed(Frame(wide.state)).points
         for name in NAMES:
             at = labels[f"/{'base' if name[0] == 'a' else 'platform'}/label/{name}"]["at"]
-            np.testing.assert_allclose(at, in_scene(wide, points[name]), atol=1.0)
+            np.testing.assert_allclose(at, in_scene(wide, points[name]), atol=1.0, err_msg=view)
 
 
-def test_label_of_a_point_behind_a_body_is_pale(wide: Tab) -> None:
+def test_label_behind_a_body_is_pale_but_not_that_of_a_gap(wide: Tab) -> None:
+    a1, b4, gap = "/base/label/a1", "/platform/label/b4", "/gaps/label/3"
     show(wide, replace(BARE, labels=True, bodies=True))
     wide.look_from("isometric")
-    before = drawn(wide)
-    assert not before["/base/label/a1"]["isHidden"]
-    dark = darkest(wide, before["/base/label/a1"]["box"])
+    dark = darkest(wide, wait_for_hidden(wide, {a1}, hidden=False)[a1]["box"])
     # A small board between a1 and the eye.
     scene = wide.running.viser.scene
     eye = np.array(wide.client.camera.position)
@@ -130,25 +136,15 @@ def test_label_of_a_point_behind_a_body_is_pale(wide: Tab) -> None:
         "/board", corners, np.array([[0, 1, 2], [0, 2, 3]]), color=(255, 255, 255), side="double"
     )
     try:
-        after = drawn(wide)
-        hidden = {name for name, label in after.items() if label["isHidden"]}
-        assert hidden - {n for n, label in before.items() if label["isHidden"]} == {
-            "/base/label/a1"
-        }
-        assert darkest(wide, after["/base/label/a1"]["box"]) > dark + 0.2
+        labels = wait_for_hidden(wide, {a1}, hidden=True)
+        assert darkest(wide, labels[a1]["box"]) > dark + 0.2
     finally:
         board.remove()
-    assert not drawn(wide)["/base/label/a1"]["isHidden"]
-
-
-def test_label_of_a_gap_is_not_pale_where_a_body_hides_it(wide: Tab) -> None:
-    session = wide.running.page.session
-    session.do(GoToSingularity(3))
-    wide.look_from("isometric")
-    # b4, with the contact at the same place, is behind the platform.
-    labels = drawn(wide)
-    assert labels["/platform/label/b4"]["isHidden"]
-    assert not labels["/gaps/label/3"]["isHidden"]
+    wait_for_hidden(wide, {a1}, hidden=False)
+    # Where δ3 vanishes b4, with the contact at the same place, is behind the platform.
+    show(wide, View())
+    wide.running.page.session.do(GoToSingularity(3))
+    assert not wait_for_hidden(wide, {b4}, hidden=True)[gap]["isHidden"]
 
 
 def darkest(tab: Tab, box: list[float]) -> float:
@@ -171,14 +167,6 @@ def darkest(tab: Tab, box: list[float]) -> float:
         }""",
         box,
     )
-
-
-def test_labels_are_gone_while_the_parts_of_the_prototype_are_apart(wide: Tab) -> None:
-    apart = View(drawn_as="prototype")
-    show(wide, apart)
-    assert len(drawn(wide)) >= len(NAMES)
-    show(wide, replace(apart, prototype=PrototypeView(exploded=0.5)))
-    assert drawn(wide) == {}
 
 
 def lengths(tab: Tab) -> tuple[float, float]:
@@ -222,20 +210,15 @@ def breadth(mask: Any) -> float:
     return float(columns[-1] - columns[0])
 
 
-@pytest.mark.parametrize("view", ON_AXES)
-def test_views_along_an_axis_draw_what_is_far_as_large_as_what_is_near(
-    wide: Tab, view: ViewName
-) -> None:
-    wide.look_from(view)
-    near, far = lengths(wide)
-    assert near == pytest.approx(far, abs=2.0)
-    target = np.array(wide.client.camera.look_at)
-    across = [1.0, 0.0, 0.0] if view != "side" else [0.0, 1.0, 0.0]
-    expected = in_scene(wide, target + 3.0 * np.array(across)) - in_scene(wide, target)
-    assert near == pytest.approx(2.0 * expected[0], abs=5.0)
-
-
-def test_other_views_draw_what_is_far_smaller(wide: Tab) -> None:
+def test_views_along_an_axis_have_no_perspective_and_others_have_one(wide: Tab) -> None:
+    for view in ON_AXES:
+        wide.look_from(view)
+        near, far = lengths(wide)
+        assert near == pytest.approx(far, abs=2.0), view
+        target = np.array(wide.client.camera.look_at)
+        across = [1.0, 0.0, 0.0] if view != "side" else [0.0, 1.0, 0.0]
+        half = in_scene(wide, target + 3.0 * np.array(across)) - in_scene(wide, target)
+        assert near == pytest.approx(2.0 * half[0], abs=5.0), view
     wide.look_from("isometric")
     near, far = lengths(wide)
     distance = float(np.linalg.norm(np.subtract(*eye_and_target(wide))))
@@ -247,9 +230,24 @@ def eye_and_target(tab: Tab) -> tuple[FloatArray, FloatArray]:
     return np.array(camera.position), np.array(camera.look_at)
 
 
-def test_view_along_an_axis_stays_without_perspective_until_it_is_turned(wide: Tab) -> None:
+def test_view_along_an_axis_has_no_perspective_until_it_is_turned(wide: Tab) -> None:
     page = wide.page
     wide.look_from("front")
+    # The handle moves the platform as far as the pointer goes.
+    before = wide.state.pose
+    placed = Placed(Frame(wide.state))
+    tip = placed.points["b4"] + [0.0, 0.0, 0.7 * ARROW_LENGTH]
+    page.mouse.move(*wide.on_screen(tip))
+    page.mouse.down()
+    page.mouse.move(*wide.on_screen(tip + [0.0, 0.0, 1.5]), steps=8)
+    page.mouse.up()
+
+    def is_moved() -> bool:
+        by = placed.scale * (np.array(wide.state.pose.position) - before.position)
+        return bool(np.allclose(by, [0.0, 0.0, 1.5], atol=0.1))
+
+    wide.wait_for(is_moved, "the platform moved by the handle")
+    wide.settle()
     box = page.locator(SCENE_CANVAS).bounding_box()
     assert box is not None
     x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.8 * box["height"]
@@ -262,7 +260,7 @@ def test_view_along_an_axis_stays_without_perspective_until_it_is_turned(wide: T
     page.mouse.move(x + 60, y - 20, steps=4)
     page.mouse.up(button="right")
     wide.wait_for(lambda: not np.allclose(eye_and_target(wide)[1], target, atol=0.1), "a shift")
-    settle(page, wide.client)
+    wide.settle()
     assert page.evaluate(IS_PARALLEL)
     near, far = lengths(wide)
     assert near == pytest.approx(far, abs=2.0)
@@ -274,30 +272,15 @@ def test_view_along_an_axis_stays_without_perspective_until_it_is_turned(wide: T
     page.mouse.down()
     page.mouse.move(x + 80, y, steps=4)
     page.mouse.up()
-    settle(page, wide.client)
-    assert not page.evaluate(IS_PARALLEL)
+    wide.wait_for(lambda: not page.evaluate(IS_PARALLEL), "perspective")
     wide.look_from("top")
     assert page.evaluate(IS_PARALLEL)
 
 
-def test_handle_moves_the_platform_in_a_view_without_perspective(wide: Tab) -> None:
-    wide.look_from("front")
-    before = wide.state
-    placed = Placed(Frame(before))
-    tip = placed.points["b4"] + [0.0, 0.0, 0.7 * ARROW_LENGTH]
-    mouse = wide.page.mouse
-    mouse.move(*wide.on_screen(tip))
-    mouse.down()
-    mouse.move(*wide.on_screen(tip + [0.0, 0.0, 1.5]), steps=8)
-    mouse.up()
-    wide.wait_for(lambda: wide.state.pose != before.pose, "another pose")
-    wide.picture()
-    moved = placed.scale * (np.array(wide.state.pose.position) - before.pose.position)
-    np.testing.assert_allclose(moved, [0.0, 0.0, 1.5], atol=0.1)
-
-
-@pytest.mark.parametrize("factor", [0.003, 1.0, 47.0])
-def test_scale_tells_how_large_things_are(wide: Tab, factor: float) -> None:
+@pytest.mark.parametrize(
+    "factor", [47.0, *(pytest.param(f, marks=pytest.mark.long) for f in (0.003, 1.0))]
+)
+def test_scale_bar_has_the_length_that_it_names_at_any_distance(wide: Tab, factor: float) -> None:
     design = scaled_design(PRESETS["paper-optimal"], factor)
     wide.running.page.session.do(Open(design))
     assert wide.running.page.wait_until_drawn()
@@ -316,19 +299,19 @@ def test_scale_tells_how_large_things_are(wide: Tab, factor: float) -> None:
     # Nearer, the bar is about as long and stands for less.
     wide.page.evaluate("window.__viserMutable.cameraControl.dollyTo(3, false)")
     wide.wait_for(lambda: wide.page.evaluate(SCALE)["text"] != scale["text"], "another bar")
-    settle(wide.page, wide.client)
+    wide.settle()
     closer = wide.page.evaluate(SCALE)
     assert float(closer["text"].removesuffix(" mm").replace(",", "")) < millimetres
     assert 30.0 <= closer["length"] <= 100.0
 
 
-def test_labels_axes_and_scale_are_in_pictures(wide: Tab) -> None:
+@pytest.mark.draws
+def test_labels_and_axes_are_in_pictures_and_gone_while_the_prototype_is_exploded(
+    wide: Tab,
+) -> None:
     def opacity() -> FloatArray:
-        wide.picture()
-        with wide.drawing():
-            pixels = wide.client.get_render(
-                600, 640, transport_format="png", timeout=PATIENCE_SECONDS
-            )
+        wide.settle()
+        pixels = wide.client.get_render(600, 640, transport_format="png", timeout=PATIENCE_SECONDS)
         return pixels[..., 3].astype(np.float64)
 
     wide.look_from("top")
@@ -338,9 +321,15 @@ def test_labels_axes_and_scale_are_in_pictures(wide: Tab) -> None:
     assert not bare[:-100].any()
     show(wide, replace(BARE, labels=True))
     assert (opacity()[:-100] > 200.0).any()
+    together = View(drawn_as="prototype")
+    show(wide, together)
+    assert len(labels_of(wide)) >= len(NAMES)
+    show(wide, replace(together, prototype=PrototypeView(exploded=0.5)))
+    assert labels_of(wide) == {}
 
 
-def test_mesh_that_changes_as_its_shadow_goes_is_drawn(wide: Tab) -> None:
+@pytest.mark.draws
+def test_mesh_changed_as_its_shadow_is_switched_off_is_drawn_anew(wide: Tab) -> None:
     """Three.js takes a geometry for updated that was replaced after its shadow was drawn."""
     show(wide, BARE)
     wide.look_from("top")

@@ -1,14 +1,15 @@
-"""All text of a page is legible: large enough, in contrast to what is behind it, not squeezed."""
+"""Text of the page is large enough, in contrast and not squeezed; each control has a name."""
 
 from __future__ import annotations
 
-from contextlib import closing
+from typing import Any
 
 import pytest
 from legibility import Text, open_folders, texts_of
-from monkey import explorer_with_data
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 from tab import Tab
+
+from explorer.app.state.actions import Set
 
 SIZE = (1280, 720)
 LEAST_SIZE, LEAST_CONTRAST = 11.0, 4.5
@@ -16,6 +17,16 @@ LEAST_SIZE, LEAST_CONTRAST = 11.0, 4.5
 SIZES = {11.0, 12.5, 15.0}
 # Sizes are computed in floating point.
 ROUNDING = 0.02
+DIALOG = "[role=dialog]"
+ROLES = {"slider", "spinbutton", "textbox", "searchbox", "combobox", "checkbox", "button", "tab"}
+
+
+@pytest.fixture
+def tab(data_tab: Tab) -> Tab:
+    """A tab of an explorer that offers saved designs, in a window of a small laptop."""
+    data_tab.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
+    data_tab.settle()
+    return data_tab
 
 
 def problems(texts: list[Text]) -> list[Text]:
@@ -29,55 +40,95 @@ def problems(texts: list[Text]) -> list[Text]:
     ]
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-def test_all_text_of_all_tabs_is_legible(browser: Browser, dark: bool) -> None:
-    with explorer_with_data() as running:
-        running.page.services.theme.choose(dark=dark)
-        with closing(Tab(browser, running, size=SIZE, dark=dark)) as tab:
-            sizes: dict[float, str] = {}
-            found = 0
-            tabs = tab.page.get_by_role("tab")
-            for index, name in enumerate(tabs.all_inner_texts()):
-                tabs.nth(index).click()
-                open_folders(tab.page)
-                # A tab may be laid out and named a moment later.
-                tab.wait_for(
-                    lambda: not problems(texts_of(tab.page)),
-                    f"legible text in {name}: {problems(texts_of(tab.page))}",
-                )
-                texts = texts_of(tab.page)
-                found += len(texts)
-                sizes |= {round(text.size, 1): text.text for text in texts}
-            assert found > 500
-            assert set(sizes) <= SIZES, sizes
+def controls(tab: Tab) -> list[tuple[str, str]]:
+    """Return role and name of every control of the page, as a screen reader knows them."""
+    inspector: Any = tab.page.context.new_cdp_session(tab.page)
+    nodes: list[dict[str, Any]] = inspector.send("Accessibility.getFullAXTree")["nodes"]
+    inspector.detach()
+    return [
+        (node["role"]["value"], node.get("name", {}).get("value", "").strip())
+        for node in nodes
+        if not node.get("ignored") and node.get("role", {}).get("value") in ROLES
+    ]
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-def test_all_text_of_the_bar_and_of_the_dialogs_is_legible(browser: Browser, dark: bool) -> None:
-    with explorer_with_data() as running:
-        running.page.services.theme.choose(dark=dark)
-        with closing(Tab(browser, running, size=SIZE, dark=dark)) as tab:
-            bar = texts_of(tab.page, ".ex-bar")
-            assert len(bar) > 8
-            places = {"bar": bar}
-            for name in running.page.panels.titles("dialog"):
-                tab.open_dialog(name)
-                open_folders(tab.page)
-                tab.wait_for(
-                    lambda: not problems(texts_of(tab.page, "[role=dialog]")),
-                    f"legible text in {name}: {problems(texts_of(tab.page, '[role=dialog]'))}",
-                )
-                places[name] = texts_of(tab.page, "[role=dialog]")
-                assert places[name], name
-                tab.page.keyboard.press("Escape")
-                expect(tab.page.get_by_role("dialog", name=name)).to_have_count(0)
-            assert {"Designs", "History", "Export", "Help"} <= places.keys()
-            for name, texts in places.items():
-                assert not problems(texts), name
-                assert {round(text.size, 1) for text in texts} <= SIZES, name
+def test_text_of_all_tabs_and_dialogs_is_legible(tab: Tab, *, dark: bool) -> None:
+    tab.running.page.services.theme.choose(dark=dark)
+    scheme = "document.documentElement.dataset.mantineColorScheme"
+    tab.wait_for(lambda: tab.page.evaluate(scheme) == ("dark" if dark else "light"), "the theme")
+    sizes: dict[float, str] = {}
+    count = 0
+
+    def read(place: str, within: str = "") -> None:
+        nonlocal count
+        # It may be laid out and named a moment later.
+        tab.wait_for(
+            lambda: not problems(texts_of(tab.page, within)),
+            f"legible text in {place}: {problems(texts_of(tab.page, within))}",
+        )
+        texts = texts_of(tab.page, within)
+        assert texts, place
+        count += len(texts)
+        sizes.update({round(text.size, 1): text.text for text in texts})
+
+    for name in tab.page.get_by_role("tab").all_inner_texts():
+        tab.turn_to(name.strip())
+        open_folders(tab.page)
+        read(name)
+    assert count > 500
+    assert len(texts_of(tab.page, ".ex-bar")) > 8
+    names = tab.running.page.panels.titles("dialog")
+    assert {"Designs", "History", "Export", "Help"} <= set(names)
+    for name in names:
+        tab.open_dialog(name)
+        open_folders(tab.page)
+        read(name, DIALOG)
+        tab.page.keyboard.press("Escape")
+        expect(tab.page.get_by_role("dialog", name=name)).to_have_count(0)
+    assert set(sizes) <= SIZES, sizes
+    tab.running.page.services.theme.choose(dark=False)
 
 
-def test_what_is_not_legible_is_found(tab: Tab) -> None:
+def test_every_control_has_a_name_in_every_tab_and_dialog(tab: Tab) -> None:
+
+    def wait_for_names(place: str) -> None:
+        tab.wait_for(
+            lambda: all(name for _, name in controls(tab)), f"names of all controls in {place}"
+        )
+
+    for name in tab.page.get_by_role("tab").all_inner_texts():
+        tab.turn_to(name.strip())
+        open_folders(tab.page)
+        wait_for_names(name)
+    for name in ("Designs", "History", "Export", "Help"):
+        tab.open_dialog(name)
+        wait_for_names(name)
+    tab.page.keyboard.press("Escape")
+    tab.turn_to("Pose")
+    tab.wait_for(lambda: ("slider", "l1 leg 1") in controls(tab), "the first slider")
+    assert len([1 for role, _ in controls(tab) if role == "slider"]) >= 10
+    for words in ("x", "yaw (°)"):
+        assert ("slider", words) in controls(tab)
+        assert ("textbox", words) in controls(tab)
+    # Both ends of a range have names of their own.
+    tab.turn_to("Design")
+    tab.wait_for(lambda: ("textbox", "l1 most") in controls(tab), "the first range")
+    found = controls(tab)
+    for words in ("l1", "d1, d3", "b4 x"):
+        for end in ("least", "most"):
+            assert found.count(("textbox", f"{words} {end}")) == 1
+    # What comes later has one too.
+    tab.page.keyboard.press("k")
+    tab.page.get_by_role("dialog").wait_for()
+    tab.running.page.session.do(Set("design.unit_mm", 0.0))
+    # As the page says it.
+    tab.page.get_by_text("The unit must be positive; got 0").wait_for()
+    wait_for_names("what came later")
+
+
+@pytest.mark.long
+def test_text_that_is_not_legible_is_found(tab: Tab) -> None:
     """The measures themselves, by texts that are too small, too pale, or too tight."""
     bad = {
         "font-size: 10px": "small",

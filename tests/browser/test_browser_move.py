@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from contextlib import closing
 from typing import cast
 
 import numpy as np
 import pytest
 from kept_tab import OpenTab
-from playwright.sync_api import Browser, Locator, expect
+from likeness import decoded, likeness
+from playwright.sync_api import Locator, expect
 from tab import SIZE, TRACK, Tab
 
 from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.features.mechanism.modes import HoveredMode
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.scene.placing import Placed
-from explorer.app.screenshot import settle
-from explorer.app.server import Running
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, joints_of
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import forward
+from explorer.numerics.arrays import FloatArray
 
 LABELS = [JOINT_LABELS[name] for name in JOINTS]
 
@@ -41,33 +40,33 @@ def values_of(state: State) -> tuple[float, ...]:
     return (*state.joints, *state.pose.position, *state.yaw_pitch_roll)
 
 
-def test_page_loads_without_a_complaint_and_asks_nobody_else(
-    browser: Browser, running: Running
-) -> None:
-    with closing(Tab(browser, running, draws=True)) as tab:
-        assert_page_shows_state(tab)
-        tab.picture()
-        own = (tab.running.url, f"blob:{tab.running.url}", "data:")
-        assert [url for url in tab.requests if not url.startswith(own)] == []
-        assert tab.complaints() == []
-
-
-@pytest.mark.parametrize(("joint", "typed"), [(0, 12.5), (1, 10.4), (5, 14.25)])
-def test_a_length_typed_in_its_field_moves_the_mechanism(
-    tab: Tab, joint: int, typed: float
-) -> None:
+@pytest.mark.draws
+def test_page_loaded_again_shows_and_draws_the_same_and_asks_nobody_else(tab: Tab) -> None:
+    # Of a mesh that has got another shape, three.js may keep drawing the first one.
+    drawn = decoded(tab.picture())
+    for _ in range(2):
+        tab.reload()
+        assert likeness(drawn, decoded(tab.picture())).spot < 2.0
+    tab.type(LABELS[2], "9.9\n")
+    tab.wait_for(lambda: tab.state.joints[2] == 9.9, "the length that was typed")
     before = tab.state
-    tab.type(LABELS[joint], f"{typed:g}")
-    tab.wait_for(lambda: tab.state.joints[joint] == typed, "the length that was typed")
-    state = tab.state
-    others = [i for i in range(6) if i != joint]
-    assert [state.joints[i] for i in others] == [before.joints[i] for i in others]
-    assert state.pose != before.pose
-    np.testing.assert_allclose(joints_of(state.design, state.pose), state.joints, atol=1e-9)
+    tab.reload()
+    assert tab.state == before
     assert_page_shows_state(tab)
+    own = (tab.running.url, f"blob:{tab.running.url}", "data:")
+    assert [url for url in tab.requests if not url.startswith(own)] == []
+    assert tab.complaints() == []
 
 
-def test_a_leg_slider_dragged_by_mouse_moves_the_mechanism(tab: Tab) -> None:
+def test_mechanism_follows_fields_sliders_and_the_home_button(tab: Tab) -> None:
+    before = tab.state
+    tab.type(LABELS[0], "12.5\n")
+    tab.wait_for(lambda: tab.state.joints[0] == 12.5, "the length that was typed")
+    assert tab.state.joints[1:] == before.joints[1:]
+    assert tab.state.pose != before.pose
+    joints = joints_of(tab.state.design, tab.state.pose)
+    np.testing.assert_allclose(joints, tab.state.joints, atol=1e-9)
+    assert_page_shows_state(tab)
     before = tab.state
     goal = tab.drag(LABELS[5], 0.5)
     tab.wait_for(lambda: abs(tab.state.joints[5] - goal) < 0.2, "the length dragged to")
@@ -75,67 +74,66 @@ def test_a_leg_slider_dragged_by_mouse_moves_the_mechanism(tab: Tab) -> None:
     assert tab.state.pose != before.pose
     assert tab.state.joints[:5] == before.joints[:5]
     assert_page_shows_state(tab)
-
-
-def test_a_pose_slider_moves_the_legs(tab: Tab) -> None:
     before = tab.state
     goal = tab.drag("y", 0.6)
     tab.wait_for(lambda: abs(tab.state.pose.position[1] - goal) < 0.4, "the y dragged to")
     assert tab.state.pose.position[::2] == before.pose.position[::2]
     assert tab.state.joints != before.joints
-    tab.type("roll (°)", "12")
+    tab.type("roll (°)", "12\n")
     tab.wait_for(lambda: tab.state.yaw_pitch_roll[2] == 12.0, "the roll that was typed")
+    assert_page_shows_state(tab)
+    tab.push("Home pose")
+    home = home_pose(tab.state.design)
+    tab.wait_for(lambda: tab.state.pose == home, "the home pose")
     assert_page_shows_state(tab)
 
 
-def test_choosing_a_mode_keeps_the_legs_and_takes_that_assembly(tab: Tab) -> None:
+def test_row_of_a_mode_shows_its_ghost_while_it_is_pointed_at_and_is_chosen(tab: Tab) -> None:
+    session, hovered = tab.running.page.session, tab.running.page.services.get(HoveredMode)
+    before, number = tab.state, session.history.step.number
+    tab.settle()
+    row_of_mode(tab, 6).scroll_into_view_if_needed()
+    for mode in (6, 2):
+        row_of_mode(tab, mode).hover()
+        tab.wait_for(lambda mode=mode: hovered.row == mode, f"the ghost of mode {mode}")
+    tab.wait_for(lambda: ghosts_in_scene(tab) == 1, "one ghost in the scene")
+    assert tab.state == before
+    assert session.history.step.number == number
+    tab.page.mouse.move(SIZE[0] // 2, 4)
+    tab.wait_for(lambda: hovered.row is None, "no ghost")
+    tab.wait_for(lambda: ghosts_in_scene(tab) == 0, "no ghost in the scene")
+    # A row that is replaced under the pointer, since its numbers change, is left later too.
+    row_of_mode(tab, 2).hover()
+    tab.wait_for(lambda: hovered.row == 2, "the ghost")
+    session.do(SetPosition(0, 11.0))
+    expect(row_of_mode(tab, 2)).to_contain_text("11.0")
+    tab.page.mouse.move(SIZE[0] // 2, 4)
+    tab.wait_for(lambda: hovered.row is None, "no ghost any more")
+    # A press keeps the legs and takes that assembly.
     before = tab.state
     other = before.mode ^ 0b101
+    tab.settle()
     row_of_mode(tab, other).click()
     tab.wait_for(lambda: tab.state.mode == other, "the mode that was chosen")
     solution = forward(before.design, before.joints)
     np.testing.assert_allclose(tab.state.pose.position, solution.position[other], atol=1e-9)
     np.testing.assert_allclose(tab.state.joints, before.joints, atol=1e-9)
     assert_page_shows_state(tab)
-
-
-def test_pointer_on_a_mode_shows_its_ghost_until_it_leaves_or_the_mode_is_chosen(tab: Tab) -> None:
-    hovered = tab.running.page.services.get(HoveredMode)
-    before, number = tab.state, tab.running.page.session.history.step.number
-    row_of_mode(tab, 6).scroll_into_view_if_needed()
-    for mode in (6, 2):
-        row_of_mode(tab, mode).hover()
-        tab.wait_for(lambda mode=mode: hovered.row == mode, f"the ghost of mode {mode}")
-    tab.wait_for(lambda: ghosts_shown(tab) == 1, "one ghost in the scene")
-    assert tab.state == before
-    assert tab.running.page.session.history.step.number == number
-    tab.page.mouse.move(SIZE[0] // 2, 4)
-    tab.wait_for(lambda: hovered.row is None, "no ghost")
-    tab.wait_for(lambda: ghosts_shown(tab) == 0, "no ghost in the scene")
-    # A row that is replaced under the pointer, since its numbers change, is left later too.
-    row_of_mode(tab, 2).hover()
-    tab.wait_for(lambda: hovered.row == 2, "the ghost")
-    tab.running.page.session.do(SetPosition(0, 11.0))
-    expect(row_of_mode(tab, 2)).to_contain_text("11.0")
-    tab.page.mouse.move(SIZE[0] // 2, 4)
-    tab.wait_for(lambda: hovered.row is None, "no ghost any more")
-
-
-def test_keyboard_on_a_mode_shows_its_ghost_and_chooses_it(tab: Tab) -> None:
-    hovered = tab.running.page.services.get(HoveredMode)
+    # The keyboard does the same.
+    tab.settle()
     tab.page.get_by_role("button", name="Other modes as ghosts").focus()
     for _ in range(3):
         tab.page.keyboard.press("Tab")
     tab.wait_for(lambda: hovered.row == 2, "the ghost of the row with the focus")
     tab.page.keyboard.press("Enter")
-    tab.wait_for(lambda: tab.state.mode == 2, "that mode")
+    tab.wait_for(lambda: tab.state.mode == 2, "the mode of the row with the focus")
 
 
 def row_of_mode(tab: Tab, mode: int) -> Locator:
     return tab.page.get_by_role("button", name=f"Mode {mode}, ")
 
 
-def ghosts_shown(tab: Tab) -> int:
+def ghosts_in_scene(tab: Tab) -> int:
     return tab.page.evaluate(
         """() => Object.entries(window.__viserMutable.nodeRefFromName)
             .filter(([name, node]) => /^\\/ghosts\\/platform\\/\\d$/.test(name) && node?.visible)
@@ -143,7 +141,7 @@ def ghosts_shown(tab: Tab) -> int:
     )
 
 
-def test_lengths_that_cannot_close_leave_the_pose_and_offer_the_nearest(tab: Tab) -> None:
+def test_length_that_cannot_close_leaves_the_pose_and_offers_the_nearest(tab: Tab) -> None:
     alert = tab.page.get_by_role("alert").filter(has_text="cannot close")
     button = tab.page.get_by_role("button", name="Use the nearest length")
     expect(alert).to_be_hidden()
@@ -180,33 +178,9 @@ def test_lengths_that_cannot_close_leave_the_pose_and_offer_the_nearest(tab: Tab
     assert_page_shows_state(tab)
 
 
-def test_a_track_holds_still_while_its_slider_is_dragged(tab: Tab) -> None:
-    # Beyond what is possible, so that the track is longer than it would be of itself.
-    tab.field("x").fill("60")
-    tab.page.keyboard.press("Enter")
-    tab.wait_until_shown("x", 60.0)
-    thumb = tab.slider("x")
-    ends: list[tuple[str | None, str | None]] = []
-    at, track = thumb.bounding_box(), tab.row("x").locator(TRACK).bounding_box()
-    assert at is not None
-    assert track is not None
-    y = at["y"] + 0.5 * at["height"]
-    tab.page.mouse.move(at["x"] + 0.5 * at["width"], y)
-    tab.page.mouse.down()
-    for share in (0.8, 0.5, 0.3, 0.4):
-        tab.page.mouse.move(track["x"] + share * track["width"], y, steps=4)
-        settle(tab.page, tab.client)
-        ends.append((thumb.get_attribute("aria-valuemin"), thumb.get_attribute("aria-valuemax")))
-    tab.page.mouse.up()
-    assert ends == [ends[0]] * len(ends)
-    assert float(ends[0][1] or "") == 60.0
-    # Once something else moves it, the track is what is possible again.
-    tab.push("Home pose")
-    tab.wait_for(lambda: thumb.get_attribute("aria-valuemax") == "21", "the track of before")
-
-
-def test_the_tint_of_a_track_covers_what_closes(tab: Tab) -> None:
-    """Where the track is tinted is read from the places of the marks, as the stylesheet does."""
+def test_track_is_tinted_where_the_legs_close_and_stays_while_it_is_dragged(tab: Tab) -> None:
+    # Where it is tinted is read from the places of the marks, as the stylesheet does.
+    tab.settle()
     for joint, words in enumerate(LABELS):
         row = tab.row(words)
         track = row.locator(".mantine-Slider-track").bounding_box()
@@ -223,76 +197,74 @@ def test_the_tint_of_a_track_covers_what_closes(tab: Tab) -> None:
         expected = [min(max(end, low), high) for interval in intervals for end in interval]
         # A pixel is a hundredth of the track.
         assert places == pytest.approx(expected, abs=0.01 * (high - low))
-
-
-def test_home_brings_back_the_home_pose(tab: Tab) -> None:
-    tab.type("z", "6.5")
-    tab.wait_for(lambda: tab.state.pose.position[2] == 6.5, "the z that was typed")
+    # Beyond what is possible, so that the track is longer than it would be of itself.
+    tab.type("x", "60\n")
+    tab.wait_until_shown("x", 60.0)
+    tab.settle()
+    thumb = tab.slider("x")
+    ends: list[tuple[str | None, str | None]] = []
+    at, track = thumb.bounding_box(), tab.row("x").locator(TRACK).bounding_box()
+    assert at is not None
+    assert track is not None
+    y = at["y"] + 0.5 * at["height"]
+    tab.page.mouse.move(at["x"] + 0.5 * at["width"], y)
+    tab.page.mouse.down()
+    for share in (0.8, 0.3, 0.4):
+        tab.page.mouse.move(track["x"] + share * track["width"], y, steps=4)
+        tab.settle()
+        ends.append((thumb.get_attribute("aria-valuemin"), thumb.get_attribute("aria-valuemax")))
+    tab.page.mouse.up()
+    assert ends == [ends[0]] * len(ends)
+    assert float(ends[0][1] or "") == 60.0
+    # Once something else moves it, the track is what is possible again.
     tab.push("Home pose")
-    home = home_pose(tab.state.design)
-    tab.wait_for(lambda: tab.state.pose == home, "the home pose")
-    assert_page_shows_state(tab)
+    tab.wait_for(lambda: thumb.get_attribute("aria-valuemax") == "21", "the track of before")
 
 
-@pytest.mark.parametrize("axis", [1, 2])
-def test_dragging_an_arrow_of_the_gizmo_moves_the_platform_along_it(tab: Tab, axis: int) -> None:
+def test_arrow_of_the_gizmo_moves_the_platform_along_it(tab: Tab) -> None:
     # Large enough for the hand to be as exact as asked for below.
     tab.page.set_viewport_size({"width": 1280, "height": 720})
     tab.look_from("isometric")
     before = tab.state
     placed = Placed(Frame(before))
-    arrow = before.pose.rotation[:, axis]
+    arrow = before.pose.rotation[:, 1]
     tip = placed.points["b4"] + 0.7 * ARROW_LENGTH * arrow
     mouse = tab.page.mouse
     mouse.move(*tab.on_screen(tip))
     mouse.down()
     mouse.move(*tab.on_screen(tip + 1.5 * arrow), steps=8)
     mouse.up()
-    tab.wait_for(lambda: tab.state.pose != before.pose, "another pose")
-    tab.picture()
-    moved = placed.scale * (np.array(tab.state.pose.position) - before.pose.position)
-    assert moved @ arrow == pytest.approx(1.5, abs=0.3)
-    np.testing.assert_allclose(moved, (moved @ arrow) * arrow, atol=1e-3)
+
+    def moved_by() -> FloatArray:
+        return placed.scale * (np.array(tab.state.pose.position) - before.pose.position)
+
+    # A slow browser may still be reporting the drag.
+    tab.wait_for(lambda: abs(float(moved_by() @ arrow) - 1.5) < 0.3, "a platform as far along")
+    np.testing.assert_allclose(moved_by(), (moved_by() @ arrow) * arrow, atol=1e-3)
     np.testing.assert_allclose(tab.state.pose.rotation, before.pose.rotation, atol=1e-6)
     assert_page_shows_state(tab)
 
 
-def test_a_reload_keeps_the_state(tab: Tab) -> None:
-    tab.type(LABELS[2], "9.9")
-    tab.wait_for(lambda: tab.state.joints[2] == 9.9, "the length that was typed")
-    before = tab.state
-    tab.reload()
-    assert tab.state == before
-    assert_page_shows_state(tab)
-
-
-def test_two_tabs_stay_in_step(open_tab: OpenTab) -> None:
+def test_two_tabs_stay_in_step_through_many_values(open_tab: OpenTab) -> None:
     one, other = open_tab(), open_tab()
-    one.type(LABELS[3], "11.2")
+    one.type(LABELS[3], "11.2\n")
     other.wait_until_shown(LABELS[3], 11.2)
-    other.type("x", "9.5")
+    other.type("x", "9.5\n")
     one.wait_until_shown("x", 9.5)
-    for tab in (one, other):
-        assert_page_shows_state(tab)
-
-
-def test_sixty_values_in_a_row_end_with_the_last_in_every_tab(open_tab: OpenTab) -> None:
-    one, other = open_tab(), open_tab()
+    other.push("Home pose")
+    one.wait_until_shown("x", 10.0)
+    # Many values in a row end with the last.
     field = one.field(LABELS[5])
-    for hundredths in range(1241, 1301):
+    for hundredths in range(1281, 1301):
         field.fill(f"{hundredths / 100:g}")
-    for tab in (one, other):
-        tab.wait_until_shown(LABELS[5], 13.0)
+    one.page.keyboard.press("Enter")
     one.wait_for(lambda: one.state.joints[5] == 13.0, "the last length")
     for tab in (one, other):
+        tab.wait_until_shown(LABELS[5], 13.0)
         assert_page_shows_state(tab)
-
-
-def test_a_slider_thrown_about_ends_where_the_mouse_left_it_in_every_tab(open_tab: OpenTab) -> None:
-    one, other = open_tab(), open_tab()
-    goal = one.drag("x", 0.62, steps=60)
+    # A slider that is thrown about ends where the mouse leaves it.
+    goal = one.drag("x", 0.62, steps=20)
     one.wait_for(lambda: abs(one.state.pose.position[0] - goal) < 0.4, "the x dragged to")
-    assert one.running.page.session.wait_until_idle()
     for tab in (one, other):
         assert_page_shows_state(tab)
     assert abs(one.state.pose.position[0] - goal) < 0.4

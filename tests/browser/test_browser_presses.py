@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import pytest
 from tab import TRACK, Tab
 
 from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.scene.placing import Placed
-from explorer.app.screenshot import settle
 from explorer.app.session.gestures import PAUSE_SECONDS
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
 
-REST = 1000 * (PAUSE_SECONDS + 0.3)
+# Longer than the pause after which an event begins a step of its own, where no press is known.
+REST_SECONDS = PAUSE_SECONDS + 0.3
 
 # The page moves on as the pointer is released, and then does nothing for a second.
 BUSY_AT_RELEASE = """() => {
@@ -55,28 +56,32 @@ def move(tab: Tab, x: float, y: float) -> None:
     tab.wait_for(lambda: tab.state.pose != before, "a move")
 
 
-def test_drag_of_a_slider_that_rests_is_one_step_and_the_next_drag_another(tab: Tab) -> None:
-    settle(tab.page, tab.client)
+@pytest.fixture
+def tab(tab: Tab) -> Tab:
+    """A tab at rest."""
+    tab.settle()
+    return tab
+
+
+def test_drag_of_a_slider_or_of_the_gizmo_is_one_step_however_long_it_rests(tab: Tab) -> None:
     first = tab.state.pose
     for drag in (1, 2):
         x, y, width = grab(tab, "x")
         for share in (0.02, 0.04, 0.06):
             move(tab, x + share * width, y)
-            tab.page.wait_for_timeout(REST)
+            tab.advance(REST_SECONDS)
         # The window may lose the focus while a hand holds.
         tab.page.evaluate("dispatchEvent(new Event('blur'))")
-        tab.page.wait_for_timeout(REST)
+        tab.advance(REST_SECONDS)
         move(tab, x + 0.08 * width, y)
         tab.page.mouse.up()
         # The last of the moves may arrive after the release.
         tab.wait_for(lambda: tab.stands("x", tab.state.pose.position[0]), "the last value")
+        tab.settle()
         assert steps(tab) == drag
-    tab.page.keyboard.press("ControlOrMeta+z")
-    tab.page.keyboard.press("ControlOrMeta+z")
+    for _ in range(2):
+        tab.page.keyboard.press("ControlOrMeta+z")
     tab.wait_for(lambda: tab.state.pose == first, "the pose of before")
-
-
-def test_drag_of_the_gizmo_that_rests_is_one_step(tab: Tab) -> None:
     tab.look_from("isometric")
     placed = Placed(Frame(tab.state))
     arrow = tab.state.pose.rotation[:, 0]
@@ -85,50 +90,46 @@ def test_drag_of_the_gizmo_that_rests_is_one_step(tab: Tab) -> None:
     tab.page.mouse.down()
     for share in (0.5, 1.0, 1.5):
         move(tab, *tab.on_screen(tip + share * arrow))
-        tab.page.wait_for_timeout(REST)
+        tab.advance(REST_SECONDS)
     tab.page.mouse.up()
     assert steps(tab) == 1
 
 
-def test_last_value_that_a_busy_page_sends_late_is_of_the_press(tab: Tab) -> None:
-    settle(tab.page, tab.client)
+def test_release_that_is_reported_late_or_lost_ends_the_press(tab: Tab) -> None:
     x, y, width = grab(tab, "x")
     move(tab, x + 0.05 * width, y)
+    # The last value that a busy page sends late belongs to the press.
     tab.page.evaluate(BUSY_AT_RELEASE)
     before = tab.state.pose
     tab.page.mouse.up()
     tab.wait_for(lambda: tab.state.pose != before, "the last value")
     assert steps(tab) == 1
-
-
-def test_release_that_was_lost_ends_with_the_next_move_of_the_pointer(tab: Tab) -> None:
-    settle(tab.page, tab.client)
+    tab.push("Home pose")
+    tab.wait_until_shown("x", 10.0)
+    tab.settle()
+    before_drag = steps(tab)
     x, y, width = grab(tab, "x")
     move(tab, x + 0.05 * width, y)
-    # In another window the page hears of none.
+    # A release in another window is not heard; the next move of the pointer tells of it.
     tab.page.evaluate(
         "addEventListener('pointerup', event => event.stopImmediatePropagation(),"
         " {capture: true, once: true})"
     )
     tab.page.mouse.up()
     tab.page.mouse.move(x, y + 40, steps=2)
-    tab.page.wait_for_timeout(REST)
+    tab.advance(REST_SECONDS)
     tab.slider("x").focus()
     tab.page.keyboard.press("ArrowRight")
-    tab.wait_for(lambda: steps(tab) == 2, "a step of its own")
+    tab.wait_for(lambda: steps(tab) == before_drag + 2, "a step of its own")
 
 
-def test_same_press_after_the_page_was_loaded_again_counts(tab: Tab) -> None:
+def test_press_counts_after_a_reload_and_on_markup_that_is_replaced_meanwhile(tab: Tab) -> None:
     # It is the first press of its page each time.
     for value in (11.0, 12.0):
         tab.running.page.session.do(SetPosition(0, value))
-        button = tab.page.get_by_role("button", name=f"Undo x = {value:g}")
-        button.click()
+        tab.page.get_by_role("button", name=f"Undo x = {value:g}").click()
         tab.wait_for(lambda: tab.stands("x", 10.0), "the pose of before")
         tab.reload()
-
-
-def test_press_on_markup_that_is_replaced_before_the_release_counts(tab: Tab) -> None:
     tab.page.get_by_role("button", name="Help", exact=True).hover()
     tab.page.mouse.down()
     tab.page.evaluate(REPLACE, "[data-opens=Help]")

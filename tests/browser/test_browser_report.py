@@ -18,7 +18,7 @@ from explorer.cli import run
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 
 
-def test_the_page_asks_for_nothing_and_runs_nothing(browser: Browser) -> None:
+def test_report_of_a_hostile_name_asks_for_nothing_and_runs_nothing(browser: Browser) -> None:
     hostile = '</title></style><script>window.hit = 1</script><img src=x onerror="window.hit=1">'
     html = make_report(msgspec.structs.replace(OPTIMAL, name=hostile)).decode()
     page = browser.new_page(viewport={"width": 1000, "height": 1200})
@@ -36,27 +36,28 @@ def test_the_page_asks_for_nothing_and_runs_nothing(browser: Browser) -> None:
     page.close()
 
 
-@pytest.mark.parametrize("width", [360, 820, 1280])
-def test_nothing_is_wider_than_the_page(browser: Browser, width: int) -> None:
-    page = browser.new_page(viewport={"width": width, "height": 900})
+def test_report_is_nowhere_wider_than_its_page(browser: Browser) -> None:
+    page = browser.new_page()
     page.set_content(make_report(OPTIMAL).decode(), wait_until="load")
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    # Words of drawings stay within them.
-    beyond = page.evaluate(
-        """() => [...document.querySelectorAll('svg')].flatMap(svg => {
-            const frame = svg.getBoundingClientRect();
-            return [...svg.querySelectorAll('text')].filter(text => {
-                const box = text.getBoundingClientRect();
-                return box.left < frame.left - 1 || box.right > frame.right + 1
-                    || box.top < frame.top - 1 || box.bottom > frame.bottom + 1;
-            }).map(text => text.textContent);
-        })"""
-    )
-    assert beyond == []
+    for width in (360, 820, 1280):
+        page.set_viewport_size({"width": width, "height": 900})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        # Words of drawings stay within them.
+        beyond = page.evaluate(
+            """() => [...document.querySelectorAll('svg')].flatMap(svg => {
+                const frame = svg.getBoundingClientRect();
+                return [...svg.querySelectorAll('text')].filter(text => {
+                    const box = text.getBoundingClientRect();
+                    return box.left < frame.left - 1 || box.right > frame.right + 1
+                        || box.top < frame.top - 1 || box.bottom > frame.bottom + 1;
+                }).map(text => text.textContent);
+            })"""
+        )
+        assert beyond == [], width
     page.close()
 
 
-def test_the_pdf_is_the_same_page_on_paper(
+def test_report_as_pdf_is_the_same_page_on_paper(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     out = tmp_path / "report.pdf"
@@ -74,7 +75,8 @@ def test_the_pdf_is_the_same_page_on_paper(
     assert b"/Outlines" in data
 
 
-def test_the_picture_of_the_readme_is_todays(browser: Browser) -> None:
+@pytest.mark.long
+def test_report_looks_like_its_stored_picture(browser: Browser) -> None:
     # Text in another font of the same size is as far off as panels are.
     limit = Likeness(structure=0.3, colour=2.5, spot=100.0)
     expected = (FOLDER / "report.png").read_bytes()

@@ -1,11 +1,10 @@
-"""Files out of a real browser, each to the one that asked; and the page in a notebook."""
+"""Pictures and pages out of a real browser, and the page in a notebook."""
 
 from __future__ import annotations
 
-import csv
 import http.server
-import io
 import threading
+import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,22 +14,17 @@ import imageio.v3
 import numpy as np
 import pytest
 from likeness import blocks, decoded, likeness
-from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Download, Locator, Page, expect
 from tab import Tab
 
 import explorer
-from explorer.app.features.sharing.files import SharedFiles
 from explorer.app.features.sharing.view_picture import Pixels
-from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
-from explorer.app.state.actions import Set, SetPosition
+from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS
+from explorer.app.state.actions import Set
 from explorer.app.state.view import View
+from explorer.numerics.arrays import FloatArray
 
-# Pictures of the page are drawn by the page.
-pytestmark = pytest.mark.draws
-
-OpenTab = Callable[[], Tab]
 untyped: Any = imageio.v3
 
 # In milliseconds.
@@ -47,23 +41,19 @@ def as_html(shown: Any) -> str:
     return shown._repr_mimebundle_()["text/html"]
 
 
-def at_rest(page: Page, canvas: Locator) -> bytes:
-    """Return a picture of a scene once two in a row are the same and something is drawn."""
-    last = b""
-    for _ in range(100):
-        data = canvas.screenshot()
-        if data == last and decoded(data).std() > 0.01:
-            return data
-        last = data
-        page.wait_for_timeout(150)
-    raise AssertionError("the scene did not come to rest")
+def wait_until_drawn(page: Page, canvas: Locator, is_drawn: Callable[[FloatArray], bool]) -> None:
+    """Wait until the picture of a scene is as a condition says."""
+    deadline = time.monotonic() + PATIENCE_SECONDS
+    while not is_drawn(decoded(canvas.screenshot())):
+        assert time.monotonic() < deadline, "the scene is not drawn"
+        page.wait_for_timeout(50)
 
 
 def pixels_of(download: Download) -> Pixels:
     return untyped.imread(download.path().read_bytes(), extension=".png")
 
 
-def picture(tab: Tab, *, transparent: bool) -> Pixels:
+def take_picture(tab: Tab, *, transparent: bool) -> Pixels:
     tab.switch("Transparent", on=transparent)
     with tab.page.expect_download() as download:
         tab.push("Download picture")
@@ -71,17 +61,25 @@ def picture(tab: Tab, *, transparent: bool) -> Pixels:
     return pixels_of(download.value)
 
 
-def test_a_picture_has_the_size_and_the_background_asked_for_and_no_handle(tab: Tab) -> None:
+def reds(pixels: NDArray[Any]) -> int:
+    """Return how many pixels are as red as nothing but the handle is, and the axes in a corner."""
+    pixels = pixels[: pixels.shape[0] * 3 // 4]
+    red, green, blue = (pixels[..., i] for i in range(3))
+    return int(((red > 200) & (green < 60) & (blue < 160)).sum())
+
+
+@pytest.mark.draws
+def test_picture_has_the_size_and_background_that_are_set_and_no_handle(tab: Tab) -> None:
     tab.open_dialog("Export")
-    settle(tab.page, tab.client)
+    tab.settle()
     tab.page.get_by_text("Picture of another size").click()
     tab.type("Width (px)", "320")
     tab.type("Height (px)", "240")
     tab.page.keyboard.press("Tab")
-    opaque = picture(tab, transparent=False)
+    opaque = take_picture(tab, transparent=False)
     assert opaque.shape == (240, 320, 3)
     assert (opaque[0, 0] > 240).all()
-    clear = picture(tab, transparent=True)
+    clear = take_picture(tab, transparent=True)
     assert clear.shape == (240, 320, 4)
     assert clear[..., 3].min() == 0
     assert clear[..., 3].max() == 255
@@ -93,16 +91,8 @@ def test_a_picture_has_the_size_and_the_background_asked_for_and_no_handle(tab: 
     with_handle = tab.client.get_render(240, 320, transport_format="png", timeout=PATIENCE_SECONDS)
     assert reds(with_handle) > 0
     assert reds(opaque) == 0
-
-
-def reds(pixels: NDArray[Any]) -> int:
-    """Return how many pixels are as red as nothing but the handle is, and the axes in a corner."""
-    pixels = pixels[: pixels.shape[0] * 3 // 4]
-    red, green, blue = (pixels[..., i] for i in range(3))
-    return int(((red > 200) & (green < 60) & (blue < 160)).sum())
-
-
-def test_a_picture_twice_as_large_as_shown_shows_the_same(tab: Tab) -> None:
+    # A picture twice as large as the scene shows the same.
+    tab.page.keyboard.press("Escape")
     tab.running.page.session.do(Set("view", View(handle=False)))
     shown = decoded(tab.picture())
     taken = pixels_of(tab.export("Picture", "PNG twice as shown")) / 255.0
@@ -114,20 +104,9 @@ def test_a_picture_twice_as_large_as_shown_shows_the_same(tab: Tab) -> None:
     assert found.structure < 0.05
 
 
-def test_a_size_out_of_bounds_is_refused_to_the_one_who_asked(open_tab: OpenTab) -> None:
-    asking, other = open_tab(), open_tab()
-    files = asking.running.page.services.get(SharedFiles)
-    files.picture((9, 100), transparent=False, client_id=asking.client.client_id)
-    notice = "the width of a picture is 16 to 8192 pixels; got 9"
-    expect(asking.page.get_by_text(notice)).to_be_visible(timeout=PATIENCE)
-    expect(other.page.get_by_text(notice)).to_be_hidden()
-    # Another may be asked for at once.
-    files.picture((64, 48), transparent=False, client_id=asking.client.client_id)
-    with asking.page.expect_download():
-        pass
-
-
-def test_the_scene_is_one_page_that_works_without_network(tab: Tab, browser: Browser) -> None:
+def test_scene_as_one_page_works_without_network_and_asks_for_nothing(
+    tab: Tab, browser: Browser
+) -> None:
     tab.running.page.session.do(Set("view", View(handle=False)))
     tab.look_from("front")
     download = tab.export("Scene", "HTML")
@@ -149,15 +128,14 @@ def test_the_scene_is_one_page_that_works_without_network(tab: Tab, browser: Bro
         expect(page.locator("#caption")).to_contain_text("1 unit = 10 mm", timeout=PATIENCE)
         page.locator("#webgl-software-rendering").get_by_role("button").click()
         canvas = page.locator(SCENE_CANVAS)
-        drawn = at_rest(page, canvas)
+        wait_until_drawn(page, canvas, lambda picture: picture.std() > 0.05)
+        drawn = decoded(canvas.screenshot())
         # As it was looked at: from the front the guide is level, and a3 is behind it.
-        assert decoded(drawn).std() > 0.05
         page.mouse.move(320, 240)
         page.mouse.down()
         page.mouse.move(420, 300, steps=5)
         page.mouse.up()
-        turned = at_rest(page, canvas)
-        assert likeness(decoded(drawn), decoded(turned)).spot > PLAIN_TO_SEE
+        wait_until_drawn(page, canvas, lambda picture: likeness(drawn, picture).spot > PLAIN_TO_SEE)
         # No panel and no way to a server.
         expect(page.get_by_role("slider")).to_have_count(0)
     finally:
@@ -165,45 +143,6 @@ def test_the_scene_is_one_page_that_works_without_network(tab: Tab, browser: Bro
     assert asked[0] == file.as_uri()
     assert all(url.startswith(INSIDE) for url in asked)
     assert said == []
-
-
-def test_the_session_comes_as_a_table_to_the_one_who_asked(open_tab: OpenTab) -> None:
-    asking, other = open_tab(), open_tab()
-    arrived: list[Download] = []
-
-    def note(download: Download) -> None:
-        arrived.append(download)
-
-    other.page.on("download", note)
-    goal = asking.drag("x", 0.6)
-
-    def has_come() -> bool:
-        x = asking.state.pose.position[0]
-        return asking.stands("x", x) and abs(x - goal) < 0.4
-
-    # A slow browser may still be telling of the drag.
-    asking.wait_for(has_come, "the x dragged to")
-    session = asking.running.page.session
-    assert session.wait_until_idle()
-    session.do(SetPosition(2, 7.0))
-    assert session.wait_until_idle()
-    download = asking.export("Session", "CSV")
-    assert download.suggested_filename == "paper-optimal-session.csv"
-    rows = list(csv.DictReader(io.StringIO(download.path().read_text(encoding="utf-8"))))
-    poses = [[float(row[name]) for name in "xyz"] for row in rows]
-    assert poses[0] == [10.0, 5.0, 9.0]
-    assert poses[-1] == list(asking.state.pose.position)
-    assert poses[-1][2] == 7.0
-    assert rows[0]["moved_by"] == "Open paper-optimal"
-    assert rows[-2]["moved_by"].startswith("x = ")
-    assert rows[-1]["moved_by"] == "z = 7"
-    times = [float(row["time_s"]) for row in rows]
-    assert times == sorted(times)
-    joints = [float(rows[-1][name]) for name in explorer.JOINTS]
-    found = explorer.forward(explorer.PRESETS["paper-optimal"], joints)
-    assert_allclose(found.position[int(rows[-1]["mode"])], poses[-1], atol=1e-9)
-    other.page.wait_for_timeout(500)
-    assert arrived == []
 
 
 @contextmanager
@@ -228,10 +167,8 @@ def notebook(html: str, tmp_path: Path) -> Generator[str]:
             thread.join()
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
-def test_in_a_notebook_the_page_is_live_both_ways(
-    browser: Browser, tmp_path: Path, host: str
-) -> None:
+@pytest.mark.parametrize("host", [pytest.param("127.0.0.1", marks=pytest.mark.long), "localhost"])
+def test_page_in_a_notebook_is_live_both_ways(browser: Browser, tmp_path: Path, host: str) -> None:
     context = browser.new_context(viewport={"width": 1000, "height": 640})
     context.set_default_timeout(PATIENCE)
     try:
@@ -254,14 +191,14 @@ def test_in_a_notebook_the_page_is_live_both_ways(
             field.fill("12.5")
             field.press("Enter")
             expect(field).to_have_value("12.5", timeout=PATIENCE)
-            for _ in range(500):
-                if shown.pose.position[2] != 8.0:
-                    break
+            deadline = time.monotonic() + PATIENCE_SECONDS
+            while shown.pose.position[2] == 8.0:
+                assert time.monotonic() < deadline, "the pose has not changed"
                 page.wait_for_timeout(20)
             moved = explorer.inverse(shown.design, shown.pose.position, shown.pose.rotation)
             assert moved[5] == pytest.approx(12.5, abs=1e-9)
             canvas = frame.locator(SCENE_CANVAS)
-            assert decoded(at_rest(page, canvas)).std() > 0.05
+            wait_until_drawn(page, canvas, lambda picture: picture.std() > 0.05)
             # A frame of another site has no storage. An error at one message loses those after it.
             assert errors == []
     finally:

@@ -1,4 +1,4 @@
-"""Studies in a browser: clicks and brushes in the plots, and a study started from the page."""
+"""Studies in a browser: clicks and brushes in the plots."""
 
 from __future__ import annotations
 
@@ -11,17 +11,13 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser
 from tab import Tab
 
-from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.features.studies.feed import NO_PLAN, PlotJson
 from explorer.app.features.studies.panel import StudiesPanel
-from explorer.app.screenshot import settle
 from explorer.app.server import Running, start
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Set
-from explorer.app.state.studies import MOST, StudyPlan
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.parts import write_part
@@ -92,17 +88,17 @@ def tab(browser: Browser, running: Running) -> Iterator[Tab]:
         assert tab.complaints() == []
 
 
-def looked_at(tab: Tab) -> None:
+def open_studies(tab: Tab) -> None:
     tab.page.set_viewport_size({"width": WINDOW["width"], "height": WINDOW["height"]})
     tab.turn_to("Studies")
-    settle(tab.page, tab.client)
+    tab.settle()
 
 
 def panel_of(tab: Tab) -> StudiesPanel:
     return tab.running.page.services.get(StudiesPanel)
 
 
-def settled(tab: Tab) -> None:
+def wait_for_plots(tab: Tab) -> None:
     """Wait until the plots are those of the state, and are listened to."""
     feed = panel_of(tab).feed
 
@@ -120,13 +116,13 @@ def settled(tab: Tab) -> None:
         found = plots()
         if found is None:
             return False
-        revision = f'"uirevision":{_revision(found[0].to_json())}'
+        revision = f'"uirevision":{revision_in(found[0].to_json())}'
         return bool(tab.page.evaluate(shows, revision))
 
     tab.wait_for(are_shown, "the plots of the state")
 
 
-def _revision(text: str) -> int:
+def revision_in(text: str) -> int:
     return int(text.partition('"uirevision":')[2].partition("}")[0])
 
 
@@ -134,22 +130,24 @@ def studies_of(tab: Tab) -> Any:
     return tab.state.studies
 
 
-def test_what_hands_do_in_the_plots(tab: Tab, home: Path) -> None:
+def test_design_is_picked_and_brushed_by_clicks_and_drags_in_the_plots(
+    tab: Tab, home: Path
+) -> None:
     results = load_results(home / "some")
     volume, reach = results.columns["volume"], results.columns["reach"]
-    looked_at(tab)
+    open_studies(tab)
     tab.choose("Study", "some")
-    settled(tab)
+    wait_for_plots(tab)
 
     # A click on a point opens that very design.
-    row = _lonely(results)
+    row = loneliest_row(results)
     place = tab.page.evaluate(POINT, ["", volume[row], reach[row]])
     tab.page.mouse.move(*place)
     tab.page.mouse.click(*place)
     tab.wait_for(lambda: studies_of(tab).picked is not None, "a pick")
     assert studies_of(tab).picked == int(results.columns["index"][row])
     assert tab.state.design == results.design_of_row(row)
-    settled(tab)
+    wait_for_plots(tab)
 
     # A box around it brushes both axes, and all else is left out.
     place = tab.page.evaluate(POINT, ["", volume[row], reach[row]])
@@ -159,14 +157,14 @@ def test_what_hands_do_in_the_plots(tab: Tab, home: Path) -> None:
     tab.page.mouse.up()
     tab.wait_for(lambda: len(studies_of(tab).brushes) == 2, "a box")
     assert {each.axis for each in studies_of(tab).brushes} == {"volume", "reach"}
-    settled(tab)
-    _assert_left_out(tab, results)
+    wait_for_plots(tab)
+    assert_left_out(tab, results)
     assert row not in tab.page.evaluate(LEFT_OUT)
 
     # What is undone is gone from the plots too.
     tab.running.page.session.travel(UNDO)
     tab.wait_for(lambda: not studies_of(tab).brushes, "no brush")
-    settled(tab)
+    wait_for_plots(tab)
     assert tab.page.evaluate(LEFT_OUT) == []
     assert not any(tab.page.evaluate(BRUSHES))
 
@@ -178,7 +176,7 @@ def test_what_hands_do_in_the_plots(tab: Tab, home: Path) -> None:
     tab.page.mouse.click(*line)
     tab.wait_for(lambda: studies_of(tab).picked == other, "a pick of a line")
     assert tab.state.design == results.design_of_row(other)
-    settled(tab)
+    wait_for_plots(tab)
 
     # A drag along an axis brushes it.
     tab.page.evaluate(TOP)
@@ -194,13 +192,13 @@ def test_what_hands_do_in_the_plots(tab: Tab, home: Path) -> None:
     assert brush.axis == "b2"
     ((low, high),) = brush.ranges
     assert -4.2 < low < high < 4.2
-    settled(tab)
-    _assert_left_out(tab, results)
+    wait_for_plots(tab)
+    assert_left_out(tab, results)
     assert 0 < len(tab.page.evaluate(LEFT_OUT)) < COUNT
 
     tab.page.get_by_title("Clear all brushes").click()
     tab.wait_for(lambda: not studies_of(tab).brushes, "no brush")
-    settled(tab)
+    wait_for_plots(tab)
     drawing = panel_of(tab).feed.drawing
     assert drawing is not None
     best = int(results.columns["index"][drawing.front[0]])
@@ -209,51 +207,7 @@ def test_what_hands_do_in_the_plots(tab: Tab, home: Path) -> None:
     assert tab.state.design == results.design_of_row(int(drawing.front[0]))
 
 
-def test_a_small_study_is_started_and_cancelled(tab: Tab, home: Path) -> None:
-    # So many, of something so slow, that even a slow browser can cancel it on the way.
-    plan = StudyPlan(MOST, 20.0, ("a3x", "b2"), ("volume", "accessible_volume"), ())
-    tab.running.page.session.do(Set("studies.plan", plan))
-    looked_at(tab)
-    count = tab.slider("Number of designs")
-    count.wait_for()
-    tab.push("Start study")
-    # The settings give their place to the progress.
-    expect(count).to_have_count(0)
-    panel = panel_of(tab)
-    tab.wait_for(lambda: panel.runner.run is not None, "a study")
-    expect(tab.page.get_by_text(f"of {MOST:,} designs").first).to_be_visible()
-    tab.push("Cancel study")
-    tab.wait_for(lambda: panel.runner.run is None, "the end of a cancelled study")
-    tab.push("New study")
-    count.wait_for()
-    tab.push("Back")
-    expect(count).to_have_count(0)
-    name = studies_of(tab).name
-    assert name is not None
-    assert _count(home / name) < MOST
-
-
-def test_a_study_that_was_cut_off_is_gone_on_with(tab: Tab, home: Path) -> None:
-    session = tab.running.page.session
-    looked_at(tab)
-    session.do(OpenStudy("half"))
-    tab.push("Continue the study")
-    tab.wait_for(lambda: _count(home / "half") == COUNT, "the whole study")
-    settled(tab)
-    tab.wait_for(lambda: tab.page.locator(".js-plotly-plot").count() == 2, "both plots")
-    # Another one can be looked at, and none.
-    session.do(OpenStudy(None))
-    tab.wait_for(lambda: tab.page.locator(".js-plotly-plot").count() == 0, "no plots")
-
-
-def _count(folder: Path) -> int:
-    try:
-        return load_results(folder).count
-    except ValueError:
-        return 0
-
-
-def _lonely(results: Results) -> int:
+def loneliest_row(results: Results) -> int:
     """Return the row whose point is farthest from all others in the scatter plot."""
     points = np.column_stack([results.columns["volume"], results.columns["reach"]])
     points = (points - points.min(axis=0)) / np.ptp(points, axis=0)
@@ -262,7 +216,7 @@ def _lonely(results: Results) -> int:
     return int(apart.min(axis=1).argmax())
 
 
-def _assert_left_out(tab: Tab, results: Results) -> None:
+def assert_left_out(tab: Tab, results: Results) -> None:
     """Compare what the plot leaves out with the law, row by row."""
     expected = [
         int(index)

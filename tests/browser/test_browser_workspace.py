@@ -1,4 +1,4 @@
-"""The workspace in a real page: its volume, a cut in the middle, a map that is read and clicked."""
+"""The map of the workspace in a real page: what is read under the pointer, where a click goes."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import msgspec
 import numpy as np
 import pytest
 from machines import FULL, six
-from playwright.sync_api import Browser, Locator, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 from tab import Tab
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.slice_map import map_facts
+from explorer.app.look import read_script
 from explorer.app.scene.bands import Colouring
-from explorer.app.screenshot import PATIENCE_SECONDS
-from explorer.app.server import Running
-from explorer.app.state.actions import Open, Set, SetVariable
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Open, Set
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Struts, Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
-from explorer.numerics.number_text import format_number
+from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.accuracy import worst_error
@@ -33,99 +33,82 @@ from explorer.statics.reactions import PART_NAMES
 from explorer.statics.weights import payload_wrench
 from explorer.workspace.held import part_names
 from explorer.workspace.position_bands import PartMeasure, PositionMeasure
-from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
 READING = re.compile(r"x ([−\d.]+), z ([−\d.]+) units: min \|δ\| ([\d.]+) \(δ(\d)\)")
 
+# Sizes of the type of a map, in pixels.
+TYPE_SIZES = """map => {
+    const scale = map.getScreenCTM().a;
+    return [...map.querySelectorAll("text")].map(
+        (text) => scale * parseFloat(getComputedStyle(text).fontSize));
+}"""
+
 
 @pytest.fixture
-def tab(browser: Browser, running: Running) -> Iterator[Tab]:
+def tab(tab: Tab) -> Tab:
     """A tab in a window of a small laptop."""
-    tab = Tab(browser, running, size=(1280, 720), draws=True)
-    yield tab
-    assert tab.complaints() == []
-    tab.close()
+    tab.page.set_viewport_size({"width": 1280, "height": 720})
+    tab.settle()
+    return tab
+
+
+@pytest.fixture
+def script(browser: Browser) -> Iterator[Page]:
+    """A blank page with the script that reads maps."""
+    page = browser.new_page()
+    page.evaluate(f"() => {{ {read_script('map')} }}")
+    yield page
+    page.close()
+
+
+def open_map(tab: Tab, level: float) -> None:
+    """Cut the workspace at a y, and wait until its map is drawn and rests."""
+    tab.turn_to("Workspace")
+    tab.settle()
+    tab.push("y")
+    map_in(tab).wait_for()
+    move_cut(tab, level)
+
+
+def move_cut(tab: Tab, level: float) -> None:
+    """Cut the workspace at another y, and wait until its map is drawn and rests."""
+    tab.running.page.session.do(Set("view.workspace.level", level))
+    expect(map_in(tab)).to_have_attribute("aria-label", f"Map of the slice at y = {level:g}")
+    tab.settle()
 
 
 def map_in(tab: Tab) -> Locator:
     return tab.page.locator("[data-map]")
 
 
-def rest_on(tab: Tab, across: float, up: float) -> None:
-    """Rest the pointer on a place of the map, in shares of its picture."""
+def rest_on(tab: Tab, across: float, up: float) -> Locator:
+    """Rest the pointer on a place of the map, in shares of its picture; return the reading."""
     box = map_in(tab).bounding_box()
     assert box is not None
     tab.page.mouse.move(box["x"] + across * box["width"], box["y"] + up * box["height"])
+    return tab.page.locator(".ex-reading")
+
+
+def read_at(tab: Tab, across: float, up: float, words: re.Pattern[str]) -> re.Match[str]:
+    """Return what is read at a place of the map."""
+    reading = rest_on(tab, across, up)
+    expect(reading).to_have_text(words)
+    found = words.search(reading.inner_text())
+    assert found is not None
+    return found
+
+
+def press(tab: Tab) -> None:
+    tab.page.mouse.down()
+    tab.page.mouse.up()
 
 
 def number(text: str) -> float:
-    return float(text.replace("−", "-"))
+    return float(text.replace("−", "-").replace(",", ""))
 
 
-def test_workspace_is_seen_cut_read_and_left_as_a_file(tab: Tab) -> None:
-    page = tab.running.page
-    page.session.do(SetVariable("a3x", 17.0))
-    assert page.wait_until_drawn(PATIENCE_SECONDS)
-    # Its volume is in sight without any press, and its solid after two.
-    volume = f"{format_number(workspace_volume(tab.state.design).volume, 6)} units³"
-    expect(tab.page.get_by_text(volume).first).to_be_visible()
-    tab.turn_to("Workspace")
-    expect(tab.page.get_by_text(volume).last).to_be_visible()
-    tab.push("Solid")
-    tab.wait_for(lambda: page.services.get(WorkspaceFeed).drawing is not None, "the solid")
-    # One more cuts it in its middle, and the pointer reads the map.
-    tab.push("y")
-    map_in(tab).wait_for()
-    drawing = page.services.get(WorkspaceFeed).drawing
-    assert drawing is not None
-    assert drawing.extent is not None
-    middle = 0.5 * float(drawing.extent[0][1] + drawing.extent[1][1])
-    assert drawing.level == pytest.approx(middle)
-    reading = tab.page.locator(".ex-reading")
-    expect(reading).to_have_text("Point at the map to read it, click to go there.")
-    rest_on(tab, 0.5, 0.5)
-    expect(reading).to_have_text(READING)
-    found = READING.match(reading.inner_text())
-    assert found is not None
-    position = np.array([number(found[1]), middle, number(found[2])])
-    sizes = np.abs(margins(position, tab.state.pose.rotation))
-    assert number(found[3]) == pytest.approx(float(sizes.min()), abs=0.02)
-    assert int(found[4]) == int(sizes.argmin()) + 1
-    # Beside the outline, and beside the frame.
-    rest_on(tab, 0.2, 0.1)
-    expect(reading).to_contain_text("beyond the limits")
-    rest_on(tab, 0.02, 0.02)
-    expect(reading).to_have_text("Point at the map to read it, click to go there.")
-    # A click goes to what is read.
-    rest_on(tab, 0.6, 0.6)
-    expect(reading).to_have_text(READING)
-    found = READING.match(reading.inner_text())
-    assert found is not None
-    tab.page.mouse.down()
-    tab.page.mouse.up()
-    goal = [number(found[1]), middle, number(found[2])]
-    tab.wait_for(
-        lambda: bool(np.allclose(tab.state.pose.position, goal, atol=0.006)), "the position read"
-    )
-    # Its type is legible in a panel as narrow as this.
-
-    def sizes_of_type() -> list[float]:
-        return map_in(tab).evaluate(
-            """map => {
-                const scale = map.getScreenCTM().a;
-                return [...map.querySelectorAll("text")].map(
-                    (text) => scale * parseFloat(getComputedStyle(text).fontSize));
-            }"""
-        )
-
-    # A map that is replaced meanwhile has no sizes, and no comparison with them holds.
-    tab.wait_for(lambda: min(sizes_of_type()) >= 11.0 - 1e-3, "a map in type of 11 pixels")
-    download = tab.export("Workspace", "STEP")
-    assert download.suggested_filename.endswith("-workspace.step")
-
-
-def test_page_computes_margins_and_conditioning_as_the_library_does(tab: Tab) -> None:
+def test_map_script_margins_and_conditioning_are_those_of_the_library(script: Page) -> None:
     rng = np.random.default_rng(8)
     platform = np.array([[*OPTIMAL.b1, 0.0], [OPTIMAL.b2, 0.0, 0.0], [OPTIMAL.b3, 0.0, 0.0]])
     cases: list[dict[str, object]] = []
@@ -150,8 +133,7 @@ def test_page_computes_margins_and_conditioning_as_the_library_does(tab: Tab) ->
             "reach": OPTIMAL.reach,
         }
         cases.append({"facts": facts, "p": position.tolist()})
-    tab.wait_for(lambda: bool(tab.page.evaluate("!!window.explorer?.map")), "the script")
-    computed = tab.page.evaluate(
+    computed = script.evaluate(
         """cases => cases.map(({ facts, p }) => {
             const { leastMargin, inverseCondition, jacobian } = window.explorer.map;
             return [leastMargin(facts, p).least, inverseCondition(jacobian(facts, p))];
@@ -161,7 +143,7 @@ def test_page_computes_margins_and_conditioning_as_the_library_does(tab: Tab) ->
     np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
+def test_map_script_utilisation_under_a_load_is_that_of_the_library(script: Page) -> None:
     rng = np.random.default_rng(3)
     load = np.array([4.0, -3.0, -6.0, 5.0, 10.0, -5.0])
     cases: list[dict[str, object]] = []
@@ -181,8 +163,7 @@ def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
         names = part_names(FULL) if measure == "share" else PART_NAMES
         expected.append((share, names[part]))
         cases.append({"facts": map_facts(colouring), "p": position.tolist()})
-    tab.wait_for(lambda: bool(tab.page.evaluate("!!window.explorer?.map")), "the script")
-    found = tab.page.evaluate(
+    found = script.evaluate(
         """cases => cases.map(({ facts, p }) => {
             const { value, part } = window.explorer.map.amount(facts, p);
             return [Number.isFinite(value) ? value : -1, part];
@@ -198,14 +179,12 @@ def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
             assert of_page == part
 
 
-@pytest.mark.parametrize("measure", ["error", "deflection"])
-def test_page_computes_how_far_the_tool_moves_as_the_library_does(
-    tab: Tab, measure: PositionMeasure
-) -> None:
+def test_map_script_displacement_of_the_tool_is_that_of_the_library(script: Page) -> None:
     rng = np.random.default_rng(4)
     cases: list[dict[str, object]] = []
     expected: list[float] = []
-    for trial in range(40):
+    for trial in range(80):
+        measure: PositionMeasure = ("error", "deflection")[trial % 2]
         design = msgspec.structs.replace(
             FULL,
             unit_mm=float(rng.uniform(1.0, 20.0)),
@@ -217,7 +196,7 @@ def test_page_computes_how_far_the_tool_moves_as_the_library_does(
         )
         rotation = rotation_from_yaw_pitch_roll(rng.uniform(-80.0, 80.0, 3))
         position = rng.uniform(-20.0, 20.0, 3)
-        if trial % 4 == 0:
+        if trial % 8 in (0, 1):
             # Near a singular position, or at one.
             position[2] = (0.0, 1e-6, 1e-3)[trial % 3]
         load = rng.uniform(-50.0, 50.0, 6)
@@ -231,8 +210,7 @@ def test_page_computes_how_far_the_tool_moves_as_the_library_does(
         expected.append(float(moved))
         facts = map_facts(Colouring(design, rotation, measure, 1.0, load))
         cases.append({"facts": facts, "p": position.tolist()})
-    tab.wait_for(lambda: bool(tab.page.evaluate("!!window.explorer?.map")), "the script")
-    found = tab.page.evaluate(
+    found = script.evaluate(
         """cases => cases.map(({ facts, p }) => {
             const { value } = window.explorer.map.amount(facts, p);
             return Number.isFinite(value) ? value : -1;
@@ -244,99 +222,66 @@ def test_page_computes_how_far_the_tool_moves_as_the_library_does(
     np.testing.assert_allclose(found, finite, rtol=1e-6)
 
 
-@pytest.mark.parametrize("measure", ["error", "deflection"])
-def test_map_of_displacements_is_read_under_the_pointer(tab: Tab, measure: str) -> None:
-    page, load = tab.running.page, (0.0, 0.0, -50.0)
+def test_map_of_each_measure_is_read_and_the_reading_stays_while_it_is_drawn_again(
+    tab: Tab,
+) -> None:
+    session, load = tab.running.page.session, (0.0, 0.0, -50.0)
+    open_map(tab, 6.0)
+    # Its type is legible in a panel as narrow as this.
+    assert min(map_in(tab).evaluate(TYPE_SIZES)) >= 11.0 - 1e-3
+    hint = "Point at the map to read it, click to go there."
+    expect(tab.page.locator(".ex-reading")).to_have_text(hint)
+    # Beside the outline, and beside the frame.
+    expect(rest_on(tab, 0.2, 0.1)).to_contain_text("beyond the limits")
+    expect(rest_on(tab, 0.02, 0.02)).to_have_text(hint)
+    read_at(tab, 0.6, 0.4, READING)
+    before = tab.page.locator(".ex-reading").inner_text()
+    move_cut(tab, 5.0)
+    expect(tab.page.locator(".ex-reading")).to_have_text(before)
+
+    def read(measure: str, words: str, *actions: Action) -> tuple[FloatArray, re.Match[str]]:
+        for action in (*actions, Set("view.workspace.colour", measure)):
+            session.do(action)
+        tab.page.mouse.move(0, 0)
+        move_cut(tab, 5.0)
+        found = read_at(tab, 0.6, 0.4, re.compile(rf"x ([−\d.]+), z ([−\d.]+) units: {words}"))
+        return np.array([number(found[1]), 5.0, number(found[2])]), found
+
     actuators = Actuators(error_mm=six([0.05] * 6), stiffness_n_mm=six([1000.0] * 6))
-    page.session.do(Open(msgspec.structs.replace(OPTIMAL, actuators=actuators)))
-    page.session.do(Set("view.forces.force", load))
-    page.session.do(Set("view.workspace.colour", measure))
-    tab.turn_to("Workspace")
-    tab.push("y")
-    map_in(tab).wait_for()
-    reading = tab.page.locator(".ex-reading")
-    name = {"error": "worst error of the tool", "deflection": "deflection under the load"}[measure]
-    words = re.compile(rf"x ([−\d.]+), z ([−\d.]+) units: {name} ([\d.,]+) mm")
-    rest_on(tab, 0.6, 0.4)
-    expect(reading).to_have_text(words)
-    found = words.match(reading.inner_text())
-    drawing = page.services.get(WorkspaceFeed).drawing
-    assert found is not None
+    stiff = msgspec.structs.replace(OPTIMAL, actuators=actuators)
+    of_the_load = Set("view.forces.force", load)
+    rotation = tab.state.pose.rotation
+    at, found = read("error", r"worst error of the tool ([\d.,]+) mm", Open(stiff), of_the_load)
+    moved = float(worst_error(OPTIMAL, at, rotation, [0.05] * 6).displacement)
+    assert number(found[3]) == pytest.approx(moved, rel=0.02)
+    at, found = read("deflection", r"deflection under the load ([\d.,]+) mm")
+    soft = compliance(OPTIMAL, at, rotation, [1000.0] * 6)
+    moved = float(np.linalg.norm(deflection(soft, [*load, 0.0, 0.0, 0.0])[:3]))
+    assert number(found[3]) == pytest.approx(moved, rel=0.02)
+    words = r"largest share of a limit ([\d.,]+) % \(([\w ]+)\)"
+    at, found = read("share", words, Open(FULL))
+    drawing = tab.running.page.services.get(WorkspaceFeed).drawing
     assert drawing is not None
-    assert drawing.level is not None
-    at = np.array([number(found[1]), drawing.level, number(found[2])])
-    rotation = np.array(drawing.request.rotation)
-    if measure == "error":
-        moved = worst_error(OPTIMAL, at, rotation, [0.05] * 6).displacement
-    else:
-        soft = compliance(OPTIMAL, at, rotation, [1000.0] * 6)
-        moved = np.linalg.norm(deflection(soft, [*load, 0.0, 0.0, 0.0])[:3])
-    assert number(found[3].replace(",", "")) == pytest.approx(float(moved), rel=0.02)
-
-
-def test_map_of_shares_is_read_under_the_pointer(tab: Tab) -> None:
-    page = tab.running.page
-    page.session.do(Open(FULL))
-    page.session.do(Set("view.workspace.colour", "share"))
-    tab.turn_to("Workspace")
-    tab.push("y")
-    map_in(tab).wait_for()
-    reading = tab.page.locator(".ex-reading")
-    words = re.compile(r"largest share of a limit ([\d.,]+) % \(([\w ]+)\)")
-    rest_on(tab, 0.6, 0.4)
-    expect(reading).to_have_text(words)
-    found = words.search(reading.inner_text())
-    where = re.match(r"x ([−\d.]+), z ([−\d.]+) units", reading.inner_text())
-    drawing = page.services.get(WorkspaceFeed).drawing
-    assert found is not None
-    assert where is not None
-    assert drawing is not None
-    assert drawing.level is not None
     assert drawing.request.load is not None
-    at = np.array([number(where[1]), drawing.level, number(where[2])])
-    rotation = np.array(drawing.request.rotation)
     case = load_case(FULL, rotation, np.array(drawing.request.load))
     share = float(largest_shares(case, rotation, at[None])[0][0])
-    assert 0.01 * float(found[1].replace(",", "")) == pytest.approx(share, rel=0.02)
-    assert found[2] in part_names(FULL)
-
-
-def test_reading_stays_while_the_map_is_drawn_anew(tab: Tab) -> None:
-    tab.turn_to("Workspace")
-    tab.push("y")
-    map_in(tab).wait_for()
-    rest_on(tab, 0.5, 0.5)
-    reading = tab.page.locator(".ex-reading")
-    expect(reading).to_have_text(READING)
-    before = reading.inner_text()
-    tab.running.page.session.do(Set("view.workspace.level", 9.0))
-    assert tab.running.page.wait_until_drawn(PATIENCE_SECONDS)
-    expect(map_in(tab)).to_have_attribute("aria-label", "Map of the slice at y = 9")
-    expect(reading).to_have_text(before)
+    assert 0.01 * number(found[3]) == pytest.approx(share, rel=0.02)
+    assert found[4] in part_names(FULL)
 
 
 def test_map_of_the_tool_is_read_and_leads_the_tool_there(tab: Tab) -> None:
-    page, tool = tab.running.page, (1.0, 0.0, 3.0)
-    page.session.do(Set("design", msgspec.structs.replace(OPTIMAL, tool=Tool(position=tool))))
+    session, tool = tab.running.page.session, (1.0, 0.0, 3.0)
+    session.do(Set("design", msgspec.structs.replace(OPTIMAL, tool=Tool(position=tool))))
     tab.turn_to("Pose")
     tab.push("tool point")
-    tab.turn_to("Workspace")
-    tab.push("y")
-    map_in(tab).wait_for()
-    page.session.do(Set("view.workspace.level", 6.0))
-    expect(map_in(tab)).to_have_attribute("aria-label", "Map of the slice at y = 6")
-    reading = tab.page.locator(".ex-reading")
-    rest_on(tab, 0.55, 0.6)
-    expect(reading).to_have_text(READING)
-    found = READING.match(reading.inner_text())
-    assert found is not None
+    open_map(tab, 6.0)
+    found = read_at(tab, 0.55, 0.6, READING)
     goal = np.array([number(found[1]), 6.0, number(found[2])])
     offset = tab.state.pose.rotation @ np.array(tool)
     sizes = np.abs(margins(goal - offset, tab.state.pose.rotation))
     assert number(found[3]) == pytest.approx(float(sizes.min()), abs=0.02)
     assert int(found[4]) == int(sizes.argmin()) + 1
-    tab.page.mouse.down()
-    tab.page.mouse.up()
+    press(tab)
 
     def is_there() -> bool:
         pose = tab.state.pose

@@ -17,7 +17,7 @@ import zstandard
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from explorer.app.browser.viser_gaps import element_id
+from explorer.app.browser.viser_gaps import element_id, mark_broadcasts, run_script_in
 from explorer.app.server import Running
 
 _COUNT = itertools.count()
@@ -99,10 +99,14 @@ class Client:
 
     Args:
         connection: To the explorer.
+
+    Attributes:
+        client_id: Its number on the server; -1 until it counts as connected.
     """
 
     def __init__(self, connection: ClientConnection) -> None:
         self.connection = connection
+        self.client_id = -1
         self.controls: dict[str, dict[str, Any]] = {}
         self._decompressor = zstandard.ZstdDecompressor()
         # A client counts once it has told of its camera.
@@ -141,6 +145,25 @@ class Client:
                 self.controls[message["uuid"]].update(message["updates"])
         return messages
 
+    def read_all_sent(self, running: Running) -> list[dict[str, Any]]:
+        """Return the messages up to the last one that was sent to this client before this call."""
+        handle = running.viser.get_clients()[self.client_id]
+        # What is sent to all clients and what is sent to one are kept in order apart.
+        number = -1 - next(_COUNT)
+        mark_broadcasts(handle, number)
+        run_script_in(handle, f"ownMark = {number};")
+        messages: list[dict[str, Any]] = []
+        awaited = {f".mark = {number};", f"ownMark = {number};"}
+        while awaited:
+            messages += self.read()
+            sources = [str(message.get("source")) for message in messages]
+            awaited = {end for end in awaited if not any(end in s for s in sources)}
+        return messages
+
+    def flush(self) -> None:
+        """Return once the server has read all that was sent."""
+        assert self.connection.ping().wait(PATIENCE_SECONDS)
+
     def read_until_quiet(self, seconds: float = 0.7) -> list[dict[str, Any]]:
         """Return all that comes until nothing comes for so long, two minutes at most."""
         messages: list[dict[str, Any]] = []
@@ -159,8 +182,6 @@ def client_of(running: Running) -> Generator[Client]:
     known = set(running.viser.get_clients())
     with closing(opened(running.url)) as connection:
         client = Client(connection)
-        deadline = time.monotonic() + 60.0
-        while set(running.viser.get_clients()) <= known:
-            assert time.monotonic() < deadline, "the client does not count as connected"
-            time.sleep(0.005)
+        wait_for(lambda: set(running.viser.get_clients()) - known)
+        (client.client_id,) = set(running.viser.get_clients()) - known
         yield client

@@ -1,0 +1,425 @@
+"""The guard over the wire: what clients that are no page may do to a server, and what not."""
+
+from __future__ import annotations
+
+import functools
+import math
+import socket
+import threading
+from collections.abc import Generator
+from contextlib import closing, contextmanager, suppress
+from http import HTTPStatus
+from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from client import Client, client_of, opened, press_update, wait_for
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin, Subprotocol
+
+from explorer.app.browser.viser_gaps import ServerControls
+from explorer.app.browser.viser_server import start_viser, stop_viser
+from explorer.app.features.optimise import buttons
+from explorer.app.security import client_messages
+from explorer.app.security.access import Access
+from explorer.app.security.client_messages import LARGEST_PICTURE, PATIENCE
+from explorer.app.security.guard import MOST_WAITING, Guard
+from explorer.app.server import Running, start
+from explorer.errors import ServerError
+from explorer.mechanism.design_file import PRESETS
+
+DESIGN = PRESETS["paper-optimal"]
+TOKEN = "a-token_of-16-or-more"
+PATIENCE_SECONDS = 60.0
+
+
+def websocket_status(url: str, **headers: str | None) -> int:
+    """Return the status with which a websocket is refused; 101 if it is let in."""
+    try:
+        opened(url, **headers).close()
+    except InvalidStatus as refusal:
+        return refusal.response.status_code
+    return HTTPStatus.SWITCHING_PROTOCOLS
+
+
+def page_status(url: str, **headers: str) -> int:
+    """Return the status of the page for a plain request."""
+    try:
+        with urlopen(Request(url, headers=headers), timeout=PATIENCE_SECONDS) as response:
+            return response.status
+    except HTTPError as error:
+        with error:
+            status, reason = error.code, error.read().decode()
+    assert len(reason.splitlines()) == 1
+    return status
+
+
+def close_code(connection: ClientConnection) -> int | None:
+    """Read until the server closes, and return its code."""
+    try:
+        while True:
+            connection.recv(timeout=PATIENCE_SECONDS)
+    except ConnectionClosed as closed:
+        return None if closed.rcvd is None else closed.rcvd.code
+
+
+@contextmanager
+def drained(connection: ClientConnection) -> Generator[None]:
+    """Read what comes on a thread; in the end close the connection."""
+
+    def read() -> None:
+        with suppress(ConnectionClosed, OSError):
+            while True:
+                connection.recv()
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    yield
+    connection.close()
+    reader.join()
+
+
+def test_guard_request_from_elsewhere_is_refused(running: Running) -> None:
+    url, port = running.url, running.viser.get_port()
+    near, evil = url.replace("127.0.0.1", "localhost"), f"http://evil.example:{port}"
+    for origin in (None, "null", "http://evil.example", near, "file://", "https://127.0.0.1"):
+        assert websocket_status(url, origin=origin) == HTTPStatus.FORBIDDEN, origin
+    # A foreign name that leads here, with its own origin too, and links that lead elsewhere.
+    assert websocket_status(url, host="evil.example", origin=evil) == HTTPStatus.FORBIDDEN
+    assert page_status(url, Host=f"evil.example:{port}") == HTTPStatus.FORBIDDEN
+    assert page_status(f"{url}/?websocket=ws://127.0.0.1:{port + 1}") == HTTPStatus.FORBIDDEN
+    assert page_status(f"{url}/?playbackPath={evil}/x") == HTTPStatus.FORBIDDEN
+    assert page_status(f"{url}/?darkMode") == HTTPStatus.OK
+    assert page_status(url, Host=f"localhost:{port}") == HTTPStatus.OK
+    assert websocket_status(url, host="localhost", origin=near) == HTTPStatus.SWITCHING_PROTOCOLS
+
+
+def test_guard_with_a_token_refuses_who_lacks_it() -> None:
+    running = start(DESIGN, host="0.0.0.0", port=0, token=TOKEN)
+    try:
+        port = running.viser.get_port()
+        bare = f"http://127.0.0.1:{port}"
+        assert running.url == f"{bare}/?token={TOKEN}"
+        for url in (bare, f"{bare}/?token=", f"{bare}/?token={TOKEN}x"):
+            assert page_status(url) == HTTPStatus.UNAUTHORIZED, url
+            assert websocket_status(url) == HTTPStatus.UNAUTHORIZED, url
+        cookie = f"explorer-token-{port}={TOKEN}"
+        assert websocket_status(bare, cookie=cookie[:-1]) == HTTPStatus.UNAUTHORIZED
+        evil = "http://evil.example"
+        assert websocket_status(bare, cookie=cookie, origin=evil) == HTTPStatus.FORBIDDEN
+        assert websocket_status(running.url, origin=None) == HTTPStatus.FORBIDDEN
+        assert page_status(running.url) == HTTPStatus.OK
+        assert websocket_status(bare, cookie=cookie) == HTTPStatus.SWITCHING_PROTOCOLS
+        assert websocket_status(running.url) == HTTPStatus.SWITCHING_PROTOCOLS
+    finally:
+        running.stop()
+
+
+NO_MESSAGES: dict[str, bytes | str] = {
+    "nothing": b"",
+    "text": "hello",
+    "noise": bytes(range(256)),
+    "no map": msgspec.msgpack.encode([1, 2, 3]),
+    "a type that is none": msgspec.msgpack.encode({"type": "Nonsense"}),
+    "a missing field": msgspec.msgpack.encode({"type": "GuiUpdateMessage"}),
+    "deep": b"\x81\xa4type" + b"\x91" * 100_000,
+    "a length that lies": b"\xdf\xff\xff\xff\xff",
+    "for the server's own use": msgspec.msgpack.encode(
+        {"type": "RunJavascriptMessage", "source": "alert(1)"}
+    ),
+    "a page's reset": msgspec.msgpack.encode({"type": "ResetGuiMessage"}),
+    "a node": msgspec.msgpack.encode({"type": "RemoveSceneNodeMessage", "name": "/platform"}),
+}
+
+
+def test_guard_client_out_of_patience_is_closed_and_has_changed_nothing(running: Running) -> None:
+    session = running.page.session
+    design = session.state.design
+    with client_of(running) as watching, client_of(running) as client:
+        watching.read_all_sent(running)
+        for message in NO_MESSAGES.values():
+            client.connection.send(message)
+        # It is still heard.
+        client.update(client.find("x"), 9.0)
+        wait_for(lambda: session.state.pose.position[0] == 9.0)
+        for _ in range(PATIENCE - len(NO_MESSAGES)):
+            client.connection.send(b"")
+        assert close_code(client.connection) == 1008
+        messages = watching.read_all_sent(running)
+        alerts = [each for each in messages if each.get("source") == "alert(1)"]
+        assert alerts == []
+        kinds = {message["type"] for message in messages}
+        assert kinds.isdisjoint({"ResetGuiMessage", "RemoveSceneNodeMessage"})
+    assert session.state.design == design
+
+
+def test_guard_giant_message_ends_the_connection(running: Running) -> None:
+    with client_of(running) as client:
+        client.connection.send(b"\0" * (LARGEST_PICTURE + 1))
+        assert close_code(client.connection) == 1009
+    with client_of(running):
+        pass
+
+
+def test_guard_client_of_another_version_is_told_to_reload(running: Running) -> None:
+    address, origin = running.url.replace("http", "ws"), Origin(running.url)
+    for protocols in (None, [Subprotocol("viser-v0.2.0")], [Subprotocol("chat")]):
+        with (
+            connect(address, origin=origin, subprotocols=protocols, proxy=None) as connection,
+            pytest.raises(ConnectionClosed, match="reload the page"),
+        ):
+            connection.recv(timeout=PATIENCE_SECONDS)
+
+
+def test_guard_noise_on_the_line_is_passed_over(
+    running: Running, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for noise in (
+        b"\x16\x03\x01\x02\x00\x01\x00",
+        b"GET / HTTP/1.1\r\nHost",
+        b"POST / HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + b"X: y\r\n" * 500,
+        b"\r\n\r\n",
+        b"GET /" + b"a" * 99_999,
+    ):
+        with socket.create_connection(("127.0.0.1", running.viser.get_port())) as line:
+            line.settimeout(PATIENCE_SECONDS)
+            with suppress(OSError):
+                line.sendall(noise)
+                line.shutdown(socket.SHUT_WR)
+                while line.recv(4096):
+                    pass
+    assert page_status(running.url) == HTTPStatus.OK
+    assert capfd.readouterr().err == ""
+
+
+ANYTHING: tuple[Any, ...] = (
+    math.nan, math.inf, -math.inf, 1e308, -1e308, 1e-320, 0, -1, 2**63, -(2**63), 1e25, 0.1, True,
+    False, None, "", "nan", "1e5", "x" * 50_000, "\0", "../../x", "<script>alert(1)</script>", b"1",
+    [], [1.0], [math.nan] * 3, [1e308] * 3, [0.0] * 3, ["1"] * 3, [[1.0]] * 3, [0.0] * 10_000,
+    {}, {"value": 1.0}, {"__class__": 1},
+)  # fmt: skip
+# Each control gets so many of them, each value goes to some controls of each kind.
+TURNS = 6
+
+
+def test_guard_state_stays_sound_whatever_its_controls_are_given(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(client_messages, "PATIENCE", 10**9)
+    running = start(DESIGN, port=0)
+    session = running.page.session
+    try:
+        with client_of(running) as client:
+            client.read_all_sent(running)
+            kinds = {props["type"] for props in client.controls.values()}
+            assert {"GuiSliderMessage", "GuiNumberMessage", "GuiVector3Message",
+                    "GuiCheckboxMessage", "GuiDropdownMessage"} <= kinds  # fmt: skip
+            # Buttons ask for files and runs, and hold no value.
+            inputs = [
+                uuid
+                for uuid, props in client.controls.items()
+                if "value" in props and not props["type"].startswith("GuiButton")
+            ]
+            assert len(inputs) > 50
+            with drained(client.connection):
+                for turn in range(TURNS):
+                    for count, uuid in enumerate(inputs):
+                        client.update(uuid, ANYTHING[(7 * turn + count) % len(ANYTHING)])
+                    client.flush()
+                    assert session.wait_until_idle(PATIENCE_SECONDS)
+        assert session.wait_until_idle(PATIENCE_SECONDS)
+        state = session.state
+        assert np.isfinite([*state.joints, *state.pose.position, *state.pose.quaternion]).all()
+        assert np.isfinite(state.design.variables).all()
+        # What is sent to those who come later is sound too.
+        with client_of(running) as late:
+            late.read_all_sent(running)
+            controls = late.controls.values()
+            numbers = [v for p in controls if isinstance(v := p.get("value"), float)]
+        assert len(numbers) > 30
+        assert np.isfinite(numbers).all()
+    finally:
+        running.stop()
+
+
+def test_guard_reads_no_message_while_too_many_changes_wait() -> None:
+    guard = Guard(Access.to("127.0.0.1", None))
+    server = start_viser("127.0.0.1", 0, guard.guarded)
+    waiting, looks, updates = [0], [0], [0]
+
+    def count_waiting() -> int:
+        looks[0] += 1
+        return waiting[0]
+
+    def note(_: object) -> None:
+        updates[0] += 1
+
+    server.gui.add_slider("n", 0, 100, 1, 0).on_update(note)
+    guard.let_in(ServerControls(server), count_waiting)
+    try:
+        with closing(opened(f"http://127.0.0.1:{server.get_port()}")) as connection:
+            client = Client(connection)
+            client.flush()
+            waiting[0] = MOST_WAITING + 1
+            for value in range(1, 21):
+                client.update(client.find("n"), value)
+            # It looks again and again whether there is room by now.
+            looks[0] = 0
+            wait_for(lambda: looks[0] > 5)
+            assert updates == [0]
+            waiting[0] = MOST_WAITING
+            wait_for(lambda: updates == [20])
+    finally:
+        stop_viser(server)
+
+
+def test_guard_files_go_to_the_tab_that_asks_alone(running: Running) -> None:
+    with client_of(running) as client, client_of(running) as other:
+        client.read_all_sent(running)
+        client.update(*press_update(running, buttons.DESIGN))
+        mine: list[dict[str, Any]] = []
+        while not any(message["type"] == "FileTransferPart" for message in mine):
+            mine += client.read()
+        content = b"".join(m["content"] for m in mine if m["type"] == "FileTransferPart")
+        assert b'"paper-optimal"' in content
+        kinds = {message["type"] for message in other.read_all_sent(running)}
+        assert not any(kind.startswith("FileTransfer") for kind in kinds)
+
+
+def test_guard_upload_is_taken_whole_and_acknowledged_to_its_sender_alone(running: Running) -> None:
+    button = running.viser.gui.add_upload_button("Try")
+    taken: list[bytes] = []
+    button.on_upload(lambda _: taken.append(button.value.content))
+    begin = {"type": "FileTransferStartUpload", "filename": "../../etc/passwd", "mime_type": "x"}
+    try:
+        with client_of(running) as client, client_of(running) as other:
+            client.read_all_sent(running)
+            source = client.find("Try")
+
+            def part(transfer: str, index: int, content: bytes) -> dict[str, Any]:
+                return {"type": "FileTransferPart", "source_component_uuid": source,
+                        "transfer_uuid": transfer, "part_index": index,
+                        "content": content}  # fmt: skip
+
+            begin["source_component_uuid"] = source
+            client.send({**begin, "transfer_uuid": "empty", "part_count": 0, "size_bytes": 0})
+            client.send({**begin, "transfer_uuid": "two", "part_count": 2, "size_bytes": 6})
+            # More than was said, twice the same, and somebody else's.
+            client.send(part("two", 0, b"x" * 7))
+            client.send(part("two", 0, b"abc"))
+            client.send(part("two", 0, b"xyz"))
+            client.flush()
+            other.send(part("two", 1, b"666"))
+            other.flush()
+            client.send(part("two", 1, b"def"))
+            wait_for(lambda: taken == [b"", b"abcdef"])
+            acknowledged: set[str] = set()
+            while acknowledged != {"empty", "two"}:
+                acknowledged |= {
+                    message["transfer_uuid"]
+                    for message in client.read()
+                    if message["type"] == "FileTransferPartAck"
+                }
+            kinds = {message["type"] for message in other.read_all_sent(running)}
+            assert "FileTransferPartAck" not in kinds
+        with client_of(running) as late:
+            kinds = {message["type"] for message in late.read_all_sent(running)}
+            assert "FileTransferPartAck" not in kinds
+    finally:
+        button.remove()
+
+
+def test_viser_that_serves_in_another_way_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    ports: list[int] = []
+
+    def stop(server: viser.ViserServer) -> None:
+        ports.append(server.get_port())
+        stop_viser(server)
+
+    # As if viser had come to serve from elsewhere.
+    monkeypatch.setattr("explorer.app.browser.viser_server.SERVING_MODULE", "viser.elsewhere")
+    monkeypatch.setattr("explorer.app.browser.viser_server.stop_viser", stop)
+    with pytest.raises(
+        ServerError, match=r"^viser [^\n]* does not guard; [^\n]*pip install[^\n]*$"
+    ):
+        start(DESIGN, port=0)
+    assert len(ports) == 1
+    with pytest.raises(OSError, match="refused"):
+        socket.create_connection(("127.0.0.1", ports[0]))
+
+
+# A server that stops while a connection is accepted may leave it open without a word.
+@pytest.mark.parametrize("count", [3, pytest.param(20, marks=pytest.mark.long)])
+def test_server_that_stops_leaves_nobody_waiting(count: int) -> None:
+    for _ in range(count):
+        server = start_viser("127.0.0.1", 0, Guard(Access.to("127.0.0.1", None)).guarded)
+        at = ("127.0.0.1", server.get_port())
+        callers = [
+            threading.Thread(target=call_until_refused, args=at, daemon=True) for _ in range(4)
+        ]
+        for caller in callers:
+            caller.start()
+        stop_viser(server)
+        for caller in callers:
+            caller.join(PATIENCE_SECONDS)
+            assert not caller.is_alive()
+
+
+def call_until_refused(host: str, port: int) -> None:
+    """Ask for what is not there, over and over, for as long as somebody answers."""
+    while True:
+        try:
+            line = socket.create_connection((host, port))
+        except ConnectionRefusedError:
+            return
+        except ConnectionResetError:
+            # It stopped between taking the call up and answering it.
+            continue
+        with line, suppress(ConnectionError):
+            line.sendall(b"GET /nothing HTTP/1.1\r\n\r\n")
+            while line.recv(4096):
+                pass
+
+
+def test_server_that_stops_does_not_wait_for_a_silent_connection() -> None:
+    """Browsers open connections in advance, for which websockets waits ten seconds."""
+    guard = Guard(Access.to("127.0.0.1", None))
+    before = set(threading.enumerate())
+    server = start_viser(
+        "127.0.0.1", 0, lambda serve: guard.guarded(functools.partial(serve, open_timeout=None))
+    )
+    at = ("127.0.0.1", server.get_port())
+    with socket.create_connection(at) as line:
+        # Lines are taken up in turn: once this one is answered the silent one is known.
+        assert page_status("http://{}:{}/".format(*at)) == HTTPStatus.OK
+        stop_viser(server)
+        assert set(threading.enumerate()) <= before
+        with suppress(ConnectionError):
+            assert not line.recv(1)
+
+
+@pytest.mark.parametrize("stops", [False, True])
+def test_client_before_the_page_is_served_with_the_page_or_let_go(*, stops: bool) -> None:
+    guard = Guard(Access.to("127.0.0.1", None))
+    server = start_viser("127.0.0.1", 0, guard.guarded)
+    try:
+        with closing(opened(f"http://127.0.0.1:{server.get_port()}")) as connection:
+            assert connection.ping().wait(PATIENCE_SECONDS)
+            if stops:
+                stop_viser(server)
+                with pytest.raises(ConnectionClosed):
+                    connection.recv(timeout=PATIENCE_SECONDS)
+            else:
+                with pytest.raises(TimeoutError):
+                    connection.recv(timeout=0.0)
+                guard.let_in(ServerControls(server), lambda: 0)
+                assert connection.recv(timeout=PATIENCE_SECONDS)
+    finally:
+        if not stops:
+            stop_viser(server)

@@ -1,0 +1,132 @@
+"""What a tab sends and is sent: switches of the view, notices, and tables of the session."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from client import Client, client_of, press_update, wait_for
+
+import explorer
+from explorer.app.features.sharing.files import SharedFiles
+from explorer.app.features.view.panel import FORMS, LAYERS
+from explorer.app.server import Running
+from explorer.app.state.actions import Open, SetPosition
+from explorer.app.state.view import View
+from explorer.mechanism.margins import TETRAHEDRA
+
+PATIENCE_SECONDS = 60.0
+
+
+def notices(messages: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    """Return the type and the text of the messages that show, change or remove a notice."""
+    return [
+        (message["type"], message.get("props", {}).get("body", ""))
+        for message in messages
+        if "Notification" in message["type"]
+    ]
+
+
+def find_control(client: Client, label: str) -> str:
+    """Return the id of the control with this label, whatever blanks are in it."""
+    (uuid,) = (
+        uuid
+        for uuid, props in client.controls.items()
+        if str(props.get("label", "")).split() == label.split()
+    )
+    return uuid
+
+
+def test_switch_of_the_view_switches_its_part_and_no_other(running: Running) -> None:
+    def part_of(name: str) -> Callable[[View], bool]:
+        return lambda view: bool(getattr(view, name))
+
+    def tetrahedron_of(index: int) -> Callable[[View], bool]:
+        return lambda view: view.tetrahedra[index]
+
+    parts = {label: part_of(name) for name, label, _ in LAYERS}
+    for index, points in enumerate(TETRAHEDRA):
+        parts[f"δ{index + 1}: {' '.join(points)}"] = tetrahedron_of(index)
+    session = running.page.session
+    before = session.state.view
+    with client_of(running) as client:
+        for label, part in parts.items():
+            switch, was = find_control(client, label), part(before)
+            client.update(switch, not was)
+            wait_for(lambda part=part, was=was: part(session.state.view) != was)
+            view = session.state.view
+            assert [o for o, p in parts.items() if p(view) != p(before)] == [label]
+            client.update(switch, was)
+            wait_for(lambda: session.state.view == before)
+
+
+def test_form_of_the_mechanism_is_chosen_by_a_press_and_given_up_by_another(
+    running: Running,
+) -> None:
+    session = running.page.session
+    # A press on the form that is drawn goes back to the schematic.
+    presses = [*((form, form) for form in FORMS), ("6-4 twin", "schematic")]
+    with client_of(running) as client:
+        for form, drawn in presses:
+            client.update(*press_update(running, "view.form", form))
+            wait_for(lambda drawn=drawn: session.state.view.drawn_as == drawn)
+
+
+def test_picture_of_an_impossible_size_is_refused_to_the_tab_that_asks_alone(
+    running: Running,
+) -> None:
+    files = running.page.services.get(SharedFiles)
+    with client_of(running) as client, client_of(running) as other:
+        files.picture((9, 100), transparent=False, client_id=client.client_id)
+        messages: list[dict[str, Any]] = []
+        while not any("pixels; got 9" in text for _, text in notices(messages)):
+            messages += client.read()
+        (text,) = (text for _, text in notices(messages) if "got 9" in text)
+        assert "the width of a picture is 16 to 8192 pixels; got 9" in text
+        assert not any("got 9" in text for _, text in notices(other.read_all_sent(running)))
+
+
+def test_notice_of_compiling_counts_up_and_goes_when_it_is_done(running: Running) -> None:
+    compiling = running.page.compiling
+    with client_of(running) as client:
+        client.read_all_sent(running)
+        for share, kind, words in (
+            (0.0, "NotificationShowMessage", "0 % done"),
+            (0.4, "NotificationUpdateMessage", "40 % done"),
+            (1.0, "RemoveNotificationMessage", ""),
+        ):
+            compiling.show(share)
+            ((found, text),) = notices(client.read_all_sent(running))
+            assert found == kind
+            assert words in text
+
+
+def test_session_is_sent_as_a_table_of_its_poses_and_their_steps(running: Running) -> None:
+    session, design = running.page.session, explorer.PRESETS["paper-optimal"]
+    session.do(Open(design))
+    assert session.wait_until_idle(PATIENCE_SECONDS)
+    with client_of(running) as client:
+        client.update(client.find("x"), 12.5)
+        wait_for(lambda: session.state.pose.position[0] == 12.5)
+        assert session.wait_until_idle(PATIENCE_SECONDS)
+        session.do(SetPosition(2, 7.0))
+        assert session.wait_until_idle(PATIENCE_SECONDS)
+        running.page.services.get(SharedFiles).session(client.client_id)
+        messages: list[dict[str, Any]] = []
+        while not any(message["type"] == "FileTransferPart" for message in messages):
+            messages += client.read()
+    start, *_ = (m for m in messages if m["type"] == "FileTransferStartDownload")
+    assert start["filename"] == "paper-optimal-session.csv"
+    content = b"".join(m["content"] for m in messages if m["type"] == "FileTransferPart")
+    rows = list(csv.DictReader(io.StringIO(content.decode())))
+    assert [row["moved_by"] for row in rows[-3:]] == ["Open paper-optimal", "x = 12.5", "z = 7"]
+    poses = [[float(row[name]) for name in "xyz"] for row in rows]
+    assert poses[-3:] == [[10.0, 5.0, 9.0], [12.5, 5.0, 9.0], [12.5, 5.0, 7.0]]
+    times = [float(row["time_s"]) for row in rows]
+    assert times == sorted(times)
+    joints = [float(rows[-1][name]) for name in explorer.JOINTS]
+    found = explorer.forward(design, joints)
+    np.testing.assert_allclose(found.position[int(rows[-1]["mode"])], poses[-1], atol=1e-9)
