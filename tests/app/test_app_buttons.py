@@ -1,34 +1,47 @@
-"""Buttons in markup: what the page sends of a press arrives, and nothing else does anything."""
+"""Values and presses of buttons in markup arrive; a tab has one filled button at most."""
 
 from __future__ import annotations
 
+import asyncio
 import re
 import threading
+import time
 from collections.abc import Generator
 from contextlib import closing
+from typing import Any
 
+import numpy as np
 import pytest
 import viser
-from client import press_update, presses_in, wait_for
+from client import client_of, press_update, presses_in, wait_for
 from desk import CLIENT
+from page_props import shown_by
+from sample_states import iterates_of
 from socket_tab import SocketTab
 
 from explorer.app import look
-from explorer.app.server import Running, start
-from explorer.app.session.session import UNDO
+from explorer.app.browser import viser_gaps
+from explorer.app.browser.viser_gaps import PLACE
+from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
+from explorer.app.features.optimise import runner
+from explorer.app.features.optimise.actions import SetRequest, StartRun
+from explorer.app.features.paths.actions import Go
+from explorer.app.inputs.controls import MAIN
+from explorer.app.server import Running
+from explorer.app.session.session import UNDO, Session
+from explorer.app.state.actions import Open, Set, SetJoint, SetPosition
 from explorer.app.state.compared import SLOTS
+from explorer.app.state.optimisation import OptimisationRequest, SearchResult
+from explorer.app.widgets import assigning
+from explorer.app.widgets.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
 from explorer.app.widgets.buttons import LONGEST_VALUE, Buttons, press_button
 from explorer.files.packaged import SOURCES
 from explorer.mechanism.design_file import PRESETS
 
 pytestmark = pytest.mark.usefixtures("idle_workers")
 
-
-@pytest.fixture(scope="module")
-def running() -> Generator[Running]:
-    running = start(PRESETS["paper-optimal"], port=0)
-    yield running
-    running.stop()
+FILLED = "is-main"
+ENDLESS = OptimisationRequest(objective="smallest-reach", volume=7053.0, starts=10_000)
 
 
 @pytest.fixture(scope="module")
@@ -110,17 +123,9 @@ def test_presses_of_one_client_are_handled_in_their_order(server: viser.ViserSer
     assert "late" not in handled
 
 
-def test_button_in_markup_is_escaped_and_labelled() -> None:
-    html = press_button(
-        "open", '"<b>', "Open", hint='"Open"', label="Open it", is_on=True, is_disabled=True
-    )
-    assert html == (
-        '<button type="button" data-press="open" data-value="&quot;&lt;b&gt;" '
-        'title="&quot;Open&quot;" aria-label="Open it" aria-pressed="true" disabled>Open</button>'
-    )
-    assert press_button("open", 3, "x") == (
-        '<button type="button" data-press="open" data-value="3">x</button>'
-    )
+def test_button_in_markup_is_escaped() -> None:
+    html = press_button("open", '"<b>', "Open", hint='"Open"', label='"Open')
+    assert 'data-value="&quot;&lt;b&gt;" title="&quot;Open&quot;" aria-label="&quot;Open"' in html
 
 
 def test_every_class_of_the_markup_has_a_rule() -> None:
@@ -130,3 +135,245 @@ def test_every_class_of_the_markup_has_a_rule() -> None:
     ruled = set(re.findall(r"\.(ex-[a-z]+)", sheet))
     variables = set(re.findall(r"--(ex-[a-z]+)", sheet))
     assert used <= ruled | variables
+
+
+def filled_in(container: Any) -> list[str]:
+    """Return the filled buttons that are visible in a container, by their words or markup."""
+    found: list[str] = []
+    for handle in container._children.values():
+        props = handle._impl.props
+        if not getattr(props, "visible", True):
+            continue
+        if isinstance(handle, viser.GuiHtmlHandle):
+            found += [FILLED] * handle.content.count(FILLED)
+        elif isinstance(handle, viser.GuiButtonHandle):
+            found += [handle.label] * (handle.color == MAIN and not handle.disabled)
+        if hasattr(handle, "_children"):
+            found += filled_in(handle)
+    return found
+
+
+def filled_by_tab(running: Running) -> dict[str, list[str]]:
+    """Return the filled buttons of each tab and dialog, by its title, and those of the bar."""
+    gui: Any = running.viser.gui
+    panels: dict[str, list[str]] = {"bar": filled_in(gui._container_handle_from_uuid["root"])}
+    for handle in gui._panel_handle_from_uuid.values():
+        for label, tab in zip(handle._tab_labels, handle._tab_handles, strict=True):
+            panels[label] = filled_in(tab)
+    return panels
+
+
+def check_filled(running: Running, *expected: str) -> None:
+    """Check that no place has two filled buttons, and that the expected ones have one."""
+    assert running.page.session.wait_until_idle()
+    found = filled_by_tab(running)
+    assert {"bar", "Pose", "Optimise", "Export", "Designs"} <= found.keys()
+    assert {place: each for place, each in found.items() if len(each) > 1} == {}
+    assert {place for place in expected if not found[place]} == set()
+
+
+def test_each_tab_has_one_filled_button_at_most(running: Running) -> None:
+    session, buttons = running.page.session, running.page.buttons
+    check_filled(running, "Optimise", "Paths", "Studies")
+    session.do(SetJoint(0, 200.0))
+    check_filled(running, "Pose")
+    session.do(Open(PRESETS["paper-optimal"]))
+    buttons.press("compare.pin", "", CLIENT)
+    wait_for(lambda: not session.state.compared.is_empty)
+    check_filled(running, "Compare")
+    buttons.press("studies.start", "", CLIENT)
+    wait_for(lambda: session.state.studies.name is not None)
+    check_filled(running)
+    session.do(Go())
+    wait_for(lambda: session.state.journey is not None)
+    check_filled(running, "Paths")
+    session.do(Open(PRESETS["paper-optimal"]))
+
+
+def test_search_and_its_answer_leave_one_filled_button_at_most(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # No iterate is drawn, so that the page comes to rest during the search.
+    monkeypatch.setattr(runner, "PACE", 600.0)
+    session = running.page.session
+    session.do(SetRequest("optimisation.request", ENDLESS))
+    session.do(StartRun())
+    wait_for(lambda: session.state.optimisation.is_on)
+    check_filled(running)
+    running.page.buttons.press("optimise.cancel", "", CLIENT)
+    wait_for(lambda: not session.state.optimisation.is_on)
+    check_filled(running)
+    (best,) = iterates_of(session.state, 1)
+    session.do(Set("optimisation.run.verdict", SearchResult("converged", "", best)))
+    check_filled(running, "Optimise")
+
+
+@pytest.mark.parametrize("size", [1e-12, 1.0, 1e6])
+def test_nodes_follow_steps_that_are_small_beside_where_they_are(
+    server: viser.ViserServer, size: float
+) -> None:
+    node, assigner = server.scene.add_frame(f"/follower{size}"), Assigner(server)
+    rng = np.random.default_rng(1)
+    position, wxyz = size * rng.normal(size=3), np.array([1.0, 0.0, 0.0, 0.0])
+    for _ in range(5):
+        position = position * (1.0 + 1e-7 * rng.normal(size=3))
+        wxyz = wxyz + 1e-9 * rng.normal(size=4)
+        updates = [(node, "position", position), (node, "wxyz", tuple(wxyz))]
+        assert len(assigner.assign(updates)) == 2
+        assert node.position.tolist() == position.tolist()
+        assert node.wxyz.tolist() == wxyz.tolist()
+        assert sent_place(server, node.name) == (position.tolist(), wxyz.tolist())
+        assert assigner.assign(updates) == []
+
+
+def test_value_that_a_user_sets_while_a_frame_is_computed_stays(server: viser.ViserServer) -> None:
+    slider: Any = server.gui.add_slider("slider", min=0.0, max=10.0, step=0.1, initial_value=1.0)
+    assigner, state = Assigner(server), slider._impl
+    before = time.time()
+    assert assigner.assign([(slider, "value", 2.0)], since=before)
+    # As viser does when a browser tells it, for frames that began before, after, and before the
+    # clock was set back.
+    for set_at, began, expected in (
+        (before, before - 1.0, 7.0),
+        (before, time.time() + 1.0, 3.0),
+        (before + 3600.0, before, 3.0),
+    ):
+        state.value, state.update_timestamp = 7.0, set_at
+        assigner.assign([(slider, "value", 3.0)], since=began)
+        assert slider.value == expected
+
+
+@pytest.mark.parametrize("name", ["value", "position"])
+def test_value_that_crossed_with_the_user_is_sent_again_when_the_user_rests(
+    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    handle: Any
+    if name == "value":
+        handle = server.gui.add_slider("crossed", min=0.0, max=9.0, step=0.1, initial_value=1.0)
+        first, second, state = 2.0, 7.0, handle._impl
+    else:
+        handle = server.scene.add_transform_controls("/crossed")
+        first, second, state = (2.0, 0.0, 0.0), (7.0, 0.0, 0.0), handle._impl_aux
+    assigner, sent, now = Assigner(server), list[object](), 1000.0
+    monkeypatch.setattr(assigning.time, "time", lambda: now)
+
+    def resend(handle: object, name: str) -> None:
+        sent.append(getattr(handle, name))
+
+    monkeypatch.setattr(assigning, "resend", resend)
+
+    def draw(value: object, seconds: float) -> bool:
+        nonlocal now
+        now += seconds
+        assigner.assign([(handle, name, np.array(value) if name in PLACE else value)])
+        return assigner.settle()
+
+    def use(value: object, seconds: float) -> None:
+        nonlocal now
+        now += seconds
+        if name == "value":
+            state.value, state.update_timestamp = value, now
+            viser_gaps.resend(handle, name)
+        else:
+            state.last_updated, handle.position[:] = now, value
+
+    # Nobody has touched it.
+    assert not draw(first, 1.0)
+    # A user did, before the browser can have shown that.
+    use(second, 0.3)
+    assert draw(second, 0.1)
+    assert sent == []
+    assert not draw(second, QUIET_SECONDS)
+    np.testing.assert_array_equal(sent, [second])
+    # Once is enough, unless that crosses too.
+    assert not draw(second, 0.1)
+    use(first, 0.1)
+    assert draw(first, 0.1)
+    assert not draw(first, QUIET_SECONDS)
+    assert len(sent) == 2
+    # What a user sets long after is what the browser shows.
+    assert not draw(second, 1.0)
+    use(first, CROSSING_SECONDS + 0.1)
+    assert not draw(first, 2.0 * QUIET_SECONDS)
+    assert len(sent) == 2
+
+
+def test_browser_that_crossed_with_the_explorer_shows_what_its_user_set(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = running.page
+    # However slow the machine is, the browser's answer counts as one that crossed.
+    monkeypatch.setattr(assigning, "CROSSING_SECONDS", 3600.0)
+    with client_of(running) as client:
+        uuid = client.find(JOINT_LABELS["l1"])
+        values: list[float] = []
+
+        def read_until(value: float) -> None:
+            while values[-1:] != [value]:
+                values.extend(
+                    message["updates"]["value"]
+                    for message in client.read()
+                    if message.get("uuid") == uuid and "value" in message.get("updates", {})
+                )
+
+        # Told of one value, it sends another before it has shown that.
+        page.session.do(SetJoint(0, 11.5))
+        read_until(11.5)
+        client.update(uuid, 12.5)
+        read_until(12.5)
+        assert page.session.state.joints[0] == 12.5
+
+
+def test_panels_that_a_drag_leaves_no_time_for_are_drawn_with_the_next_frame(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = running.page.session
+
+    def controls() -> dict[str, object]:
+        assert session.wait_until_idle()
+        return {key: value for key, value in shown_by(running).items() if not key.startswith("/")}
+
+    before = controls()
+    with monkeypatch.context() as drag:
+        drag.setattr(Session, "has_more", property(lambda _: True))
+        drag.setattr("explorer.app.page.PANELS_SECONDS", np.inf)
+        session.do(SetPosition(0, 1.5))
+        assert controls() == before
+    session.redraw()
+    after = controls()
+    assert after != before
+    session.redraw()
+    assert controls() == after
+
+
+def sent_place(server: viser.ViserServer, name: str) -> tuple[list[float], list[float]]:
+    """Return position and orientation that a browser would get that comes now."""
+    found: dict[str, list[float]] = {}
+    serializer: Any = server.get_scene_serializer()
+    for _, message in serializer._messages:
+        if message.get("name") == name:
+            found |= {key: list(message[key]) for key in ("position", "wxyz") if key in message}
+    return found["position"], found["wxyz"]
+
+
+def test_message_sent_as_a_tab_begins_to_wait_wakes_it(server: viser.ViserServer) -> None:
+    internals: Any = server
+    buffer = internals._websock_server.get_message_buffer()
+    loop: asyncio.AbstractEventLoop = buffer.event_loop
+    plain = loop.create_future
+
+    def create_future() -> asyncio.Future[Any]:
+        # Who waits has seen that nothing is there, and cannot be woken yet.
+        del loop.create_future
+        sender = threading.Thread(target=lambda: server.scene.add_frame("/sent"))
+        sender.start()
+        sender.join()
+        return plain()
+
+    async def wait() -> bool:
+        # What woke the loop before this has been done by now.
+        buffer.message_event.clear()
+        loop.create_future = create_future  # type: ignore[method-assign]
+        return await buffer.message_event.wait()
+
+    assert asyncio.run_coroutine_threadsafe(wait(), loop).result(60.0)
