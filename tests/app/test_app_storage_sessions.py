@@ -1,0 +1,657 @@
+"""Saved sessions come back to the last bit, and outlast kills, damage and other explorers."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import threading
+import time
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, cast
+
+import msgspec
+import pytest
+from client import wait_for
+from desk import Desk, thick
+from hypothesis import example, given, strategies as st
+from killed import run_until_killed
+from sample_states import OPTIMAL, Sample, rich_state, samples, states_of
+
+from explorer.app.features.optimise.actions import StartRun
+from explorer.app.session.history import History, Step, start_history
+from explorer.app.session.session import REDO, UNDO, Session
+from explorer.app.state.actions import SetName, SetPosition
+from explorer.app.state.state import Run, State, joints_of, opened
+from explorer.app.storage.autosaver import Autosaver
+from explorer.app.storage.folder import data_folder, lock_folder
+from explorer.app.storage.session_file import MOST_ORPHANS, SessionFile
+from explorer.app.storage.session_format import (
+    MOST_BYTES,
+    MOST_STEPS,
+    SCHEMA,
+    SchemaError,
+    decode_header,
+    decode_session,
+    encode_session,
+)
+from explorer.app.storage.user_data import open_user_data
+from explorer.errors import StorageError
+from explorer.mechanism.pose import Pose
+
+DATA = Path(__file__).parents[1] / "data"
+RICH, OPENED = rich_state(), opened(OPTIMAL)
+WHOLE = encode_session(History((Step(7, "Open", OPENED), Step(8, "All", RICH)), 1), 3)
+
+
+def saved_part_of(state: State) -> State:
+    """Return what a file holds of a state: all but what goes on or is computed again."""
+    if state.optimisation.is_on:
+        run = state.optimisation.run
+        assert run is not None
+        state = replace(run.own, optimisation=replace(state.optimisation, run=None))
+    paths, found = state.paths, state.optimisation
+    journey = None if paths.journey is None else replace(paths.journey, is_playing=False)
+    paths = replace(paths, request=0, planning=None, problem=None, journey=journey)
+    run = None if found.run is None else saved_run_of(found.run)
+    found = replace(found, run=run)
+    return replace(state, taken=None, gesture=None, paths=paths, optimisation=found)
+
+
+def saved_run_of(run: Run) -> Run:
+    best = run.best
+    shown = tuple(each for each in run.iterates if best is not None and each.run == best.run)
+    return replace(run, own=saved_part_of(run.own), iterates=shown, comparison=None)
+
+
+def history_of(states: list[State], words: str = "Step {} «é»") -> History:
+    steps = (Step(number, words.format(number), state) for number, state in enumerate(states))
+    return History(tuple(steps), len(states) - 1)
+
+
+def moves(state: State, count: int) -> list[State]:
+    """Return a state and those after moves along x."""
+    states = [state]
+    for number in range(count):
+        states.append(SetPosition(0, 5.0 + 0.01 * number).apply(states[-1]))
+    return states
+
+
+def signed(body: bytes, schema: int = SCHEMA, generation: int = 3) -> bytes:
+    """Return a file with this second line and a valid checksum."""
+    checksum = zlib.crc32(body, zlib.crc32(b"%d %d " % (schema, generation)))
+    head = {"schema": schema, "generation": generation, "checksum": checksum}
+    return json.dumps(head).encode() + b"\n" + body
+
+
+def leaves(value: Any, path: str = "") -> dict[str, Any]:
+    """Return the values within the parts of a state, by their paths."""
+    if not is_dataclass(value):
+        return {path: value}
+    found: dict[str, Any] = {}
+    for each in fields(value):
+        found |= leaves(getattr(value, each.name), f"{path}.{each.name}")
+    return found
+
+
+def test_rich_state_differs_from_a_new_one_in_every_saved_value() -> None:
+    new, rich = leaves(opened(OPTIMAL)), leaves(RICH)
+    transient = {"taken", "gesture", "paths.request", "paths.planning", "paths.problem"}
+    same = {path[1:] for path, value in new.items() if rich.get(path, ...) == value}
+    assert same == transient
+
+
+@given(samples())
+def test_session_after_any_actions_is_read_back_to_the_last_bit(actions: list[Sample]) -> None:
+    history = history_of(states_of(actions))
+    read = decode_session(encode_session(history, 3), "file")
+    assert [(step.number, step.words) for step in read.steps] == [
+        (step.number, step.words) for step in history.steps
+    ]
+    assert read.at == history.at
+    for step, found in zip(history.steps, read.steps, strict=True):
+        # As text, in which no bit of a number and no sign of a zero is lost.
+        assert repr(found.state) == repr(saved_part_of(step.state))
+        assert found.state == saved_part_of(step.state)
+
+
+@pytest.mark.parametrize(
+    ("words", "least", "most"),
+    [("Step {}", MOST_STEPS, MOST_STEPS), ("x" * 20_000, 2, 20), ("x" * 2 * MOST_BYTES, 1, 1)],
+    ids=["long", "large", "huge"],
+)
+def test_long_and_large_histories_lose_steps_far_from_the_present_one(
+    words: str, least: int, most: int
+) -> None:
+    history = history_of(moves(opened(OPTIMAL), 3 * MOST_STEPS), words)
+    data = encode_session(history, 1)
+    read = decode_session(data, "file")
+    assert least <= len(read.steps) <= most
+    assert len(data) <= MOST_BYTES + 200 or len(read.steps) == 1
+    assert read.step.state == history.step.state
+    assert read.step.number == history.step.number
+
+
+def test_infinite_number_is_refused_when_the_session_is_written() -> None:
+    state = replace(opened(OPTIMAL), yaw_pitch_roll=(float("inf"), 0.0, 0.0))
+    with pytest.raises(StorageError, match="no file can"):
+        encode_session(start_history(state), 1)
+
+
+@given(st.integers(0, len(WHOLE) - 1), st.integers(1, 255))
+@example(len(WHOLE) - 1, 1)
+def test_file_with_a_changed_byte_or_cut_short_is_refused(place: int, change: int) -> None:
+    damaged = bytearray(WHOLE)
+    damaged[place] ^= change
+    for data in (bytes(damaged), WHOLE[:place]):
+        with pytest.raises(StorageError):
+            decode_session(data, "file")
+
+
+@given(st.binary(max_size=300))
+@example(b"\n")
+@example(b"[" * 100_000)
+@example(b'{"words":[],"at":0,"first":0,"objects":[],"states":[]}')
+@example(b'{"words":["a"],"at":0,"first":0,"objects":[{"a":{"#":0}}],"states":[0]}')
+@example(b'{"words":["a"],"at":0,"first":0,"objects":[{"a":{"b":0}}],"states":[0]}')
+def test_any_bytes_are_refused_in_one_line(data: bytes) -> None:
+    for each in (data, signed(data)):
+        with pytest.raises(StorageError) as refusal:
+            decode_session(each, "file")
+        assert "\n" not in str(refusal.value)
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the paths to all values within one, as keys and indices."""
+    yield path
+    inner: Any = ()
+    if isinstance(value, dict):
+        inner = cast("dict[str, Any]", value).items()
+    elif isinstance(value, list):
+        inner = enumerate(cast("list[Any]", value))
+    for key, each in inner:
+        yield from places(each, (*path, key))
+
+
+def at_place(value: Any, path: tuple[Any, ...]) -> Any:
+    for key in path:
+        value = value[key]
+    return value
+
+
+BODY: Any = msgspec.json.decode(WHOLE.partition(b"\n")[2])
+PLACES = [path for path in places(BODY) if path]
+
+
+ODD: list[Any] = json.loads(
+    """[null, true, -1, 0, 8, 2.5, -1e300, 1e400, 100000000000000000000000000000,
+        "", "odd", [], [1], {}, {"x": 1}, {"#": 0}, {"#": 7}, [[], [], []]]"""
+)
+
+
+@given(st.sampled_from(PLACES), st.sampled_from(ODD))
+@example(("words",), ["Open"])
+@example(("words",), ["Open"] * 3)
+def test_value_of_another_kind_is_refused_or_read_as_any_other(
+    path: tuple[Any, ...], odd: object
+) -> None:
+    body = copy.deepcopy(BODY)
+    at_place(body, path[:-1])[path[-1]] = odd
+    problem = ""
+    try:
+        read = decode_session(signed(json.dumps(body).encode()), "file")
+        # Of a run only the iterates of one start are written.
+        once = decode_session(encode_session(read, 1), "file")
+        assert decode_session(encode_session(once, 1), "file") == once
+        assert path != ("words",)
+    except StorageError as error:
+        problem = str(error)
+    assert "\n" not in problem
+
+
+Change = Callable[[State], State]
+FAR = Pose((1e39, 5.0, 9.0), OPENED.pose.quaternion)
+NONSENSE: dict[str, Change] = {
+    "a huge length": lambda state: replace(state, joints=(*state.joints[:5], 1e300)),
+    "a negative length": lambda state: replace(state, joints=(-5.0, *state.joints[1:])),
+    "joints of another pose": lambda state: replace(state, joints=(*state.joints[::-1],)),
+    "a pose far away": lambda state: replace(
+        state, pose=FAR, joints=joints_of(state.design, FAR)
+    ),
+    "a pose with other joints": lambda state: replace(
+        state, pose=Pose((5.0, 5.0, 5.0), state.pose.quaternion)
+    ),
+    "a huge radius": lambda state: thick(state, 1e30),
+    "another design": lambda state: replace(
+        state, design=msgspec.structs.replace(state.design, b1=(1.0, 1.0))
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("nonsense", NONSENSE)
+@pytest.mark.parametrize("place", ["shown", "undone", "before a run"])
+def test_state_that_no_page_shows_is_refused_wherever_it_is(nonsense: str, place: str) -> None:
+    bad = NONSENSE[nonsense](OPENED)
+    if place == "before a run":
+        run = RICH.optimisation.run
+        assert run is not None
+        optimisation = replace(RICH.optimisation, run=replace(run, own=bad))
+        bad = replace(RICH, optimisation=optimisation)
+    states = [bad, OPENED] if place == "undone" else [OPENED, bad]
+    with pytest.raises(StorageError, match="file cannot be used") as refusal:
+        decode_session(encode_session(history_of(states), 1), "file")
+    assert str(refusal.value).isprintable()
+
+
+@pytest.mark.parametrize("schema", [2, 3])
+def test_file_of_an_earlier_schema_opens_and_is_the_same_once_it_is_written_again(
+    schema: int,
+) -> None:
+    data = (DATA / f"session-{schema}.json").read_bytes()
+    assert decode_header(data, "file").schema == schema
+    read = decode_session(data, "file")
+    assert len({step.number for step in read.steps}) == len(read.steps) > 1
+    assert read.step.state.design.name.startswith("é «one»")
+    assert repr(decode_session(encode_session(read, 3), "file")) == repr(read)
+
+
+def test_file_of_a_newer_schema_is_told_from_a_damaged_one() -> None:
+    head = b'{"schema": %d, "generation": 5, "what": "nobody knows"}\n' % (SCHEMA + 1)
+    assert decode_header(head, "file").generation == 5
+    for rest in (b"", b"anything", b"\xff"):
+        with pytest.raises(SchemaError, match="newer"):
+            decode_session(head + rest, "file")
+
+
+# Seconds that no test waits, and those after which a test gives up.
+NEVER, PATIENCE = 1e6, 60.0
+
+
+def numbered(number: int) -> History:
+    """Return a session that is known by a number: the first coordinate of b4."""
+    return start_history(SetPosition(0, float(number)).apply(OPENED))
+
+
+def number_of(history: History | None) -> float | None:
+    return None if history is None else history.step.state.pose.position[0]
+
+
+def leave_session(folder: Path, number: int) -> Path:
+    """Save a session as an explorer does that ends; return its file."""
+    store = SessionFile(folder)
+    store.save(numbered(number))
+    path = store.path
+    store.close()
+    assert path is not None
+    return path
+
+
+def resume(folder: Path) -> float | None:
+    """Return the session with which the next explorer starts, and leave it again."""
+    store = SessionFile(folder)
+    resumed = store.resume()
+    store.close()
+    assert resumed.messages == ()
+    return number_of(resumed.history)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return the contents of all files in a folder except locks, by name."""
+    files = [path for path in folder.iterdir() if not path.name.endswith(".lock")]
+    return {path.name: path.read_bytes() for path in files}
+
+
+def test_next_explorer_continues_in_the_same_file(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "sessions"
+    first = SessionFile(folder)
+    assert first.resume().history is None
+    assert first.path is None
+    for number in range(5):
+        generation = first.save(numbered(number))
+        assert first.path is not None
+        data = first.path.read_bytes()
+        assert data == encode_session(numbered(number), generation)
+        assert decode_header(data, "file").generation == generation == 1 + number
+    first.close()
+    second = SessionFile(folder)
+    resumed = second.resume()
+    assert (resumed.history, resumed.messages) == (numbered(4), ())
+    assert second.path == first.path or first.path is None
+    assert second.save(numbered(5)) == 6
+    second.close()
+    assert len(contents(folder)) == 1
+    assert resume(folder) == 5
+
+
+def test_explorers_side_by_side_have_a_file_each_and_the_last_save_is_the_newest(
+    tmp_path: Path,
+) -> None:
+    leave_session(tmp_path, 0)
+    one, two, three = (SessionFile(tmp_path) for _ in range(3))
+    assert number_of(one.resume().history) == 0
+    assert two.resume().history is None
+    # As with a design that is opened from a file, which resumes no session.
+    three.save(numbered(30))
+    for number in range(1, 10):
+        one.save(numbered(number))
+    two.save(numbered(20))
+    assert len({one.path, two.path, three.path}) == 3
+    one.save(numbered(10))
+    for store in (one, two, three):
+        store.close()
+    stores = [SessionFile(tmp_path) for _ in range(4)]
+    assert [number_of(store.resume().history) for store in stores] == [10, 20, 30, None]
+    for store in stores:
+        store.close()
+
+
+def test_only_the_newest_sessions_are_kept_although_clocks_were_set_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    living = SessionFile(tmp_path)
+    living.save(numbered(-1))
+    now = time.time()
+    for number in range(MOST_ORPHANS + 5):
+        # Each start of the explorer is a year before the last one.
+        before = now - number * 365.25 * 86400.0
+        monkeypatch.setattr(time, "time", lambda before=before: before)
+        os.utime(leave_session(tmp_path, number), (before, before))
+    store = SessionFile(tmp_path)
+    assert number_of(store.resume().history) == MOST_ORPHANS + 4
+    # Its own, those without an explorer, and that of the explorer that runs.
+    assert len(contents(tmp_path)) == 1 + MOST_ORPHANS + 1
+    assert living.save(numbered(-2)) > 0
+    store.close()
+    living.close()
+    assert resume(tmp_path) == -2
+
+
+def test_leftovers_are_removed_unless_their_explorer_runs_and_other_paths_ignored(
+    tmp_path: Path,
+) -> None:
+    living = SessionFile(tmp_path)
+    living.save(numbered(1))
+    assert living.path is not None
+    path = leave_session(tmp_path, 2)
+    writing = tmp_path / f".{living.path.name}.0123.part"
+    dead = [tmp_path / f".{path.name}.0123.part", tmp_path / ".0123.json.4.part"]
+    dead.append(tmp_path / "0123.lock")
+    for each in (writing, *dead):
+        each.write_bytes(b"part")
+    # Folders, links and pipes named like sessions are ignored.
+    (tmp_path / "folder.json").mkdir()
+    (tmp_path / "gone.json").symlink_to(tmp_path / "nowhere")
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe.json")
+    assert resume(tmp_path) == 2
+    assert writing.exists()
+    assert not any(each.exists() for each in dead)
+    living.close()
+
+
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "cut": lambda whole: whole[: len(whole) // 2],
+    "changed": lambda whole: whole.replace(b"2.0", b"3.0", 1),
+    "empty": lambda _: b"",
+    "other": lambda _: b'{"schema": 1}\n',
+    # No page can show it.
+    "too far": lambda _: encode_session(history_of([NONSENSE["a pose far away"](OPENED)]), 3),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_file_is_renamed_and_the_session_before_is_resumed(
+    tmp_path: Path, damage: str
+) -> None:
+    leave_session(tmp_path, 1)
+    path = leave_session(tmp_path, 2)
+    damaged = DAMAGES[damage](path.read_bytes())
+    for ending in (".broken", ".broken2"):
+        path.write_bytes(damaged)
+        store = SessionFile(tmp_path)
+        resumed = store.resume()
+        store.close()
+        assert number_of(resumed.history) == 1
+        (message,) = resumed.messages
+        assert "\n" not in message
+        assert path.name in message
+        assert repr(path.name + ending) in message
+        assert (tmp_path / (path.name + ending)).read_bytes() == damaged
+        assert not path.exists()
+    assert resume(tmp_path) == 1
+
+
+def test_file_of_a_newer_explorer_is_left_alone_and_new_saves_are_newer(tmp_path: Path) -> None:
+    leave_session(tmp_path, 1)
+    newer = tmp_path / "newer.json"
+    newer.write_bytes(b'{"schema": 99, "generation": 1000, "more": [1]}\nbinary \xff')
+    before = newer.read_bytes()
+    store = SessionFile(tmp_path)
+    resumed = store.resume()
+    assert number_of(resumed.history) == 1
+    (message,) = resumed.messages
+    assert "newer" in message
+    assert newer.read_bytes() == before
+    assert store.save(numbered(2)) == 1001
+    store.close()
+
+
+def test_session_is_only_read_where_nothing_can_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise StorageError("read-only")
+
+    for number in (1, 2):
+        path = leave_session(tmp_path, number)
+    path.write_bytes(b"damaged")
+    before = contents(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr("explorer.app.storage.session_file.lock_folder", refuse)
+        store = SessionFile(tmp_path)
+        resumed = store.resume()
+        assert number_of(resumed.history) == 1
+        assert any("read-only" in message for message in resumed.messages)
+        assert any(path.name in message for message in resumed.messages)
+        with pytest.raises(StorageError, match="read-only"):
+            store.save(numbered(3))
+        assert contents(tmp_path) == before
+    # Once it can be written, the session is saved in a file of its own.
+    store.save(numbered(3))
+    assert {*contents(tmp_path)} > {*before}
+    store.close()
+
+
+def test_folder_that_is_a_file_or_locked_is_reported_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "data").write_bytes(b"")
+    store = SessionFile(tmp_path / "data" / "sessions")
+    resumed = store.resume()
+    assert resumed.history is None
+    with pytest.raises(StorageError, match="EXPLORER_DATA") as refusal:
+        store.save(numbered(1))
+    assert resumed.messages == (str(refusal.value),)
+    assert "\n" not in str(refusal.value)
+    # So is a folder that another explorer locks.
+    monkeypatch.setattr("explorer.app.storage.folder.PATIENCE_SECONDS", 0.0)
+    with lock_folder(tmp_path), pytest.raises(StorageError, match="another explorer"):
+        SessionFile(tmp_path).save(numbered(1))
+
+
+def test_data_folder_is_that_of_the_environment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
+    leave_session(tmp_path / "sessions", 5)
+    # An explorer that is opened with a design leaves the saved session.
+    fresh, again = open_user_data(resume=False), open_user_data(resume=True)
+    assert fresh.history is None
+    assert number_of(again.history) == 5
+    again.store.close()
+    monkeypatch.setenv("EXPLORER_DATA", "~/mine")
+    assert data_folder() == Path.home() / "mine"
+    monkeypatch.setenv("EXPLORER_DATA", "")
+    assert data_folder().name == "flagged-explorer"
+    assert data_folder().is_absolute()
+
+
+def test_save_killed_between_any_two_writes_leaves_the_session_before_or_the_new_one(
+    tmp_path: Path,
+) -> None:
+    leave_session(tmp_path, 1)
+    number, writes, is_killed = 1, 0, True
+    while is_killed:
+        store = SessionFile(tmp_path)
+        before = number_of(store.resume().history)
+        number += 1
+        is_killed = run_until_killed(partial(store.save, numbered(number)), writes)
+        # The system releases the lock of a process that is killed.
+        store.close()
+        assert resume(tmp_path) in ({before, number} if is_killed else {number})
+        # A half-written file is gone with the next start.
+        assert len(contents(tmp_path)) == 1
+        writes += 1
+    assert writes > 1
+
+
+@dataclass
+class MemoryStore:
+    """A store in memory that can fail and block."""
+
+    saved: list[float | None] = field(default_factory=list[float | None])
+    problem: Exception | None = None
+    may_save: threading.Event = field(default_factory=threading.Event)
+    began: threading.Event = field(default_factory=threading.Event)
+    is_closed: bool = False
+
+    def __post_init__(self) -> None:
+        self.may_save.set()
+
+    def save(self, history: History) -> int:
+        assert threading.current_thread() is not threading.main_thread()
+        assert not self.is_closed
+        self.began.set()
+        assert self.may_save.wait(PATIENCE)
+        if self.problem is not None:
+            raise self.problem
+        self.saved.append(number_of(history))
+        return len(self.saved)
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+def start_autosaver(
+    store: MemoryStore, quiet: float, longest: float
+) -> tuple[Autosaver, list[str]]:
+    messages: list[str] = []
+    saver = Autosaver(store, messages.append, quiet=quiet, longest=longest, retry=NEVER)
+    return saver, messages
+
+
+def test_last_of_many_changes_is_saved_and_one_posted_during_a_save_is_next() -> None:
+    store = MemoryStore()
+    saver, messages = start_autosaver(store, NEVER, NEVER)
+    for number in range(100):
+        saver.post(numbered(number))
+    assert store.saved == []
+    assert saver.flush(PATIENCE)
+    assert store.saved == [99]
+    # Without a change nothing is saved; and the next change waits again.
+    assert saver.flush(PATIENCE)
+    saver.post(numbered(100))
+    assert store.saved == [99]
+    saver.stop()
+    assert store.saved == [99, 100]
+    assert store.is_closed
+    assert messages == []
+    store = MemoryStore()
+    store.may_save.clear()
+    saver, _ = start_autosaver(store, 0.0, 0.0)
+    saver.post(numbered(1))
+    assert store.began.wait(PATIENCE)
+    saver.post(numbered(2))
+    store.may_save.set()
+    assert saver.flush(PATIENCE)
+    assert store.saved == [1, 2]
+    saver.stop()
+
+
+@pytest.mark.parametrize(
+    ("quiet", "longest", "is_endless"), [(0.01, NEVER, False), (NEVER, 0.05, True)]
+)
+def test_change_is_saved_once_it_is_quiet_or_after_the_longest_time(
+    quiet: float, longest: float, is_endless: bool
+) -> None:
+    store = MemoryStore()
+    saver, _ = start_autosaver(store, quiet, longest)
+    saver.post(numbered(0))
+
+    def is_saved() -> bool:
+        if is_endless:
+            saver.post(numbered(len(store.saved)))
+        return len(store.saved) >= (3 if is_endless else 1)
+
+    wait_for(is_saved)
+    saver.stop()
+
+
+def test_failure_is_reported_once_and_so_is_its_end() -> None:
+    store = MemoryStore(problem=StorageError("the disk is full; make room"))
+    saver, messages = start_autosaver(store, 0.0, 0.0)
+    for number in range(3):
+        saver.post(numbered(number))
+        assert not saver.flush(PATIENCE)
+    assert messages == [
+        "The session is not saved: the disk is full; make room. The explorer keeps trying."
+    ]
+    store.problem = None
+    # The last one posted is not lost.
+    assert saver.flush(PATIENCE)
+    assert store.saved == [2]
+    assert messages[1:] == ["The session is saved again."]
+    store.problem = ZeroDivisionError("a\nfault")
+    saver.post(numbered(3))
+    assert not saver.flush(PATIENCE)
+    assert "\n" not in messages[2]
+    assert "a fault" in messages[2]
+    saver.stop()
+    # It ends although it cannot save.
+    assert store.saved == [2]
+    assert store.is_closed
+    assert len(messages) == 3
+
+
+def test_resumed_session_is_undone_and_redone(desk: Desk, tmp_path: Path) -> None:
+    saver = Autosaver(SessionFile(tmp_path), desk.complaints.append)
+    for action in (SetName("mine"), SetPosition(0, 12.0)):
+        desk.session.do(action)
+        saver.follow(desk.state, desk.session.history)
+    # Until a search ends, the session before it is saved.
+    before = desk.session.history
+    desk.session.do(StartRun())
+    saver.follow(desk.state, desk.session.history)
+    assert desk.state.optimisation.is_on
+    saver.stop()
+
+    history = SessionFile(tmp_path).resume().history
+    assert history is not None
+    assert [(step.number, step.words, step.state) for step in history.steps] == [
+        (step.number, step.words, step.state) for step in before.steps
+    ]
+    assert history.step.state == before.step.state
+    session = Session(history.step.state, lambda _: None, print, print, history)
+    try:
+        for travel, expected in ((UNDO, before.steps[0]), (REDO, before.steps[2])):
+            for _ in range(2):
+                session.travel(travel)
+            assert session.wait_until_idle()
+            assert session.state == expected.state
+    finally:
+        session.stop()
+    assert desk.complaints == []
