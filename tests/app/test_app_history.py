@@ -1,23 +1,28 @@
-"""The history: every step can be undone, redone and gone back to, and a drag is one step."""
+"""Every step can be undone and redone; a drag is one step, and a press of a browser too."""
 
 from __future__ import annotations
 
 import importlib
 import itertools
 import pkgutil
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
+from client import wait_for
 from desk import Desk
 from hypothesis import given, settings, strategies as st
+from socket_tab import SocketTab
 
 import explorer.app
 from explorer.app.features.optimise.actions import CancelRun, EndRun, StartRun
 from explorer.app.features.paths.actions import Advance, CancelPlan, Go, Play, SetPathTime
-from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum, Jog
-from explorer.app.features.studies.actions import BrushAxis, OpenStudy
-from explorer.app.session import history
+from explorer.app.features.singularity.actions import GoToSingularity, Jog
+from explorer.app.features.studies.actions import OpenStudy
+from explorer.app.server import Running
+from explorer.app.session import gestures, history
 from explorer.app.session.gestures import PAUSE_SECONDS, UserAction
 from explorer.app.session.history import restore, settle, start_history
 from explorer.app.session.session import REDO, UNDO
@@ -30,15 +35,16 @@ from explorer.app.state.actions import (
     SetAngle,
     SetJoint,
     SetMode,
-    SetPose,
     SetPosition,
     SetVariable,
 )
+from explorer.app.state.frame import Frame
 from explorer.app.state.optimisation import SearchResult
-from explorer.app.state.presses import Press
-from explorer.app.state.state import State, opened
+from explorer.app.state.presses import Press, Presses
+from explorer.app.state.state import Hold, State, opened
 from explorer.errors import ExplorerError, InputError
-from explorer.mechanism.design import VARIABLES
+from explorer.legs.moves import move_clearance
+from explorer.mechanism.design import JOINTS, VARIABLES, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 
@@ -125,13 +131,14 @@ def test_history_undoes_and_redoes_every_step_exactly(
         assert before.move_to(step.number).step is step
 
 
-presses = st.one_of(st.none(), st.builds(Press, st.integers(1, 2), st.integers(1, 3)))
+press_or_none = st.one_of(st.none(), st.builds(Press, st.integers(1, 2), st.integers(1, 3)))
 
 
 @few
 @given(
     st.lists(
-        st.tuples(st.sampled_from("ab"), presses, st.floats(0.0, 3.0 * PAUSE_SECONDS)), min_size=1
+        st.tuples(st.sampled_from("ab"), press_or_none, st.floats(0.0, 3.0 * PAUSE_SECONDS)),
+        min_size=1,
     )
 )
 def test_step_ends_with_the_press_with_the_control_or_after_a_pause(
@@ -279,29 +286,6 @@ def test_what_is_shown_is_no_step_and_undo_leaves_it(done: list[Action | str]) -
         assert settle(recorder.state) == settle(replace(alone.state, view=view))
 
 
-@pytest.mark.parametrize(
-    ("action", "expected"),
-    [
-        (SetJoint(0, 12.5), "l1 = 12.5"),
-        (SetPosition(2, 9.25), "z = 9.25"),
-        (SetAngle(0, -70.0), "yaw = −70°"),
-        (SetPose(Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))), "Move b4 to 1, 2, 3"),
-        (SetMode(1), "Assembly mode 1 (− − +)"),
-        (SetVariable("b3", 5.0), "b3 = 5"),
-        (Jog(0, 2.0), "δ1 alone, by 2°"),
-        (GoToStratum((3, 4, 2, 1)), "Go to stratum (3, 4, 2, 1)"),
-        (GoToSingularity(2), "Go to the nearest pose with δ2 = 0"),
-        (Open(OTHER), f"Open {OTHER.name}"),
-        (OpenStudy("trade-off"), "Study trade-off"),
-        (BrushAxis("mean_margin", ((1.0, 2.0),)), "Brush mean margin at nodes"),
-    ],
-    ids=lambda each: str(each)[:20],
-)
-def test_step_names_its_action(recorder: Recorder, action: Action, expected: str) -> None:
-    recorder.do(action)
-    assert recorder.words == [expected]
-
-
 def test_every_action_has_words() -> None:
     # These end no step, or are described by what they lead to.
     silent = {StartRun, CancelRun, UserAction}
@@ -313,3 +297,169 @@ def test_every_action_has_words() -> None:
                 own = kind.words is not Action.words or kind.describe is not Action.describe
                 worded = kind.template or own
                 assert worded, f"{module.name}.{name}: no words for its step"
+
+
+@pytest.fixture
+def moved() -> State:
+    """The optimum after a move along x from its home pose, at the time 100."""
+    return UserAction(SetPosition(0, 14.0), "x", 100.0).apply(opened(OPTIMAL))
+
+
+def start_of(state: State) -> Pose:
+    assert state.gesture is not None
+    return state.gesture.start
+
+
+def test_drag_of_many_events_is_one_move_from_where_it_began() -> None:
+    state = start = opened(OPTIMAL)
+    assert start.gesture is None
+    assert Frame(start).last_move is None
+    for i in range(30):
+        state = UserAction(SetPosition(0, 10.0 + 0.2 * (i + 1)), "x", 50.0 + 0.016 * i).apply(state)
+    assert start_of(state) == start.pose
+    move = Frame(state).last_move
+    assert move is not None
+    assert (move.start, move.end, move.steps) == (start.pose, state.pose, 1)
+    expected = move_clearance(OPTIMAL, start.pose, state.pose)
+    np.testing.assert_array_equal(move.clearance, expected.clearance)
+    np.testing.assert_array_equal(move.overlaps, expected.overlaps)
+
+
+def test_gesture_of_one_press_continues_after_a_rest_and_ends_with_it(moved: State) -> None:
+    first, second = Press(1, 1), Press(1, 2)
+    state = UserAction(SetPosition(0, 15.0), "y", 200.0, first).apply(moved)
+    rested = UserAction(SetPosition(0, 16.0), "y", 200.0 + 60 * PAUSE_SECONDS, first).apply(state)
+    assert start_of(rested) == start_of(state) == moved.pose
+    again = UserAction(SetPosition(0, 17.0), "y", 200.1 + 60 * PAUSE_SECONDS, second).apply(rested)
+    assert start_of(again) == rested.pose
+
+
+def test_event_that_arrives_late_does_not_end_a_move(moved: State) -> None:
+    late = UserAction(SetPosition(0, 15.0), "x", 99.0).apply(moved)
+    on = UserAction(SetPosition(0, 16.0), "x", 100.0 + 0.99 * PAUSE_SECONDS).apply(late)
+    assert start_of(late) == start_of(on) == OPTIMAL.home
+
+
+@pytest.mark.parametrize(
+    "action",
+    [SetVariable("b1x", 4.3), Open(OTHER), Open(OPTIMAL), Reset(), SetMode(6)],
+    ids=lambda action: type(action).__name__,
+)
+@pytest.mark.parametrize("hold", ["pose", "legs"])
+def test_change_of_design_or_mode_ends_the_move(moved: State, action: Action, hold: Hold) -> None:
+    for source in ("x", "other"):
+        after = UserAction(action, source, 100.1).apply(replace(moved, hold=hold))
+        assert after.gesture is None
+        assert Frame(after).last_move is None
+
+
+def test_action_that_moves_nothing_leaves_the_last_move(moved: State) -> None:
+    thick = Set("design.limits", Limits(leg_radii=(0.5, 0.5, 0.5, 0.5)))
+    for action in (thick, Set("design.unit_mm", 3.0), Set("view", opened(OTHER).view)):
+        assert UserAction(action, "other", 100.1).apply(moved).gesture == moved.gesture
+
+
+def test_move_back_to_the_start_sweeps_nothing(moved: State) -> None:
+    back = UserAction(SetPosition(0, 10.0), "x", 100.2).apply(moved)
+    assert back.pose == OPTIMAL.home
+    assert Frame(back).last_move is None
+    on = UserAction(SetPosition(0, 9.0), "x", 100.4).apply(back)
+    assert start_of(on) == OPTIMAL.home
+    assert Frame(on).last_move is not None
+
+
+def test_drag_through_lengths_that_cannot_close_is_one_move(moved: State) -> None:
+    joint = JOINTS.index("l1")
+    low, high = Frame(moved).snapshot.intervals[joint][-1]
+    state = UserAction(SetJoint(joint, 0.5 * (low + high)), "l1", 200.0).apply(moved)
+    for i in range(8):
+        state = UserAction(SetJoint(joint, high + 1.0 + i), "l1", 200.2 + 0.2 * i).apply(state)
+        assert state.unclosed is not None
+    state = UserAction(SetJoint(joint, high - 0.01), "l1", 201.8).apply(state)
+    assert start_of(state) == moved.pose
+
+
+def test_button_begins_a_new_move_and_a_singularity_does_not(moved: State) -> None:
+    home = UserAction(GoHome(), object(), 100.1).apply(moved)
+    assert start_of(home) == moved.pose
+    again = UserAction(GoHome(), object(), 100.2).apply(home)
+    assert again.gesture == home.gesture
+    through = UserAction(SetPosition(2, -4.0), "z", 300.0).apply(moved)
+    assert through.mode != moved.mode
+    assert start_of(through) == moved.pose
+
+
+@pytest.fixture
+def presses() -> Presses:
+    return Presses()
+
+
+def test_press_lasts_from_its_beginning_to_its_release(presses: Presses) -> None:
+    presses.record(1, 7, 10.0)
+    assert presses.at(1, 9.9) is None
+    assert presses.at(1, 10.0) == presses.at(1, 1e6) == Press(1, 7)
+    # Presses of other browsers last no longer than their own.
+    presses.record(2, -3, 10.0)
+    assert presses.at(2, 11.0) is presses.at(None, 11.0) is None
+    presses.record(1, -7, 20.0)
+    assert presses.at(1, 20.0) == Press(1, 7)
+    assert presses.at(1, 20.1) is None
+    # What was done before the release may be made after it.
+    assert presses.at(1, 15.0) == Press(1, 7)
+    presses.forget(1)
+    presses.forget(3)
+    assert presses.at(1, 15.0) is None
+
+
+def test_press_ends_with_the_next_one_and_goes_on_after_its_window_was_left(
+    presses: Presses,
+) -> None:
+    presses.record(1, 7, 10.0)
+    presses.record(1, -7, 11.0)
+    presses.record(1, 7, 15.0)
+    assert presses.at(1, 16.0) == Press(1, 7)
+    presses.record(1, 8, 20.0)
+    # Its release was lost on the way.
+    presses.record(1, -7, 20.1)
+    assert presses.at(1, 19.0) == Press(1, 7)
+    assert presses.at(1, 21.0) == Press(1, 8)
+
+
+def test_changes_during_a_press_of_a_browser_are_one_step(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Every pause is too long.
+    monkeypatch.setattr(gestures, "PAUSE_SECONDS", -1.0)
+    gui: Any = running.viser.gui
+    handles: list[Any] = list(gui._gui_input_handle_from_uuid.values())
+    slider = next(each for each in handles if each.label == "x")
+    session: Any = running.page.session
+    with closing(SocketTab(running.url)) as tab:
+
+        def inboxes() -> list[str]:
+            clients: list[Any] = list(running.viser.get_clients().values())
+            fields = [each.gui._gui_input_handle_from_uuid for each in clients]
+            both = [pair for each in fields for pair in tuple(each.items())]
+            return [uuid for uuid, field in both if field.label == "Press"]
+
+        wait_for(inboxes)
+        (inbox,) = inboxes()
+        begun = len(session.history.steps)
+        values = (11.0 + 0.25 * number for number in itertools.count())
+
+        def move() -> int:
+            value = next(values)
+            tab.update(slider._impl.uuid, value)
+            wait_for(lambda: session.state.pose.position[0] == value)
+            return len(session.history.steps) - begun
+
+        tab.update(inbox, 1)
+        assert [move() for _ in range(3)] == [1, 1, 1]
+        tab.update(inbox, -1)
+        tab.update(inbox, 2)
+        assert [move() for _ in range(3)] == [2, 2, 2]
+        # Without a press, as with keys, each is a step.
+        tab.update(inbox, -2)
+        wait_for(lambda: move() > 2)
+        last = move()
+        assert [move() for _ in range(2)] == [last + 1, last + 2]
