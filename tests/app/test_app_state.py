@@ -1,15 +1,21 @@
-"""The state and its actions, with no browser: what every control of the page comes down to."""
+"""The state, its actions and the session that makes them, with no browser."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Generator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
+from strategies import designs
 
+from explorer.app.session.session import Session
 from explorer.app.state.action import Action
 from explorer.app.state.actions import (
     GoHome,
@@ -27,12 +33,13 @@ from explorer.app.state.actions import (
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, joints_of, mode_at, opened
 from explorer.errors import DesignError, ExplorerError, InputError
-from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES, Limits
+from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import forward
 from explorer.mechanism.pose import Pose
 
 OPTIMAL = PRESETS["paper-optimal"]
+PATIENCE = 60.0
 
 
 def closes(state: State) -> bool:
@@ -193,12 +200,6 @@ def test_reset_and_home_lead_back_to_the_design_as_opened_and_its_home_pose(stat
     assert Reset().apply(SetVariable("b2", 1.0).apply(other)).design.name == "paper-initial"
 
 
-def test_limits_are_judged_where_the_mechanism_stands(state: State) -> None:
-    tight = Set("design.limits", Limits(l1=(0.0, 5.0))).apply(state)
-    assert tight.pose == state.pose
-    assert [v.limit for v in Frame(tight).snapshot.violations] == ["l1"]
-
-
 @pytest.mark.parametrize("length", [0.0, -1.0, float("nan"), 5e-324, 1e300])
 def test_warning_length_that_is_not_positive_is_refused(state: State, length: float) -> None:
     with pytest.raises(InputError, match="positive"):
@@ -244,3 +245,151 @@ def test_state_after_any_actions_does_not_contradict_itself(
         else:
             assert not forward(state.design, state.joints).feasible
             assert state.unclosed.failing
+
+
+def stuck_states(design: Design, seed: int) -> list[State]:
+    """Return the states in which a joint was set beyond an interval in which it closes."""
+    rng = np.random.default_rng(seed)
+    place = rng.uniform(-0.6, 0.6, 3) * design.reach
+    pose = Pose.of_yaw_pitch_roll(place.tolist(), rng.uniform(-80.0, 80.0, 3).tolist())
+    state, found = opened(design, pose), list[State]()
+    for joint, name in enumerate(JOINTS):
+        for low, high in Frame(state).snapshot.intervals[joint]:
+            for value in (low - 0.1 * design.reach, high + 0.1 * design.reach):
+                if value < 0.0 and name in LENGTHS:
+                    continue
+                after = SetJoint(joint, value).apply(state)
+                if after.unclosed is not None:
+                    found.append(after)
+    return found
+
+
+@settings(max_examples=settings().max_examples // 5)
+@given(designs(sizes=(10.0, 1e-6, 1e6)), st.integers(0, 2**32 - 1))
+def test_nearest_length_is_never_singular(design: Design, seed: int) -> None:
+    for stuck in stuck_states(design, seed)[:1]:
+        after = UseNearest().apply(stuck)
+        assert after.unclosed is None
+        assert forward(after.design, after.joints).feasible
+        if after.pose == stuck.pose:
+            # No length is regular: the mechanism stays as it was.
+            continue
+        frame = Frame(after)
+        assert frame.verdict.kind != "singular"
+        assert len(frame.snapshot.bordering_modes) == 1
+        assert frame.snapshot.mode == stuck.mode
+        reason = frame.verdict.reason(after.design.unit_mm)
+        assert after.remark is not None
+        assert after.remark.endswith(f"short of it: {reason}.")
+        assert ("nearest that stays clear," in after.remark) == (frame.verdict.kind == "clear")
+
+
+class Watched:
+    """A session whose frames, complaints and faults are kept."""
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+        self.complaints: list[tuple[str, int | None]] = []
+        self.faults: list[Exception] = []
+        self._drawing = threading.Event()
+        self._gate = threading.Event()
+        self._gate.set()
+        self.session = Session(
+            opened(PRESETS["paper-optimal"]),
+            self._draw,
+            lambda message, who: self.complaints.append((message, who)),
+            self.faults.append,
+        )
+
+    @contextmanager
+    def busy(self) -> Generator[None]:
+        """Keep the session at one frame, so that all that is posted meanwhile waits."""
+        self._drawing.clear()
+        self._gate.clear()
+        self.session.do(SetPosition(0, 9.0))
+        assert self._drawing.wait(PATIENCE)
+        yield
+        self._gate.set()
+        assert self.session.wait_until_idle()
+
+    def _draw(self, frame: Frame) -> None:
+        self._drawing.set()
+        self._gate.wait(PATIENCE)
+        self.frames.append(frame)
+
+
+@pytest.fixture
+def watched() -> Watched:
+    return Watched()
+
+
+def test_only_the_newest_of_a_burst_is_computed(watched: Watched) -> None:
+    with watched.busy():
+        for i in range(100):
+            value = 11.0 + 0.001 * i
+            watched.session.post(
+                "slider", lambda _, value=value: SetJoint(0, value), stamp=float(i)
+            )
+    assert watched.session.state.joints[0] == 11.0 + 0.001 * 99
+    # One that was under way, and one for all the rest.
+    assert len(watched.frames) == 2
+    assert watched.frames[-1].state is watched.session.state
+
+
+def test_changes_of_one_burst_are_made_in_the_order_of_their_stamps(watched: Watched) -> None:
+    now = time.time()
+    with watched.busy():
+        for stamp in (3.0, 1.0, 2.0):
+            watched.session.post(
+                "slider", lambda _, value=stamp: SetPosition(1, value), stamp=now + stamp
+            )
+        watched.session.post("a", lambda s: SetPosition(2, 2 * s.pose.position[2]), stamp=now + 2)
+        watched.session.post("b", lambda _: SetPosition(2, 5.0), stamp=now + 1)
+    assert watched.session.state.pose.position[1:] == (3.0, 10.0)
+
+
+def test_refused_change_is_reported_to_its_client_and_the_state_is_drawn_again(
+    watched: Watched,
+) -> None:
+    before = watched.session.state
+    watched.session.do(SetVariable("a3y", 0.0), who=7)
+    assert watched.session.wait_until_idle()
+    ((message, who),) = watched.complaints
+    assert "degenerate" in message
+    assert who == 7
+    assert watched.session.state == before
+    assert watched.frames[-1].state == before
+
+
+def test_unexpected_fault_is_reported_and_the_session_continues(watched: Watched) -> None:
+    def broken(_: State) -> Action:
+        raise RuntimeError("broken on purpose")
+
+    watched.session.post("broken", broken)
+    assert watched.session.wait_until_idle()
+    assert [str(fault) for fault in watched.faults] == ["broken on purpose"]
+    watched.session.do(SetPosition(0, 9.0))
+    assert watched.session.wait_until_idle()
+    assert watched.session.state.pose.position[0] == 9.0
+
+
+def test_settled_state_has_all_that_was_posted_before(watched: Watched) -> None:
+    settled: list[State] = []
+    with watched.busy():
+        for x in (3.0, 4.0):
+            watched.session.post("x", lambda _, x=x: SetPosition(0, x))
+        reader = threading.Thread(target=lambda: settled.append(watched.session.settled()))
+        reader.start()
+    reader.join()
+    assert settled[0].pose.position[0] == 4.0
+
+
+def test_changes_from_many_threads_are_all_made(watched: Watched) -> None:
+    def run(axis: int) -> None:
+        for i in range(30):
+            watched.session.post(axis, lambda _, i=i: SetPosition(axis, 5.0 + 0.01 * i))
+
+    with ThreadPoolExecutor(3) as threads:
+        list(threads.map(run, range(3)))
+    assert watched.session.wait_until_idle()
+    assert watched.session.state.pose.position == pytest.approx((5.29, 5.29, 5.29))
