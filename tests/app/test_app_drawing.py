@@ -1,28 +1,49 @@
-"""What is drawn, looked at without a browser: colours, marks, framing, text."""
+"""What is drawn, looked at without a browser: colours, shapes, cameras, the sketch."""
 
 from __future__ import annotations
 
+import itertools
 import re
+import threading
+from types import SimpleNamespace
+from typing import Any, cast
 
 import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from limited_designs import scaled_design
+from strategies import designs
 
-from explorer.app.features.singularity.distance import distance_table
-from explorer.app.features.singularity.panel import measures_table, summary
-from explorer.app.inputs.tracks import decimals
+from explorer.app.features.mechanism.sketch import (
+    FIGURE_WIDTH,
+    HEIGHT,
+    WIDTH,
+    figures,
+)
+from explorer.app.features.singularity.panel import measures_table
+from explorer.app.look import read_stylesheet
 from explorer.app.scene.bands import COLLIDING, PLAIN
-from explorer.app.scene.camera import FIELD_OF_VIEW, VIEWS, ViewName, framing
+from explorer.app.scene.camera import (
+    FIELD_OF_VIEW,
+    FIRST_ASPECT,
+    REMEMBERED,
+    VIEWS,
+    Cameras,
+    ViewName,
+    are_in_picture,
+    framing,
+    has_perspective,
+)
 from explorer.app.scene.part import around
-from explorer.app.scene.placing import Placed, round_step
+from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import cylinder, plate, sphere, turned_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
-from explorer.app.widgets.colours import FAR, FAR_WARNINGS, SINGULAR, Rgb, proximity_colour
+from explorer.app.widgets import charts
+from explorer.app.widgets.colours import FAR_WARNINGS, OUTLINE, Rgb, proximity_colour
 from explorer.app.widgets.markup import share
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, IntArray
@@ -30,10 +51,42 @@ from explorer.numerics.arrays import FloatArray, IntArray
 OPTIMAL = PRESETS["paper-optimal"]
 
 
+# Of panels, of the scene, and of fields within panels, as viser draws them.
+LIGHT = {"panel": "#ffffff", "scene": "#ffffff", "field": "#ffffff"}
+DARK = {"panel": "#242424", "scene": "#141414", "field": "#2e2e2e"}
+
+
+def rgb(colour: str) -> Rgb:
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return red, green, blue
+
+
 def luminance(colour: Rgb) -> float:
-    """Return the relative luminance of an sRGB colour, 0 to 1."""
-    linear = (np.array(colour) / 255.0) ** 2.2
-    return float(linear @ [0.2126, 0.7152, 0.0722])
+    """Return the relative luminance as WCAG 2 defines it."""
+    shares = [value / 255.0 for value in colour]
+    linear = [s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: Rgb, other: Rgb) -> float:
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("name", ["grey", "within", "close", "beyond"])
+def test_words_are_legible_in_both_themes(name: str) -> None:
+    found = re.search(rf"--ex-{name}: light-dark\((#\w+), (#\w+)\)", read_stylesheet())
+    assert found is not None
+    for colour, backgrounds in zip(found.groups(), (LIGHT, DARK), strict=True):
+        for place, background in backgrounds.items():
+            assert contrast(rgb(colour), rgb(background)) >= 4.5, f"{colour} on a {place}"
+
+
+def test_lines_of_charts_and_alerts_are_seen_in_both_themes() -> None:
+    for chart in ("BLUE", "TEAL", "VIOLET", "ORANGE", "NEUTRAL"):
+        for backgrounds in (LIGHT, DARK):
+            assert contrast(getattr(charts, chart), rgb(backgrounds["panel"])) >= 3.0
+    assert contrast(OUTLINE, rgb(LIGHT["panel"])) >= 3.0
 
 
 def as_deuteranope(colour: Rgb) -> FloatArray:
@@ -41,13 +94,6 @@ def as_deuteranope(colour: Rgb) -> FloatArray:
     linear = (np.array(colour) / 255.0) ** 2.2
     matrix = [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]]
     return np.clip(matrix @ linear, 0.0, 1.0) ** (1 / 2.2) * 255.0
-
-
-@given(st.floats(0.0, 1e3))
-def test_colour_depends_on_the_size_of_the_level(level: float) -> None:
-    assert proximity_colour(level) == proximity_colour(-level)
-    assert proximity_colour(0.0) == SINGULAR
-    assert proximity_colour(FAR_WARNINGS + level) == FAR
 
 
 def test_luminance_grows_on_either_side_towards_the_warning_length() -> None:
@@ -60,11 +106,8 @@ def test_luminance_grows_on_either_side_towards_the_warning_length() -> None:
     # Either side is told from the other without green cones.
     apart = [np.linalg.norm(as_deuteranope(a) - as_deuteranope(b)) for a in below for b in above]
     assert min(apart) > 60.0
-
-
-def test_colours_of_collisions_and_limits_differ_without_green_cones_and_in_grey() -> None:
-    off = as_deuteranope(COLLIDING) - as_deuteranope(PLAIN)
-    assert float(np.linalg.norm(off)) > 60.0
+    # So are collisions from limits, in grey too.
+    assert np.linalg.norm(as_deuteranope(COLLIDING) - as_deuteranope(PLAIN)) > 60.0
     assert luminance(PLAIN) > 2.0 * luminance(COLLIDING)
 
 
@@ -90,13 +133,6 @@ def test_view_holds_the_whole_mechanism_and_little_more(
     assert 0.9 < max(across.max(), upward.max()) <= 1.0
 
 
-@given(st.floats(1e-20, 1e20))
-def test_scenes_are_about_ten_units_large_whatever_the_design(reach: float) -> None:
-    step = round_step(reach / 10.0)
-    assert 6.3 <= reach / step <= 15.9
-    assert float(f"{step:.0e}"[0]) in (1.0, 2.0, 5.0)
-
-
 @given(st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
 def test_squares_of_the_ground_have_the_size_of_their_label(factor: float, unit_mm: float) -> None:
     design = scaled_design(PRESETS["paper-optimal"], factor)
@@ -108,11 +144,6 @@ def test_squares_of_the_ground_have_the_size_of_their_label(factor: float, unit_
     real = unit_mm * float(np.linalg.norm(placed.frame.snapshot.points.a2))
     assert drawn / placed.square == pytest.approx(real / placed.square_mm)
     assert 0.5 <= placed.square <= 2.0
-
-
-@pytest.mark.parametrize(("step", "digits"), [(1.0, 0), (0.1, 1), (0.001, 3), (10.0, 0), (0.25, 2)])
-def test_number_field_shows_the_decimals_of_its_step(step: float, digits: int) -> None:
-    assert decimals(step) == digits
 
 
 @given(st.lists(st.tuples(*[st.floats(-1, 1)] * 3), min_size=1, max_size=8))
@@ -142,32 +173,6 @@ def test_primitive_meshes_are_closed_and_look_outwards() -> None:
     assert closed_volume(*plate(square, 0.5, 1.0, 1.5)) == pytest.approx(expected, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("z", "pitch", "words"),
-    [
-        (9.0, 0, "Clear of singularities"),
-        (9.0, 0, "Within all limits"),
-        (0.5, 0, "Near a singularity"),
-        (0.0, 20, "δ3 = 0: b4 on the base plane"),
-        (0.0, 20, "Singular<"),
-        (19.0, 0, "box z = 19 is above its maximum 18"),
-    ],
-)
-def test_summary_names_broken_limits_and_nearness(z: float, pitch: float, words: str) -> None:
-    pose = Pose.of_yaw_pitch_roll((10, 5, z), (-73.1, pitch, 0))
-    assert words in summary(Frame(opened(OPTIMAL, pose)))
-
-
-@pytest.mark.parametrize(
-    ("factor", "margin"), [(1e-4, "−0.000900"), (1.0, "−9.00"), (1e4, "−90,000"), (1e9, "−9 × 10⁹")]
-)
-def test_margins_of_every_size_have_as_many_digits(factor: float, margin: str) -> None:
-    pose = Pose.of_yaw_pitch_roll((10 * factor, 5 * factor, 9 * factor), (-73.1, 0, 0))
-    html = distance_table(Frame(opened(scaled_design(OPTIMAL, factor), pose)))
-    assert f">{margin}<" in html
-    assert "units³" in html
-
-
 def test_small_share_is_not_shown_as_zero() -> None:
     assert share(0.0308) == "0.0308"
     assert share(1.651e-9) == "1.65 × 10⁻⁹"
@@ -176,3 +181,230 @@ def test_small_share_is_not_shown_as_zero() -> None:
     text = re.sub(r"<[^>]+>", " ", measures_table(Frame(opened(thin))))
     # Below a millionth, as its power of ten says.
     assert re.search(r"1/cond J\s+[1-9]\S* × 10⁻[⁷⁸⁹]", text)
+
+
+# Height of type of 11 pixels from the top of b to the bottom of y.
+TYPE_HEIGHT = 11.0
+
+
+@given(designs())
+def test_texts_of_a_sketch_are_within_it_and_do_not_overlap(design: Design) -> None:
+    for figure, left in zip(figures(design), (0.0, WIDTH - FIGURE_WIDTH), strict=True):
+        for word in figure.words:
+            assert left <= word.left
+            assert word.left + word.width <= left + FIGURE_WIDTH + 1e-9
+            assert 0.5 * TYPE_HEIGHT <= word.at[1] <= HEIGHT - 0.5 * TYPE_HEIGHT
+        for one, other in itertools.combinations(figure.words, 2):
+            right = min(one.left + one.width, other.left + other.width)
+            across = right - max(one.left, other.left)
+            assert across <= 0.0 or abs(one.at[1] - other.at[1]) >= TYPE_HEIGHT, (one, other)
+
+
+@given(designs())
+def test_dimension_is_as_long_as_its_variable_in_one_scale(design: Design) -> None:
+    values: dict[str, float] = dict(zip(VARIABLES, design.variables, strict=True))
+    measured: dict[str, float] = {}
+    for figure in figures(design):
+        lengths = {each.word.variable: each.line for each in figure.dimensions}
+        # One scale for each figure: that of its longest dimension.
+        longest = max(lengths, key=lambda name: abs(values[name]))
+        drawn = {
+            name: (end[0] - start[0]) if start[1] == end[1] else (start[1] - end[1])
+            for name, (start, end) in lengths.items()
+        }
+        scale = drawn[longest] / values[longest]
+        assert scale > 0.0
+        for name, length in drawn.items():
+            assert length == pytest.approx(scale * values[name], abs=1e-6 * FIGURE_WIDTH)
+            measured[name] = length
+    assert sorted(measured) == sorted(VARIABLES)
+
+
+POINTS = np.random.default_rng(5).uniform(-6.0, 9.0, (20, 3))
+# Of viser, before it is told where to begin.
+UNTOLD = np.array([3.0, 3.0, 3.0])
+FIRST = framing(POINTS, "isometric", FIRST_ASPECT)[0]
+
+
+class Browser:
+    """A browser, as far as cameras know one; at first it may miss where its camera is put."""
+
+    client_id = 5
+
+    class Camera:
+        """Of the browser, as the server knows it."""
+
+        aspect = 0.7
+        fov = 0.6
+        up_direction = (0.0, 0.0, 1.0)
+        position = UNTOLD
+        look_at = np.zeros(3)
+
+        def __init__(self) -> None:
+            self.updated: Any = print
+
+        def on_update(self, callback: Any) -> None:
+            self.updated = callback
+
+    def __init__(self) -> None:
+        self.camera = Browser.Camera()
+        self.puts: list[FloatArray] = []
+
+    def put(self, _: Any, eye: FloatArray, __: FloatArray) -> None:
+        """Take note of where the camera is put; whether it goes there is another matter."""
+        self.puts.append(eye)
+
+    def tell(self, position: FloatArray) -> None:
+        self.camera.position = position
+        self.camera.updated(None)
+
+
+@pytest.fixture
+def browser() -> Any:
+    return Browser()
+
+
+@pytest.fixture
+def cameras(browser: Any) -> Cameras:
+    first: Any = SimpleNamespace()
+    cameras = Cameras(first, lambda: POINTS, browser.put)
+    cameras.frame_first()
+    assert np.allclose(first.position, FIRST)
+    cameras.connected(browser)
+    return cameras
+
+
+EYE = framing(POINTS, "isometric", 0.7)[0]
+
+
+@pytest.mark.parametrize("missed", [0, 1, REMEMBERED + 3])
+@pytest.mark.parametrize("start", [UNTOLD, FIRST])
+def test_camera_of_a_browser_that_missed_its_place_is_put_there_again(
+    cameras: Cameras, browser: Any, missed: int, start: FloatArray
+) -> None:
+    for _ in range(missed):
+        puts = len(browser.puts)
+        browser.tell(start)
+        assert not cameras.stands(browser)
+        # At once, since nothing may follow.
+        assert len(browser.puts) == puts + 1
+        assert np.allclose(browser.puts[-1], EYE)
+    browser.tell(EYE * (1.0 + 1e-7))
+    assert cameras.stands(browser)
+
+
+def test_camera_of_a_browser_that_says_nothing_is_put_again_and_does_not_stand(
+    cameras: Cameras, browser: Any
+) -> None:
+    """What was sent to a browser that is still loading may have been lost."""
+    for looks in range(2, 5):
+        assert not cameras.stands(browser)
+        cameras.look_again(browser)
+        assert len(browser.puts) == looks
+        assert np.allclose(browser.puts[-1], EYE)
+
+
+def test_camera_is_put_last_for_the_shape_that_its_browser_told_last(browser: Any) -> None:
+    """While its panels are laid out a browser tells of several, each heard on its own thread."""
+    others: list[threading.Thread] = []
+
+    def points() -> FloatArray:
+        # Another shape is told while this one is framed.
+        if browser.camera.aspect == 1.6:
+            browser.camera.aspect = 0.9
+            others.append(threading.Thread(target=browser.camera.updated, args=(None,)))
+            others[-1].start()
+            others[-1].join(0.1)
+        return POINTS
+
+    cameras = Cameras(cast("Any", SimpleNamespace()), points, browser.put)
+    cameras.frame_first()
+    cameras.connected(browser)
+    browser.camera.aspect = 1.6
+    browser.tell(EYE)
+    for other in others:
+        other.join()
+    assert np.allclose(browser.puts[-1], framing(POINTS, "isometric", 0.9)[0])
+
+
+def test_camera_that_somebody_moved_is_left_alone(cameras: Cameras, browser: Any) -> None:
+    elsewhere = np.array([1.0, -30.0, 2.0])
+    browser.tell(elsewhere)
+    assert cameras.stands(browser)
+    cameras.look_again(browser)
+    browser.camera.aspect = 1.4
+    browser.tell(elsewhere)
+    assert len(browser.puts) == 1
+
+
+def test_camera_is_put_again_when_its_browser_changes_its_shape(
+    cameras: Cameras, browser: Any
+) -> None:
+    browser.camera.aspect = 1.4
+    browser.tell(EYE)
+    assert np.allclose(browser.puts[-1], framing(POINTS, "isometric", 1.4)[0])
+    cameras.disconnected(browser)
+    browser.camera.aspect = 0.9
+    browser.tell(EYE)
+    assert len(browser.puts) == 2
+    assert cameras.stands(browser)
+
+
+@given(
+    st.tuples(st.floats(0.0, 6.3), st.floats(-1.1, 1.1)),
+    st.floats(0.4, 2.5),
+    st.integers(0, 2**32 - 1),
+    st.floats(0.01, 100.0),
+)
+def test_framed_points_are_in_the_picture_and_not_from_closer(
+    angles: tuple[float, float], aspect: float, seed: int, size: float
+) -> None:
+    azimuth, elevation = angles
+    flat = np.array([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)])
+    points = size * np.random.default_rng(seed).uniform(-6.0, 9.0, (20, 3))
+    eye, target = framing(points, flat, aspect)
+    assert are_in_picture(points, eye, target, FIELD_OF_VIEW, aspect)
+    closer = target + 0.85 * (eye - target)
+    assert not are_in_picture(points, closer, target, FIELD_OF_VIEW, aspect)
+    # Nothing behind a camera is in its picture, if it has perspective.
+    if has_perspective(target - eye):
+        behind = 2.0 * eye - target + 0.0 * points
+        assert not are_in_picture(behind, eye, target, 2.0, aspect)
+
+
+@pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3)], ids=str)
+def test_camera_has_no_perspective_along_an_axis_alone(axis: FloatArray) -> None:
+    upright = axis + [0.0, -1e-4, 0.0] if axis[2] else axis
+    assert not has_perspective(3.0 * upright)
+    assert has_perspective(3.0 * (upright + 0.01 * np.array([0.3, 0.5, 0.8])))
+
+
+def test_camera_follows_what_leaves_its_picture_and_keeps_its_direction(browser: Any) -> None:
+    points, first = POINTS.copy(), SimpleNamespace()
+
+    def look(_: Any, eye: FloatArray, target: FloatArray) -> None:
+        browser.puts.append(eye)
+        browser.camera.look_at = target
+        browser.tell(eye)
+
+    def count_puts_with(factor: float) -> int:
+        points[:] *= factor
+        cameras.follow([browser])
+        return len(browser.puts)
+
+    browser.camera.fov = FIELD_OF_VIEW
+    cameras = Cameras(cast("Any", first), lambda: points, look)
+    cameras.frame_first()
+    cameras.connected(browser)
+    assert count_puts_with(1.0) == 1
+    # The user turns it to where everything is seen.
+    eye, target = framing(points, np.array([-1.0, -0.4, 0.3]), 0.7)
+    browser.camera.look_at = target
+    browser.tell(target + 1.2 * (eye - target))
+    assert count_puts_with(1.1) == 1
+    assert count_puts_with(2.0) == 2
+    towards = (browser.camera.position - browser.camera.look_at) / (eye - target)
+    assert np.ptp(towards) < 1e-9
+    # The user comes closer to look at a part, and stays there.
+    browser.tell(browser.camera.look_at + 0.3 * (eye - target))
+    assert count_puts_with(1.5) == 2
