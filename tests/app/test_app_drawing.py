@@ -50,7 +50,6 @@ from explorer.numerics.arrays import FloatArray, IntArray
 
 OPTIMAL = PRESETS["paper-optimal"]
 
-
 # Of panels, of the scene, and of fields within panels, as viser draws them.
 LIGHT = {"panel": "#ffffff", "scene": "#ffffff", "field": "#ffffff"}
 DARK = {"panel": "#242424", "scene": "#141414", "field": "#2e2e2e"}

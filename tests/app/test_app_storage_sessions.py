@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import os
 import threading
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import msgspec
 import pytest
@@ -165,65 +164,12 @@ def test_any_bytes_are_refused_in_one_line(data: bytes) -> None:
         assert "\n" not in str(refusal.value)
 
 
-def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Yield the paths to all values within one, as keys and indices."""
-    yield path
-    inner: Any = ()
-    if isinstance(value, dict):
-        inner = cast("dict[str, Any]", value).items()
-    elif isinstance(value, list):
-        inner = enumerate(cast("list[Any]", value))
-    for key, each in inner:
-        yield from places(each, (*path, key))
-
-
-def at_place(value: Any, path: tuple[Any, ...]) -> Any:
-    for key in path:
-        value = value[key]
-    return value
-
-
-BODY: Any = msgspec.json.decode(WHOLE.partition(b"\n")[2])
-PLACES = [path for path in places(BODY) if path]
-
-
-ODD: list[Any] = json.loads(
-    """[null, true, -1, 0, 8, 2.5, -1e300, 1e400, 100000000000000000000000000000,
-        "", "odd", [], [1], {}, {"x": 1}, {"#": 0}, {"#": 7}, [[], [], []]]"""
-)
-
-
-@given(st.sampled_from(PLACES), st.sampled_from(ODD))
-@example(("words",), ["Open"])
-@example(("words",), ["Open"] * 3)
-def test_value_of_another_kind_is_refused_or_read_as_any_other(
-    path: tuple[Any, ...], odd: object
-) -> None:
-    body = copy.deepcopy(BODY)
-    at_place(body, path[:-1])[path[-1]] = odd
-    problem = ""
-    try:
-        read = decode_session(signed(json.dumps(body).encode()), "file")
-        # Of a run only the iterates of one start are written.
-        once = decode_session(encode_session(read, 1), "file")
-        assert decode_session(encode_session(once, 1), "file") == once
-        assert path != ("words",)
-    except StorageError as error:
-        problem = str(error)
-    assert "\n" not in problem
-
-
-Change = Callable[[State], State]
 FAR = Pose((1e39, 5.0, 9.0), OPENED.pose.quaternion)
-NONSENSE: dict[str, Change] = {
-    "a huge length": lambda state: replace(state, joints=(*state.joints[:5], 1e300)),
+NONSENSE: dict[str, Callable[[State], State]] = {
     "a negative length": lambda state: replace(state, joints=(-5.0, *state.joints[1:])),
     "joints of another pose": lambda state: replace(state, joints=(*state.joints[::-1],)),
     "a pose far away": lambda state: replace(
         state, pose=FAR, joints=joints_of(state.design, FAR)
-    ),
-    "a pose with other joints": lambda state: replace(
-        state, pose=Pose((5.0, 5.0, 5.0), state.pose.quaternion)
     ),
     "a huge radius": lambda state: thick(state, 1e30),
     "another design": lambda state: replace(
