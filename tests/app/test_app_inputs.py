@@ -1,16 +1,19 @@
-"""Ranges of sliders: what is possible, held still, tinted where it is feasible."""
+"""Ranges of sliders hold what is possible; refusals are told in the words of the page."""
 
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
+import msgspec
 import pytest
 import viser
 from desk import Desk
 from hypothesis import given, strategies as st
 
 from explorer.app.features.feature import Services
+from explorer.app.features.machine.panel import MachinePanel
 from explorer.app.features.mechanism.design_panel import DesignPanel, pushed
 from explorer.app.features.mechanism.pose_panel import MovePanel
 from explorer.app.inputs.ranges import (
@@ -24,12 +27,15 @@ from explorer.app.inputs.ranges import (
     position_span,
     variable_span,
 )
-from explorer.app.inputs.tracks import Span, close_up, round_span, tint_marks
+from explorer.app.inputs.tracks import Span, tint_marks
+from explorer.app.session.field_words import FIELD_WORDS, message_of
+from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetJoint, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
-from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES, Design
-from explorer.mechanism.design_file import PRESETS
+from explorer.errors import DesignError
+from explorer.mechanism.design import JOINTS, VARIABLES, Design, Limits
+from explorer.mechanism.design_file import PRESETS, decode_design
 
 OPTIMAL = PRESETS["paper-optimal"]
 
@@ -65,18 +71,6 @@ def test_ranges_are_round_and_hold_the_design_whatever_its_size(size: float) -> 
         assert span.low <= value <= span.high, name
 
 
-def test_range_is_no_wider_than_what_is_possible_and_some_room() -> None:
-    state = opened(OPTIMAL)
-    # The box of the paper is 20, 34 and 18 units wide.
-    for axis, width in enumerate((20.0, 34.0, 18.0)):
-        span = position_span(state, axis)
-        assert width < span.high - span.low < 1.2 * width
-    for joint, name in enumerate(JOINTS):
-        span = joint_span(state, joint)
-        assert span.high - span.low < 35.0
-        assert span.low >= 0.0 or name not in LENGTHS
-
-
 intervals = st.lists(st.floats(-40.0, 40.0), min_size=2, max_size=6, unique=True).map(
     lambda ends: tuple(zip(sorted(ends)[::2], sorted(ends)[1::2], strict=False))
 )
@@ -96,38 +90,6 @@ def test_marks_tint_what_lies_within_intervals_and_nothing_else(
         is_inside = any(low < value < high for low, high in given_intervals)
         is_at_an_end = any(abs(value - end) < 1e-9 for pair in given_intervals for end in pair)
         assert is_tinted == is_inside or is_at_an_end
-
-
-@given(intervals, st.floats(-30.0, 30.0), st.floats(0.5, 60.0))
-def test_close_up_shows_the_intervals_and_stays_while_they_fit(
-    given_intervals: tuple[tuple[float, float], ...], low: float, width: float
-) -> None:
-    inside = [(max(a, -30.0), min(b, 30.0)) for a, b in given_intervals if a < 30.0 and b > -30.0]
-    fresh = close_up(WHOLE, given_intervals, None)
-    assert WHOLE.low <= fresh.low < fresh.high <= WHOLE.high
-    if not inside:
-        assert fresh == WHOLE
-        return
-    first, last = inside[0][0], inside[-1][1]
-    assert fresh.low <= first <= last <= fresh.high
-    # At least a third is tinted, or the intervals are small beside the whole range.
-    assert fresh.high - fresh.low <= 3.0 * max(last - first, 0.1 * 60.0)
-    # A close-up that was made serves its own intervals.
-    assert close_up(WHOLE, given_intervals, fresh) == fresh
-    before = round_span(low, low + width, WHOLE.step)
-    kept = close_up(WHOLE, given_intervals, before)
-    assert kept in (before, fresh)
-    if kept == before != fresh:
-        assert before.low <= first <= last <= before.high
-
-
-@given(st.floats(-1e9, 1e9), st.floats(0.0, 1e9), st.integers(-12, 6))
-def test_round_span_holds_the_given_one(low: float, width: float, power: int) -> None:
-    step = 10.0**power
-    span = round_span(low, low + width, step)
-    slack = 1e-9 * max(1.0, abs(low) + width)
-    assert low - 11.0 * step - slack <= span.low <= low + slack
-    assert low + width - slack <= span.high <= low + width + 11.0 * step + slack
 
 
 @given(st.tuples(st.floats(-9, 9), st.floats(0, 9)), st.booleans(), st.floats(-20, 20))
@@ -227,3 +189,57 @@ def test_limit_that_is_switched_on_excludes_nothing_at_first(
         assert limits.box[1][axis] >= span.high - room
     assert limits.guide[0] < 0.0
     assert limits.guide[1] > 20.0
+
+
+# What no text for people holds: names with an underscore or a point within, and JSON's.
+CODE = re.compile(r"[a-z]_[a-z]|[a-z]\.[a-z]|\bnull\b|\bNone\b")
+BAD = (-1.0, 0.0, 181.0, 1e9, 1e45)
+
+
+def test_refusals_of_the_page_hold_no_names_of_the_code(
+    server: viser.ViserServer, desk: Desk, services: Services
+) -> None:
+    gui: Any = server.gui
+    before = set(gui._gui_input_handle_from_uuid)
+    for panel in (DesignPanel, MovePanel, MachinePanel):
+        panel(services)
+    handles = [h for u, h in gui._gui_input_handle_from_uuid.items() if u not in before]
+    start = desk.state
+    for handle in handles:
+        values: list[object] = []
+        match handle.value:
+            case float():
+                values += BAD
+            case (float(low), float(high)):
+                values += [pair for bad in BAD for pair in ((bad, high), (low, bad))]
+            case _:
+                continue
+        for value in values:
+            desk.use(handle, value)
+            if desk.state != start:
+                desk.session.travel(UNDO)
+                start = desk.state
+    words = {each for each in FIELD_WORDS.values() if any(each in said for said in desk.complaints)}
+    assert len(words) > 20
+    assert [message for message in desk.complaints if CODE.search(message)] == []
+
+
+@pytest.mark.parametrize(
+    ("field", "message"),
+    [
+        ('"unit_mm": 0', "The unit must be positive; got 0"),
+        ('"node_step": -1', "The step of the nodes must be positive; got -1"),
+        ('"limits": {"l1": [3, 2]}', "The length l1: the minimum 3 exceeds the maximum 2"),
+    ],
+)
+def test_refusal_of_a_file_names_its_field_and_the_page_says_it_in_words(
+    field: str, message: str
+) -> None:
+    data = f'{{"schema": 2, "a3": [9, 4], "b1": [4, -1], "b2": 3, "b3": 1.5, {field}}}'
+    with pytest.raises(DesignError, match=field.strip('"').partition('"')[0]):
+        decode_design(data.encode(), "mine.json")
+    fields: dict[str, Any] = msgspec.json.decode(data)
+    limits = fields.pop("limits", {})
+    with pytest.raises(DesignError) as refusal:
+        Design(**fields, limits=Limits(**limits))
+    assert message_of(refusal.value).startswith(message)
