@@ -1,22 +1,38 @@
-"""What the page says without being asked reaches browsers that come later; failing saves stand."""
+"""Notices, files, the tour and its preferences, and the facts that a browser sends."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
+import numpy as np
 import pytest
 from client import Client, client_of, press_update, presses_in, wait_for
+from desk import Desk
+from services import StubWorker
 
+from explorer.app.browser.browser_facts import BrowserFacts, decode_facts
+from explorer.app.browser.downloads import Downloads
 from explorer.app.features.designs.name import UNSAVED
+from explorer.app.features.help.tour import STEPS, start_tour
+from explorer.app.layout import is_narrow
 from explorer.app.server import Running, start
 from explorer.app.session.faults import Faults
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import opened
 from explorer.app.storage.library import Library
+from explorer.app.storage.preferences import NAME, PreferenceFile, Preferences
 from explorer.app.storage.session_file import SessionFile
-from explorer.app.storage.user_data import UserData, open_user_data
+from explorer.app.storage.user_data import UserData
+from explorer.app.widgets.theme import BRAND, BRAND_ON_DARK, Theme
+from explorer.errors import StorageError
+from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 
 
@@ -95,22 +111,140 @@ def test_notice_before_any_browser_is_shown_to_the_first_one_alone(tmp_path: Pat
             assert notices_of(other) == []
 
 
-def test_notices_without_a_browser_keep_the_newest(tmp_path: Path) -> None:
-    with explorer_with(data_in(tmp_path)) as running:
-        for number in range(100):
-            running.page.services.tell(f"notice {number}")
-        with client_of(running) as client:
-            bodies = [notice["body"] for notice in notices_of(client)]
-        assert 0 < len(bodies) <= 20
-        assert bodies == [f"notice {number}" for number in range(100 - len(bodies), 100)]
+def encoded(what: str) -> bytes:
+    return what.encode()
 
 
-def test_damaged_session_is_shown_to_the_first_browser(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.fixture
+def files(worker: StubWorker) -> Downloads:
+    server: Any = SimpleNamespace(get_clients=lambda: {1: Mock(), 2: Mock()})
+    return Downloads(server, worker, lambda message, who: pytest.fail(f"{who}: {message}"))
+
+
+def test_only_a_file_of_the_same_name_and_browser_without_a_notice_is_replaced(
+    files: Downloads, worker: StubWorker
 ) -> None:
-    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
-    (tmp_path / "sessions").mkdir()
-    (tmp_path / "sessions" / "one.json").write_bytes(b"damaged")
-    with explorer_with(open_user_data(resume=True)) as running, client_of(running) as client:
-        (notice,) = notices_of(client)
-        assert "'one.json.broken'" in notice["body"]
+    for who, name in ((1, "workspace.3mf"), (1, "hull.3mf"), (2, "hull.3mf"), (1, "hull.3mf")):
+        files.compute(who, name, encoded, (name,))
+    workspace, hull, of_another, again = (order.key for order in worker.orders)
+    assert hull == again
+    assert len({workspace, hull, of_another}) == 3
+    for _ in range(2):
+        files.compute(1, "report.pdf", encoded, ("report",), ("Report", "A moment."))
+    first, second = (order.key for order in worker.orders[4:])
+    assert first != second
+    # For a browser that is gone none is made.
+    files.compute(7, "hull.3mf", encoded, ("hull",))
+    assert len(worker.orders) == 6
+
+
+@pytest.mark.parametrize("design", PRESETS.values(), ids=str)
+def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(design: Design) -> None:
+    state = start = opened(design)
+    tour = start_tour(Frame(state))
+    assert tour.step_by(-1, Frame(state)).at == 0
+    for index, step in enumerate(STEPS):
+        assert tour.at == index
+        assert not tour.after_frame(Frame(state)).is_done
+        state = tour.step.show(Frame(state)).apply(state)
+        tour = tour.after_frame(Frame(state))
+        assert tour.is_done
+        # It comes close to a singularity without reaching it.
+        assert np.abs(Frame(state).snapshot.margins).min() > 0.0
+        # Once done it stays so, whatever is done next.
+        assert tour.after_frame(Frame(start)).is_done
+        if step.after is not None:
+            state = step.after.apply(state)
+        assert tour.is_last == (index == len(STEPS) - 1)
+        tour = tour.step_by(1, Frame(state))
+    assert tour.at == len(STEPS) - 1
+    assert state.optimisation.is_on
+
+
+def test_preferences_are_remembered_each_by_itself_and_of_two_explorers(tmp_path: Path) -> None:
+    assert PreferenceFile(tmp_path).chosen == Preferences(dark=None, tour_seen=False)
+    # Reading them makes no file.
+    assert list(tmp_path.iterdir()) == []
+    folder = tmp_path / "new" / "folder"
+    one, other = PreferenceFile(folder), PreferenceFile(folder)
+    one.choose(tour_seen=True)
+    other.choose(dark=True)
+    assert PreferenceFile(folder).chosen == Preferences(dark=True, tour_seen=True)
+    # A later explorer may remember more.
+    (tmp_path / NAME).write_bytes(b'{"dark": true, "language": "fr"}')
+    assert PreferenceFile(tmp_path).chosen == Preferences(dark=True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [b"{", b"null", b'{"dark": 7}', b"\xff\xfe", b'{"dark":' + b"[" * 9000, b" " * 20_000 + b"{}"],
+)
+def test_preferences_in_a_broken_file_count_as_none_and_are_replaced(
+    tmp_path: Path, text: bytes
+) -> None:
+    (tmp_path / NAME).write_bytes(text)
+    file = PreferenceFile(tmp_path)
+    assert file.chosen == Preferences()
+    file.choose(dark=True)
+    assert json.loads((tmp_path / NAME).read_bytes()) == {"dark": True, "tour_seen": False}
+
+
+def test_preferences_in_a_folder_that_takes_no_file_are_refused_in_a_line(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_bytes(b"")
+    file = PreferenceFile(tmp_path / "taken")
+    with pytest.raises(StorageError) as refusal:
+        file.choose(dark=True)
+    assert "\n" not in str(refusal.value)
+    assert file.chosen.dark is True
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{}",
+        '{"width": -1, "height": 5, "dark": false}',
+        '{"width": 1, "height": 5, "dark": 1}',
+        '{"width": 1, "height": 5, "dark": true, "more": 1}',
+        "[" * 100_000,
+    ],
+)
+def test_facts_are_read_unless_no_browser_sends_them(text: str) -> None:
+    assert decode_facts(text) is None
+    sent = '{"width": 1024, "height": 768.5, "dark": true}'
+    assert decode_facts(sent) == BrowserFacts(1024, 768.5, True)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "narrow"),
+    # In a low window two panels one over the other would be too low to be of use.
+    [
+        (1280, 720, False),
+        (768, 1024, True),
+        (1099, 700, True),
+        (1100, 700, False),
+        (860, 480, False),
+    ],
+)
+def test_panels_are_stacked_where_the_window_is_narrow_and_high(
+    width: int, height: int, narrow: bool
+) -> None:
+    assert is_narrow(BrowserFacts(width, height, False)) is narrow
+
+
+def test_theme_is_set_once_for_each_change_and_is_no_step_of_the_history(desk: Desk) -> None:
+    themes: list[dict[str, Any]] = []
+
+    def keep(**theme: Any) -> None:
+        themes.append(theme)
+
+    gui: Any = SimpleNamespace(configure_theme=keep)
+    theme = Theme(gui, dark=False, changed=desk.session.redraw)
+    for dark in (False, True, True, False):
+        theme.choose(dark=dark)
+    assert [t["dark_mode"] for t in themes] == [False, True, False]
+    assert [t["brand_color"] for t in themes] == [BRAND, BRAND_ON_DARK, BRAND]
+    # No tunnel to anywhere is offered in either.
+    assert not any(t["show_share_button"] for t in themes)
+    assert desk.session.wait_until_idle()
+    assert len(desk.session.history.steps) == 1

@@ -1,4 +1,4 @@
-"""Tasks of the worker that send messages, are cancelled, or die with their process."""
+"""Tasks of the worker that send messages, are cancelled, fail or die with their process."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from queue import Queue
@@ -14,7 +15,8 @@ from typing import Any
 import pytest
 from client import wait_for
 
-from explorer.app.session import jobs
+from explorer.app.session import jobs, memory
+from explorer.app.session.faults import Faults, read_fault
 from explorer.app.session.jobs import RESTARTED, Worker
 from explorer.app.session.worker import CANCELLED
 from tests.app import telling
@@ -298,3 +300,47 @@ def has_ended(process: int) -> bool:
     except FileNotFoundError:
         return True
     return state == "Z"
+
+
+PROBLEM = "ValueError: setting 2.5 with ('a', 'b')"
+
+
+@pytest.mark.parametrize(
+    ("task", "arguments", "problem", "reports"),
+    [
+        ("fail", (2.5, ("a", "b")), PROBLEM, [PROBLEM]),
+        ("fall", (), "it died", [RESTARTED, "it died; the request is kept in"]),
+        ("refuse", (), "refused on purpose", []),
+    ],
+)
+def test_fault_of_a_task_is_saved_and_reported_unless_it_is_a_refusal(
+    tmp_path: Path, task: str, arguments: tuple[Any, ...], problem: str, reports: list[str]
+) -> None:
+    told, failed = list[str](), Queue[str]()
+    receive = None if task == "fall" else Queue[object]().put
+    worker = Worker(told.append, died="it died", faults=Faults(tmp_path / "faults"))
+    try:
+        worker.submit(task, getattr(telling, task), arguments, failed.put, failed.put, receive)
+        assert failed.get(timeout=PATIENCE) == problem
+    finally:
+        worker.stop()
+    assert len(told) == len(reports)
+    assert all(report in each for report, each in zip(reports, told, strict=True))
+    kept = list((tmp_path / "faults").glob("*"))
+    assert len(kept) == bool(reports)
+    for path in kept:
+        assert str(path) in told[-1]
+        fault = read_fault(path)
+        assert (fault.task, fault.arguments) == (task, arguments)
+
+
+def test_memory_is_trimmed_repeatedly_within_the_context(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    thrice = threading.Semaphore(0)
+    monkeypatch.setattr(memory, "TRIM_SECONDS", 0.001)
+    monkeypatch.setattr(memory, "trim", thrice.release)
+    before = set(threading.enumerate())
+    with memory.trim_repeatedly():
+        assert all(thrice.acquire(timeout=60.0) for _ in range(3))
+    assert set(threading.enumerate()) <= before

@@ -17,9 +17,8 @@ from desk import viewed
 from services import StubWorker, services_for
 
 from explorer.app.features.legs.tasks import RadiusRequest, draw_radius_curve
-from explorer.app.features.workspace import tasks
 from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.regions import MOST_LIVE_NODES, find_accessible
+from explorer.app.features.workspace.regions import MOST_LIVE_NODES
 from explorer.app.features.workspace.tasks import (
     WorkspaceRequest,
     WorkspaceSurface,
@@ -28,7 +27,6 @@ from explorer.app.features.workspace.tasks import (
 from explorer.app.features.workspace.words import drawing_words
 from explorer.app.scene.bands import COLOURED_EDGE, MOST_COLOURED, Colouring, Shell
 from explorer.app.scene.creases import creased_faces
-from explorer.app.server import Running
 from explorer.app.session import feed as session_feed
 from explorer.app.session.feed import Stage
 from explorer.app.session.jobs import Worker
@@ -81,18 +79,6 @@ def with_solid(state: State) -> State:
     return Set("view.workspace.solid", True).apply(state)
 
 
-def test_surface_is_sent_before_anything_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    sent: list[Any] = []
-
-    def workspace_solid_later(*arguments: Any, **options: Any) -> Any:
-        assert [type(each) for each in sent] == [WorkspaceSurface]
-        return workspace_solid(*arguments, **options)
-
-    monkeypatch.setattr(tasks, "workspace_solid", workspace_solid_later)
-    drawing = draw_workspace(a_request(), Channel(sent.append, lambda: False))
-    assert sent[0] is drawing.surface
-
-
 def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numbers(
     worker: Worker,
 ) -> None:
@@ -124,23 +110,6 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     assert feed.surface is None
 
 
-def test_strata_are_requested_after_the_solid(
-    running: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    page, requested = running.page, list[str]()
-
-    def record(key: object, task: Any, *arguments: Any, **options: Any) -> int:
-        requested.append(task.__name__)
-        return -1
-
-    monkeypatch.setattr(page.worker, "submit", record)
-    view = with_solid(page.session.state).view
-    page.session.do(Set("view", replace(view, singular=replace(view.singular, strata=True))))
-    page.session.do(SetVariable("a3x", 18.0))
-    assert page.session.wait_until_idle()
-    assert requested.index("draw_workspace") < requested.index("strata_distances")
-
-
 def test_empty_workspace_names_the_limit_that_empties_it() -> None:
     limits = Limits(l1=(0.0, 1.0), box=((10.0, 10.0, 10.0), (11.0, 11.0, 11.0)))
     state = Set("design.limits", limits).apply(opened(OPTIMAL))
@@ -155,15 +124,6 @@ def area(shells: Sequence[Shell]) -> float:
     triangles = np.concatenate([shell.vertices[shell.faces] for shell in shells])
     a, b, c = np.moveaxis(triangles, 1, 0)
     return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-
-
-@pytest.mark.parametrize("colour", ["margin", "condition"])
-def test_coloured_bands_cover_the_same_surface(colour: str) -> None:
-    plain = draw_workspace(a_request()).surface
-    banded = draw_workspace(a_request(colour=colour)).surface
-    assert len(banded.shells) > 1
-    assert banded.coarse_edge is None
-    assert area(banded.shells) == pytest.approx(area(plain.shells), rel=1e-9)
 
 
 def test_workspace_large_beside_the_reach_has_a_bounded_number_of_facets() -> None:
@@ -308,14 +268,6 @@ def test_grid_too_fine_for_live_nodes_leaves_the_rest_of_the_drawing() -> None:
     assert same is not None
     assert same.node_count is not None
     assert drawing.accessible.volume == same.volume
-
-
-def test_accessible_workspace_is_kept_for_the_next_request() -> None:
-    stages: list[str] = []
-    for expected in (True, False):
-        stages.clear()
-        find_accessible(THICK, HOME_ROWS, None, 0.52, lambda words, _: stages.append(words))
-        assert bool(stages) == expected
 
 
 def test_cancelled_drawing_leaves_none_of_an_older_design() -> None:
