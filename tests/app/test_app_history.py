@@ -359,6 +359,16 @@ def test_action_that_moves_nothing_leaves_the_last_move(moved: State) -> None:
         assert UserAction(action, "other", 100.1).apply(moved).gesture == moved.gesture
 
 
+def test_last_move_has_the_radii_of_the_present_design(moved: State) -> None:
+    thin = Frame(moved).last_move
+    limits = Limits(leg_radii=(0.5, 0.1, 0.2, 0.4))
+    thick = Frame(Set("design.limits", limits).apply(moved)).last_move
+    assert thin is not None
+    assert thick is not None
+    sums = [0.6, 0.7, 0.9, 0.3, 0.5, 0.6]
+    np.testing.assert_allclose(thick.clearance, thin.clearance - sums, atol=1e-9)
+
+
 def test_move_back_to_the_start_sweeps_nothing(moved: State) -> None:
     back = UserAction(SetPosition(0, 10.0), "x", 100.2).apply(moved)
     assert back.pose == OPTIMAL.home

@@ -25,7 +25,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.widgets.colours import SINGULAR, WARNED, proximity_colour
 from explorer.measures.snapshot import evaluate
-from explorer.measures.verdict import TITLES, verdict, warnings
+from explorer.measures.verdict import DISTANCE_SHARE, TITLES, verdict, warnings
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
@@ -174,6 +174,24 @@ def test_verdict_on_a_nearly_degenerate_design_names_the_conditioning_and_its_ma
     assert found.incidences[0] == 2
     assert re.match(r"1/cond J is \S+, most by δ2; δ2 = 0 is \S+ mm away", found.reason(10.0))
     assert found.brief(10.0).startswith("1/cond J ")
+
+
+def test_verdict_names_a_measure_that_is_below_its_warning_value() -> None:
+    # Of a platform as large as the base, which a small turn displaces much.
+    design = OPTIMAL.with_variables([19.0, 7.0, 14.0, -13.0, 12.0, 18.0])
+    rng, warn, causes = np.random.default_rng(0), warnings(design.reach), set[str]()
+    for _ in range(400):
+        snapshot = evaluate(design, random_pose(design, rng))
+        found = verdict(snapshot)
+        if found.kind == "near":
+            causes.add(found.cause)
+            margin = abs(snapshot.margins[found.incidences[0] - 1])
+            assert {
+                "distance": min(found.distance, margin * DISTANCE_SHARE) < warn.distance,
+                "turn": found.turn < warn.turn,
+                "condition": found.condition < warn.condition,
+            }[found.cause]
+    assert causes == {"distance", "turn", "condition"}
 
 
 def test_verdict_scales_with_the_warning_length() -> None:
