@@ -45,10 +45,13 @@ def explorer_with(data: UserData) -> Generator[Running]:
         running.stop()
 
 
-def notices_of(client: Client) -> list[dict[str, Any]]:
-    """Return the notices of a client until it is quiet."""
-    messages = client.read_until_quiet(0.5)
-    return [m["props"] for m in messages if m["type"] == "NotificationShowMessage"]
+def notices_until(client: Client, words: str) -> list[dict[str, Any]]:
+    """Return the notices that a client is sent, up to the first with these words in it."""
+    notices: list[dict[str, Any]] = []
+    while not any(words in notice["body"] for notice in notices):
+        messages = client.read()
+        notices += [m["props"] for m in messages if m["type"] == "NotificationShowMessage"]
+    return notices
 
 
 def has_warning(running: Running) -> bool:
@@ -78,7 +81,7 @@ def test_data_folder_unwritable_from_the_start_stands_in_the_bar_until_it_can_be
         assert page.session.wait_until_idle()
         wait_for(lambda: has_warning(running))
         with client_of(running) as client:
-            client.read_until_quiet(0.5)
+            client.read_all_sent(running)
             (bar,) = (
                 props["content"]
                 for props in client.controls.values()
@@ -88,8 +91,7 @@ def test_data_folder_unwritable_from_the_start_stands_in_the_bar_until_it_can_be
             assert "EXPLORER_DATA" in bar
             # A press shows the whole reason.
             client.update(*press_update(running, UNSAVED))
-            (notice,) = notices_of(client)
-            assert "a file lies where a folder is meant" in notice["body"]
+            assert len(notices_until(client, "a file lies where a folder is meant")) == 1
         folder.unlink()
         assert page.autosaver.flush()
         wait_for(lambda: not has_warning(running))
@@ -100,7 +102,7 @@ def test_notice_before_any_browser_is_shown_to_the_first_one_alone(tmp_path: Pat
     with explorer_with(replace(data_in(tmp_path), messages=messages)) as running:
         running.page.services.tell("the study has ended")
         with client_of(running) as client:
-            notices = notices_of(client)
+            notices = notices_until(client, "the study has ended")
             assert [notice["body"] for notice in notices] == [
                 *(f"File {number} is damaged." for number in range(3)),
                 "the study has ended",
@@ -108,7 +110,8 @@ def test_notice_before_any_browser_is_shown_to_the_first_one_alone(tmp_path: Pat
             # They stay until they are closed, since the page may still be loading.
             assert {notice["auto_close_seconds"] for notice in notices} == {None}
         with client_of(running) as other:
-            assert notices_of(other) == []
+            running.page.services.tell("the next study has ended")
+            assert len(notices_until(other, "the next study has ended")) == 1
 
 
 def encoded(what: str) -> bytes:

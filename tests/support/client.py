@@ -164,17 +164,6 @@ class Client:
         """Return once the server has read all that was sent."""
         assert self.connection.ping().wait(PATIENCE_SECONDS)
 
-    def read_until_quiet(self, seconds: float = 0.7) -> list[dict[str, Any]]:
-        """Return all that comes until nothing comes for so long, two minutes at most."""
-        messages: list[dict[str, Any]] = []
-        deadline = time.monotonic() + 120.0
-        while time.monotonic() < deadline:
-            try:
-                messages += self.read(seconds)
-            except TimeoutError:
-                break
-        return messages
-
 
 @contextmanager
 def client_of(running: Running) -> Generator[Client]:
