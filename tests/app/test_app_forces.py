@@ -1,4 +1,4 @@
-"""Loads on the page: the verdict, the tables, the arrows, the handle and the nearest position."""
+"""Forces and precision on the page: figures, tables, arrows, the ellipsoid and the budget."""
 
 from __future__ import annotations
 
@@ -16,33 +16,35 @@ import viser
 from desk import Desk, by_name, number
 from services import StubWorker, services_for
 
-from explorer import Actuators, Guide, Payload, Struts, Tool
+from explorer import Actuators, Guide, Payload, Struts, Tolerances, Tool
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.actions import FITTING, SetForce, fitting_scale
 from explorer.app.features.forces.load_figure import LoadFigure
 from explorer.app.features.forces.loads import Loads, NearestFeed, WeightsFeed, load_of
 from explorer.app.features.forces.panel import GO, WORST, ForcesPanel, largest, tables, verdict
-from explorer.app.features.forces.scene import (
-    LONGEST_REACTION,
-    ForcesScene,
-    LoadHandle,
-    load_tip,
-    reaction_vectors,
-    tool_point,
-)
+from explorer.app.features.forces.scene import ForcesScene, LoadHandle, load_tip, tool_point
 from explorer.app.features.forces.words import share_colour, share_look, share_words
+from explorer.app.features.precision.actions import SetTolerances
+from explorer.app.features.precision.budget import SET, BudgetFeed, BudgetPart, budget_request
+from explorer.app.features.precision.panel import TYPICAL, PrecisionPanel
+from explorer.app.features.precision.pose import PosePrecision
+from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene, drawn_times
+from explorer.app.features.precision.tasks import budget_of
 from explorer.app.scene.placing import SCENE_REACH, Placed
 from explorer.app.scene.shapes import linear_colour
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
-from explorer.app.state.view import ForcesView
+from explorer.app.state.view import ForcesView, PrecisionView
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.colours import GHOST, SINGULAR
-from explorer.errors import InputError
+from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
+from explorer.mechanism.typical import typical_machine
+from explorer.statics.budget.costs import stated_tolerances
+from explorer.statics.error_sources import SOURCES
 from explorer.statics.forces import actuator_forces, strut_bending
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -66,23 +68,6 @@ def move_to(state: State, *position: float) -> State:
     """Return a state with b4 at a position."""
     x, y, z = position
     return replace(state, pose=Pose((x, y, z), state.pose.quaternion))
-
-
-@pytest.fixture
-def services(server: viser.ViserServer) -> Services:
-    return services_for(server)
-
-
-@pytest.fixture
-def desk() -> Generator[Desk]:
-    desk = Desk(loaded_state())
-    yield desk
-    desk.session.stop()
-
-
-def contents(panel: ForcesPanel, frame: Frame) -> str:
-    """Return the markup of the panel."""
-    return " ".join(str(value) for _, name, value in panel.updates(frame) if name == "content")
 
 
 def words_of(state: State) -> str:
@@ -139,29 +124,6 @@ def test_design_without_limits_shows_forces_and_no_shares() -> None:
     assert services_for().get(LoadFigure)(Frame(state)) == ""
 
 
-def test_part_with_a_limit_and_no_force_uses_none_of_it() -> None:
-    state = loaded_state(force=(0.0, 0.0, 0.0), weighed="none")
-    assert "Holds the load" in words_of(state)
-    text = "".join(tables(loaded_pose(state)))
-    assert (text.count(">0\N{NO-BREAK SPACE}%<"), text.count("no limit")) == (10, 0)
-    free = msgspec.structs.replace(LIMITED, guide=Guide(), struts=Struts())
-    assert "".join(tables(loaded_pose(loaded_state(free)))).count("no limit") == 4
-
-
-def test_force_of_any_direction_is_shown_beside_the_forces(
-    server: viser.ViserServer, buttons: Buttons
-) -> None:
-    design = msgspec.structs.replace(LIMITED, payload=Payload(0.0, (0.0, 0.0, 0.0), 20.0))
-    state = loaded_state(design, force=(0.0, 0.0, 0.0))
-    found = loaded_pose(state)
-    text = "".join(tables(found))
-    assert text.count("±") == 10
-    spread = number(re.findall(r"± ([0-9.]+) N<", text)[1])
-    assert spread == pytest.approx(found.held.spread[1], rel=1e-2)
-    panel = ForcesPanel(services_for(server, Desk(state).session, buttons=buttons))
-    assert "20 N in any direction" in contents(panel, Frame(state))
-
-
 def test_singular_pose_shows_infinite_forces() -> None:
     state = move_to(loaded_state(), 10.0, 5.0, 0.0)
     assert "infinite" in words_of(state)
@@ -200,18 +162,18 @@ def test_nearest_position_that_holds_the_load_is_searched_and_gone_to(
     worker = StubWorker()
     services = services_for(server, desk.session, worker, buttons=buttons)
     panel, feed = ForcesPanel(services), services.get(NearestFeed)
+    show_in(desk, loaded_state())
     feed.follow(Frame(desk.state))
     assert feed.request is None
-    desk.session.do(Set("view.forces", ForcesView(shown=True, force=(0.0, 0.0, -25.0))))
+    show_in(desk, loaded_state(force=(0.0, 0.0, -25.0)))
     frame = Frame(desk.state)
     feed.follow(frame)
-    assert feed.request is not None
-    assert "searching" in contents(panel, frame)
+    assert "searching" in markup(panel, frame.state)
     worker.work()
     drawing = feed.drawing
     assert drawing is not None
     assert drawing.pose is not None
-    assert "mm from here" in contents(panel, frame)
+    assert "mm from here" in markup(panel, frame.state)
     desk.press(buttons, GO)
     assert desk.state.pose == drawing.pose
     assert services.get(Loads).of(Frame(desk.state)).share <= 1.0
@@ -219,17 +181,14 @@ def test_nearest_position_that_holds_the_load_is_searched_and_gone_to(
     assert feed.request is None
 
 
-def test_press_turns_the_force_into_its_worst_direction(
-    server: viser.ViserServer, buttons: Buttons, desk: Desk
-) -> None:
-    ForcesPanel(services_for(server, desk.session, buttons=buttons))
-    desk.press(buttons, WORST)
-    state = desk.state
-    assert math.hypot(*state.view.forces.force) == pytest.approx(10.0, rel=1e-3)
-    worst = loaded_pose(state).share
-    for direction in np.random.default_rng(3).normal(size=(30, 3)):
-        x, y, z = (10.0 * direction / np.linalg.norm(direction)).tolist()
-        assert loaded_pose(SetForce((x, y, z)).apply(state)).share <= worst * (1.0 + 1e-3)
+def test_press_turns_the_force_into_its_worst_direction(services: Services, desk: Desk) -> None:
+    ForcesPanel(services)
+    show_in(desk, loaded_state())
+    before = loaded_pose(desk.state)
+    desk.press(services.buttons, WORST)
+    after = desk.state
+    assert math.hypot(*after.view.forces.force) == pytest.approx(10.0, rel=1e-3)
+    assert loaded_pose(after).share > before.share
 
 
 def test_load_is_an_arrow_from_the_tool_by_its_scale(services: Services) -> None:
@@ -241,14 +200,6 @@ def test_load_is_an_arrow_from_the_tool_by_its_scale(services: Services) -> None
     assert nodes["/forces/label/load"]["text"] == "5 N"
     assert nodes["/forces/label/l4"]["visible"]
     np.testing.assert_allclose(services.get(ForcesScene).corners(placed)[0], load_tip(placed))
-
-
-def test_arrows_of_reactions_keep_their_order_and_a_bound() -> None:
-    placed = Placed(Frame(loaded_state()))
-    forces = np.array([[1e-3, 0, 0], [1.0, 0, 0], [0, 20.0, 0], [0, 0, 1e9]])
-    lengths = np.linalg.norm(reaction_vectors(placed, forces), axis=1)
-    assert (np.diff(lengths) > 0.0).all()
-    assert lengths[-1] <= LONGEST_REACTION * placed.reach
 
 
 def test_forces_are_drawn_in_the_colour_of_their_share(services: Services) -> None:
@@ -316,14 +267,198 @@ def test_force_that_is_not_finite_is_refused(force: tuple[float, float, float]) 
         SetForce(force).apply(loaded_state())
 
 
-def test_share_has_words() -> None:
+def test_share_has_words_and_a_look() -> None:
     shares = [None, 0.004, 0.5, 0.9996, 1.0, 1.0000001, 1.004, 1.234, 1e5, math.inf]
     words = [share_words(share).replace("\N{NO-BREAK SPACE}", " ") for share in shares]
     # What exceeds the limit never reads as the limit.
     assert words[:6] == ["no limit", "0 %", "50 %", "100.0 %", "100.0 %", "above 100.0 %"]
     assert words[6:] == ["100.4 %", "123 %", "∞", "∞"]
-
-
-def test_share_has_a_look_for_within_close_and_beyond() -> None:
     looks = [share_look(share) for share in (0.5, 0.9, 1.0, 1.001)]
     assert looks == ["within", "close", "close", "beyond"]
+
+
+# Precision
+
+
+TYPICAL_DESIGN = msgspec.structs.replace(
+    typical_machine(OPTIMAL)[0], tool=Tool((1.0, -0.5, 2.0)), payload=Payload(0.5, (1.0, 0.0, 1.0))
+)
+SINGULAR_POSE = Pose((3.0, 4.0, 5.0), (1.0, 0.0, 0.0, 0.0))
+
+
+def state_with(design: Design = TYPICAL_DESIGN, **precision: Any) -> State:
+    """Return a design at home under a force, with what is drawn of its precision."""
+    state = opened(design)
+    forces = ForcesView(force=(3.0, -4.0, -10.0), moment=(0.05, 0.0, -0.02))
+    view = replace(state.view, forces=forces, precision=PrecisionView(**precision))
+    return Set("view", view).apply(state)
+
+
+def markup(panel: Any, state: State) -> str:
+    """Return the markup of a panel."""
+    return " ".join(str(v) for _, name, v in panel.updates(Frame(state)) if name == "content")
+
+
+def words(html: str) -> str:
+    return re.sub("<[^>]+>", " ", html)
+
+
+@pytest.fixture
+def worker() -> Generator[StubWorker]:
+    worker = StubWorker(at_once=True)
+    yield worker
+    worker.stop()
+
+
+def show_in(desk: Desk, state: State) -> None:
+    """Have a desk show the design and the view of a state."""
+    desk.session.do(Set("design", state.design))
+    desk.session.do(Set("view", state.view))
+
+
+def test_panel_has_the_numbers_of_the_pose(services: Services) -> None:
+    state = state_with()
+    precision = services.get(PosePrecision).of(Frame(state))
+    worst, rms = precision.worst(), precision.rms()
+    text = words(markup(PrecisionPanel(services), state))
+    for value in (10.0 * worst.displacement, 10.0 * rms.displacement):
+        assert f"{float(value):.3g} mm" in text
+    assert f"{math.degrees(float(worst.turn)):.3g}°" in text
+    moved = 10.0 * float(np.linalg.norm(precision.deflection[:3]))
+    assert f"{moved:.3g} mm" in text
+    softest = 10.0 * float(precision.principal.displacement[0])
+    assert f"{softest:.3g} mm/N" in text
+    percents = [int(each) for each in re.findall(r"(?:guide|struts|actuators) (\d+)&nbsp;%", text)]
+    assert len(percents) == 3
+    assert sum(percents) == pytest.approx(100, abs=1)
+
+
+def test_ideal_design_is_offered_typical_values(services: Services, desk: Desk) -> None:
+    panel = PrecisionPanel(services)
+    assert "states no errors" in markup(panel, desk.state)
+    desk.press(services.buttons, TYPICAL)
+    assert desk.state.design == typical_machine(OPTIMAL)[0]
+    assert "Assume" not in markup(panel, desk.state)
+    # What the design states stays.
+    actuators = Actuators(error_mm=(0.0, 0.0, 0.01, 0.0, 0.0, 0.0))
+    tolerances = Tolerances(b4=(0.0, 0.0, 0.2))
+    stated = msgspec.structs.replace(
+        OPTIMAL, actuators=actuators, struts=Struts(outer_mm=20.0), tolerances=tolerances
+    )
+    stiff = msgspec.structs.replace(actuators, stiffness_n_mm=(1000.0,) * 6)
+    assert typical_machine(stated)[0] == msgspec.structs.replace(stated, actuators=stiff)
+
+
+@pytest.mark.parametrize("case", ["huge deflection", "singular pose"])
+def test_scene_of_a_huge_deflection_or_a_singular_pose_is_empty(
+    services: Services, case: str
+) -> None:
+    state = state_with(ellipsoid=True, deflected=True)
+    scenes: list[Any] = [DeflectedScene(services)]
+    if case == "singular pose":
+        state = replace(state, pose=SINGULAR_POSE)
+        scenes.append(ErrorEllipsoidScene(services))
+    else:
+        struts = Struts(outer_mm=1e-40, inner_mm=0.0)
+        state = state_with(msgspec.structs.replace(OPTIMAL, struts=struts), deflected=True)
+    text = words(markup(PrecisionPanel(services), state))
+    assert "nan" not in text
+    assert text.count("singular") == (2 if case == "singular pose" else 0)
+    assert ("mm/N" in text) == (case == "huge deflection")
+    for scene in scenes:
+        drawn = by_name(scene.updates(Placed(Frame(state))))
+        assert not any(each["visible"] for each in drawn.values())
+
+
+def test_ellipsoid_is_that_of_the_covariance(services: Services) -> None:
+    placed = Placed(Frame(state_with(ellipsoid=True)))
+    precision = services.get(PosePrecision).of(placed.frame)
+    drawn = by_name(ErrorEllipsoidScene(services).updates(placed))
+    body, label = drawn["/precision/ellipsoid/body"], drawn["/precision/ellipsoid/label"]["text"]
+    times = float(re.search(r"× ([\d.,]+)$", label)[1].replace(",", ""))  # type: ignore[index]
+    moved = precision.by_source[:3] * precision.bounds
+    # Errors that are uniform within ± e have the standard deviation e / √3.
+    sizes = np.sqrt(np.linalg.eigvalsh(moved @ moved.T / 3.0))[::-1]
+    np.testing.assert_allclose(np.array(body["scale"]) / (times * placed.scale), sizes, rtol=1e-9)
+    # The RMS displacement is that of its three semi-axes.
+    assert np.linalg.norm(sizes) == pytest.approx(float(precision.rms().displacement))
+    np.testing.assert_allclose(
+        body["position"], placed.on_platform(placed.frame.state.design.tool.position)
+    )
+
+
+@pytest.mark.parametrize("times", [None, 20.0])
+def test_deflected_shape_is_the_linear_motion_magnified(
+    services: Services, times: float | None
+) -> None:
+    state = state_with(deflected=True, times=times)
+    placed = Placed(Frame(state))
+    precision = services.get(PosePrecision).of(placed.frame)
+    drawn = by_name(DeflectedScene(services).updates(placed))
+    magnified = drawn_times(placed, precision)
+    assert times in (None, magnified)
+    # One that leaves the scene is limited.
+    wide = Placed(Frame(state_with(deflected=True, times=1e30)))
+    balls = by_name(DeflectedScene(services).updates(wide))["/precision/balls"]
+    assert np.abs(balls["batched_positions"]).max() < 200.0
+    v, w = precision.deflection[:3], precision.deflection[3:]
+    tool = placed.on_platform(state.design.tool.position)
+    names = list(placed.platform_points)
+    tips = np.array([*(placed.points[name] for name in names), tool])
+    moved = tips + magnified * (placed.scale * v + np.cross(w, tips - tool))
+    balls = drawn["/precision/balls"]["batched_positions"]
+    np.testing.assert_allclose(balls, moved, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "values", [{"times": 0.0}, {"wanted": -1.0}, {"wanted": 1e-300}, {"wanted_turn": math.inf}]
+)
+def test_precision_of_the_view_that_is_not_positive_is_refused(values: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="must be positive"):
+        PrecisionView(**values)
+
+
+@pytest.mark.parametrize("over", ["pose", "workspace"])
+def test_budget_keeps_what_is_wanted_and_is_set_in_one_step(
+    services: Services, desk: Desk, over: Any
+) -> None:
+    show_in(desk, state_with(budget=True, over=over, wanted=0.5))
+    part = BudgetPart(services)
+    before = desk.state.design
+    services.get(BudgetFeed).follow(Frame(desk.state))
+    text = markup(part, desk.state)
+    drawing = budget_of(budget_request(desk.state))
+    assert drawing.found is not None
+    assert drawing.costs.worst_displacement <= 0.5
+    assert len(re.findall("<tr", text)) == len(SOURCES)
+    desk.press(services.buttons, SET)
+    design = desk.state.design
+    assert design != before
+    # Tolerances that may be any stay.
+    endless = list(stated_tolerances(design))
+    endless[0], endless[6] = math.inf, math.inf
+    assert SetTolerances(tuple(endless)).apply(desk.state).design == design
+    known = np.isfinite(drawing.costs.tolerances)
+    np.testing.assert_array_equal(stated_tolerances(design)[known], drawing.costs.tolerances[known])
+    # The costs of what is set are those that were told.
+    again = budget_of(budget_request(Set("view.precision.wanted", None).apply(desk.state)))
+    assert known.all()
+    assert again.costs.worst_displacement == pytest.approx(drawing.costs.worst_displacement)
+
+
+def test_budget_that_cannot_be_kept_is_reported_in_one_line(
+    server: viser.ViserServer, desk: Desk
+) -> None:
+    show_in(desk, state_with(budget=True, wanted=0.01, keep_actuators=True))
+    worker, buttons = StubWorker(), Buttons(server)
+    services = services_for(server, desk.session, worker, buttons=buttons)
+    part, before = BudgetPart(services), desk.state
+    services.get(BudgetFeed).follow(Frame(before))
+    with pytest.raises(NoAnswerError) as error:
+        worker.work()
+    worker.orders[-1].failed(str(error.value))
+    text = words(markup(part, before))
+    assert "There is no budget" in text
+    assert "actuators" in text
+    desk.press(buttons, SET)
+    assert desk.state == before
