@@ -1,11 +1,13 @@
-"""The panel of the workspace: its volume, what it shows, the cut, the map and files."""
+"""The workspace on the page: its volume, the cut, the map, files, and what a load leaves of it."""
 
 from __future__ import annotations
 
 import html
 import itertools
 import json
+import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -13,33 +15,45 @@ import msgspec
 import numpy as np
 import pytest
 from desk import CLIENT, Desk
+from machines import six
 from services import StubDownloads, services_for
 from workspace_feeds import drawing_of, follow
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_request
 from explorer.app.features.workspace.files import FORMATS, WorkspaceFiles
 from explorer.app.features.workspace.orientation import workspace_rotation
-from explorer.app.features.workspace.panel import SHOWN, WorkspacePanel
-from explorer.app.features.workspace.slice_map import cut_loops, map_picture
+from explorer.app.features.workspace.panel import COLOUR, SHOWN, WorkspacePanel
+from explorer.app.features.workspace.slice_map import map_picture
+from explorer.app.features.workspace.tasks import STEP, WorkspaceDrawing, export_mesh
 from explorer.app.features.workspace.volume import VolumeFeed
-from explorer.app.features.workspace.words import volume_headline
-from explorer.app.state.actions import Set, SetAngle, SetPosition, SetVariable
+from explorer.app.features.workspace.words import drawing_words, volume_headline
+from explorer.app.scene.bands import AT_LIMIT, PLAIN
+from explorer.app.state.actions import Open, Set, SetAngle, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
+from explorer.app.state.view import ForcesView
+from explorer.errors import InputError
 from explorer.export.report.drawings.slices import Slices
 from explorer.measures.verdict import warnings
-from explorer.mechanism.design import Swing
+from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
-from explorer.workspace.limits.constraints import HalfSpace
-from explorer.workspace.position_bands import position_bands
+from explorer.statics.accuracy import worst_error
+from explorer.statics.compliance import compliance, deflection, stiffness_of
+from explorer.statics.reactions import limit_shares, reactions
+from explorer.statics.weights import design_weights, payload_wrench
+from explorer.workspace.held import held_workspace
+from explorer.workspace.position_bands import SHARE_COLOURS, SHARES, STEP_COLOURS, position_bands
 from explorer.workspace.slices.outline import slice_outline
 from explorer.workspace.slices.volume import workspace_volume
-from explorer.workspace.solids.solids import cut_solid, workspace_solid
+from explorer.workspace.solids.solids import workspace_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -78,17 +92,13 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
 
 def test_volume_is_that_of_the_orientation_that_is_chosen() -> None:
     services, state = services_for(), SetAngle(1, 20.0).apply(opened(OPTIMAL))
-    texts = [services.get(VolumeFeed).text.words]
-    for orientation in ("pose", "home"):
+    for orientation, words in (("pose", "present"), ("home", "home")):
         chosen = with_workspace(state, orientation=orientation)
         follow(services, chosen)
+        feed = services.get(VolumeFeed)
         expected = workspace_volume(OPTIMAL, workspace_rotation(Frame(chosen))).volume
-        texts.append(services.get(VolumeFeed).text.words)
-        assert texts[-1] == f"{format_number(expected, 6)} units³"
-        assert f"in the {'present' if orientation == 'pose' else 'home'} orientation" in (
-            volume_headline(Frame(chosen), services.get(VolumeFeed))
-        )
-    assert len(set(texts)) == 3
+        assert feed.text.words == f"{format_number(expected, 6)} units³"
+        assert f"in the {words} orientation" in volume_headline(Frame(chosen), feed)
 
 
 def test_volume_is_requested_before_the_drawing_and_once_only() -> None:
@@ -106,7 +116,6 @@ def test_empty_workspace_names_what_empties_it_instead_of_a_volume() -> None:
     follow(services, state)
     words = volume_headline(Frame(state), services.get(VolumeFeed))
     assert "The workspace is empty" in words
-    assert services.get(VolumeFeed).text.words == "empty"
     assert "l1 maximum" in words
     assert drawing_of(with_workspace(state, solid=True, cut="x")).slice_map is None
 
@@ -193,21 +202,14 @@ def test_slider_of_the_cut_spans_the_extent_and_follows_the_design(services: Ser
 
 
 @pytest.mark.parametrize("axis", AXES)
-@pytest.mark.parametrize("name", list(PRESETS))
-def test_extent_of_the_cut_is_that_of_the_limits_rather_than_of_facets(
-    name: str, axis: Axis
-) -> None:
-    """A slice just within the extent is not empty, and one just beyond is."""
-    design = PRESETS[name]
-    drawing = drawing_of(with_workspace(opened(design), solid=True, cut=axis))
+def test_slice_just_within_the_extent_of_the_cut_is_not_empty_and_one_beyond_is(axis: Axis) -> None:
+    drawing = drawing_of(with_workspace(opened(OPTIMAL), solid=True, cut=axis))
     assert drawing.extent is not None
-    index = "xyz".index(axis)
     rotation = np.array(drawing.request.rotation)
     for end, outward in zip(drawing.extent, (-1.0, 1.0), strict=True):
-        inner, outer = (
-            slice_outline(design, rotation, axis, float(end[index]) + outward * off)
-            for off in (-1e-3, 1e-3)
-        )
+        level = float(end["xyz".index(axis)])
+        inner = slice_outline(OPTIMAL, rotation, axis, level - outward * 1e-3)
+        outer = slice_outline(OPTIMAL, rotation, axis, level + outward * 1e-3)
         assert inner is not None
         assert outer is not None
         assert inner.loops
@@ -230,13 +232,6 @@ def test_switch_of_the_cut_keeps_the_other_side(services: Services, desk: Desk, 
     for drawing, side in ((near, -sign), (far, sign)):
         corners = np.concatenate([shell.vertices for shell in drawing.surface.shells])[:, index]
         assert (side * (corners - near.level)).min() == pytest.approx(0.0, abs=1e-9)
-    volumes: list[float] = []
-    for side in (-1.0, 1.0):
-        solid = workspace_solid(OPTIMAL, np.array(near.request.rotation), 0.1)
-        volumes.append(
-            cut_solid(solid, HalfSpace("cut", side * np.eye(3)[index], side * near.level)).volume
-        )
-    assert sum(volumes) == pytest.approx(solid.volume)
 
 
 # The map
@@ -298,15 +293,6 @@ def test_map_has_the_exact_outline_of_the_slice(axis: Axis) -> None:
         assert np.linalg.norm(places - point, axis=1).min() < 2e-3
 
 
-def test_map_with_limits_on_swings_has_an_outline_too() -> None:
-    limits = msgspec.structs.replace(OPTIMAL.limits, swing=Swing(b4=50.0, a1=70.0))
-    design = msgspec.structs.replace(OPTIMAL, limits=limits)
-    drawing = drawing_of(with_workspace(opened(design), solid=True, cut="z"))
-    assert drawing.slice_map is not None
-    assert 'class="edge"' in drawing.slice_map.markup
-    assert drawing.volume < 7000.0
-
-
 def test_b4_is_a_cross_where_it_is_and_faint_beside_the_slice() -> None:
     state = opened(OPTIMAL)
     drawn = drawing_of(with_workspace(state, solid=True, cut="y")).slice_map
@@ -346,24 +332,6 @@ def test_bands_of_the_condition_number_end_at_its_levels(
     assert float(np.quantile(errors, 0.99)) < 0.05
 
 
-@pytest.mark.parametrize("axis", range(3))
-def test_polygons_around_a_cut_have_the_area_of_its_faces(axis: int) -> None:
-    solid = workspace_solid(OPTIMAL, None, 0.1)
-    level = (10.0, 5.0, 6.0)[axis]
-    half = cut_solid(solid, HalfSpace("cut", np.eye(3)[axis], level))
-    first, second = (k for k in range(3) if k != axis)
-    loops = cut_loops(half, (first, second))
-    outline = slice_outline(OPTIMAL, Frame(opened(OPTIMAL)).snapshot.rotation, "xyz"[axis], level)
-    assert outline is not None
-    # The shoelace formula.
-    area = sum(
-        0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-        for x, y in (loop.T for loop in loops)
-    )
-    assert abs(area) == pytest.approx(outline.area, rel=2e-3)
-    assert cut_loops(solid, (first, second)) == []
-
-
 @pytest.mark.parametrize(
     "text", ["", "[1,2]", "[1,2,3,4]", '["1",2,3]', "[1e999,2,3]", "[NaN,1,2]", "{}", "[1,2,1e13]"]
 )
@@ -384,8 +352,242 @@ def test_files_are_sent_in_the_format_that_is_asked_for(services: Services, desk
         files.send(what, file_format, CLIENT.client_id)
         assert downloads.sent[-1] == (CLIENT.client_id, f"paper-optimal-{what}.{file_format}")
     desk.session.do(Set("view.workspace.region", "accessible"))
-    assert desk.state.view.workspace.region == "accessible"
     files.send("hull", "stl", CLIENT.client_id)
     assert downloads.sent[-1][1] == "paper-optimal-accessible-hull.stl"
+    desk.session.do(Set("view.workspace.region", "held"))
+    files.send("workspace", "3mf", CLIENT.client_id)
+    assert downloads.sent[-1][1] == "paper-optimal-workspace-that-holds-the-load.3mf"
     files.send_hull_at_home("3mf", CLIENT.client_id)
     assert downloads.sent[-1][1] == "paper-optimal-hull.3mf"
+
+
+# Under the load of the page, and by the precision of the tool
+
+
+LOADED = msgspec.structs.replace(
+    OPTIMAL,
+    tool=Tool((1.0, 0.0, 2.0)),
+    payload=Payload(0.5, (1.0, 0.0, 1.0), 5.0),
+    actuators=Actuators(push_n=(150, 200, 150, 200, 150, 150)),
+    struts=Struts(moment_nm=4.0),
+)
+PRECISE = msgspec.structs.replace(
+    LOADED,
+    actuators=Actuators(error_mm=six([0.05] * 6), stiffness_n_mm=six([1000.0] * 6)),
+    struts=Struts(outer_mm=12.0, inner_mm=10.0),
+)
+FORCES = ForcesView(force=(3.0, 0.0, -40.0), moment=(0.0, 0.2, 0.0))
+# FORCES in N and N × unit.
+LOAD = (3.0, 0.0, -40.0, 0.0, 20.0, 0.0)
+
+
+def load_state(design: Design = LOADED, forces: ForcesView = FORCES, **changes: Any) -> State:
+    """Return a design under the forces, with its workspace shown."""
+    view = opened(design).view
+    workspace = replace(view.workspace, solid=True, **changes)
+    return Set("view", replace(view, forces=forces, workspace=workspace)).apply(opened(design))
+
+
+def shares_at(design: Design, points: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return the largest shares of a limit at positions (n, 3), by reactions."""
+    tool, weights = design.tool.position, design_weights(design)
+    held = reactions(design, points, rotation, np.array(LOAD), tool, weights)
+    return np.asarray(limit_shares(design, held).max(axis=-1))
+
+
+def panel_text(panel: WorkspacePanel, state: State) -> str:
+    """Return the markup of the panel in a state."""
+    return "".join(str(v) for _, name, v in panel.updates(Frame(state)) if name == "content")
+
+
+# The bands
+
+
+def share_off(
+    drawing: WorkspaceDrawing,
+    bands: dict[Any, tuple[float, float]],
+    measure: Callable[[FloatArray], FloatArray],
+    tolerance: float,
+) -> float:
+    """Return the share of the area where a random point of a triangle is off its band."""
+    random = np.random.default_rng(2)
+    total = off = 0.0
+    for shell in drawing.surface.shells:
+        low, high = bands[shell.colour]
+        corners = shell.vertices[shell.faces]
+        weights = random.dirichlet([0.5, 0.5, 0.5], len(corners))
+        values = measure((corners * weights[:, :, None]).sum(axis=1))
+        sides = np.diff(corners, axis=1)
+        areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        # Between its corners the end of a band is straight.
+        is_off = (values < low * (1.0 - tolerance)) | (values > high * (1.0 + tolerance))
+        off += float(areas[is_off].sum())
+        total += float(areas.sum())
+    return off / total
+
+
+@pytest.mark.parametrize("cut", [None, "y"])
+def test_surface_lies_in_the_bands_of_the_shares_also_beside_singular_planes(cut: Any) -> None:
+    limits = Limits(box=((0.0, -12.0, -10.0), (20.0, 22.0, 18.0)), margin=None)
+    design = msgspec.structs.replace(LOADED, limits=limits)
+    pose = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-60.0, 20.0, 30.0))
+    drawing = drawing_of(replace(load_state(design, colour="share", cut=cut), pose=pose))
+    rotation = np.array(drawing.request.rotation)
+    bands = dict(zip(SHARE_COLOURS, itertools.pairwise((0.0, *SHARES, math.inf)), strict=True))
+    assert share_off(drawing, bands, lambda at: shares_at(design, at, rotation), 0.02) < 2e-3
+    # Triangles end at the planes that pass through the surface, in the last band.
+    crossed = 0
+    last = drawing.surface.shells[0]
+    assert last.colour == SHARE_COLOURS[-1]
+    corners = np.concatenate([shell.vertices for shell in drawing.surface.shells])
+    for normal in planes_of_singularity(rotation):
+        sides = corners @ normal
+        if sides.min() < -0.1 and sides.max() > 0.1:
+            crossed += 1
+            assert np.abs(last.vertices @ normal).min() < 1e-9
+            across = last.vertices[last.faces] @ normal
+            assert ((across > -1e-9).all(axis=1) | (across < 1e-9).all(axis=1)).all()
+    assert crossed > 1
+
+
+@pytest.mark.parametrize(
+    ("colour", "cut"), [("force", None), ("bending", "y"), ("error", None), ("deflection", "y")]
+)
+def test_surface_lies_in_the_bands_of_its_measure(colour: Any, cut: Any) -> None:
+    design = OPTIMAL if colour in ("force", "bending") else PRECISE
+    drawing = drawing_of(load_state(design, colour=colour, cut=cut))
+    rotation, tool = np.array(drawing.request.rotation), design.tool.position
+
+    def measure(points: FloatArray) -> FloatArray:
+        if colour == "error":
+            return worst_error(design, points, rotation, six([0.05] * 6), tool).displacement
+        if colour == "deflection":
+            # The payload's force of any direction does not count.
+            wrench = LOAD + payload_wrench(design, rotation)
+            soft = compliance(design, points, rotation, *stiffness_of(design), tool)
+            return design.unit_mm * np.linalg.norm(deflection(soft, wrench)[:, :3], axis=-1)
+        found = reactions(design, points, rotation, np.array(LOAD))
+        if colour == "force":
+            return np.asarray(np.abs(found.actuators).max(axis=-1))
+        return np.asarray(0.01 * found.bending.max(axis=-1))
+
+    bands = dict(
+        zip(STEP_COLOURS, itertools.pairwise(sorted((*drawing.levels, 0.0))), strict=False)
+    )
+    assert share_off(drawing, bands, measure, 0.03) < 5e-3
+    assert len(drawing.surface.shells) > 3
+
+
+def test_load_that_is_not_shown_changes_no_request() -> None:
+    other = replace(FORCES, force=(0.0, 0.0, 7.0))
+    limited = msgspec.structs.replace(PRECISE, guide=Guide(force_n=100.0))
+    cases: tuple[tuple[dict[str, Any], bool], ...] = (
+        ({"colour": "plain"}, False),
+        ({"colour": "margin", "cut": "x"}, False),
+        ({"region": "accessible"}, False),
+        ({"colour": "error"}, False),
+        ({"colour": "share"}, True),
+        ({"colour": "force"}, True),
+        ({"colour": "deflection"}, True),
+        ({"region": "held"}, True),
+    )
+    for changes, is_loaded in cases:
+        request = workspace_request(Frame(load_state(limited, **changes)))
+        changed = workspace_request(Frame(load_state(limited, forces=other, **changes)))
+        assert request is not None
+        assert (request != changed) is is_loaded
+        if is_loaded:
+            assert request.load == LOAD
+
+
+def test_payload_without_a_weight_loads_nothing_but_its_force() -> None:
+    weightless = replace(FORCES, weighed="none")
+    request = workspace_request(Frame(load_state(forces=weightless, region="held")))
+    assert request is not None
+    assert request.design.payload == Payload(0.0, (1.0, 0.0, 1.0), 5.0)
+    weighty = workspace_request(Frame(load_state(region="held")))
+    assert weighty is not None
+    assert weighty.design.payload == LOADED.payload
+
+
+@pytest.mark.parametrize(
+    ("colour", "words"),
+    [
+        ("error", "The actuators of the design have no errors"),
+        ("deflection", "The design is rigid"),
+        ("share", "has no limits of forces"),
+    ],
+)
+def test_colour_that_a_design_states_nothing_of_asks_for_what_it_needs(
+    services: Services, desk: Desk, colour: str, words: str
+) -> None:
+    desk.session.do(Open(OPTIMAL))
+    desk.session.do(Set("view", load_state(OPTIMAL, colour=colour).view))
+    panel = WorkspacePanel(services)
+    request = workspace_request(Frame(desk.state))
+    assert request is not None
+    assert request.colour == "plain"
+    assert words in panel_text(panel, desk.state)
+    desk.press(services.buttons, COLOUR, "largest actuator force")
+    assert desk.state.view.workspace.colour == "force"
+    assert words not in panel_text(panel, desk.state)
+
+
+# The part that holds the load
+
+
+@pytest.fixture(scope="module")
+def feed() -> WorkspaceFeed:
+    """The feed after it has drawn the part that holds the load."""
+    services = services_for()
+    follow(services, load_state(region="held"))
+    return services.get(WorkspaceFeed)
+
+
+@pytest.fixture(scope="module")
+def drawing(feed: WorkspaceFeed) -> WorkspaceDrawing:
+    assert feed.drawing is not None
+    return feed.drawing
+
+
+def test_part_that_holds_the_load_is_drawn_and_measured(
+    feed: WorkspaceFeed, drawing: WorkspaceDrawing
+) -> None:
+    assert drawing.trouble is None
+    rotation = np.array(drawing.request.rotation)
+    expected = held_workspace(LOADED, rotation, LOAD).held_volume
+    assert drawing.held_volume == pytest.approx(expected, rel=5e-3)
+    assert 0.1 < expected / drawing.volume < 0.9
+    words = drawing_words(Frame(load_state(region="held")), feed)
+    assert "hold the load" in words
+    assert f"{100.0 * (drawing.held_volume or 0.0) / drawing.volume:.2f} %" in words
+    assert "(3, 0, −40) N at the tool, (0, 0.2, 0) N m, 0.5 kg of payload" in words
+    assert {shell.colour for shell in drawing.surface.shells} == {PLAIN, AT_LIMIT}
+    for shell in drawing.surface.shells:
+        shares = shares_at(LOADED, shell.vertices, rotation)
+        assert np.quantile(shares, 0.99) < 1.02
+        if shell.colour == AT_LIMIT:
+            assert np.quantile(shares, 0.1) > 0.99
+
+
+def test_load_that_nothing_holds_names_the_part(services: Services) -> None:
+    weak = msgspec.structs.replace(LOADED, actuators=Actuators(push_n=(2, 2, 2, 2, 2, 2)))
+    state = load_state(weak, region="held")
+    follow(services, state)
+    drawing = services.get(WorkspaceFeed).drawing
+    assert drawing is not None
+    assert drawing.trouble is not None
+    assert re.search(r"payload; actuator \w+ is at its limit there", drawing.trouble.reason)
+    text = panel_text(WorkspacePanel(services), state)
+    assert text.count("No position holds the load") == 1
+    # All within the limits is drawn instead.
+    assert drawing.mesh_volume == pytest.approx(drawing.volume, rel=0.02)
+
+
+def test_files_that_cannot_be_written_say_why(drawing: WorkspaceDrawing) -> None:
+    rows = drawing.request.rotation
+    with pytest.raises(InputError, match="along which a part takes its limit consists of facets"):
+        export_mesh(LOADED, rows, 0.1, "held", None, LOAD, "workspace", STEP)
+    heavy = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0)
+    with pytest.raises(InputError, match="nothing holds the load: the best position found holds"):
+        export_mesh(LOADED, rows, 0.1, "held", None, heavy, "workspace", "stl")
