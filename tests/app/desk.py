@@ -11,14 +11,17 @@ from dataclasses import replace
 from typing import Any
 
 import msgspec
+import numpy as np
 import viser
 
 from explorer.app.session.session import Session, Who
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State
+from explorer.app.state.state import State, opened
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
 
 
 class Browser:
@@ -83,6 +86,16 @@ class Desk:
 
     def _fail(self, error: Exception) -> None:
         raise error
+
+
+def random_states(count: int, seed: int = 3) -> list[State]:
+    """Return the paper's optimum in poses all about its home."""
+    rng = np.random.default_rng(seed)
+    poses = (
+        Pose.of_yaw_pitch_roll(rng.uniform(-8.0, 15.0, 3), rng.uniform(-80.0, 80.0, 3))
+        for _ in range(count)
+    )
+    return [opened(PRESETS["paper-optimal"], pose) for pose in poses]
 
 
 def thick(state: State, *radii: float) -> State:

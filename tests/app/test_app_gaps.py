@@ -1,26 +1,27 @@
-"""What the scene shows of singularities: gaps, contacts and the filled tetrahedron; no browser."""
+"""What the scene shows of singularities, and the shadow on the ground; no browser."""
 
 from __future__ import annotations
 
-import asyncio
 import functools
 import itertools
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-import viser
-from desk import Desk, by_name, number, viewed
+from desk import Desk, by_name, number, random_states, viewed
 from incidence import distance_of_lines, distance_to_plane
 from numpy.testing import assert_allclose
+from scipy.spatial import ConvexHull
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism import marks
+from explorer.app.features.ground.ground import shadow_outlines
+from explorer.app.features.ground.lighting import TO_SUN
 from explorer.app.features.mechanism.approach import FADE_FROM, FARTHEST, approaches
+from explorer.app.features.mechanism.bodies import BASE_RADIUS, PLATE_THICKNESS, platform_plate
 from explorer.app.features.mechanism.flags import Flags
 from explorer.app.features.mechanism.gaps import DASHES, Gaps, gap_text, shown_gaps
+from explorer.app.features.mechanism.legs import PLATE_TOP
 from explorer.app.features.mechanism.marks import (
     CLEAR_HANDLE,
     FAINT_HANDLE,
@@ -31,7 +32,7 @@ from explorer.app.features.mechanism.tetrahedra import INSET, Tetrahedra
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum
 from explorer.app.features.singularity.distance import DistancePanel, distance_table
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import linear_colour, of_one_colour
+from explorer.app.scene.shapes import linear_colour, plate
 from explorer.app.state.actions import Open, SetJoint, SetPose
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
@@ -45,15 +46,6 @@ from explorer.singularity.strata import GENERIC, STRATA
 
 OPTIMAL = PRESETS["paper-optimal"]
 Drawn = dict[str, dict[str, Any]]
-
-
-def random_states(count: int, seed: int = 5) -> list[State]:
-    rng = np.random.default_rng(seed)
-    poses = (
-        Pose.of_yaw_pitch_roll(rng.uniform(-8.0, 15.0, 3), rng.uniform(-80.0, 80.0, 3))
-        for _ in range(count)
-    )
-    return [opened(OPTIMAL, pose) for pose in poses]
 
 
 @functools.cache
@@ -77,7 +69,7 @@ def scenes() -> list[Placed]:
     """Return scenes of random poses, on the way to each incidence, and of every stratum."""
     singular = (GoToStratum(w).apply(opened(OPTIMAL)) for w in STRATA if w != GENERIC)
     near = itertools.chain.from_iterable(map(approaching, (1, 2, 3)))
-    return [Placed(Frame(state)) for state in (*random_states(12), *near, *singular)]
+    return [Placed(Frame(state)) for state in (*random_states(12, seed=5), *near, *singular)]
 
 
 def draw(part: Gaps | Tetrahedra | Flags, scene: State | Placed) -> Drawn:
@@ -157,9 +149,6 @@ def test_contacts_are_marked_where_the_pose_is_singular_and_nowhere_else(gaps: G
             for index in expected:
                 point = placed.scale * snapshot.gaps.base[index]
                 assert_allclose(node["batched_positions"][index], point, atol=1e-5)
-    nodes: dict[str, Any] = {node.name: node for node, _, _ in gaps.updates(scenes()[0])}
-    colours = nodes["/gaps/contacts"].batched_colors.tolist()
-    assert {tuple(colour) for colour in colours} == {linear_colour(SINGULAR)}
 
 
 @pytest.mark.parametrize("incidence", [1, 2, 3])
@@ -232,36 +221,7 @@ def test_designs_of_any_size_are_drawn_alike(factor: float) -> None:
                 assert_allclose(b.ends, ratio * a.ends, rtol=1e-6, atol=1e-6)
 
 
-# Flags
-
-
-def test_flags_reach_the_ends_of_the_gaps_that_are_near(services: Services) -> None:
-    flags = services.get(Flags)
-
-    def is_on_plane(nodes: Drawn, root: str, point: FloatArray) -> bool:
-        corners = nodes[f"{root}/flag/plane"]["vertices"]
-        low, high = corners.min(axis=0) - 1e-4, corners.max(axis=0) + 1e-4
-        return bool(((low <= point) & (point <= high)).all())
-
-    def is_on_line(nodes: Drawn, root: str, x: float) -> bool:
-        line = nodes[f"{root}/flag/line"]
-        low = line["position"][0]
-        return low - 1e-4 <= x <= low + line["scale"][2] + 1e-4
-
-    for placed in scenes():
-        nodes = draw(flags, placed)
-        for index, each in enumerate(approaches(placed, None)):
-            if each.ends is None or each.presence < 1.0:
-                continue
-            base, platform = each.ends
-            local = (platform - placed.points["b4"]) @ placed.frame.snapshot.rotation
-            if index == 0:
-                assert is_on_plane(nodes, "/platform", local)
-            elif index == 1:
-                assert is_on_line(nodes, "/base", base[0])
-                assert is_on_line(nodes, "/platform", local[0])
-            else:
-                assert is_on_plane(nodes, "/base", base)
+# The camera
 
 
 def test_camera_follows_near_gaps_and_not_the_pointer(services: Services, desk: Desk) -> None:
@@ -326,11 +286,6 @@ def test_row_that_is_pointed_at_fills_its_tetrahedron_until_the_pointer_leaves(
     assert desk.session.history == steps
 
 
-def test_row_that_is_pointed_at_is_filled_in_place_of_the_nearest() -> None:
-    filled = [a.is_filled for a in approaches(Placed(Frame(approaching(1)[-1])), 3)]
-    assert filled == [False, False, True]
-
-
 @pytest.mark.parametrize("incidence", [1, 2, 3])
 def test_switch_of_a_tetrahedron_hides_its_edges_name_faces_and_gap(
     tetrahedra: Tetrahedra, gaps: Gaps, incidence: int
@@ -349,21 +304,6 @@ def test_switch_of_a_tetrahedron_hides_its_edges_name_faces_and_gap(
             assert nodes[f"/tetrahedra/{other}/edges"]["visible"] is True
 
 
-def test_names_of_tetrahedra_stand_at_their_centres_and_go_with_the_labels(
-    tetrahedra: Tetrahedra,
-) -> None:
-    placed = Placed(Frame(opened(OPTIMAL)))
-    nodes, hidden = (
-        draw(tetrahedra, placed),
-        draw(tetrahedra, viewed(opened(OPTIMAL), labels=False)),
-    )
-    for incidence, names in enumerate(TETRAHEDRA, start=1):
-        name = nodes[f"/tetrahedra/{incidence}/name"]
-        assert name["visible"] is True
-        assert hidden[f"/tetrahedra/{incidence}/name"]["visible"] is False
-        assert_allclose(name["position"], np.mean([placed.points[p] for p in names], axis=0))
-
-
 def test_tetrahedron_that_fails_is_outlined_even_if_it_is_switched_off(
     tetrahedra: Tetrahedra,
 ) -> None:
@@ -377,44 +317,14 @@ def test_tetrahedron_that_fails_is_outlined_even_if_it_is_switched_off(
 # The gizmo
 
 
-def look(handle: DragHandle, state: State) -> tuple[float, float]:
-    values = by_name(handle.updates(Placed(Frame(state))))["/handle"]
-    return values["scale"], values["opacity"]
-
-
 def test_gizmo_is_small_and_faint_where_it_would_hide_a_gap(services: Services) -> None:
     handle = services.get(DragHandle)
-    assert look(handle, opened(OPTIMAL)) == CLEAR_HANDLE
-    # b4 is on the base plane.
-    assert look(handle, approaching(3)[-1]) == FAINT_HANDLE
+    # At the last pose b4 is on the base plane.
+    for state, look in ((opened(OPTIMAL), CLEAR_HANDLE), (approaching(3)[-1], FAINT_HANDLE)):
+        values = by_name(handle.updates(Placed(Frame(state))))["/handle"]
+        assert (values["scale"], values["opacity"]) == look
     # a1 on the platform plane is far from b4.
     assert not hides_a_gap(Placed(Frame(approaching(1)[-1])))
-
-
-def test_gizmo_keeps_its_look_while_it_moves_and_changes_it_in_a_pause(
-    services: Services, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    handle, state = services.get(DragHandle), approaching(3)[-1]
-    redrawn: list[bool] = []
-    timers: list[tuple[float, Callable[[], None]]] = []
-    monkeypatch.setattr(services.session, "redraw", lambda: redrawn.append(True))
-
-    def start_timer(seconds: float, act: Callable[[], None]) -> None:
-        timers.append((seconds, act))
-
-    monkeypatch.setattr(marks, "start_timer", start_timer)
-    monkeypatch.setattr(marks, "PAUSE", 600.0)
-    gizmo: Any = handle.handle
-    event = viser.TransformControlsEvent(None, 1, gizmo, "update")
-    for move in gizmo._impl_aux.update_cb:
-        asyncio.run(move(event))
-    assert look(handle, state) == CLEAR_HANDLE
-    ((seconds, look_again),) = timers
-    assert seconds == 600.0
-    look_again()
-    assert redrawn == [True]
-    monkeypatch.setattr(marks, "PAUSE", -1.0)
-    assert look(handle, state) == FAINT_HANDLE
 
 
 # Colours
@@ -426,6 +336,35 @@ def test_linear_colours_are_those_of_the_srgb_standard(colour: tuple[int, int, i
     # The inverse, from linear to sRGB.
     back = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     assert np.abs(255.0 * back - colour).max() < 6.0
-    assert np.unique(of_one_colour(colour, 4).reshape(-1, 3), axis=0).tolist() == [
-        list(linear_colour(colour))
-    ]
+
+
+# The shadow on the ground
+
+
+GROUND = PLATE_TOP - PLATE_THICKNESS
+POSES = (None, Pose.of_yaw_pitch_roll((9.0, 8.0, 7.5), (-38.0, 24.0, 8.0)))
+
+
+def on_ground(points: FloatArray) -> FloatArray:
+    """Return where rays of the sun through points (n, 3) meet the ground, (n, 2)."""
+    steps = (points[:, 2] - GROUND) / TO_SUN[2]
+    return (points - steps[:, None] * TO_SUN)[:, :2]
+
+
+def area(points: FloatArray) -> float:
+    return float(ConvexHull(points).volume)
+
+
+@pytest.mark.parametrize("pose", POSES)
+def test_shadow_of_plates_is_their_projection(pose: Pose | None) -> None:
+    scene = Placed(Frame(opened(OPTIMAL, pose)))
+    base, platform, *_ = shadow_outlines(scene, GROUND)
+    corners = np.array([scene.points[name][:2] for name in ("a1", "a2", "a3")])
+    solid, _ = plate(corners, BASE_RADIUS, GROUND, PLATE_TOP)
+    assert area(base) == pytest.approx(area(on_ground(solid)), rel=0.01)
+    local, _ = platform_plate(scene)
+    rotation = scene.frame.snapshot.rotation
+    projected = on_ground(scene.points["b4"] + local @ rotation.T)
+    # The plate counts as a sheet, so that its shadow lacks the rim of its thickness.
+    assert area(platform) == pytest.approx(area(projected), rel=0.12)
+    assert area(np.concatenate([platform, projected])) <= 1.02 * area(projected)

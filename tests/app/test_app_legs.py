@@ -1,71 +1,496 @@
-"""The legs on the page: clearances, capsules, radii and the swept tetrahedra, without a browser."""
+"""The legs on the page: the accessible workspace, clearances, radii and the last move."""
 
 from __future__ import annotations
 
+import io
 import re
-from typing import Any
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any, Literal, TypeVar
 
+import msgspec
 import numpy as np
 import pytest
+import trimesh
 import viser
-from desk import Desk, by_name, number, rows_of, thick, viewed
+from desk import Desk, by_name, number, random_states, rows_of, thick, viewed
+from hypothesis import given, strategies as st
+from services import StubWorker, services_for
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Feed, Services
 from explorer.app.features.legs.clearance import ClearanceScene
+from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.panel import DIGITS, LegsPanel, clearance_table, move_table
+from explorer.app.features.legs.radius_plot import chart_columns, radius_words, volume_at
 from explorer.app.features.legs.swept import SweptTetrahedra
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.legs import Legs
+from explorer.app.features.workspace import regions
+from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.panel import WorkspacePanel
+from explorer.app.features.workspace.slice_map import SliceMap
+from explorer.app.features.workspace.tasks import (
+    REACHED_TOLERANCE,
+    STEP,
+    WorkspaceDrawing,
+    export_mesh,
+    exported_name,
+)
+from explorer.app.features.workspace.words import drawing_words, nothing_words, workspace_details
 from explorer.app.inputs.ranges import radius_span
+from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.scene.placing import Placed
 from explorer.app.session.gestures import UserAction
-from explorer.app.state.actions import SetPose, SetPosition
+from explorer.app.state.actions import Set, SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.widgets.colours import OUTLINE, SWEPT, TUBE
+from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, leg_axes, leg_clearances
 from explorer.legs.interference import step_overlaps, swept_tetrahedra
 from explorer.legs.moves import move_clearance
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.workspace.accessible.radii import RadiusCurve
+from explorer.workspace.accessible.start import StartError, check_start
+from explorer.workspace.accessible.workspace import accessible_workspace
+from explorer.workspace.least_clearance import least_clearances
+from explorer.workspace.limits.constraints import constraints, slacks
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
+RADIUS = 0.2
+Followed = TypeVar("Followed", bound=Feed)
+# Rows of the rotation at home.
+LEVEL = regions.rows_of(opened(OPTIMAL).pose.rotation)
+
+
+def show(state: State, **changes: Any) -> State:
+    """Return the state with the accessible workspace shown."""
+    values = {"solid": True, "region": "accessible", **changes}
+    workspace = replace(state.view.workspace, **values)
+    return Set("view", replace(state.view, workspace=workspace)).apply(state)
+
+
+def show_curve(state: State) -> State:
+    return Set("view", replace(state.view, radius_curve=True)).apply(state)
+
+
+def with_limits(state: State, **limits: Any) -> State:
+    return Set("design.limits", msgspec.structs.replace(state.design.limits, **limits)).apply(state)
+
+
+def beyond_its_limits() -> State:
+    """Return the optimum with a leg 4 that is too short for its home."""
+    return with_limits(opened(OPTIMAL), l4=(0.0, 12.5))
+
+
+def follow(
+    state: State, kind: Callable[[Services], Followed], services: Services | None = None
+) -> tuple[Followed, StubWorker]:
+    """Return the feed of a class, which has drawn a state, and its worker."""
+    services = services or services_for()
+    feed, worker = services.get(kind), services.worker
+    assert isinstance(worker, StubWorker)
+    feed.follow(Frame(state))
+    answer(worker)
+    return feed, worker
+
+
+@cache
+def execute(task: Callable[[Any], Any], request: object) -> Any:
+    """Return what a task finds, computed once for all tests."""
+    return task(request)
+
+
+def answer(worker: StubWorker) -> None:
+    """Answer the newest order, if there is any."""
+    for order in worker.orders[-1:]:
+        order.done(execute(order.task, order.request))
+
+
+def drawing_of(state: State) -> WorkspaceDrawing:
+    drawing = follow(state, WorkspaceFeed)[0].drawing
+    assert drawing is not None
+    return drawing
+
+
+def clearance_at(state: State, points: FloatArray) -> FloatArray:
+    """Return the least clearance of any two legs at positions (n, 3)."""
+    return leg_clearances(state.design, points, state.pose.rotation).clearance.min(axis=-1)
+
+
+untyped_trimesh: Any = trimesh
+# Forces and moments of no load.
+UNLOADED = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+THICK = show(thick(opened(OPTIMAL), RADIUS))
+
+
+# The accessible workspace
+
+
+def test_drawing_has_the_numbers_of_the_library() -> None:
+    drawing = drawing_of(THICK)
+    expected = accessible_workspace(THICK.design, tolerance=REACHED_TOLERANCE * OPTIMAL.reach)
+    assert drawing.accessible is not None
+    assert drawing.trouble is None
+    assert drawing.volume == expected.volume
+    assert drawing.accessible.volume == expected.accessible_volume
+    assert drawing.accessible.node_count == expected.accessible_node_count
+    assert drawing.accessible.pairs == expected.pairs
+    assert drawing.accessible.harmless_radius == expected.harmless_radius
+    assert drawing.nodes is not None
+    assert drawing.nodes.count == expected.node_count
+    assert drawing.mesh_volume == pytest.approx(expected.accessible_volume, rel=1e-3)
+
+
+def test_faces_where_legs_begin_to_collide_have_a_colour_of_their_own() -> None:
+    shells = {shell.colour: shell for shell in drawing_of(THICK).surface.shells}
+    assert set(shells) == {PLAIN, COLLIDING}
+    collide = shells[COLLIDING].vertices[shells[COLLIDING].faces].reshape(-1, 3)
+    # Where two pairs begin at once an edge cuts the corner, by less than a step of the grid.
+    off = np.abs(clearance_at(THICK, collide))
+    assert float(np.median(off)) < 1e-6
+    assert float(np.quantile(off, 0.98)) < 0.1
+    plain = shells[PLAIN].vertices[shells[PLAIN].faces].mean(axis=1)
+    limits = constraints(THICK.design, THICK.pose.rotation)
+    on_limits = np.abs(slacks(limits, plain)).min(axis=-1)
+    assert float(on_limits.max()) < 2.0 * REACHED_TOLERANCE * OPTIMAL.reach
+    whole = drawing_of(show(THICK, region="limits"))
+    assert [shell.colour for shell in whole.surface.shells] == [PLAIN]
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_cut_takes_one_side_and_maps_the_accessible_part(axis: int) -> None:
+    level = (12.0, -10.0, 0.3)[axis]
+    state = show(THICK, cut="xyz"[axis], level=level)
+    drawing = drawing_of(state)
+    side = -1.0 if axis == 1 else 1.0
+    vertices = np.concatenate([shell.vertices for shell in drawing.surface.shells])
+    assert float((side * (vertices[:, axis] - level)).max()) == pytest.approx(0.0, abs=1e-9)
+    assert drawing.slice_map is not None
+    first, second = drawing.slice_map.plane
+    lows, highs = np.array(drawing.slice_map.lows), np.array(drawing.slice_map.highs)
+    points = np.full((3000, 3), level)
+    flat = np.random.default_rng(axis).uniform(lows, highs, (len(points), 2))
+    points[:, [first, second]] = flat
+    limits = constraints(THICK.design, THICK.pose.rotation)
+    within = np.asarray((slacks(limits, points) >= 0.2).all(axis=-1))
+    blocked = inside(path_points(drawing.slice_map, "is-blocked"), flat)[within]
+    colliding = inside(path_points(drawing.slice_map, "is-colliding"), flat)[within]
+    clearance = clearance_at(THICK, points[within])
+    assert blocked.any()
+    assert not blocked.all()
+    # The surface of collisions has facets as long as a step of its grid.
+    assert float(clearance[~blocked].min()) > -0.1
+    assert float(clearance[blocked].max()) < 0.1
+    # Where legs collide is outlined on a finer grid, whatever path leads there.
+    np.testing.assert_array_equal(
+        colliding[np.abs(clearance) > 5e-3], (clearance <= 0.0)[np.abs(clearance) > 5e-3]
+    )
+
+
+def path_points(drawn: SliceMap, class_name: str) -> list[FloatArray]:
+    """Return the polygons of the path of a class in a map, in design units."""
+    (data,) = re.findall(rf'<path d="([^"]*)"[^>]*class="{class_name}"', drawn.markup)
+    polygons = [
+        np.array([[float(x) for x in point.split(",")] for point in part.rstrip("Z").split("L")])
+        for part in data.split("M")[1:]
+    ]
+    return [polygon / drawn.own_scale + np.array(drawn.lows) for polygon in polygons]
+
+
+def inside(polygons: list[FloatArray], points: FloatArray) -> BoolArray:
+    """Return which points (n, 2) lie in polygons by the even-odd rule."""
+    crossings = np.zeros(len(points), dtype=np.int64)
+    for polygon in polygons:
+        for (x0, y0), (x1, y1) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+            spans = (y0 > points[:, 1]) != (y1 > points[:, 1])
+            with np.errstate(divide="ignore", invalid="ignore"):
+                at = x0 + (points[:, 1] - y0) / (y1 - y0) * (x1 - x0)
+            crossings += spans & (at > points[:, 0])
+    return crossings % 2 == 1
+
+
+def test_cut_beyond_the_extent_goes_through_the_middle_and_one_within_stays() -> None:
+    for level, found in ((-50.0, 10.0), (None, 10.0), (50.0, 10.0), (17.0, 17.0)):
+        state = show(opened(OPTIMAL), region="limits", cut="x", level=level)
+        assert drawing_of(state).level == pytest.approx(found)
+
+
+def test_drawing_with_another_cut_colour_or_hull_computes_no_workspace_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drawing_of(THICK)
+    monkeypatch.setattr(regions, "accessible_workspace", pytest.fail)
+    for changes in ({"cut": "x", "level": 3.0}, {"colour": "margin"}, {"hull": True}):
+        assert drawing_of(show(THICK, **changes)).accessible is not None
+
+
+@pytest.mark.parametrize(
+    ("start", "region", "orders"),
+    [("home", "accessible", 1), ("pose", "accessible", 2), ("pose", "limits", 1)],
+)
+def test_move_requests_a_drawing_only_if_paths_start_at_the_pose(
+    start: str, region: str, orders: int
+) -> None:
+    services = services_for()
+    state = show(THICK, start=start, region=region)
+    for each in (state, SetPosition(2, 8.0).apply(state)):
+        services.get(WorkspaceFeed).follow(Frame(each))
+    assert isinstance(services.worker, StubWorker)
+    assert len(services.worker.orders) == orders
+
+
+def test_failure_of_an_older_request_is_no_problem() -> None:
+    feed, worker = follow(THICK, WorkspaceFeed)
+    feed.follow(Frame(show(THICK, colour="margin")))
+    first, second = worker.orders
+    first.failed("too late")
+    assert feed.problem is None
+    second.failed("it failed")
+    assert feed.problem == "it failed"
+    answer(worker)
+    assert feed.problem is None
+    assert feed.is_current
+
+
+def test_curve_is_requested_once_for_all_radii() -> None:
+    feed, worker = follow(opened(OPTIMAL), RadiusFeed)
+    state = show_curve(opened(OPTIMAL))
+    narrow = with_limits(state, margin=1.0)
+    for each, orders in (
+        (opened(OPTIMAL), 0),
+        (state, 1),
+        (thick(state, 0.3), 1),
+        (SetPosition(0, 11.0).apply(state), 1),
+        (narrow, 2),
+        (opened(OPTIMAL), 2),
+    ):
+        feed.follow(Frame(each))
+        assert len(worker.orders) == orders
+    assert worker.orders[-1].request.design.limits.margin == 1.0
+
+
+def summary(state: State) -> str:
+    """Return all that the panel says of the drawing of a state."""
+    frame, feed = Frame(state), follow(state, WorkspaceFeed)[0]
+    return drawing_words(frame, feed) + workspace_details(frame, feed)
+
+
+def test_numbers_of_the_panel_are_those_of_the_library() -> None:
+    drawing, html = drawing_of(THICK), summary(THICK)
+    accessible = drawing.accessible
+    assert accessible is not None
+    volume, percent = accessible.volume, 100.0 * accessible.volume / drawing.volume
+    for text in (
+        f"{format_number(volume, 6)} units³ accessible, {format_number(percent, 4)} %",
+        f"{accessible.node_count} of 999",
+        "Legs 1 – 4, 2 – 4, 3 – 4 collide",
+    ):
+        assert text in html
+    head, *rows = [row for row in rows_of(html) if len(row) == 3]
+    assert [row[0] for row in (head, *rows)] == ["legs"] + [f"{i} – {j}" for i, j in PAIRS]
+    for (_, clearance, blocked), pair in zip(rows, accessible.pairs, strict=True):
+        assert number(clearance) == pytest.approx(pair.clearance, rel=5e-3)
+        shown = 0.0 if blocked == "–" else number(blocked)
+        assert shown == pytest.approx(pair.blocked_volume, rel=5e-3)
+
+
+def test_home_in_trouble_leaves_the_solid_and_says_what_would_do() -> None:
+    state = show(beyond_its_limits())
+    home = np.array(state.pose.position)
+    drawing, whole = drawing_of(state), drawing_of(show(state, region="limits"))
+    trouble = drawing.trouble
+    assert drawing.accessible is None
+    assert trouble is not None
+    with pytest.raises(StartError) as refused:
+        check_start(state.design, state.pose.rotation, home)
+    assert trouble.reason == str(refused.value)
+    assert "l4 = 13.01 is above its maximum 12.5" in trouble.reason
+    assert trouble.nearest is not None
+    check_start(state.design, state.pose.rotation, np.array(trouble.nearest))
+    assert drawing.mesh_volume == pytest.approx(whole.mesh_volume, rel=1e-4)
+    assert nothing_words(drawing) == "Nothing is accessible from the home position"
+    # The alert of the panel has these words.
+    assert nothing_words(drawing) not in summary(state)
+
+
+def test_button_of_a_home_in_trouble_goes_to_the_nearest_start(
+    services: Services, desk: Desk
+) -> None:
+    panel, before = WorkspacePanel(services), show(beyond_its_limits())
+    desk.session.do(Set("design", before.design))
+    desk.session.do(Set("view", before.view))
+    feed, worker = follow(before, WorkspaceFeed, services)
+    updates = list(panel.updates(Frame(before)))
+    assert any("Nothing is accessible from the home position" in str(v) for *_, v in updates)
+    (button,) = (
+        handle
+        for handle, name, value in updates
+        if isinstance(handle, viser.GuiButtonHandle) and (name, value) == ("visible", True)
+    )
+    drawing = feed.drawing
+    assert drawing is not None
+    assert drawing.trouble is not None
+    desk.click(button)
+    after = desk.state
+    assert desk.complaints == []
+    assert after.pose.position == drawing.trouble.nearest
+    np.testing.assert_allclose(after.pose.rotation, before.pose.rotation, atol=1e-12)
+    assert after.view.workspace == replace(before.view.workspace, start="pose")
+    assert after.design == before.design
+    feed.follow(Frame(after))
+    answer(worker)
+    assert feed.drawing is not None
+    assert feed.drawing.accessible is not None
+    assert (button, "visible", False) in list(panel.updates(Frame(after)))
+
+
+@pytest.mark.parametrize("what", ["workspace", "hull"])
+def test_exported_mesh_has_the_volume_of_the_drawing(what: str) -> None:
+    drawing = drawing_of(show(THICK, hull=True))
+    tolerance = REACHED_TOLERANCE * OPTIMAL.reach
+    data = export_mesh(THICK.design, LEVEL, tolerance, "accessible", None, UNLOADED, what, "stl")
+    mesh = untyped_trimesh.load_mesh(io.BytesIO(data), file_type="stl")
+    expected = drawing.mesh_volume if what == "workspace" else drawing.hull_volume
+    assert expected is not None
+    assert mesh.volume == pytest.approx(expected * OPTIMAL.unit_mm**3, rel=1e-4)
+    assert exported_name("accessible", what) == f"accessible {what}"
+    assert exported_name("limits", what) == what
+
+
+@pytest.mark.parametrize(
+    ("limits", "region", "what", "file_format", "reason"),
+    [
+        ({"l4": (0.0, 12.5)}, "accessible", "workspace", "stl", "no position is accessible from"),
+        ({}, "limits", "hull", STEP, "a convex hull.*export it as 3mf, stl, glb, obj or ply"),
+        ({}, "accessible", "workspace", STEP, "begin to collide.*export it as 3mf, stl, glb"),
+    ],
+)
+def test_file_that_cannot_be_written_is_refused_with_what_would_work(
+    limits: dict[str, Any],
+    region: Literal["limits", "accessible"],
+    what: str,
+    file_format: str,
+    reason: str,
+) -> None:
+    design = with_limits(THICK, **limits).design
+    with pytest.raises(InputError, match=reason):
+        export_mesh(design, LEVEL, 0.1, region, None, UNLOADED, what, file_format)
+
+
+# The curve of radii
+
+
+def curve_of(state: State) -> RadiusCurve:
+    drawing = follow(show_curve(state), RadiusFeed)[0].drawing
+    assert drawing is not None
+    assert drawing.curve is not None
+    return drawing.curve
+
+
+def words_of(state: State) -> str:
+    return radius_words(Frame(state), follow(show_curve(state), RadiusFeed)[0])
+
+
+@given(st.lists(st.floats(1.0, 1e3), min_size=2, max_size=30), st.none() | st.floats(0.0, 2.0))
+def test_chart_shows_any_curve_and_marks_on_it(values: list[float], radius: float | None) -> None:
+    whole = curve_of(opened(OPTIMAL))
+    drawn = replace(
+        whole,
+        radii=np.append(np.linspace(0.0, 0.5, len(values)), 0.5),
+        volumes=np.array([*sorted(values, reverse=True), 0.0]),
+        # Two legs that come as near as 0.1 bear radii of 0.05.
+        least=whole.least._replace(clearance=np.full(len(PAIRS), 0.1)),
+    )
+    x, y, *columns = chart_columns(drawn, radius)
+    assert (np.diff(x) >= 0.0).all()
+    assert (np.diff(y) <= 1e-9).all()
+    assert y[-1] == 0.0
+    assert x[-1] > 0.5
+    at = np.searchsorted(x, drawn.radii)
+    np.testing.assert_allclose(y[at[:-1]], drawn.volumes[:-1])
+    marked = (radius, drawn.radius_at(0.99), drawn.harmless)
+    for column, expected in zip(columns, marked, strict=True):
+        points = np.nonzero(np.isfinite(column))[0]
+        assert x[points].tolist() == ([] if expected is None else [expected])
+        for point in points:
+            assert column[point] == pytest.approx(volume_at(drawn, x[point]))
+    assert volume_at(drawn, 0.6) == 0.0
+
+
+def test_words_of_the_curve_show_its_radii_shares_and_first_contacts() -> None:
+    expected, html = curve_of(opened(OPTIMAL)), words_of(thick(opened(OPTIMAL), RADIUS))
+    rows = rows_of("<tr></tr>" + html)
+    assert [row[0] for row in rows] == ["present radius", "99 % accessible up to", "no loss up to"]
+    assert number(rows[0][1]) == RADIUS
+    share = 100.0 * volume_at(expected, RADIUS) / float(expected.volumes[0])
+    assert number(rows[0][2]) == pytest.approx(share, rel=5e-3)
+    assert number(rows[1][1]) == pytest.approx(expected.radius_at(0.99), rel=5e-3)
+    assert rows[2][1] == "0"
+    assert "touch within the limits, where z = 0: legs 1 and 4 at (0, 0, 0)" in html
+    least = least_clearances(OPTIMAL)
+    for pair in (PAIRS.index((2, 4)), PAIRS.index((3, 4))):
+        x, y = (f"{v:.3g}".replace("-", "−") for v in least.position[pair, :2])
+        assert f"legs {PAIRS[pair][0]} and {PAIRS[pair][1]} at ({x}, {y}, 0)" in html
+
+
+def test_chart_appears_once_its_curve_is_computed(services: Services, worker: StubWorker) -> None:
+    panel, feed = LegsPanel(services), services.get(RadiusFeed)
+    state = show_curve(opened(OPTIMAL))
+
+    def chart(state: State) -> dict[str, Any]:
+        feed.follow(Frame(state))
+        updates = list(panel.updates(Frame(state)))
+        return {name: v for h, name, v in updates if isinstance(h, viser.GuiUplotHandle)}
+
+    assert chart(opened(OPTIMAL)) == chart(state) == {"visible": False}
+    assert "Computing" in radius_words(Frame(state), feed)
+    answer(worker)
+    drawn = chart(state)
+    assert drawn["visible"] is True
+    expected = chart_columns(curve_of(state), 0.0)
+    for found, column in zip(drawn["data"], expected, strict=True):
+        np.testing.assert_array_equal(found, column)
+    # A new limit: the old curve, called out of date, until the new one is there.
+    narrow = with_limits(state, margin=1.0)
+    assert chart(narrow)["visible"] is True
+    assert "computing" in radius_words(Frame(narrow), feed)
+    answer(worker)
+    assert "computing" not in radius_words(Frame(narrow), feed)
+
+
 JOINED = Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0)
 END = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-20.0, 0.0, 15.0))
 
 
-def swept(end: Pose = END, start: State | None = None) -> State:
-    """Return the state after a move, its swept tetrahedra shown."""
-    begin = opened(OPTIMAL) if start is None else start
-    shown = viewed(begin, swept=True)
-    return UserAction(SetPose(end), "drag", 100.0).apply(shown)
+def swept(start: State) -> State:
+    """Return the state after a move to END, its swept tetrahedra shown."""
+    return UserAction(SetPose(END), "drag", 100.0).apply(viewed(start, swept=True))
 
 
-def random_states(count: int) -> list[State]:
-    """Return the optimum in poses all about its home, with legs of different radii."""
-    rng = np.random.default_rng(7)
-    return [
-        thick(
-            opened(
-                OPTIMAL,
-                Pose.of_yaw_pitch_roll(rng.uniform(-8.0, 15.0, 3), rng.uniform(-80, 80, 3)),
-            ),
-            *rng.uniform(0.0, 1.5, 4).tolist(),
-        )
-        for _ in range(count)
-    ]
-
-
-STATES = random_states(12)
+# With legs of different radii.
+STATES = [
+    thick(state, *radii)
+    for state, radii in zip(
+        random_states(12, seed=7),
+        np.random.default_rng(7).uniform(0.0, 1.5, (12, 4)).tolist(),
+        strict=True,
+    )
+]
 
 
 def clearances(state: State) -> np.ndarray[Any, np.dtype[np.float64]]:
     return leg_clearances(state.design, state.pose.position, state.pose.rotation).clearance
 
 
-# The panel
+# Clearances in the panel
 
 
 def in_column(values: list[float]) -> Any:
@@ -97,13 +522,13 @@ def test_table_shows_the_clearance_of_each_pair() -> None:
 def test_legs_that_share_a_joint_are_called_joined() -> None:
     index = PAIRS.index((2, 4))
     assert rows_of(clearance_table(Frame(opened(JOINED))))[index] == ["2 – 4", "joined", ""]
-    state = swept(start=opened(JOINED))
+    state = swept(opened(JOINED))
     assert rows_of(move_table(Frame(state)))[index] == ["2 – 4", "", "joined", ""]
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3, 0.4])
 def test_last_move_is_judged_by_both_tests(radius: float) -> None:
-    state = thick(swept(), radius)
+    state = thick(swept(opened(OPTIMAL)), radius)
     home = opened(OPTIMAL).pose
     exact = move_clearance(state.design, home, END)
     overlaps = step_overlaps(
@@ -123,34 +548,7 @@ def test_last_move_is_judged_by_both_tests(radius: float) -> None:
     assert f"overlap of {', '.join(named)}<" in html
 
 
-def test_words_of_a_move_say_whether_it_is_free() -> None:
-    # With the two lines perpendicular both carriages stand in one place.
-    turned = Pose(opened(OPTIMAL).pose.position, (1.0, 0.0, 0.0, -1.0))
-    assert "Legs touch on the way" in move_table(Frame(swept(turned)))
-    assert "Move the platform" in move_table(Frame(opened(OPTIMAL)))
-    html = move_table(Frame(swept(Pose((10.0, 5.0, 8.0), opened(OPTIMAL).pose.quaternion))))
-    assert "no overlap" in html
-    assert "ex-within" in html
-    assert "ex-beyond" not in html
-
-
-def test_last_move_is_shown_on_request(services: Services, desk: Desk) -> None:
-    panel = LegsPanel(services)
-    checkbox: Any = next(
-        handle
-        for handle, _, _ in panel.updates(Frame(desk.state))
-        if isinstance(handle, viser.GuiCheckboxHandle)
-    )
-    for on in (True, False):
-        desk.use(checkbox, on)
-        assert desk.state.view.swept is on
-        updates = list(panel.updates(Frame(desk.state)))
-        shown = [v for h, n, v in updates if isinstance(h, viser.GuiHtmlHandle) and n == "visible"]
-        # The words of the radius curve are not shown.
-        assert shown == [on, False]
-
-
-# The scene
+# Legs and clearances in the scene
 
 
 def test_legs_that_collide_are_coloured(services: Services) -> None:
@@ -206,26 +604,8 @@ def test_legs_with_radii_are_drawn_as_capsules(services: Services) -> None:
     np.testing.assert_allclose(ends["batched_scales"][:, 0], np.repeat(radii, 2), rtol=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("radius", "view", "hidden"),
-    [
-        (0.0, {}, ("line", "label", "rods", "ends")),
-        (0.0, {"clearance": True, "drawn_as": "6-4 twin"}, ("line", "label")),
-        (0.3, {"drawn_as": "6-4 twin"}, ("rods", "ends")),
-        (0.3, {"legs": False}, ("rods", "ends")),
-    ],
-)
-def test_clearances_and_capsules_are_hidden_where_they_are_not_wanted(
-    services: Services, radius: float, view: dict[str, Any], hidden: tuple[str, ...]
-) -> None:
-    shown = viewed(thick(opened(OPTIMAL), radius), **view)
-    drawn = by_name(ClearanceScene(services).updates(Placed(Frame(shown))))
-    for name in hidden:
-        assert drawn[f"/clearance/{name}"] == {"visible": False}
-
-
 def test_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
-    state, home = swept(), opened(OPTIMAL).pose
+    state, home = swept(opened(OPTIMAL)), opened(OPTIMAL).pose
     placed = Placed(Frame(state))
     drawn = by_name(SweptTetrahedra(services).updates(placed))
     assert all(each["visible"] is True for each in drawn.values())
@@ -241,46 +621,6 @@ def test_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
         mesh = drawn[f"/swept/{leg}"]
         np.testing.assert_allclose(mesh["vertices"], body, rtol=1e-5, atol=1e-5)
         assert mesh["color"] == colour
-    lines = drawn["/swept/edges"]
-    assert lines["points"].shape == lines["colors"].shape == (20, 2, 3)
-    assert [tuple(c) for c in lines["colors"][::5, 0].tolist()] == colours
-    # The legs where they were, over the edges.
-    starts = placed.scale * leg_axes(OPTIMAL, home.position, home.rotation)
-    np.testing.assert_allclose(drawn["/swept/starts"]["points"], starts, rtol=1e-5, atol=1e-5)
-
-
-def test_swept_tetrahedra_are_hidden_and_cost_nothing_where_they_are_not_wanted(
-    services: Services,
-) -> None:
-    scene = SweptTetrahedra(services)
-    for view in ({"swept": False}, {"swept": True, "drawn_as": "6-4 twin"}):
-        frame = Frame(viewed(swept(), **view))
-        assert list(by_name(scene.updates(Placed(frame))).values()) == [{"visible": False}] * 6
-        assert "last_move" not in vars(frame)
-    back = UserAction(SetPosition(0, 10.0), "x", 0.1)
-    there = UserAction(SetPosition(0, 12.0), "x", 0.0)
-    shown = viewed(opened(OPTIMAL), swept=True)
-    for state in (shown, back.apply(there.apply(shown))):
-        drawn = by_name(scene.updates(Placed(Frame(state))))
-        assert list(drawn.values()) == [{"visible": False}] * 6
-
-
-# The order of the carriages
-
-
-def test_checkbox_says_whether_the_carriages_keep_their_order(
-    services: Services, desk: Desk
-) -> None:
-    panel = DesignPanel(services)
-    boxes = {
-        handle.label: handle
-        for handle, _, _ in panel.updates(Frame(desk.state))
-        if isinstance(handle, viser.GuiCheckboxHandle)
-    }
-    for on, order in ((False, "any"), (True, "home")):
-        desk.use(boxes["Carriages keep their order"], on)
-        assert desk.state.design.limits.carriage_order == order
-    assert desk.complaints == []
 
 
 # The radii

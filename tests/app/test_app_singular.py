@@ -1,20 +1,22 @@
-"""Singularities on the page: strata, uncoupled motions, distances, performance; no browser."""
+"""Singularities and assembly modes on the page: strata, motions, distances, tables; no browser."""
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-import viser
-from desk import Desk, by_name, number
-from scipy.spatial.transform import Rotation, Slerp
+from desk import CLIENT, Desk, by_name, number, random_states
+from hypothesis import given
 from services import StubWorker, services_for
+from strategies import Case, all_cases
 
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.marks import Ghosts, ghost_points
+from explorer.app.features.mechanism.modes import MODES, HoveredMode, ModesPanel, modes_table
 from explorer.app.features.singularity.actions import (
     GoToSingularity,
     GoToStratum,
@@ -23,26 +25,15 @@ from explorer.app.features.singularity.actions import (
 )
 from explorer.app.features.singularity.distance import DistancePanel, distance_table
 from explorer.app.features.singularity.feed import StrataFeed
-from explorer.app.features.singularity.jog_panel import (
-    BEYOND,
-    HERE,
-    NEVER,
-    JogPanel,
-    jog_amount,
-    jog_label,
-    jog_span,
-    shown_travel,
-    travel_marks,
-)
-from explorer.app.features.singularity.jog_scene import JogScene, motion_line, shown_motions
+from explorer.app.features.singularity.jog_panel import jog_amount
+from explorer.app.features.singularity.jog_scene import JogScene
 from explorer.app.features.singularity.panel import SingularityPanel, summary
 from explorer.app.features.singularity.performance import performance_table
-from explorer.app.features.singularity.scene import LONGEST, BallScene, EllipsoidScene, NearestGhost
+from explorer.app.features.singularity.scene import BallScene, EllipsoidScene, NearestGhost
 from explorer.app.features.singularity.strata import GOALS, StrataPanel, distances_of
 from explorer.app.features.singularity.tasks import StrataRequest, strata_distances
-from explorer.app.inputs.ranges import coordinate_span
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import GoHome, Open, Set, SetPose, SetPosition
+from explorer.app.state.actions import Set, SetMode
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import SingularView
@@ -50,7 +41,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.displacement import displacement
 from explorer.mechanism.kinematics import attachment_points
-from explorer.mechanism.margins import INCIDENCES, margins
+from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
 from explorer.singularity.bruhat import OF_INCIDENCES, incidences
 from explorer.singularity.nearest import nearest_singularities
@@ -64,18 +55,6 @@ MOTIONS = range(len(UNCOUPLED))
 BATCHED = ("batched_positions", "batched_scales")
 
 
-def random_states(count: int, seed: int = 3) -> list[State]:
-    """Return the optimum in poses all about its home."""
-    rng = np.random.default_rng(seed)
-    return [
-        opened(
-            OPTIMAL,
-            Pose.of_yaw_pitch_roll(rng.uniform(-8.0, 15.0, 3), rng.uniform(-80, 80, 3)),
-        )
-        for _ in range(count)
-    ]
-
-
 def singular_states() -> list[State]:
     """Return the home pose brought to each singular stratum."""
     return [GoToStratum(w).apply(opened(OPTIMAL)) for w in STRATA if w != GENERIC]
@@ -83,10 +62,6 @@ def singular_states() -> list[State]:
 
 def viewed(state: State, **changes: Any) -> State:
     return Set("view.singular", replace(SingularView(), **changes)).apply(state)
-
-
-def deltas(pose: Pose) -> np.ndarray[Any, np.dtype[np.float64]]:
-    return margins(pose.position, pose.rotation)
 
 
 def plain(html: str) -> str:
@@ -175,142 +150,6 @@ def test_jog_counts_from_its_start_and_leads_back_there(motion: int) -> None:
     assert Jog(motion, 0.0).apply(state).pose == start.pose
 
 
-def test_jog_ends_when_the_platform_moves_otherwise() -> None:
-    state = Jog(2, 4.0).apply(random_states(1)[0])
-    for action in (SetPosition(0, 3.0), GoHome(), Open(OPTIMAL), Jog(5, 2.0)):
-        after = action.apply(state)
-        assert jog_amount(after, 2) == 0.0
-    # The next one begins where the platform is then.
-    after = Jog(2, 1.0).apply(SetPosition(0, 3.0).apply(state))
-    assert after.jog is not None
-    assert after.jog.start.position[0] == 3.0
-
-
-@pytest.mark.parametrize("state", random_states(4))
-def test_slider_of_a_motion_has_marks_where_the_margin_vanishes(state: State) -> None:
-    frame = Frame(state)
-    for index, motion in enumerate(UNCOUPLED):
-        travel, span = shown_travel(state, index), jog_span(state, index)
-        marks = travel_marks(frame, index)
-        for (at, shown), end in zip(marks, (travel.low, travel.high), strict=True):
-            assert span.low <= at <= span.high
-            if math.isinf(end):
-                assert shown == NEVER
-                continue
-            if shown == BEYOND:
-                assert abs(end) > abs(at)
-            else:
-                assert at == end
-                assert number(shown.rstrip("°")) == pytest.approx(end, abs=0.06)
-            after = Jog(index, end).apply(state)
-            size = float(np.linalg.norm(after.pose.position)) + 1.0
-            assert abs(deltas(after.pose)[motion.incidence - 1]) < 1e-12 * size
-
-
-def test_marks_of_a_motion_are_on_its_slider_on_any_path() -> None:
-    # On the way from mode 1 to mode 5 here, b4 passes where the motion along x does nothing.
-    paper = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-40.0, 0.0, 0.0))
-    states = [opened(OPTIMAL, paper), *random_states(4, seed=8), *singular_states()]
-    for state in states:
-        modes = Frame(state).snapshot.modes
-        first, last = modes.position[1], modes.position[5]
-        between = Slerp([0.0, 1.0], Rotation.from_matrix(modes.rotation[[1, 5]]))
-        for share in (0.0, 0.5 - 1e-9, 0.5, 0.5 + 1e-13, 0.75):
-            position = (1.0 - share) * first + share * last
-            there = opened(OPTIMAL, Pose.of(position, between(share).as_matrix()))
-            edge = coordinate_span(there).high
-            for index, motion in enumerate(UNCOUPLED):
-                most = edge if motion.kind == "translation" else 180.0
-                span = jog_span(there, index)
-                assert span.low <= 0.0 <= span.high
-                # The start is among the values of the slider.
-                assert abs(span.low / span.step - round(span.low / span.step)) < 1e-6
-                for at, shown in travel_marks(Frame(there), index):
-                    assert span.low <= at <= span.high
-                    assert abs(at) <= most
-                    if shown not in (NEVER, BEYOND, HERE, ""):
-                        assert abs(number(shown.rstrip("°"))) <= most
-                        assert "e" not in shown
-
-
-def test_slider_of_a_motion_jogs(services: Services, desk: Desk) -> None:
-    panel = JogPanel(services)
-    sliders: dict[str, Any] = {
-        handle.label: handle
-        for handle, _, _ in panel.updates(Frame(desk.state))
-        if isinstance(handle, viser.GuiSliderHandle)
-    }
-    assert len(sliders) == 6
-    before = desk.state
-    desk.use(sliders[jog_label(UNCOUPLED[0])], 12.0)
-    assert desk.state.pose == Jog(0, 12.0).apply(before).pose
-
-
-def test_marks_of_a_motion_stay_where_it_is_singular_while_it_moves(
-    services: Services, desk: Desk
-) -> None:
-    (state,) = random_states(1)
-    desk.session.do(SetPose(state.pose))
-    panel, index = JogPanel(services), 1
-    marks: list[list[tuple[float, str]]] = []
-    for amount in (0.0, 10.0, 25.0):
-        desk.session.do(Jog(index, amount))
-        found: list[Any] = [v for _, n, v in panel.updates(Frame(desk.state)) if n == "marks"]
-        marks.append(list(found[index]))
-    assert marks[0] == marks[1] == marks[2]
-    travel = shown_travel(state, index)
-    assert [value for value, _ in marks[0]] == pytest.approx([travel.low, travel.high])
-
-
-def test_motions_at_a_singular_pose_say_so_and_lead_away() -> None:
-    for index, motion in enumerate(UNCOUPLED):
-        home = opened(OPTIMAL)
-        state = GoToSingularity(motion.incidence).apply(home)
-        # A margin that is zero but for rounding is zero.
-        travel = motion.travel(state.pose)
-        assert min(abs(travel.low), abs(travel.high)) < 1e-9
-        assert travel_marks(Frame(state), index) == ((0.0, HERE), (0.0, ""))
-        assert f"δ{motion.incidence} = 0: {INCIDENCES[motion.incidence - 1]}" in plain(
-            summary(Frame(state))
-        )
-        after = Jog(index, 5.0).apply(state)
-        moved = motion.moved(state.pose, 1e-6)
-        change = margins(moved.position, moved.rotation)[motion.incidence - 1]
-        if abs(change) > 1e-9:
-            assert Frame(after).snapshot.stratum == GENERIC
-
-
-@pytest.mark.parametrize("state", random_states(3))
-def test_motion_is_drawn_from_singularity_to_singularity(state: State) -> None:
-    placed = Placed(Frame(state))
-    for motion, travel in zip(UNCOUPLED, placed.frame.travels, strict=True):
-        drawn = motion_line(placed, motion, travel)
-        assert np.isfinite(drawn.points).all()
-        ends = zip((0, -1), drawn.singular, (travel.low, travel.high), strict=True)
-        for end, is_singular, amount in ends:
-            if is_singular and motion.frame == "base":
-                there = placed.scale * np.array(motion.moved(state.pose, amount).position)
-                np.testing.assert_allclose(drawn.points[end], there, atol=1e-9)
-            assert is_singular or motion.kind == "translation"
-
-
-def test_motion_in_use_is_drawn_or_all_six_or_none(services: Services) -> None:
-    scene = JogScene(services)
-    state = random_states(1)[0]
-    for arrows, at_rest, in_use in (
-        ("one in use", (), (4,)),
-        ("all six", tuple(MOTIONS), tuple(MOTIONS)),
-        ("none", (), ()),
-    ):
-        rest = viewed(state, arrows=arrows)
-        for each, expected in ((rest, at_rest), (Jog(4, 5.0).apply(rest), in_use)):
-            placed = Placed(Frame(each))
-            assert shown_motions(placed) == expected
-            drawn = by_name(scene.updates(placed))
-            lines = [drawn[f"/motion/{i}/line"]["visible"] for i in MOTIONS]
-            assert lines == [i in expected for i in MOTIONS]
-
-
 # Distances
 
 
@@ -322,7 +161,7 @@ def test_distances_and_their_ghosts_are_those_of_the_nearest_poses(
     words = plain(distance_table(Frame(state)))
     distances = [each.distance for each in nearest]
     turns = np.degrees(least_turns(state.pose.position, state.pose.rotation))
-    for index, margin in enumerate(deltas(state.pose).tolist()):
+    for index, margin in enumerate(Frame(state).snapshot.margins):
         row = re.search(rf"δ{index + 1} (\S+) (\S+) mm (\S+)° Go {INCIDENCES[index]}", words)
         assert row is not None
         expected = (margin, OPTIMAL.unit_mm * distances[index], turns[index])
@@ -363,24 +202,7 @@ def test_buttons_lead_to_the_nearest_pose_and_refuse_where_it_is_reached(
         GoToSingularity(2).apply(viewed(GoToStratum((2, 1, 4, 3)).apply(desk.state)))
 
 
-# Performance
-
-
-@pytest.mark.parametrize("state", random_states(2))
-def test_ellipsoids_are_at_b4_and_have_their_axes(services: Services, state: State) -> None:
-    scene = EllipsoidScene(services)
-    for kind in ("speed", "force"):
-        placed = Placed(Frame(viewed(state, ellipsoid=kind)))
-        drawn = by_name(scene.updates(placed))
-        body, axes = drawn["/ellipsoid/body"], drawn["/ellipsoid/axes"]["points"]
-        assert body["visible"] is True
-        assert max(body["scale"]) <= LONGEST
-        np.testing.assert_allclose(
-            np.linalg.norm(axes[:, 1] - axes[:, 0], axis=1), 2 * np.array(body["scale"]), rtol=1e-3
-        )
-        np.testing.assert_allclose(
-            axes.mean(axis=1), np.tile(placed.points["b4"], (3, 1)), atol=1e-4
-        )
+# Singular poses
 
 
 @pytest.mark.parametrize("state", singular_states())
@@ -409,3 +231,106 @@ def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
         for _, name, value in scene.updates(placed):
             if name in ("points", "scale", "position", "wxyz", *BATCHED):
                 assert np.isfinite(np.asarray(value, dtype=np.float64)).all()
+
+
+# Assembly modes
+
+
+def rows_of_modes(frame: Frame) -> list[list[str]]:
+    """Return the cells of each row of the table."""
+    buttons = re.findall(r"<button[^>]*modes\.go.*?</button>", modes_table(frame, ""))
+    cells = [re.findall(r"<(?:b|span)(?: [^>]*)?>([^<]*)", button) for button in buttons]
+    return [[cell for cell in row if cell] for row in cells]
+
+
+def test_table_has_the_eight_modes_with_b4_and_the_limits_that_each_breaks() -> None:
+    frame = Frame(opened(OPTIMAL))
+    rows = rows_of_modes(frame)
+    assert [row[0] for row in rows] == [str(mode) for mode in range(8)]
+    for mode, row in enumerate(rows):
+        assert f"{row[0]}:  {row[1]}" == MODES[mode]
+        there = Frame(SetMode(mode).apply(frame.state))
+        np.testing.assert_allclose(
+            [number(cell) for cell in row[2:5]], there.state.pose.position, atol=0.06
+        )
+        # All numbers of the table have the same decimals.
+        assert {len(cell.partition(".")[2]) for cell in row[2:5]} == {1}
+        broken = there.snapshot.violations
+        assert (row[5] == "within") == (not broken)
+        if broken:
+            assert row[5].split(" +")[0] in broken[0].limit
+            assert str(broken[0]) in modes_table(frame, "").replace("&#x27;", "'")
+            assert row[5].endswith(f" +{len(broken) - 1}") == (len(broken) > 1)
+
+
+@given(all_cases())
+def test_table_of_any_pose_has_eight_rows_or_says_that_they_do_not_close(case: Case) -> None:
+    frame = Frame(opened(case.design, Pose.of(case.position, case.rotation)))
+    rows = rows_of_modes(frame)
+    assert len(rows) == 8
+    for row in rows:
+        if frame.snapshot.modes.feasible:
+            assert len(row) == 6
+            assert all(np.isfinite(number(cell)) for cell in row[2:5])
+        else:
+            assert row[2:] == ["does not close"]
+
+
+def test_press_on_a_row_goes_to_its_mode_and_one_in_the_head_switches_the_ghosts(
+    services: Services, desk: Desk
+) -> None:
+    ModesPanel(services)
+    desk.press(services.buttons, "modes.go", "6")
+    assert desk.state.mode == 6
+    desk.press(services.buttons, "modes.go", "8")
+    assert desk.state.mode == 6
+    for on in (True, False):
+        desk.press(services.buttons, "modes.ghosts")
+        assert desk.state.view.ghosts is on
+    labels = [command.label for command in services.buttons.commands]
+    assert "Pose › Assembly mode › 3: − + +" in labels
+    assert len(labels) == len(MODES) + 1
+
+
+def test_pointer_on_a_row_shows_one_ghost_with_its_number_and_leaves_no_step(
+    services: Services, desk: Desk
+) -> None:
+    ghosts = Ghosts(services)
+    before, steps = desk.state, desk.session.history
+
+    def drawn() -> dict[str, dict[str, Any]]:
+        return by_name(ghosts.updates(Placed(Frame(desk.state))))
+
+    def visible() -> list[str]:
+        return [name for name, values in drawn().items() if values.get("visible")]
+
+    assert visible() == []
+    desk.press(services.buttons, "modes.hover", "6")
+    assert sorted(visible()) == ["/ghosts/legs", "/ghosts/name/0", "/ghosts/platform/0"]
+    scene = drawn()
+    assert scene["/ghosts/name/0"]["text"] == MODES[6]
+    there = SetMode(6).apply(before).pose
+    points = attachment_points(OPTIMAL, there.position, there.rotation)
+    placed = Placed(Frame(desk.state))
+    expected = placed.scale * np.array([points.b1, points.b2, points.b3, points.b4])
+    np.testing.assert_allclose(ghost_points(placed, [6])[0], expected, atol=1e-9)
+    # The present mode has no ghost, and none is left once the pointer has gone.
+    for value in (str(before.mode), ""):
+        desk.press(services.buttons, "modes.hover", value)
+        assert visible() == []
+    assert desk.state == before
+    assert desk.session.history == steps
+
+
+def test_pointer_is_on_a_mode_or_on_none_and_leaves_with_its_browser(
+    services: Services, desk: Desk
+) -> None:
+    hovered = services.get(HoveredMode)
+    for text, row in (("9", None), ("-1", None), ("x", None), ("2", 2)):
+        desk.press(services.buttons, "modes.hover", text)
+        assert hovered.row == row
+    for client_id, expected in ((CLIENT.client_id + 1, 2), (CLIENT.client_id, None)):
+        client: Any = SimpleNamespace(client_id=client_id)
+        for forget in list(getattr(services.server, "_client_disconnect_cb")):  # noqa: B009
+            forget(client)
+        assert hovered.row == expected
