@@ -10,7 +10,6 @@ import re
 import signal
 from collections.abc import Iterator
 from dataclasses import replace
-from html import unescape
 from typing import Any
 
 import msgspec
@@ -36,17 +35,7 @@ from explorer.app.features.optimise.actions import (
     StartRun,
     TakePaperBox,
 )
-from explorer.app.features.optimise.buttons import (
-    ACCEPT,
-    CANCEL,
-    HULL,
-    LIFT,
-    PAPER,
-    PAPER_BOX,
-    REVERT,
-    START,
-)
-from explorer.app.features.optimise.limits import limit_rows
+from explorer.app.features.optimise.buttons import ACCEPT, CANCEL, HULL, LIFT, PAPER, REVERT, START
 from explorer.app.features.optimise.panel import OptimisePanel
 from explorer.app.features.optimise.plots import curves_of, data_of
 from explorer.app.features.optimise.problem import (
@@ -61,14 +50,7 @@ from explorer.app.features.optimise.problem import (
 from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.scene import FARTHEST, box_shown, edges_of, single
 from explorer.app.features.optimise.tasks import compare, optimise
-from explorer.app.features.optimise.words import (
-    comparison_table,
-    refused_words,
-    result_words,
-    search_notice,
-    value_text,
-    verdict_words,
-)
+from explorer.app.features.optimise.words import comparison_table, result_words, search_notice
 from explorer.app.session.session import UNDO
 from explorer.app.session.worker import Channel
 from explorer.app.state.action import Action
@@ -82,24 +64,17 @@ from explorer.app.state.actions import (
     SetVariable,
 )
 from explorer.app.state.frame import Frame
-from explorer.app.state.optimisation import (
-    PLACE,
-    Comparison,
-    OptimisationRequest,
-    SearchResult,
-    killed_result,
-    result_of,
-)
+from explorer.app.state.optimisation import PLACE, OptimisationRequest, killed_result, result_of
 from explorer.app.state.state import Run, State, opened
 from explorer.app.widgets.buttons import Buttons
-from explorer.errors import InputError, NoAnswerError
+from explorer.errors import InputError
 from explorer.measures.size import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.paper import paper_problem, paper_start
-from explorer.optimise.problem import OBJECTIVES, YAW, ObjectiveName
+from explorer.optimise.problem import OBJECTIVES, YAW
 from explorer.optimise.refutation.lifting import SWING_LIMIT
 from explorer.optimise.search.trail import Trail
 from explorer.workspace.limits.constraints import GAP, constraints, slacks
@@ -430,15 +405,6 @@ def test_opening_another_design_forgets_the_run_and_keeps_the_request() -> None:
     assert run_of(StartRun().apply(after)).number == 2
 
 
-def test_verdict_says_that_the_design_has_changed_since() -> None:
-    ended = end(start())
-    run = run_of(ended)
-    assert run.verdict is not None
-    assert "by hand" not in verdict_words(ended, run, run.verdict)
-    changed = SetVariable("b2", 3.3).apply(replace(ended, hold="pose"))
-    assert "by hand" in verdict_words(changed, run, run.verdict)
-
-
 # Problems, and what rules them out
 
 
@@ -493,24 +459,6 @@ def test_default_demands_can_be_kept_by_every_preset(name: str, objective: Any) 
     assert StartRun().apply(state).optimisation.is_on
 
 
-def test_limits_that_cannot_give_a_volume_say_so_before_a_press_and_refuse_one() -> None:
-    text = "the box holds at most 2,499 of the 8,000 units³ asked for"
-    state = ask(SMALL, opened(INITIAL))
-    assert f"T{text[1:]}." in unescape(result_words(state))
-    assert buttons_of(state)[START] == "disabled"
-    assert filled_buttons(state) == [LIFT]
-    assert buttons_of(state)[PAPER_BOX] == "enabled"
-    with pytest.raises(NoAnswerError, match=re.escape(text)):
-        StartRun().apply(state)
-    for free in (LiftLimit("box").apply(state), ask(OptimisationRequest(volume=2400.0), state)):
-        assert filled_buttons(free) == [START]
-        assert not {LIFT, PAPER_BOX} & {*buttons_of(free)}
-    # Taking the paper's box does not help where it is too small itself.
-    large = ask(OptimisationRequest(volume=20_000.0), state)
-    assert filled_buttons(large) == [LIFT]
-    assert PAPER_BOX not in buttons_of(large)
-
-
 @pytest.mark.parametrize(
     ("design", "request_", "limit", "title"),
     [
@@ -538,25 +486,6 @@ def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
     assert home_pose(after.design) == home_pose(design)
 
 
-def test_lifting_a_limit_that_is_not_there_is_refused() -> None:
-    for limit in ("", "guide", "l1 minimum", "longest leg"):
-        with pytest.raises(InputError, match="no limit named"):
-            LiftLimit(limit).apply(opened(OPTIMAL))
-
-
-@pytest.mark.parametrize("design", [INITIAL, msgspec.structs.replace(INITIAL, home=None)])
-@pytest.mark.parametrize("remedy", [LiftLimit("box"), TakePaperBox()])
-def test_remedy_against_the_box_allows_the_search_and_keeps_the_home(
-    design: Design, remedy: Action
-) -> None:
-    before = ask(replace(SMALL, clearance=0.2), opened(design))
-    after = remedy.apply(before)
-    assert refuted(before) != ()
-    assert refuted(after) == ()
-    assert home_pose(after.design) == home_pose(design)
-    assert after.pose == before.pose
-
-
 def test_tilt_is_demanded_over_the_required_box() -> None:
     state = SetRequest("optimisation.request.tilt", 20.0).apply(opened(OPTIMAL))
     problem = problem_of(state)
@@ -567,73 +496,7 @@ def test_tilt_is_demanded_over_the_required_box() -> None:
     assert "the tilt demanded must be below 90°" in refutation.message
 
 
-LOADED = msgspec.structs.replace(OPTIMAL, payload=Payload(force_n=1.0))
-
-
-@pytest.mark.parametrize(
-    ("design", "asked", "words"),
-    [
-        (OPTIMAL, {"held": True}, "no load: give its payload a mass.* in the tab Machine"),
-        (
-            OPTIMAL,
-            {"objective": "smallest-deflection"},
-            "no load: give its payload a mass.* in the tab Machine",
-        ),
-        (OPTIMAL, {"error": 0.1}, "no errors: give them.* errors of the actuators .* tab Machine"),
-        (LOADED, {"deflection": 0.1}, "The design is rigid: .* in the tab Machine"),
-    ],
-)
-def test_missing_input_of_the_machine_is_named_with_where_to_give_it(
-    design: Design, asked: dict[str, Any], words: str
-) -> None:
-    state = ask(OptimisationRequest(**asked), opened(design))
-    assert liftable(state) == ()
-    text = re.sub("<.*?>", " ", refused_words(refuted(state), liftable(state)))
-    assert "This cannot be optimised" in text
-    assert re.search(words, text), text
-    assert "tab Design" not in text
-
-
-def test_limits_in_force_are_listed_and_no_others() -> None:
-    design = limited(
-        OPTIMAL,
-        l1=(1.5, 12.0),
-        guide=(-3.0, 20.0),
-        gap=0.25,
-        box=None,
-        margin=0.5,
-        carriage_order="any",
-        swing=Swing(b4=40.0),
-        leg_radii=(0.1, 0.1, 0.3, 0.1),
-    )
-    assert dict(limit_rows(design)) == {
-        "l1": "1.5 to 12",
-        "d2, d4, l4": f"at most the reach |a3| = {design.reach:.5g}",
-        "d1, d3": "−3 to 20",
-        "|d1 − d3|": "at least 0.25",
-        "|δ1|, |δ2|, |δ3|": "at least 0.5, signs of home",
-        "swing": "at most b4 40°",
-        "leg radii": "0.1 to 0.3",
-    }
-    free = limited(OPTIMAL, box=None, carriage_order="any", margin=None)
-    assert [row for row, _ in limit_rows(free)] == ["l1, d2, d4, l4"]
-
-
 # What is shown
-
-
-def test_search_kept_from_its_volume_by_the_box_offers_to_lift_it() -> None:
-    request = OptimisationRequest(volume=2400.0)
-    state = start(request, opened(INITIAL))
-    best = iterates_of(state, 1)[0]
-    verdict = SearchResult("infeasible", "the box is too small", best, holding="box")
-    state = EndRun(run_of(state).number, verdict, (best,)).apply(state)
-    assert "No design keeps all demands" in result_words(state)
-    assert "ex-alert" not in result_words(state)
-    looks = buttons_of(state)
-    assert (looks[LIFT], looks[PAPER_BOX], looks[START]) == ("filled", "enabled", "enabled")
-    # What fell short is not offered as the main press.
-    assert looks[ACCEPT] == "enabled"
 
 
 def test_required_box_is_drawn_where_it_is() -> None:
@@ -683,25 +546,6 @@ def test_table_shows_old_and_new_and_their_difference(found: State) -> None:
     assert number(rows["longest"][1]) == pytest.approx(best_of(run).design.reach, abs=1e-4)
 
 
-def test_table_shows_infinite_loads_beside_finite_ones() -> None:
-    design = msgspec.structs.replace(
-        limited(LOADED, box=None), actuators=Actuators((50.0, 50.0, 50.0, 50.0, 50.0, 50.0))
-    )
-    on_plane, off_plane = ((8.0, 3.0, 0.0), (12.0, 7.0, 8.0)), ((8.0, 3.0, 1.0), (12.0, 7.0, 9.0))
-    request = OptimisationRequest(objective="smallest-load", box=off_plane)
-    run = run_of(start(request, opened(design)))
-    found = compare(design, design, None, (on_plane, off_plane))
-    for comparison, words in (
-        (found, ("infinite", "0.")),
-        (Comparison(found.after, found.before), ("0.", "infinite")),
-    ):
-        table = comparison_table(replace(run, comparison=comparison))
-        (cells,) = (row[1:] for row in rows_of(table) if row[0] == "load share over the box")
-        assert cells[0].startswith(words[0])
-        assert cells[1].startswith(words[1])
-        assert cells[2] == ""
-
-
 def test_charts_are_of_one_start_and_of_the_demands() -> None:
     state = start(ENDLESS)
     run = run_of(state)
@@ -716,29 +560,8 @@ def test_charts_are_of_one_start_and_of_the_demands() -> None:
     x, y, level = data_of(volume)
     assert x.tolist() == list(range(len(last)))
     assert len(y) == len(level) == len(x)
-    ended = run_of(end(state, iterates))
-    of_best = [each for each in iterates if each.run == best_of(ended).run]
-    assert len(curves_of(ended)[0].values) == len(of_best)
     # An exact match is drawn as the least power.
     small = start()
     first, second = iterates_of(small, 2)
     powers = curves_of(run_of(end(small, (first, replace(second, objective=0.0)))))[0].values
     assert powers.tolist() == [np.log10(first.value), -16.0]
-
-
-@pytest.mark.parametrize(
-    ("objective", "caption"),
-    [
-        ("smallest-load", "Load share over the box: 0.4"),
-        ("smallest-error", "Worst error over the box (units): 0.4"),
-        ("smallest-deflection", "Deflection over the box (units): 0.4"),
-        ("largest-margin", "Margin over the box (units): 0.4"),
-    ],
-)
-def test_chart_of_an_objective_has_its_unit(objective: ObjectiveName, caption: str) -> None:
-    state = start(OptimisationRequest(objective=objective), opened(MACHINE))
-    step = replace(iterates_of(state, 1)[0], objective=0.4)
-    assert curves_of(run_of(end(state, (step,))))[0].caption == caption
-    last = run_of(end(state, (replace(step, objective=None),)))
-    assert curves_of(last)[0].caption == caption.replace("0.4", "infinite")
-    assert value_text(last.problem, last.iterates[-1]).endswith(" infinite")
