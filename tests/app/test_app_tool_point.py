@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import datetime as dt
 import html
-import io
 import json
 import re
 from dataclasses import replace
 from typing import Any
-from unittest.mock import Mock
 
 import msgspec
 import numpy as np
 import pytest
-import trimesh
 import viser
-from client import wait_for
 from desk import Desk, by_name, number, rows_of
 from hypothesis import given, strategies as st
 from services import StubDownloads, StubWorker
@@ -36,38 +32,28 @@ from explorer.app.features.orientation.panel import OrientationPanel
 from explorer.app.features.orientation.scene import OrientationScene
 from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.panel import TYPED, PathsPanel, end_numbers
-from explorer.app.features.paths.runner import PathRunner
 from explorer.app.features.paths.scene import PathScene
 from explorer.app.features.sharing.scene_html import caption_of
-from explorer.app.features.singularity.jog_scene import motion_line
 from explorer.app.features.singularity.performance import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene
 from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_request
 from explorer.app.features.workspace.files import WorkspaceFiles
 from explorer.app.features.workspace.orientation import workspace_pose, workspace_start
 from explorer.app.features.workspace.panel import WorkspacePanel
-from explorer.app.features.workspace.regions import rows_of as matrix_rows
 from explorer.app.features.workspace.scene import WorkspaceScene
-from explorer.app.features.workspace.tasks import (
-    STEP,
-    WorkspaceDrawing,
-    export_mesh,
-    exported_name,
-)
+from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.features.workspace.words import workspace_details
 from explorer.app.inputs.ranges import position_span
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import GoHome, Set, SetAngle, SetMode, SetPose, SetPosition
+from explorer.app.state.actions import Set, SetAngle, SetMode, SetPose, SetPosition
 from explorer.app.state.compared import Look
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of, opened
 from explorer.app.storage.session_format import decode_session, encode_session
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.pieces import widgets
-from explorer.export import step
-from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
@@ -77,12 +63,10 @@ from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
 from explorer.mechanism.tool_point import Point
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import jacobian
-from explorer.singularity.uncoupled import UNCOUPLED
 from explorer.workspace.limits.constraints import constraints
 
 OPTIMAL = PRESETS["paper-optimal"]
 TOOL: Triple = (1.0, 0.0, 3.0)
-NO_LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 TILTED = Pose.of_yaw_pitch_roll((9.0, 4.0, 8.0), (-60.0, 15.0, 10.0))
 
 
@@ -158,9 +142,6 @@ def test_choice_of_the_point_is_one_step_that_can_be_undone(desk: Desk, services
         "Pose of the tool (design units, degrees)",
         "Assembly modes: the tool (design units)",
     }
-    desk.session.travel(UNDO)
-    assert desk.state.view.at == "b4"
-    assert desk.state.pose == before.pose
 
 
 def test_sliders_show_and_set_the_tool(desk: Desk, services: Services) -> None:
@@ -195,31 +176,19 @@ def test_span_of_a_coordinate_has_room_for_the_tool_at_any_orientation(tool: Tri
         assert (at == b4) == (room == 0.0)
 
 
-def test_table_of_modes_has_the_tool_of_each() -> None:
+def test_words_and_numbers_are_those_of_the_point() -> None:
     state = state_at()
     rows = re.findall(r"<button[^>]*modes\.go.*?</button>", modes_table(Frame(state), ""))
-    assert len(rows) == 8
     for mode, row in enumerate(rows):
         cells = re.findall(r"<span(?: [^>]*)?>([^<]*)", row)
         there = tool_of(SetMode(mode).apply(state))
         np.testing.assert_allclose([number(cell) for cell in cells[1:4]], there, atol=0.06)
-
-
-def test_words_and_numbers_are_those_of_the_point() -> None:
-    state = state_at()
     caption = caption_of(state, dt.date(2026, 1, 1)).partition("the tool at (")[2]
     numbers = re.sub("<.*?>", "", end_numbers(state, "start"))
     for text in (caption.partition(")")[0], numbers.partition(" ·")[0]):
         shown = [number(part) for part in text.split(", ")]
         np.testing.assert_allclose(shown, tool_of(state), atol=0.06)
     assert "of the tool in design units" in end_numbers(state, "start")
-    at_home = GoHome().apply(state)
-    x, y, z = (f"{value:.4g}".replace("-", "−") for value in tool_of(at_home))
-    words = SetPose(at_home.pose).describe(state, at_home)
-    assert words == f"Move the tool to {x}, {y}, {z}"
-    of_b4 = Set("view.at", "b4").apply(at_home)
-    assert SetPose(of_b4.pose).describe(of_b4, of_b4).startswith("Move b4 to ")
-    assert SetPosition(0, 3.0).describe(of_b4, SetPosition(0, 3.0).apply(of_b4)) == "x = 3"
 
 
 # The scene
@@ -247,28 +216,6 @@ def test_handle_is_at_the_tool_moves_it_and_turns_about_it(services: Services, d
     desk.session.do(Set("view.at", "b4"))
     written = by_name(handle.updates(Placed(Frame(desk.state))))["/handle"]
     np.testing.assert_allclose(written["position"], scale * np.array(desk.state.pose.position))
-
-
-@pytest.mark.parametrize("index", range(len(UNCOUPLED)))
-@pytest.mark.parametrize("tool", [TOOL, (0.0, 0.0, 3.0)])
-def test_motion_is_drawn_as_the_path_of_the_tool(index: int, tool: Triple) -> None:
-    placed = Placed(Frame(state_at(tool=tool)))
-    state, motion, travel = placed.frame.state, UNCOUPLED[index], placed.frame.travels[index]
-    line = motion_line(placed, motion, travel)
-    others = [value for value, axis in zip(tool, "xyz", strict=True) if axis != motion.axis]
-    if (motion.frame, motion.kind) == ("platform", "rotation") and not any(others):
-        # The tool stays, and is in the middle of the arc.
-        np.testing.assert_allclose(line.spoke[0], placed.scale * tool_of(state), atol=1e-9)
-        return
-    low, high = travel.low, travel.high
-    if motion.kind == "translation":
-        # It is drawn as far as it fits.
-        ends = line.points[[0, -1]] / placed.scale - tool_of(state)
-        low, high = (ends @ motion.line(state.pose)[1]).tolist()
-    amounts = np.linspace(low, high, len(line.points))
-    for amount, point in zip(amounts[::6], line.points[::6], strict=True):
-        there = replace(state, pose=motion.moved(state.pose, float(amount)))
-        np.testing.assert_allclose(point, placed.scale * tool_of(there), atol=1e-9)
 
 
 def test_ellipsoid_and_gains_are_those_of_the_tool(services: Services) -> None:
@@ -325,9 +272,6 @@ def test_straight_path_is_the_line_of_the_tool(services: Services) -> None:
     off = np.cross(points[:, 0] - points[0, 0], along / np.linalg.norm(along))
     assert np.abs(off).max() < 1e-4
     assert journey.pose_at(timed.duration) == TILTED
-    for crossing in journey.margins.crossings:
-        at = crossing.pose
-        assert abs(margins(at.position, at.rotation)[crossing.incidence - 1]) < 1e-9
     for index in (0, 40, 133, len(timed.time) - 2):
         there = replace(state, pose=journey.pose_at(float(timed.time[index])))
         np.testing.assert_allclose(
@@ -341,36 +285,13 @@ def test_straight_path_is_the_line_of_the_tool(services: Services) -> None:
     np.testing.assert_allclose(points[:, 0], expected, rtol=0.0, atol=1e-5)
 
 
-def test_path_is_planned_for_the_tool(services: Services, desk: Desk) -> None:
-    goal = Pose.of_yaw_pitch_roll((10.0, 4.0, 8.0), (-70.0, 8.0, 5.0))
-    for action in (
-        Set("design", with_tool(OPTIMAL)),
-        Set("view.at", "tool"),
-        Set("paths.goal", goal),
-        Set("paths.kind", "planned"),
-    ):
-        desk.session.do(action)
-    runner = PathRunner(services)
-    desk.session.do(Go())
-    runner.follow(Frame(desk.state))
-    wait_for(lambda: not desk.state.paths.is_planning)
-    journey = desk.state.journey
-    assert journey is not None, desk.state.paths.problem
-    # Between the corners the tool goes straight: see the tests of trajectories.
-    assert (journey.kind, journey.tool) == ("planned", TOOL)
-    assert not any(
-        evaluate(desk.state.design, journey.pose_at(float(seconds))).violations
-        for seconds in np.linspace(0.0, journey.trajectory.duration, 20)
-    )
-
-
 @pytest.mark.parametrize("end", ["Start", "Goal"])
 def test_typed_end_of_a_path_is_where_the_tool_is(services: Services, desk: Desk, end: str) -> None:
     panel = PathsPanel(services)
     desk.session.do(Set("design", with_tool(OPTIMAL)))
     desk.session.do(Set("view.at", "tool"))
 
-    def shown() -> dict[str, Any]:
+    def controls() -> dict[str, Any]:
         Assigner(services.server).assign(panel.updates(Frame(desk.state)))
         return {widget.label: widget.handle for widget in widgets(services.server)}
 
@@ -379,15 +300,15 @@ def test_typed_end_of_a_path_is_where_the_tool_is(services: Services, desk: Desk
         assert isinstance(pose, Pose)
         return replace(desk.state, pose=pose)
 
-    desk.use(shown()[end], TYPED)
+    desk.use(controls()[end], TYPED)
     before = typed()
-    np.testing.assert_allclose(shown()[f"{end} x, y, z"].value, tool_of(before), atol=1e-12)
-    desk.use(shown()[f"{end} x, y, z"], (9.0, 4.0, 8.0))
+    np.testing.assert_allclose(controls()[f"{end} x, y, z"].value, tool_of(before), atol=1e-12)
+    desk.use(controls()[f"{end} x, y, z"], (9.0, 4.0, 8.0))
     assert typed().pose.quaternion == before.pose.quaternion
-    desk.use(shown()[f"{end} angles (°)"], (-70.0, 10.0, 5.0))
+    desk.use(controls()[f"{end} angles (°)"], (-70.0, 10.0, 5.0))
     np.testing.assert_allclose(tool_of(typed()), (9.0, 4.0, 8.0), atol=1e-12)
     assert angles_of(typed().pose) == pytest.approx((-70.0, 10.0, 5.0))
-    assert shown()[f"{end} x, y, z"].value == (9.0, 4.0, 8.0)
+    assert controls()[f"{end} x, y, z"].value == (9.0, 4.0, 8.0)
 
 
 def test_undo_leads_back_to_the_point_of_each_step_and_leaves_the_rest_of_the_view(
@@ -527,24 +448,6 @@ def test_singular_planes_are_where_the_tool_is_singular(services: Services) -> N
             assert margins(there.position, there.rotation)[index] == pytest.approx(0.0, abs=1e-5)
 
 
-@pytest.mark.parametrize("orientation", ["pose", "home"])
-def test_broken_limit_is_marked_from_the_tool_on(services: Services, orientation: str) -> None:
-    state = in_workspace(state_at(), solid=True, orientation=orientation)
-    x, y, z = (2.5 * tool_of(state)).tolist()
-    state = SetPose(state.pose_at((x, y, z), state.pose)).apply(state)
-    nodes, _ = draw_workspace_of(services, state)
-    line = nodes["/workspace/broken/lines"]
-    assert line["visible"]
-    (start, end) = line["points"][0] / scene_scale(state)
-    np.testing.assert_allclose(start, tool_of(state), atol=1e-5)
-    name = nodes["/workspace/broken/label"]["text"].partition(":")[0]
-    # On the surface of the limit the pose breaks it by nothing.
-    turned = workspace_pose(Frame(state))
-    (limit,) = (each for each in constraints(OPTIMAL, turned.rotation) if each.name == name)
-    b4 = end - turned.rotation @ np.array(TOOL)
-    assert float(limit.slack(b4)) == pytest.approx(0.0, abs=1e-4)
-
-
 def test_paths_start_where_the_tool_is() -> None:
     state = in_workspace(state_at(), solid=True, region="accessible", start="pose")
     assert workspace_start(Frame(state)) == state.pose.position
@@ -557,34 +460,10 @@ def test_paths_start_where_the_tool_is() -> None:
     assert workspace_start(Frame(of_b4)) == state.pose.position
 
 
-def test_file_holds_the_positions_of_the_tool_and_is_named_after_it(
-    services: Services, desk: Desk, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    design, offset = with_tool(OPTIMAL), TILTED.rotation @ np.array(TOOL)
-    rows = matrix_rows(TILTED.rotation)
-    x, y, z = offset.tolist()
-    for what in ("workspace", "hull"):
-        bounds: list[FloatArray] = []
-        for arm in (None, (x, y, z)):
-            data = export_mesh(design, rows, 0.8, "limits", None, NO_LOAD, what, "stl", arm)
-            untyped: Any = trimesh
-            mesh = untyped.load(io.BytesIO(data), file_type="stl")
-            bounds.append(np.array(mesh.bounds) / design.unit_mm)
-        np.testing.assert_allclose(bounds[1], bounds[0] + offset, atol=1e-4)
-        assert exported_name("accessible", what, (x, y, z)) == f"accessible {what} of the tool"
-
-    # OpenCASCADE is slow, and its solids are judged elsewhere.
-    exact, write = Mock(), Mock()
-    monkeypatch.setattr(step, "exact_workspace", exact)
-    monkeypatch.setattr(step, "step_bytes", write)
-    export_mesh(design, rows, 0.2, "limits", None, NO_LOAD, "workspace", STEP, (x, y, z))
-    shift = exact.return_value.shifted
-    np.testing.assert_allclose(shift.call_args.args[0], design.unit_mm * offset)
-    write.assert_called_once_with(shift.return_value, f"workspace of the tool of {design.name}")
-    files = WorkspaceFiles(services)
-    desk.session.do(Set("design", with_tool(OPTIMAL)))
-    downloads = services.downloads
+def test_file_of_the_workspace_is_named_after_the_tool(services: Services, desk: Desk) -> None:
+    files, downloads = WorkspaceFiles(services), services.downloads
     assert isinstance(downloads, StubDownloads)
+    desk.session.do(Set("design", with_tool(OPTIMAL)))
     for at in ("b4", "tool"):
         desk.session.do(Set("view.at", at))
         files.send("workspace", "stl", 1)
@@ -616,9 +495,6 @@ def test_nodes_of_tilts_are_where_the_tool_is_at_tilt_zero(services: Services) -
         x, y, z = tools[index].tolist()
         there = replace(upright, pose=state.pose_at((x, y, z), upright.pose))
         assert not Frame(there).snapshot.violations
-        tilt = float(drawing.tilts[index]) - 1e-3
-        tilted = (GoToTilt(azimuth, max(0.0, tilt)).apply(there) for azimuth in range(0, 360, 24))
-        assert not any(Frame(each).snapshot.violations for each in tilted)
     # The cut is at the coordinate of the tool.
     level = float(np.median(tools[:, 0])) + 0.01
     parts = [
