@@ -335,13 +335,6 @@ def test_tool_angles_of_a_design_that_is_opened_are_its_own(desk: Desk) -> None:
                 "push up to 9 N and pull up to 7 N; the struts and the guide have no limit."
             ),
         ),
-        (
-            design_with(gravity=(3.0, 0.0, -4.0), guide=Guide(moment_nm=3.0)),
-            (
-                "No tool; carries nothing; gravity along (0.6, 0, −0.8); guide up to 3 N m; "
-                "the actuators and the struts have no limit."
-            ),
-        ),
     ],
 )
 def test_machine_words_tell_what_it_carries_and_what_is_limited(design: Design, words: str) -> None:

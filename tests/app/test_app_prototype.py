@@ -13,7 +13,6 @@ import pytest
 from desk import Desk, by_name, thick, viewed
 from part_gaps import least_gap
 from services import StubWorker
-from test_app_drawing import closed_volume
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import Bodies
@@ -22,18 +21,12 @@ from explorer.app.features.mechanism.legs import Legs
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.files import ASSEMBLIES
-from explorer.app.features.prototype.panel import (
-    FIT,
-    PrototypePanel,
-    trouble_of,
-)
+from explorer.app.features.prototype.panel import FIT, PrototypePanel, trouble_of
 from explorer.app.features.prototype.parts import Parts, PartsRequest, parts_drawing
 from explorer.app.features.prototype.parts_list import Bar, stock_of
 from explorer.app.features.prototype.scene import PrototypeScene, shown_places
 from explorer.app.features.prototype.tasks import export_assembly
-from explorer.app.scene.creases import creased
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import cylinder
 from explorer.app.state.actions import Open, SetPose, SetPosition, SetVariable, draw_as
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
@@ -185,7 +178,7 @@ def test_flags_and_handle_are_drawn_only_with_assembled_parts(services: Services
         assert all(bool(len(part.corners(placed))) == is_seen for part in drawn)
 
 
-def test_legs_that_collide_are_coloured(services: Services) -> None:
+def test_parts_of_legs_that_collide_are_coloured(services: Services) -> None:
     # The parts are still those of thinner legs, as while new ones are being made.
     placed_with_parts(services, with_prototype())
     placed = Placed(Frame(thick(with_prototype(), 0.3, 0.5, 0.5, 0.3)))
@@ -219,36 +212,6 @@ def test_exploded_parts_of_a_leg_are_free_of_each_other_and_within_the_corners(
         chain = [apart[name] for name in ("base", *names, "platform")]
         gap, *which = least_gap(chain, rest, least)
         assert gap == least, which
-
-
-def test_exploded_parts_move_straight_from_the_assembly(parts: Parts) -> None:
-    together, half, apart = (
-        shown_places(Placed(Frame(with_prototype(exploded=share))), parts)
-        for share in (0.0, 0.5, 1.0)
-    )
-    home = opened(OPTIMAL).pose
-    expected = parts.prototype.places(home.position, home.rotation)
-    assert np.array_equal(together.origin, expected.origin)
-    assert np.allclose(half.origin, 0.5 * (together.origin + apart.origin))
-    assert np.array_equal(apart.rotation, expected.rotation)
-    assert not apart.origin[0].any()
-
-
-# The meshes
-
-
-def test_creases_split_edges_and_no_round_faces(parts: Parts) -> None:
-    corners, faces = cylinder()
-    whole, indices = np.unique(corners.round(9), axis=0, return_inverse=True)
-    joined = indices[faces].astype(np.int32)
-    vertices, split = creased(whole, joined)
-    # A cylinder has two rims, each once in the mantle and once in a cap.
-    assert len(vertices) == 2 * len(whole)
-    assert closed_volume(vertices.astype(float), split.astype(np.int64)) == pytest.approx(
-        closed_volume(whole, joined.astype(np.int64)), rel=1e-6
-    )
-    for part, (drawn, sides) in zip(parts.prototype.parts, parts.meshes, strict=True):
-        assert np.allclose(drawn[sides], part.vertices[part.faces], atol=1e-5)
 
 
 # The feed

@@ -33,7 +33,7 @@ from explorer.app.features.sharing.view_picture import (
 )
 from explorer.app.server import Running
 from explorer.app.state.actions import Open, Set, SetMode, SetPosition, SetVariable
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import opened
 from explorer.app.state.view import View
 from explorer.errors import InputError
 from explorer.export.session_log import SessionTable, session_csv
@@ -50,10 +50,6 @@ def rows_of(table: SessionTable) -> list[dict[str, str]]:
 
 def floats(row: dict[str, str], *names: str) -> list[float]:
     return [float(row[name]) for name in names]
-
-
-def at(state: State, x: float) -> State:
-    return SetPosition(0, x).apply(state)
 
 
 @given(
@@ -97,19 +93,6 @@ def test_row_of_a_session_computes_again_by_itself(actions: list[SetPosition]) -
         assert_allclose(solution.rotation[mode], rotation, atol=1e-7)
         deltas = floats(row, "kappa1", "kappa2", "kappa3")
         assert_allclose(deltas, margins_of(np.array(position), rotation), atol=1e-12)
-
-
-def test_log_keeps_the_last_steps_and_none_that_moves_nothing() -> None:
-    log, state = SessionLog(most=7), opened(OPTIMAL)
-    for step in range(24):
-        log.record(at(state, 4.0 + 0.25 * step), step, f'step "{step}", again', 0.0)
-    last = at(state, 4.0 + 0.25 * 23)
-    log.record(Set("view", View(grid=False)).apply(last), 24, "View")
-    table = log.table()
-    assert len(log) == 7
-    assert table.position[:, 0].tolist() == [4.0 + 0.25 * step for step in range(17, 24)]
-    words = [row["moved_by"] for row in rows_of(table)]
-    assert words == [f'step "{step}", again' for step in range(17, 24)]
 
 
 @dataclass(frozen=True)

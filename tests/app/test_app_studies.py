@@ -29,12 +29,12 @@ from explorer.app.features.studies.actions import (
     PickDesign,
 )
 from explorer.app.features.studies.feed import Request, StudyDrawing, StudyFeed
-from explorer.app.features.studies.figures import PAPER, parallel, scatter
+from explorer.app.features.studies.figures import parallel, scatter
 from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.features.studies.plot_events import Boxed, Brushed, Picked, event_of
-from explorer.app.features.studies.plot_rows import PlotRows, default_axes, select_rows, thin_out
+from explorer.app.features.studies.plot_rows import PlotRows, select_rows, thin_out
 from explorer.app.features.studies.runner import StudyRunner
-from explorer.app.features.studies.words import legend, status
+from explorer.app.features.studies.words import status
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
@@ -386,6 +386,8 @@ def test_plots_hold_what_was_computed(feed: StudyFeed, home: Path) -> None:
     assert counts == sorted(counts, reverse=True)
     assert sum(counts) == int((~done).sum()) > 0
     assert drawing.plots is not None
+    assert drawing.plotted is not None
+    assert (drawing.plotted.across, drawing.plotted.up) == ("volume", "reach")
     lines, points = (json.loads(plot.to_json()) for plot in drawing.plots)
     for dimension in lines["data"][0]["dimensions"]:
         column = results.columns[dimension["name"]][done]
@@ -397,25 +399,6 @@ def test_plots_hold_what_was_computed(feed: StudyFeed, home: Path) -> None:
         rows = unpacked(trace["customdata"])
         assert unpacked(trace["x"]) == volume[rows].astype(np.float32).tolist()
         assert unpacked(trace["y"]) == reach[rows].astype(np.float32).tolist()
-
-
-@pytest.mark.parametrize("dark", [False, True])
-def test_colour_of_a_greater_value_contrasts_more_with_either_page(
-    feed: StudyFeed, dark: bool
-) -> None:
-    def light(colour: str) -> float:
-        red, green, blue = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
-
-    drawing = draw_study(feed, Studies(name="some"))
-    assert drawing.plotted is not None
-    points: Any = scatter(drawing.plotted, 1, dark=dark)
-    scale = [colour for _, colour in points["data"][1]["marker"]["colorscale"]]
-    contrasts = [abs(light(colour) - light(PAPER[dark])) for colour in scale]
-    assert contrasts == sorted(contrasts)
-    assert min(contrasts) > 0.1
-    # The legend shows the same, by the theme of each browser.
-    assert all(colour in legend(drawing) for colour in scale)
 
 
 def test_plots_show_brushes_and_the_picked_design(feed: StudyFeed, home: Path) -> None:
@@ -552,22 +535,6 @@ def status_of(results: Results, seen: PlotRows) -> str:
     return status(
         StudyDrawing(request, results, np.flatnonzero(seen.front), seen.inside, seen, None, ())
     )
-
-
-def test_front_of_the_two_objectives_shown_is_a_line() -> None:
-    columns = {"b2": [0.0, 1.0, 2.0, 3.0], "volume": [4.0, 2.0, 3.0, 1.0]}
-    columns["reach"] = [4.0, 2.0, 3.0, 5.0]
-    wanted = (Objective("volume", "max"), Objective("reach", "min"))
-    results = results_of(columns, objectives=wanted)
-    seen = select_rows(results, results.front(), Studies(name="s"))
-    assert seen is not None
-    assert default_axes(results.study, seen.axes) == (seen.across, seen.up) == ("volume", "reach")
-    (line,) = [t for t in scatter(seen, 1, dark=False)["data"] if t["mode"] == "lines"]
-    assert unpacked(line["x"]) == [2.0, 3.0, 4.0]
-    other = select_rows(results, results.front(), Studies(name="s", across="b2"))
-    assert other is not None
-    assert all(t["mode"] == "markers" for t in scatter(other, 1, dark=True)["data"])
-    assert parallel(other, 2, dark=True)["data"][0]["uirevision"] == 2
 
 
 class Studio:
