@@ -36,6 +36,7 @@ from explorer.app.features.optimise.actions import (
     TakePaperBox,
 )
 from explorer.app.features.optimise.buttons import ACCEPT, CANCEL, HULL, LIFT, PAPER, REVERT, START
+from explorer.app.features.optimise.limits import limit_rows
 from explorer.app.features.optimise.panel import OptimisePanel
 from explorer.app.features.optimise.plots import curves_of, data_of
 from explorer.app.features.optimise.problem import (
@@ -486,6 +487,14 @@ def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
     assert home_pose(after.design) == home_pose(design)
 
 
+def test_paper_box_allows_the_search_and_keeps_the_home() -> None:
+    before = ask(SMALL, opened(INITIAL))
+    after = TakePaperBox().apply(before)
+    assert refuted(before) != ()
+    assert refuted(after) == ()
+    assert home_pose(after.design) == home_pose(INITIAL)
+
+
 def test_tilt_is_demanded_over_the_required_box() -> None:
     state = SetRequest("optimisation.request.tilt", 20.0).apply(opened(OPTIMAL))
     problem = problem_of(state)
@@ -494,6 +503,31 @@ def test_tilt_is_demanded_over_the_required_box() -> None:
     state = SetRequest("optimisation.request.tilt", 95.0).apply(state)
     (refutation,) = refuted(state)
     assert "the tilt demanded must be below 90°" in refutation.message
+
+
+def test_limits_in_force_are_listed_and_no_others() -> None:
+    design = limited(
+        OPTIMAL,
+        l1=(1.5, 12.0),
+        guide=(-3.0, 20.0),
+        gap=0.25,
+        box=None,
+        margin=0.5,
+        carriage_order="any",
+        swing=Swing(b4=40.0),
+        leg_radii=(0.1, 0.1, 0.3, 0.1),
+    )
+    assert dict(limit_rows(design)) == {
+        "l1": "1.5 to 12",
+        "d2, d4, l4": f"at most the reach |a3| = {design.reach:.5g}",
+        "d1, d3": "−3 to 20",
+        "|d1 − d3|": "at least 0.25",
+        "|δ1|, |δ2|, |δ3|": "at least 0.5, signs of home",
+        "swing": "at most b4 40°",
+        "leg radii": "0.1 to 0.3",
+    }
+    free = limited(OPTIMAL, box=None, carriage_order="any", margin=None)
+    assert [row for row, _ in limit_rows(free)] == ["l1, d2, d4, l4"]
 
 
 # What is shown
