@@ -623,6 +623,25 @@ def test_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
         assert mesh["color"] == colour
 
 
+@pytest.mark.parametrize(
+    "state",
+    [
+        opened(OPTIMAL),
+        # Shown, but there is no move.
+        viewed(opened(OPTIMAL), swept=True),
+        viewed(opened(OPTIMAL), clearance=True, drawn_as="6-4 twin"),
+        viewed(thick(swept(opened(OPTIMAL)), 0.3), drawn_as="6-4 twin"),
+        viewed(thick(swept(opened(OPTIMAL)), 0.3), swept=False, legs=False),
+    ],
+)
+def test_clearances_capsules_and_tetrahedra_are_hidden_where_they_are_not_wanted(
+    services: Services, state: State
+) -> None:
+    for scene in (ClearanceScene(services), SweptTetrahedra(services)):
+        drawn = by_name(scene.updates(Placed(Frame(state))))
+        assert not any(values["visible"] for values in drawn.values())
+
+
 # The radii
 
 
