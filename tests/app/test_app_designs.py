@@ -21,7 +21,7 @@ from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.buttons import Buttons
-from explorer.errors import StorageError
+from explorer.errors import InputError, StorageError
 from explorer.mechanism.design_file import PRESETS, encode_design
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -136,6 +136,12 @@ def test_design_changed_while_it_is_saved_keeps_its_change(desk: Desk) -> None:
     changed = desk.state.design
     desk.session.do(MarkSaved(before))
     assert (desk.state.design, desk.state.base) == (changed, before)
+
+
+@pytest.mark.parametrize("name", ["", " ", "two\nlines", "x" * 101, "\x00"])
+def test_name_of_a_design_is_one_printable_line(desk: Desk, name: str) -> None:
+    with pytest.raises(InputError, match="name"):
+        SetName(name).apply(desk.state)
 
 
 def test_upload_is_read_strictly_and_its_name_is_no_path(

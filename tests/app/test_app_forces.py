@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import re
 from collections.abc import Generator
@@ -25,11 +27,17 @@ from explorer.app.features.forces.panel import GO, WORST, ForcesPanel, largest, 
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle, load_tip, tool_point
 from explorer.app.features.forces.words import share_colour, share_look, share_words
 from explorer.app.features.precision.actions import SetTolerances
-from explorer.app.features.precision.budget import SET, BudgetFeed, BudgetPart, budget_request
+from explorer.app.features.precision.budget import (
+    SET,
+    BudgetFeed,
+    BudgetPart,
+    budget_request,
+    budget_rows,
+)
 from explorer.app.features.precision.panel import TYPICAL, PrecisionPanel
 from explorer.app.features.precision.pose import PosePrecision
 from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene, drawn_times
-from explorer.app.features.precision.tasks import budget_of
+from explorer.app.features.precision.tasks import budget_of, budget_table
 from explorer.app.scene.placing import SCENE_REACH, Placed
 from explorer.app.scene.shapes import linear_colour
 from explorer.app.state.actions import Set
@@ -39,6 +47,7 @@ from explorer.app.state.view import ForcesView, PrecisionView
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.colours import GHOST, SINGULAR
 from explorer.errors import InputError, NoAnswerError
+from explorer.export.tolerance_table import COLUMNS
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
@@ -462,3 +471,22 @@ def test_budget_that_cannot_be_kept_is_reported_in_one_line(
     assert "actuators" in text
     desk.press(buttons, SET)
     assert desk.state == before
+
+
+def test_table_has_every_source_with_its_part() -> None:
+    rows = list(csv.reader(io.StringIO(budget_table(budget_request(state_with())).decode())))
+    assert rows[0] == list(COLUMNS)
+    assert sorted(row[1] for row in rows[1:]) == sorted(SOURCES)
+    by_source = {row[1]: row for row in rows[1:]}
+    assert by_source["b2y"][0] == "platform"
+    assert by_source["guide tilt y"][2:4] == ["degree", "0.1"]
+    assert sum(float(row[8]) for row in rows[1:]) == pytest.approx(1.0)
+
+
+def test_source_that_only_turns_the_tool_is_listed(services: Services) -> None:
+    errors = Actuators(error_mm=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0))
+    state = state_with(msgspec.structs.replace(OPTIMAL, actuators=errors))
+    text = words(markup(PrecisionPanel(services), state))
+    assert re.search(r"By source\s+l1\s+0(\.0+)? mm", text)
+    rows = "".join(budget_rows(budget_of(budget_request(state))))
+    assert set(re.findall(r"--share:([\d.]+)%", rows)) == {"0.00"}
