@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import html
+import io
 import json
 import re
 from dataclasses import replace
@@ -12,6 +13,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+import trimesh
 import viser
 from desk import Desk, by_name, number, rows_of
 from hypothesis import given, strategies as st
@@ -40,8 +42,9 @@ from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_reques
 from explorer.app.features.workspace.files import WorkspaceFiles
 from explorer.app.features.workspace.orientation import workspace_pose, workspace_start
 from explorer.app.features.workspace.panel import WorkspacePanel
+from explorer.app.features.workspace.regions import rows_of as matrix_rows
 from explorer.app.features.workspace.scene import WorkspaceScene
-from explorer.app.features.workspace.tasks import WorkspaceDrawing
+from explorer.app.features.workspace.tasks import WorkspaceDrawing, export_mesh
 from explorer.app.features.workspace.words import workspace_details
 from explorer.app.inputs.ranges import position_span
 from explorer.app.scene.placing import Placed, scene_scale
@@ -458,6 +461,20 @@ def test_paths_start_where_the_tool_is() -> None:
     np.testing.assert_allclose(there, tool_of(state), atol=1e-12)
     of_b4 = Set("view.at", "b4").apply(at_home)
     assert workspace_start(Frame(of_b4)) == state.pose.position
+
+
+@pytest.mark.parametrize("what", ["workspace", "hull"])
+def test_file_holds_the_positions_of_the_tool(what: str) -> None:
+    design, offset = with_tool(OPTIMAL), TILTED.rotation @ np.array(TOOL)
+    rows, no_load = matrix_rows(TILTED.rotation), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    x, y, z = offset.tolist()
+    bounds: list[FloatArray] = []
+    for arm in (None, (x, y, z)):
+        data = export_mesh(design, rows, 0.8, "limits", None, no_load, what, "stl", arm)
+        untyped: Any = trimesh
+        mesh = untyped.load(io.BytesIO(data), file_type="stl")
+        bounds.append(np.array(mesh.bounds) / design.unit_mm)
+    np.testing.assert_allclose(bounds[1], bounds[0] + offset, atol=1e-4)
 
 
 def test_file_of_the_workspace_is_named_after_the_tool(services: Services, desk: Desk) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import io
 import itertools
 import json
 import math
@@ -14,6 +15,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 import pytest
+import trimesh
 from desk import CLIENT, Desk
 from machines import six
 from services import StubDownloads, services_for
@@ -584,8 +586,12 @@ def test_load_that_nothing_holds_names_the_part(services: Services) -> None:
     assert drawing.mesh_volume == pytest.approx(drawing.volume, rel=0.02)
 
 
-def test_files_that_cannot_be_written_say_why(drawing: WorkspaceDrawing) -> None:
+def test_file_holds_the_part_that_holds_the_load_or_says_why_not(drawing: WorkspaceDrawing) -> None:
     rows = drawing.request.rotation
+    data = export_mesh(LOADED, rows, 0.02, "held", None, LOAD, "workspace", "stl")
+    untyped: Any = trimesh
+    volume = untyped.load(io.BytesIO(data), file_type="stl").volume / LOADED.unit_mm**3
+    assert volume == pytest.approx(drawing.held_volume, rel=5e-3)
     with pytest.raises(InputError, match="along which a part takes its limit consists of facets"):
         export_mesh(LOADED, rows, 0.1, "held", None, LOAD, "workspace", STEP)
     heavy = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0)
