@@ -44,10 +44,7 @@ from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 DAY = dt.date(2026, 3, 9)
-HOSTILE = (
-    '<script>alert(1)</script><img src=x onerror="alert(2)">x" onload="alert(1)" y=\''
-    "</title></style></pre>--> & &lt; ' \" ]]> <!--"
-)
+HOSTILE = '<script>alert(1)</script><img src=x onerror="a(2)">\' b="</title></style></pre>--> &lt; ]]> <!--'
 
 
 def page_of(design: Design, pose: Pose | None = None, record: Record | None = None) -> Node:
