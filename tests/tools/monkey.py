@@ -1,13 +1,10 @@
 """Random hands on a running explorer: through websockets, as many tabs, with no mercy.
 
 From the checkout, for as long as one likes: python tests/tools/monkey.py [actions] [seed]
-With --memory it looks at memory alone: the pages that it compares with take some too.
 """
 
 from __future__ import annotations
 
-import argparse
-import gc
 import io
 import math
 import os
@@ -35,18 +32,13 @@ from explorer.app.features.designs.panel import DesignsPanel
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start
-from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import RESTARTED
-from explorer.app.session.memory import freeze_objects, limit_arenas, trim_repeatedly
 from explorer.app.state.actions import Open
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
 from explorer.mechanism.design_file import PRESETS, encode_design
-from explorer.numerics.compiled import warm
 
-# Where requests are kept that failed in a worker; `python tests/tools/again.py` runs one again.
-FAULTS = Path(tempfile.gettempdir()) / "flagged-explorer-faults-of-the-monkey"
 TABS = 3
 # Between two looks at whether the page shows its state.
 BETWEEN_LOOKS = 1000
@@ -77,16 +69,12 @@ class Report:
         actions: That were done.
         faults: What the page said had gone wrong in the explorer itself.
         drift: What the page showed beside what a new page of the same state shows.
-        times: Of each look, on the monotonic clock.
-        memory: Of the process, in bytes, at each look.
         threads, processes: At each look.
     """
 
     actions: int = 0
     faults: list[str] = field(default_factory=list[str])
     drift: list[str] = field(default_factory=list[str])
-    times: list[float] = field(default_factory=list[float])
-    memory: list[int] = field(default_factory=list[int])
     threads: list[int] = field(default_factory=list[int])
     processes: list[int] = field(default_factory=list[int])
 
@@ -97,12 +85,10 @@ class Monkey:
     Args:
         running: The explorer.
         seed: For what it does; how its events fall between frames is not repeatable.
-        compares: Whether it looks at what the page shows, rather than at memory alone.
     """
 
-    def __init__(self, running: Running, seed: int, *, compares: bool = True) -> None:
+    def __init__(self, running: Running, seed: int) -> None:
         self.running = running
-        self._compares = compares
         self.report = Report()
         self._random = random.Random(seed)
         self._tabs = [SocketTab(running.url) for _ in range(TABS)]
@@ -124,8 +110,8 @@ class Monkey:
         self._gui = gui
         self._killed = 0.0
         page: Any = running.page
-        page._notify = self._hearing(page._notify)
-        page.session._report = self._fault
+        page._notify = self._listen(page._notify)
+        page.session._report = self._keep_fault
 
     def run(self, actions: int) -> Report:
         """Do so many things, look now and then, and say what came of it."""
@@ -153,20 +139,12 @@ class Monkey:
             tab.close()
 
     def look(self) -> None:
-        """Wait for quiet, compare the page with a new one of the same state, and measure."""
+        """Wait for quiet, and compare the page with a new one of the same state."""
         for tab in self._tabs:
             tab.flush()
         self._settle()
-        if self._compares:
-            self._compare()
-        gc.collect()
-        process = psutil.Process()
-        self.report.times.append(time.monotonic())
-        self.report.memory.append(process.memory_info().rss)
         self.report.threads.append(threading.active_count())
-        self.report.processes.append(len(process.children(recursive=True)))
-
-    def _compare(self) -> None:
+        self.report.processes.append(len(psutil.Process().children(recursive=True)))
         page = self.running.page
         state, history = page.session.state, page.session.history
         with explorer_with_data() as fresh:
@@ -199,19 +177,19 @@ class Monkey:
             time.sleep(0.05)
         raise AssertionError("the page does not come to rest")
 
-    def _fault(self, error: Exception) -> None:
+    def _keep_fault(self, error: Exception) -> None:
         self.report.faults.append(repr(error))
 
-    def _hearing(self, notify: Callable[[str, str, int | None], None]) -> Callable[..., None]:
+    def _listen(self, notify: Callable[[str, str, int | None], None]) -> Callable[..., None]:
         """Return how to notify people, so that what is no fault of theirs is kept."""
 
-        def notify_and_hear(title: str, message: str, who: int | None) -> None:
+        def notify_and_keep(title: str, message: str, who: int | None) -> None:
             # A worker that was killed is told of, and nothing else comes of it.
             if title != REFUSAL and message != RESTARTED:
                 self.report.faults.append(message)
             notify(title, message, who)
 
-        return notify_and_hear
+        return notify_and_keep
 
     @property
     def _tab(self) -> SocketTab:
@@ -379,32 +357,18 @@ def explorer_with_data() -> Generator[Running]:
     """Start an explorer with a data folder of its own, to be let loose on."""
     with tempfile.TemporaryDirectory() as folder:
         library, store = Library(Path(folder) / "designs"), SessionFile(Path(folder) / "sessions")
-        # What failed is to be had when the rest is gone.
-        user_data = UserData(library, store, faults=Faults(FAULTS))
-        running = start(PRESETS["paper-optimal"], port=0, user_data=user_data)
+        running = start(PRESETS["paper-optimal"], port=0, user_data=UserData(library, store))
         try:
             yield running
         finally:
             running.stop()
 
 
-def main() -> None:
+def main(actions: int = 20000, seed: int = 1) -> None:
     """Let a monkey loose and print what came of it."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("actions", nargs="?", type=int, default=20000)
-    parser.add_argument("seed", nargs="?", type=int, default=1)
-    parser.add_argument("--memory", action="store_true", help="look at memory alone")
-    asked = parser.parse_args()
-    # As the command does, lest what the kernels need is counted as growth.
-    limit_arenas()
-    warm()
-    with explorer_with_data() as running, trim_repeatedly():
-        freeze_objects()
-        began = time.monotonic()
-        report = Monkey(running, asked.seed, compares=not asked.memory).run(asked.actions)
-        print(f"{report.actions} actions in {time.monotonic() - began:.0f} s")
-    print("memory, MB:", [round(each / 1e6) for each in report.memory])
-    print("at, s:", [round(each - began) for each in report.times])
+    with explorer_with_data() as running:
+        report = Monkey(running, seed).run(actions)
+    print(f"{report.actions} actions")
     print("threads:", report.threads)
     print("processes:", report.processes)
     print("\n".join(["faults:", *report.faults, "drift:", *report.drift]))
@@ -412,4 +376,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(*map(int, sys.argv[1:]))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 
@@ -94,6 +95,11 @@ class Scene:
     size: tuple[int, int] = (1280, 800)
 
 
+def bare(**changes: Any) -> Action:
+    """Return the action that shows the bare mechanism and what the changes add."""
+    return Set("view", replace(BARE, **changes))
+
+
 SCENES = {
     "home": Scene(),
     "page": Scene(panels=True),
@@ -105,20 +111,7 @@ SCENES = {
     ),
     # From the side no two of the eight names lie on one another.
     "modes": Scene(
-        actions=(
-            Set(
-                "view",
-                View(
-                    handle=False,
-                    ghosts=True,
-                    flags=False,
-                    grid=False,
-                    tetrahedra=(False, False, False),
-                ),
-            ),
-        ),
-        view="side",
-        size=(900, 800),
+        actions=(bare(ghosts=True, flags=False, grid=False),), view="side", size=(900, 800)
     ),
     "unclosed": Scene(actions=(SetJoint(JOINTS.index("l1"), 20.0),), panels=True),
     # Tall, so that the whole diagram is in it, and the motions below.
@@ -132,30 +125,15 @@ SCENES = {
         size=(1280, 1200),
     ),
     "twin": Scene(actions=(Set("view", View(handle=False, drawn_as="6-4 twin")),)),
-    "workspace": Scene(
-        actions=(Set("view", replace(BARE, workspace=WorkspaceView(solid=True))),),
-    ),
+    "workspace": Scene(actions=(bare(workspace=WorkspaceView(solid=True)),)),
     "workspace-cut": Scene(
-        actions=(
-            Set(
-                "view",
-                replace(
-                    BARE,
-                    workspace=WorkspaceView(solid=True, colour="margin", cut="y", level=5.0),
-                ),
-            ),
-        ),
+        actions=(bare(workspace=WorkspaceView(solid=True, colour="margin", cut="y", level=5.0)),)
     ),
     # Cut open as above, so that the tilts inside are seen.
     "tilt": Scene(
         actions=(
-            Set(
-                "view",
-                replace(
-                    BARE,
-                    orientation=OrientationView(tilts=True),
-                    workspace=WorkspaceView(cut="y", level=5.0),
-                ),
+            bare(
+                orientation=OrientationView(tilts=True), workspace=WorkspaceView(cut="y", level=5.0)
             ),
         ),
         panels=True,
@@ -166,21 +144,17 @@ SCENES = {
     "accessible": Scene(
         actions=(
             Set("design.limits", with_radius(DESIGN, 0.2).limits),
-            Set("view", replace(BARE, workspace=WorkspaceView(solid=True, region="accessible"))),
-        ),
+            bare(workspace=WorkspaceView(solid=True, region="accessible")),
+        )
     ),
     "forces": Scene(
         actions=(
             Open(PRESS),
             SetPosition(2, 6.0),
-            Set(
-                "view",
-                replace(
-                    BARE,
-                    flags=False,
-                    grid=False,
-                    forces=ForcesView(shown=True, force=(-6.0, 14.0, -9.0), scale=30.0),
-                ),
+            bare(
+                flags=False,
+                grid=False,
+                forces=ForcesView(shown=True, force=(-6.0, 14.0, -9.0), scale=30.0),
             ),
         ),
         panels=True,
@@ -190,15 +164,11 @@ SCENES = {
         actions=(
             Open(typical_machine(PRESS)[0]),
             SetPosition(2, 7.0),
-            Set(
-                "view",
-                replace(
-                    BARE,
-                    flags=False,
-                    grid=False,
-                    forces=ForcesView(force=(40.0, 10.0, -20.0)),
-                    precision=PrecisionView(deflected=True, ellipsoid=True),
-                ),
+            bare(
+                flags=False,
+                grid=False,
+                forces=ForcesView(force=(40.0, 10.0, -20.0)),
+                precision=PrecisionView(deflected=True, ellipsoid=True),
             ),
         ),
         panels=True,
@@ -209,13 +179,8 @@ SCENES = {
     "load-share": Scene(
         actions=(
             Open(PRESS),
-            Set(
-                "view",
-                replace(
-                    BARE,
-                    forces=LOAD,
-                    workspace=WorkspaceView(solid=True, colour="share", cut="y", level=5.0),
-                ),
+            bare(
+                forces=LOAD, workspace=WorkspaceView(solid=True, colour="share", cut="y", level=5.0)
             ),
         ),
         panels=True,
@@ -225,10 +190,7 @@ SCENES = {
     "held": Scene(
         actions=(
             Open(PRESS),
-            Set(
-                "view",
-                replace(BARE, forces=LOAD, workspace=WorkspaceView(solid=True, region="held")),
-            ),
+            bare(forces=LOAD, workspace=WorkspaceView(solid=True, region="held")),
         ),
         panels=True,
         tab="Workspace",
@@ -236,15 +198,11 @@ SCENES = {
     # Half apart, so that each part is seen and where it belongs too.
     "prototype": Scene(
         actions=(
-            Set(
-                "view",
-                replace(
-                    BARE,
-                    flags=False,
-                    labels=False,
-                    drawn_as="prototype",
-                    prototype=PrototypeView(exploded=0.5),
-                ),
+            bare(
+                flags=False,
+                labels=False,
+                drawn_as="prototype",
+                prototype=PrototypeView(exploded=0.5),
             ),
         ),
         panels=True,
@@ -257,7 +215,7 @@ SCENES = {
     # What is left of the paper's optimum when a3 comes nearer, beside both rows of Table 1.
     "compare": Scene(
         actions=(
-            Set("view", BARE),
+            bare(),
             Pin(DESIGN),
             Pin(PRESETS["paper-initial"]),
             SetVariable("a3x", 17.0),
@@ -271,7 +229,7 @@ SCENES = {
     "optimise": Scene(
         actions=(
             Open(paper_start()),
-            Set("view", BARE),
+            bare(),
             SetRequest(
                 "optimisation.request",
                 OptimisationRequest(volume=PAPER_VOLUME, clearance=CLEARANCE),
@@ -353,7 +311,7 @@ def draw_studies(browser: Browser) -> bytes:
         running = start(DESIGN, port=0, studies=StudyFolders(Path(home)))
         try:
             session, panel = running.page.session, running.page.services.get(StudiesPanel)
-            session.do(Set("view", BARE))
+            session.do(bare())
             session.do(OpenStudy(study.name))
             session.do(PickDesign(results.design_of_row(row), index=index, study=study.name))
             session.do(brush)

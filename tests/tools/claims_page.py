@@ -1,6 +1,6 @@
 """The script that writes the manual's page of claims, and the data of the report's section.
 
-From the checkout: python tests/claims_page.py
+From the checkout: python tests/tools/claims_page.py
 """
 
 from __future__ import annotations
