@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
-from benchmarks.processes import EXPLORER, fresh_home, run_to_end, served
 from benchmarks.table import Row, seconds
-from benchmarks.timing import elapsed
+from benchmarks.timing import EXPLORER, ROOT, elapsed, run_to_end
 from explorer.app.browser.chromium import find_chromium
 from explorer.app.browser.headless import headless_browser
 
@@ -78,3 +81,39 @@ def _first_press(home: Mapping[str, str]) -> float:
         start = time.perf_counter()
         page.get_by_text("Converged", exact=True).first.wait_for()
         return time.perf_counter() - start
+
+
+def fresh_home(folder: Path) -> dict[str, str]:
+    """Return the environment of somebody who has never run the explorer."""
+    return {
+        **os.environ,
+        "XDG_CACHE_HOME": str(folder / "cache"),
+        "LOCALAPPDATA": str(folder / "cache"),
+        "EXPLORER_DATA": str(folder / "data"),
+    }
+
+
+@contextmanager
+def served(environment: Mapping[str, str]) -> Generator[str]:
+    """Serve the page from a process of its own and give its address."""
+    process = subprocess.Popen(
+        [*EXPLORER, "serve", "--no-open", "--port", "0"],
+        cwd=ROOT,
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+        # It may have started a process to compile in, which must end with it.
+        start_new_session=True,
+    )
+    with process:
+        assert process.stderr is not None
+        line = process.stderr.readline()
+        found = re.search(r"http://\S+", line)
+        try:
+            assert found, f"the explorer names no address but says {line!r}"
+            yield found[0]
+        finally:
+            if sys.platform == "win32":
+                process.kill()
+            else:
+                os.killpg(process.pid, signal.SIGKILL)

@@ -1,28 +1,30 @@
 """From the arrival of an event at the server to the last message of the scene it makes.
 
-A client in another process sends the events over a real websocket and reads all that
-comes back. An event ends when the scene with its value, or with a newer one, is assigned;
-the figures of the panels follow. The processor's time is that of both.
+A tab in another process sends the events over a real websocket and reads all that comes back.
+An event ends when the scene with its value, or with a newer one, is assigned; the figures of the
+panels follow. The processor's time is that of both.
 """
 
 from __future__ import annotations
 
+import math
+import multiprocessing
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
 from machines import PRESS
+from socket_tab import SocketTab
 
-from benchmarks.ready_page import ready_page
+from benchmarks.page import ready_page
 from benchmarks.samples import DESIGN
-from benchmarks.socket_client import Drag, HandleDrag, SliderDrag, dragging_process, sweep
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
-from explorer import Pose
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.scene.placing import scene_scale
 from explorer.app.server import Running
@@ -33,6 +35,8 @@ from explorer.app.widgets.assigning import Assigner, Update
 from explorer.mechanism.typical import typical_machine
 
 ROUNDS, EVENTS, WARM_UP_EVENTS = 3, 100, 20
+EVENTS_PER_SECOND = 30.0
+Message = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -41,14 +45,14 @@ class Kind:
 
     Attributes:
         name: In the table.
-        drag: The drag of a number of events from a state.
+        drag: The messages of a drag of so many events.
         sent: The value in a message of it.
         arrived: The same value in a state.
         is_loaded: Whether the machine has limits, errors and stiffness, and all is drawn.
     """
 
     name: str
-    drag: Callable[[State, int], Drag]
+    drag: Callable[[Running, int], list[Message]]
     sent: Callable[[Any], float]
     arrived: Callable[[State], float]
     is_loaded: bool = False
@@ -58,11 +62,44 @@ def _value(message: Any) -> float:
     return float(message.updates["value"])
 
 
-def _handle_drag(state: State, count: int) -> HandleDrag:
-    scale = scene_scale(state)
+def sweep(middle: float, count: int) -> list[float]:
+    """Return values that swing by 1 about the middle, in periods of two seconds."""
+    return [middle + math.sin(k / 10.0) for k in range(1, count + 1)]
+
+
+def _handle_drag(running: Running, count: int) -> list[Message]:
+    state = running.page.session.state
+    scale, message = scene_scale(state), "TransformControlsUpdateMessage"
     x, y, z = (scale * v for v in state.pose.position)
-    quaternion = state.pose.quaternion
-    return HandleDrag("/handle", [Pose((v, y, z), quaternion) for v in sweep(x, 1.0, count)])
+    return [
+        {"type": message, "name": "/handle", "position": (v, y, z), "wxyz": state.pose.quaternion}
+        for v in sweep(x, count)
+    ]
+
+
+def _slider_drag(running: Running, count: int) -> list[Message]:
+    handles: Any = running.viser.gui
+    (uuid,) = (
+        uuid
+        for uuid, handle in handles._gui_input_handle_from_uuid.items()
+        if getattr(handle, "label", None) == JOINT_LABELS["l1"]
+    )
+    start = running.page.session.state.joints[0]
+    return [
+        {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}
+        for value in sweep(start, count)
+    ]
+
+
+def drag(url: str, messages: Sequence[Message]) -> None:
+    """Send messages from a tab at an even pace."""
+    tab = SocketTab(url)
+    start = time.monotonic() + 0.1
+    for count, message in enumerate(messages):
+        time.sleep(max(0.0, start + count / EVENTS_PER_SECOND - time.monotonic()))
+        tab.send(message)
+    tab.flush()
+    tab.close()
 
 
 DRAG = Kind(
@@ -74,7 +111,7 @@ DRAG = Kind(
 KINDS = (
     Kind(
         "leg slider l1",
-        lambda state, count: SliderDrag(JOINT_LABELS["l1"], sweep(state.joints[0], 1.0, count)),
+        _slider_drag,
         _value,
         lambda state: state.joints[0],
     ),
@@ -173,7 +210,8 @@ def run() -> Iterator[Row]:
 def measure() -> dict[str, list[Stopwatch]]:
     """Return the stopwatch of every round, by kind."""
     watches: dict[str, list[Stopwatch]] = {kind.name: [] for kind in KINDS}
-    with ready_page() as running, dragging_process() as drag:
+    context = multiprocessing.get_context("spawn")
+    with ready_page() as running, ProcessPoolExecutor(1, mp_context=context) as tabs:
         session = running.page.session
         # The kinds take turns, so that no disturbance falls on one alone.
         for events in (WARM_UP_EVENTS, *[EVENTS] * ROUNDS):
@@ -185,7 +223,8 @@ def measure() -> dict[str, list[Stopwatch]]:
                 session.wait_until_idle()
                 stopwatch = Stopwatch(kind)
                 with timed(running, stopwatch):
-                    drag(running.url, [kind.drag(session.state, events)])
+                    tabs.submit(drag, running.url, kind.drag(running, events)).result()
+                    session.wait_until_idle()
                 if events == EVENTS:
                     watches[kind.name].append(stopwatch)
     return watches

@@ -1,8 +1,7 @@
-"""Design studies: designs a second, two workers beside one, and what a million designs ask."""
+"""Design studies: designs a second, two workers beside one, and the memory of a million."""
 
 from __future__ import annotations
 
-import heapq
 import json
 import os
 import subprocess
@@ -16,9 +15,8 @@ import msgspec
 import numpy as np
 from sweep_faults import HereWorkers
 
-from benchmarks.processes import ROOT
-from benchmarks.table import Row, per_second, seconds, times
-from benchmarks.timing import best_of, elapsed
+from benchmarks.table import Row, per_second, times
+from benchmarks.timing import ROOT, best_of, elapsed
 from explorer import (
     Design,
     LocalWorkers,
@@ -31,14 +29,12 @@ from explorer import (
 )
 from explorer.numerics.compiled import warm
 from explorer.sweep import rows, run as runs
-from explorer.sweep.parts import part_path, write_part
 from explorer.sweep.sampling import samples
 from explorer.sweep.study import STUDIES, Sampling, Study, encode_study
 from explorer.sweep.workers import Workers
 
 NODES, DESIGNS, BY_HAND, SHARED, ROUNDS = 20, 256, 32, 3072, 3
-MILLION, MANY_WORKERS, CHUNK, TIMED = 1_000_000, 100, 1024, 64
-SIZES = (1_000, 50_000, MILLION)
+CHUNK, SIZES = 1024, (1_000, 50_000, 1_000_000)
 
 STUDY = msgspec.structs.replace(
     STUDIES["trade-off"],
@@ -75,7 +71,6 @@ def run() -> Iterator[Row]:
     yield _one_core()
     yield _two_workers()
     yield _memory()
-    yield _million()
 
 
 def _one_core() -> Row:
@@ -157,41 +152,3 @@ def _memory() -> Row:
         f"{shown}; {per_second(count / duration)} sampled, packed and written",
         "constant",
     )
-
-
-def _million() -> Row:
-    """Simulate a million designs on many workers by what one chunk was seen to cost."""
-    study = study_of(MILLION, CHUNK)
-    encoded = encode_study(study)
-    timed = np.array([elapsed(lambda k=k: rows.evaluate(encoded, k, k + 1)) for k in range(TIMED)])
-    chunk = rows.rows_of_dead_workers(study, range(CHUNK), "")
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        writing = best_of(3, lambda: write_part(folder, study, 0, [chunk]))
-        size = part_path(folder, 0).stat().st_size
-    work = float(timed.mean()) * CHUNK
-    duration = _simulate(study.chunks, work, float(timed.std()) * CHUNK**0.5, writing)
-    # Rows without measures are smaller than those with them by what these take.
-    full = size + 8 * CHUNK * len(study.measures)
-    return Row(
-        f"a million designs on {MANY_WORKERS} workers, simulated, {CHUNK:,} designs a chunk",
-        f"{duration / 3600.0:.2f} h, "
-        f"{study.chunks * work / MANY_WORKERS / duration:.0%} of the workers' time at work; "
-        f"{study.chunks} files, {study.chunks * full / 1e6:.0f} MB",
-        beside=f"a chunk: {seconds(work)} of a worker, {seconds(writing)} of the sweep",
-    )
-
-
-def _simulate(chunks: int, work: float, spread: float, writing: float) -> float:
-    """Return how long chunks take on workers whose results one process writes one by one."""
-    random = np.random.default_rng(0)
-    free = [0.0] * MANY_WORKERS
-    finished: list[float] = []
-    for each in random.normal(work, spread, chunks).tolist():
-        # A worker takes the next task from those that lie ready: it waits for nobody.
-        finished.append(heapq.heappop(free) + max(0.0, each))
-        heapq.heappush(free, finished[-1])
-    sweep = 0.0
-    for done in sorted(finished):
-        sweep = max(sweep, done) + writing
-    return sweep

@@ -32,14 +32,6 @@ def as_text(rows: Sequence[Row]) -> str:
     )
 
 
-def as_markdown(rows: Sequence[Row]) -> str:
-    """Return the table in Markdown."""
-    lines = [HEAD, Row(*["---"] * len(HEAD)), *rows]
-    return "\n".join(
-        f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |" for line in lines
-    )
-
-
 def seconds(value: float) -> str:
     """Return a duration with three significant digits in the unit that suits it."""
     for unit, factor in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):

@@ -1,4 +1,4 @@
-"""The report's page of loads: true to statics, and absent without a machine."""
+"""The report of a machine: loads and precision, true to statics, and absent without one."""
 
 from __future__ import annotations
 
@@ -12,19 +12,29 @@ from limited_designs import ordinary_case
 from report_page import Node, read, table_of
 
 import explorer
-from explorer import Actuators, Design, Guide, Payload, Pose, Struts, Tool
+from explorer import Actuators, Design, Guide, Payload, Pose, Struts, Tolerances, Tool
 from explorer.app.features.sharing.reporting import make_report
 from explorer.export.report.data import gather_report_data
 from explorer.export.report.loads import ReportLoads
 from explorer.measures.case import Case
 from explorer.mechanism.design import JOINTS
+from explorer.mechanism.machine import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.reactions import LIMITED, PART_NAMES
-from explorer.statics.weights import design_weights
+from explorer.statics.compliance import largest_deflection, stiffness_of
+from explorer.statics.reactions import PART_NAMES
+from explorer.statics.weights import design_weights, payload_wrench
 from explorer.workspace.held import held_workspace
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 ZERO = np.zeros(6)
+POSE = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-60.0, 5.0, 2.0))
+TENTH: Triple = (0.1, 0.1, 0.1)
+ERRORS = Actuators(error_mm=(0.05, 0.02, 0.03, 0.04, 0.01, 0.06))
+SOFT = Actuators(stiffness_n_mm=(900.0, 1100.0, 700.0, 1300.0, 800.0, 1000.0))
+BENDS = Struts(outer_mm=12.0, inner_mm=10.0)
+TOLERANCES = Tolerances(TENTH, TENTH, TENTH, (0.2, 0.05), TENTH, TENTH, TENTH, TENTH)
+PAYLOAD = Payload(0.6, (0.0, 0.5, 1.0), 8.0)
+SINGULAR = Pose((10.0, 5.0, 9.0), (1.0, 0.0, 0.0, 0.0))
 
 
 def page_of(design: Design, pose: Pose | None = None) -> Node:
@@ -71,6 +81,25 @@ def reactions_at_home(design: Design) -> explorer.Reactions:
     return explorer.reactions(design, home.position, home.rotation, ZERO, tool, weights)
 
 
+def design_with(**parts: object) -> Design:
+    return msgspec.structs.replace(OPTIMAL, tool=Tool((0.5, -0.3, 1.5)), **parts)
+
+
+def section_of(page: Node, title: str) -> Node:
+    """Return the section with a title."""
+    (section,) = (each for each in page.all("section") if next(each.all("h2")).text == title)
+    return section
+
+
+def precision_of(design: Design) -> Node:
+    """Return the section on precision of a report at the pose of these tests."""
+    return section_of(page_of(design, POSE), "Precision")
+
+
+def given(design: Design) -> tuple[Design, Triple, FloatArray]:
+    return design, POSE.position, POSE.rotation
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
     design = loaded_case(seed)
@@ -96,62 +125,21 @@ def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
             weight, force = factor * float(value), factor * float(held.spread[index])
             found = parts[place + k].values
             assert found == [weight, force, limit, 100.0 * float(shares[index])]
-            # The share is that of the row's own numbers.
-            assert found[3] == pytest.approx(100.0 * (weight + force) / limit, rel=1e-12)
             assert f" {k + 2}" in parts[place + k].text
+    worst = ReportLoads(Case(design)).worst_payload_force
+    assert worst.share == pytest.approx(float(shares.max()), rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_report_loads_largest_payload_and_force_are_those_of_statics(seed: int) -> None:
     design = loaded_case(seed)
-    home = explorer.home_pose(design)
-    given = design, home.position, home.rotation
-    tool = design.tool.position
+    loaded = ReportLoads(Case(design)).loaded
     rows = table_of(loaded_page(seed), "Most that is held")
-    payload = explorer.largest_payload(*given, tool=tool)
-    assert rows["payload"].values == [float(payload)]
-    # In its worst direction the force takes a part to its limit, without a payload.
-    force = rows["force in every direction"].values[0]
-    direction = np.array(rows["its worst direction"].values)
-    bare = msgspec.structs.replace(design, payload=Payload())
-    held = explorer.reactions(*given, [*(force * direction), 0.0, 0.0, 0.0], tool)
-    shares = explorer.limit_shares(bare, held._replace(spread=np.zeros(12)))
-    assert shares.max() == pytest.approx(1.0, rel=1e-9)
-    assert PART_NAMES[int(shares.argmax())] in rows["its worst direction"].text
-    # The actuators alone hold no less.
-    most = explorer.largest_force(*given, np.minimum(*design.actuators.limits), tool)
-    assert force <= float(most) * (1.0 + 1e-12)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_worst_payload_force_uses_the_share_of_any_direction(seed: int) -> None:
-    design = loaded_case(seed)
-    loads = ReportLoads(Case(design))
-    worst = loads.worst_payload_force
-    assert worst.share == pytest.approx(loads.loaded.share, rel=1e-9)
-    # No sampled direction asks more, and the nearest of many asks nearly as much.
-    rng = np.random.default_rng(seed)
-    directions = rng.normal(size=(20_000, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    force = design.payload.force_n
-    plain = msgspec.structs.replace(
-        design, payload=msgspec.structs.replace(design.payload, force_n=0.0)
-    )
-    shares = _shares_under(plain, force * directions)
-    assert shares.max() <= worst.share * (1.0 + 1e-9)
-    assert shares.max() == pytest.approx(worst.share, rel=0.01)
-    here = _shares_under(plain, force * worst.direction[None])[0]
-    assert here.max() == pytest.approx(worst.share, rel=1e-9)
-    assert LIMITED[int(here.argmax())] == LIMITED[worst.part]
-
-
-def _shares_under(design: Design, forces: FloatArray) -> FloatArray:
-    """Return the shares of limits at home under forces (n, 3) at the tool, shape (n, 12)."""
-    home, load = explorer.home_pose(design), np.zeros((len(forces), 6))
-    load[:, :3] = forces
-    tool, weights = design.tool.position, design_weights(design)
-    held = explorer.reactions(design, home.position, home.rotation, load, tool, weights)
-    return explorer.limit_shares(design, held)
+    assert rows["payload"].values == [loaded.largest_payload]
+    assert rows["force in every direction"].values == [1.0 / loaded.newton.share]
+    direction = rows["its worst direction"]
+    assert direction.values == pytest.approx(loaded.newton.direction.tolist())
+    assert PART_NAMES[loaded.newton.part] in direction.text
 
 
 def test_report_loads_volume_is_that_of_held_workspace_beside_the_whole() -> None:
@@ -189,12 +177,14 @@ def test_report_of_limits_or_a_payload_alone_tells_what_follows_from_it() -> Non
     assert "share of its limit" not in page.text
 
 
-def test_report_without_a_machine_has_no_loads() -> None:
+def test_report_without_a_machine_has_neither_loads_nor_precision() -> None:
     for design in (OPTIMAL, msgspec.structs.replace(OPTIMAL, gravity=(1.0, 0.0, 0.0))):
-        assert gather_report_data(design).loads is None
+        data = gather_report_data(design)
+        assert (data.loads, data.precision) == (None, None)
         page = page_of(design)
-        assert "Loads" not in titles(page)
+        assert not {"Loads", "Precision"} & {*titles(page)}
         assert "explorer forces" not in page.text
+    assert "Precision" not in titles(page_of(design_with(payload=PAYLOAD)))
 
 
 def test_report_of_a_tool_alone_tells_the_tool_and_no_forces() -> None:
@@ -224,11 +214,86 @@ def test_report_of_too_large_a_load_names_the_best_position() -> None:
     assert note.values == [*held.best.tolist(), 100.0 * held.factor]
 
 
-def test_report_of_a_singular_pose_says_that_nothing_holds_a_load() -> None:
-    design = loaded_case(1)
-    level = Pose((10.0, 5.0, 9.0), (1.0, 0.0, 0.0, 0.0))
-    page = page_of(design, level)
-    assert not ReportLoads(Case(design, pose=level)).loaded.is_regular
-    assert "no finite forces hold a load" in page.text
-    (section,) = (each for each in page.all("section") if next(each.all("h2")).text == "Loads")
+def test_report_of_a_singular_pose_says_that_nothing_holds_a_load_or_bounds_errors() -> None:
+    section = section_of(page_of(loaded_case(1), SINGULAR), "Loads")
+    assert "no finite forces hold a load" in section.text
     assert "infinite" not in section.text
+    design = design_with(actuators=ERRORS, struts=BENDS, payload=PAYLOAD)
+    section = section_of(page_of(design, SINGULAR), "Precision")
+    assert "nothing bounds the errors" in section.text
+    assert not list(section.all("table"))
+
+
+def test_report_precision_tells_the_errors_of_the_pose_and_ranks_their_sources() -> None:
+    design = design_with(actuators=ERRORS, tolerances=TOLERANCES)
+    section, tool = precision_of(design), design.tool.position
+    by = explorer.pose_error_by_source(*given(design), tool)
+    bounds = explorer.source_errors(design)
+    rows = table_of(section, "Errors of the tool")
+    for name, part in (
+        ("actuators", slice(6)),
+        ("dimensions", slice(6, 29)),
+        ("all", slice(29)),
+    ):
+        worst = explorer.largest_error(by[:, part], bounds[part])
+        rms = explorer.rms_of_sources(by[:, part], bounds[part])
+        moved = [float(each.displacement) * design.unit_mm for each in (worst, rms)]
+        turned = [float(np.degrees(each.turn)) for each in (worst, rms)]
+        assert rows[name].values == pytest.approx([*moved, *turned], rel=1e-12)
+    alone = np.linalg.norm((by * bounds)[:3], axis=0) * design.unit_mm
+    ranked = table_of(section, "The largest 10 of 29")
+    assert list(ranked) == [explorer.SOURCES[k] for k in np.argsort(-alone)[:10]]
+    for name, row in ranked.items():
+        bound, moved, _ = row.values
+        index = explorer.SOURCES.index(name)
+        assert moved == pytest.approx(alone[index], rel=1e-12)
+        size = np.degrees(bounds[index]) if "tilt" in name else bounds[index] * design.unit_mm
+        assert bound == pytest.approx(size, rel=1e-12)
+        (bar,) = row.all("rect")
+        expected = 100.0 * alone[index] / alone.max()
+        assert float(bar.attributes["width"]) == pytest.approx(expected, abs=0.01)
+    assert "Compliance" not in section.text
+
+
+def test_report_precision_of_actuators_alone_lists_no_dimension() -> None:
+    section = precision_of(design_with(actuators=ERRORS))
+    assert list(table_of(section, "Errors of the tool")) == ["actuators"]
+    assert len(table_of(section, "Sources of errors")) == 6
+
+
+@pytest.mark.parametrize("payload", [PAYLOAD, Payload(0.6, (0.0, 0.5, 1.0)), Payload(force_n=8.0)])
+def test_report_precision_tells_what_the_payload_bends(payload: Payload) -> None:
+    design = design_with(actuators=SOFT, struts=BENDS, payload=payload)
+    section, tool = precision_of(design), design.tool.position
+    soft = explorer.compliance(*given(design), *stiffness_of(design), tool)
+    principal = explorer.principal_compliances(soft)
+    rows = [row.values for row in section.all("tr") if "mm/N" in row.text]
+    found = [values for values in rows if len(values) == 4]
+    assert [values[0] for values in found] == pytest.approx(
+        (principal.displacement * design.unit_mm).tolist()
+    )
+    assert found[0][1:] == pytest.approx(principal.force_directions[0].tolist())
+    weight = payload_wrench(design, POSE.rotation)
+    deflection = table_of(section, "Deflection")
+    size, *vector = deflection["displacement"].values
+    assert np.linalg.norm(vector) == pytest.approx(size, rel=1e-12)
+    largest, _ = largest_deflection(soft, weight, payload.force_n)
+    assert size == pytest.approx(float(largest) * design.unit_mm, rel=1e-9)
+    load = weight.copy()
+    if payload.force_n:
+        load[:3] += payload.force_n * np.array(deflection["direction of the force"].values)
+    assert vector == pytest.approx((soft @ load)[:3] * design.unit_mm, rel=1e-9)
+    shares = explorer.compliance_shares(*given(design), load, *stiffness_of(design), tool)
+    told = [row.values[0] for name, row in deflection.items() if name.startswith("share")]
+    assert told == pytest.approx([100.0 * float(share) for share in shares], rel=1e-9)
+
+
+def test_report_commands_of_a_tool_place_the_tool() -> None:
+    design = design_with(actuators=ERRORS, payload=PAYLOAD)
+    page = page_of(design, POSE)
+    at = POSE.position + POSE.rotation @ design.tool.position
+    words = " ".join(repr(float(value)) for value in at)
+    lines = page.one(id="commands").text.splitlines()
+    told = [line for line in lines if line.startswith(("explorer forces", "explorer accuracy"))]
+    assert len(told) == 2
+    assert all(f"--position {words} " in line and line.endswith("--at tool") for line in told)

@@ -1,4 +1,4 @@
-"""All of the precision of many poses, beside the same by NumPy's linear algebra."""
+"""Forces and precision of many poses, beside the same by NumPy's linear algebra."""
 
 from __future__ import annotations
 
@@ -14,14 +14,17 @@ from explorer import (
     Actuators,
     Struts,
     Tolerances,
+    actuator_forces,
     compliance_shares,
     deflection,
     inverse,
     jacobian,
     largest_error,
+    largest_force,
     pose_precision,
     principal_compliances,
     source_errors,
+    strut_bending,
 )
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
@@ -30,7 +33,7 @@ from explorer.statics.compliance import stiffness_of
 from explorer.statics.error_sources import by_source
 from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS
 
-POSES, ROUNDS = 10_000, 10
+FORCE_POSES, POSES, ROUNDS = 100_000, 10_000, 10
 TENTH = (0.1, 0.1, 0.1)
 MACHINE = msgspec.structs.replace(
     DESIGN,
@@ -47,8 +50,39 @@ HALVES = (slice(0, 3), slice(3, 6))
 
 def run() -> Iterator[Row]:
     """Yield the rows."""
-    positions, rotations, _ = around_home(POSES)
     warm()
+    yield from _forces()
+    yield from _precision()
+
+
+def _forces() -> Iterator[Row]:
+    positions, rotations, _ = around_home(FORCE_POSES)
+    loads = np.random.default_rng(1).normal(size=(FORCE_POSES, 6))
+    most = np.full(6, 100.0)
+    ours = best_of(ROUNDS, lambda: actuator_forces(DESIGN, positions, rotations, loads))
+
+    def solve() -> object:
+        transposed = np.swapaxes(jacobian(DESIGN, positions, rotations), -1, -2)
+        return np.linalg.solve(transposed, -loads[..., None])
+
+    theirs = best_of(3, solve)
+    yield Row(
+        f"forces of the six actuators in {FORCE_POSES:,} poses, one core",
+        seconds(ours),
+        "60 ms",
+        f"numpy.linalg.solve: {seconds(theirs)}; {times(theirs / ours)}",
+    )
+    bending = best_of(ROUNDS, lambda: strut_bending(DESIGN, positions, rotations, loads))
+    yield Row(f"bending of both struts in {FORCE_POSES:,} poses", seconds(bending))
+    force = best_of(ROUNDS, lambda: largest_force(DESIGN, positions, rotations, most))
+    yield Row(f"largest force in every direction in {FORCE_POSES:,} poses", seconds(force))
+    one = positions[0], rotations[0], loads[0]
+    alone = best_of(100, lambda: actuator_forces(DESIGN, *one))
+    yield Row("forces of the six actuators in one pose", seconds(alone))
+
+
+def _precision() -> Iterator[Row]:
+    positions, rotations, _ = around_home(POSES)
     errors, (stiffness, bending) = actuator_errors(MACHINE), stiffness_of(MACHINE)
 
     def all_of_it() -> object:
