@@ -22,13 +22,7 @@ from explorer import PRESETS
 from explorer.app.browser.chromium import find_chromium
 from explorer.app.browser.headless import headless_browser
 from explorer.app.browser.viser_gaps import mark_broadcasts
-from explorer.app.screenshot import (
-    AWAIT_FRAMES,
-    PATIENCE_SECONDS,
-    SCENE_CANVAS,
-    open_page,
-    settle,
-)
+from explorer.app.screenshot import AWAIT_FRAMES, PATIENCE_SECONDS, SCENE_CANVAS, open_page, settle
 from explorer.app.server import Running, start
 from explorer.app.session.memory import freeze_objects
 from explorer.numerics.compiled import warm

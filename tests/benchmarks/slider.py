@@ -109,12 +109,7 @@ DRAG = Kind(
     lambda state: state.pose.position[0] * scene_scale(state),
 )
 KINDS = (
-    Kind(
-        "leg slider l1",
-        _slider_drag,
-        _value,
-        lambda state: state.joints[0],
-    ),
+    Kind("leg slider l1", _slider_drag, _value, lambda state: state.joints[0]),
     DRAG,
     replace(DRAG, name="drag handle, forces and precision drawn", is_loaded=True),
 )

@@ -24,12 +24,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.statics.held import largest_shares, load_case
 from explorer.workspace.held import held_workspace
-from explorer.workspace.limits.constraints import (
-    BallOrCylinder,
-    HalfSpace,
-    constraints,
-    slacks,
-)
+from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints, slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.nodes import count_nodes
 from explorer.workspace.slices.volume import bounds, home_rotation, workspace_volume
