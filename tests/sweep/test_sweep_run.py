@@ -265,28 +265,6 @@ def test_copies_of_parts_are_listed_as_strays(whole: Path, tmp_path: Path) -> No
     assert summarise(whole).strays == []
 
 
-def test_part_with_a_damaged_column_is_computed_again(whole: Path, tmp_path: Path) -> None:
-    path = part_path(tmp_path, 4)
-    data = part_path(whole, 4).read_bytes()
-    with importlib.import_module("pyarrow.parquet").ParquetFile(part_path(whole, 4)) as file:
-        group = file.metadata.row_group(0)
-        columns = [group.column(k) for k in range(group.num_columns)]
-    copy_parts(whole, tmp_path)
-    assert [column.path_in_schema for column in columns] == list(columns_of(STUDY))
-    for column in columns:
-        # The last byte of its pages belongs to their data, not to their headers.
-        start = column.dictionary_page_offset or column.data_page_offset
-        spoilt = bytearray(data)
-        spoilt[start + column.total_compressed_size - 1] ^= 4
-        path.write_bytes(spoilt)
-        summary = summarise(tmp_path)
-        assert (summary.damaged, summary.count) == (1, 83 - 8)
-    workers = HereWorkers()
-    assert run_study(STUDY, tmp_path, workers).kept == 83 - 8
-    assert workers.pieces == [range(32, 40)]
-    assert contents(tmp_path) == contents(whole)
-
-
 def test_part_with_any_flipped_bit_is_damaged_or_equal(whole: Path, tmp_path: Path) -> None:
     ((_, _, expected),) = [each for each in sound_parts(whole, []) if each[1] == 1]
     data = part_path(whole, 1).read_bytes()
@@ -556,10 +534,7 @@ def test_run_ends_when_workers_cannot_start_fail_or_have_other_versions(
         with pytest.raises(RunError, match=words):
             run_study(STUDY, tmp_path, HereWorkers())
     monkeypatch.setattr(SpawnProcess, "start", refuse)
-    with (
-        LocalWorkers(2) as workers,
-        pytest.raises(RunError, match="no worker process stays alive"),
-    ):
+    with LocalWorkers(2) as workers, pytest.raises(RunError, match="no worker process stays alive"):
         run_study(STUDY, tmp_path, workers)
     assert part_paths(tmp_path) == []
 
