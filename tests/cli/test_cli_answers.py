@@ -1,7 +1,15 @@
-"""What the commands answer is what the package computes, as JSON and as text."""
+"""What the commands answer, whole and once, as the package computes it; and the process."""
 
 from __future__ import annotations
 
+import dataclasses
+import errno
+import inspect
+import json
+import os
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import msgspec
@@ -10,15 +18,17 @@ import pytest
 from command_line import CommandLine
 
 import explorer
+from explorer import InputError, NoAnswerError
+from explorer.cli import COMMANDS, main, run
+from explorer.cli.commands.sweep import Sweep
+from explorer.cli.parsing import load_command
 from explorer.mechanism.feasible_intervals import feasible_intervals
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
+from explorer.sweep.run import RunError
 
 POSITION = (8.0, -2.5, 1.1e1)
 ANGLES = (-60.0, 12.5, -7.0)
-POSE = [
-    *("--position", "8", "-2.5", "1.1e1"),
-    *("--yaw-pitch-roll", "-60", "12.5", "-7"),
-]
+POSE = [*("--position", "8", "-2.5", "1.1e1"), *("--yaw-pitch-roll", "-60", "12.5", "-7")]
 PRESET = explorer.PRESETS["paper-optimal"]
 
 
@@ -84,16 +94,13 @@ def test_singularity_json_has_the_snapshot(cli: CommandLine) -> None:
     }
 
 
-def test_singularity_singular_pose_has_status_0(cli: CommandLine) -> None:
+def test_singularity_singular_pose_has_status_0_and_names_its_incidence(cli: CommandLine) -> None:
     found = cli.answer("singularity", "--position", "0", "0", "0")
     assert found["determinant"] == 0.0
     assert found["stratum_dimension"] < 5
     assert found["incidences"] == [1, 2, 3]
     assert [each["distance"] for each in found["nearest"]] == [0.0, 0.0, 0.0]
     assert all(each["position"] == [0.0, 0.0, 0.0] for each in found["nearest"])
-
-
-def test_singularity_singular_pose_names_its_incidence(cli: CommandLine) -> None:
     argv = ["singularity", "--position", "10", "5", "0", "--yaw-pitch-roll", "-70", "20", "30"]
     text = cli.text(*argv)
     (row,) = [line for line in text.splitlines() if line.startswith("singular ")]
@@ -126,18 +133,6 @@ def test_forward_joints_of_inverse_give_the_pose_in_its_mode(cli: CommandLine) -
     assert [float(value) for value in rows[expected.mode][4:7]] == pytest.approx(POSITION)
 
 
-def test_forward_infeasible_joints_have_status_1(
-    cli: CommandLine,
-) -> None:
-    joints = snapshot().joints.copy()
-    joints[0] = 0.5
-    found = cli.answer("forward", "--joints", *map(repr, joints.tolist()), status=1)
-    assert found["feasible"] is False
-    assert found["modes"] == []
-    assert found["discriminants"] == explorer.discriminants(PRESET, joints).tolist()
-    assert found["discriminants"][0] < 0.0
-
-
 def test_forward_infeasible_joints_suggested_value_is_feasible(cli: CommandLine) -> None:
     for joint in range(6):
         joints = snapshot().joints.copy()
@@ -149,14 +144,16 @@ def test_forward_infeasible_joints_suggested_value_is_feasible(cli: CommandLine)
         assert explorer.forward(PRESET, joints).feasible
 
 
-def test_forward_infeasible_joints_name_the_tetrahedron(
-    cli: CommandLine,
-) -> None:
+def test_forward_infeasible_joints_have_status_1_and_name_the_tetrahedron(cli: CommandLine) -> None:
     joints = snapshot().joints.copy()
     joints[5] = 60.0
+    argv = ["forward", "--joints", *map(repr, joints.tolist())]
     squares = explorer.discriminants(PRESET, joints)
     assert [square < 0 for square in squares.tolist()] == [False, False, True]
-    message = cli.refusal("forward", "--joints", *map(repr, joints.tolist()), status=1)
+    found = cli.answer(*argv, status=1)
+    assert (found["feasible"], found["modes"]) == (False, [])
+    assert found["discriminants"] == squares.tolist()
+    message = cli.refusal(*argv, status=1)
     assert message.startswith("explorer: ")
     assert "trilateration 3 (tetrahedron b4 a1 a2 a3)" in message
     assert f"{squares[2]:.4g}" in message
@@ -187,9 +184,7 @@ def test_design_option_file_equals_its_preset(cli: CommandLine, tmp_path: Path) 
 
 
 def test_answers_are_free_of_messages_of_libraries(
-    cli: CommandLine,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
+    cli: CommandLine, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def chatty(design: object, pose: explorer.Pose, **options: object) -> None:
         print("(a library) did this")
@@ -209,3 +204,315 @@ def test_answers_are_free_of_messages_of_libraries(
     assert cli.text(*argv) == f"{out}\n"
     handle = True
     assert cli.answer(*argv, "--handle") == {"file": str(out), "size": [640, 480]}
+
+
+# Commands that write files beside their answer, the option of each file, and what names it.
+PAPER = ("optimise", "--design", "paper-initial", "--target-volume", "900")
+WITH_FILES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "path": (("path", "--to", "12", "8", "7"), ("--out",)),
+    "budget": (("budget", "--typical", "--wanted", "5"), ("--out",)),
+    "optimise": (PAPER, ("--out", "--record")),
+}
+PROGRESS = re.compile(r"\[[#.]*\] .*")
+
+
+def run_with_progress(cli: CommandLine, *argv: object, status: int) -> tuple[str, list[str]]:
+    """Return standard output, and the lines of standard error without those of progress."""
+    cli.has_progress = True
+    out, err = cli.run(*argv, status=status)
+    return out, [line for line in err.splitlines() if not PROGRESS.fullmatch(line)]
+
+
+def fail_for_space(*_: object) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize("name", WITH_FILES)
+def test_answer_is_printed_though_the_disk_is_full(
+    cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    cli.has_progress = True
+    argv, options = WITH_FILES[name]
+    files = [(option, tmp_path / f"{option[2:]}.x") for option in options]
+    given = [*argv, *(word for pair in files for word in pair)]
+
+    whole = cli.answer(*argv)
+    text, _ = run_with_progress(cli, *argv, status=0)
+    monkeypatch.setattr(os, "fsync", fail_for_space)
+    found = cli.answer(*given, status=1)
+    ignored = {"seconds", "trajectory"}
+    assert {key: found[key] for key in whole if key not in ignored} == {
+        key: value for key, value in whole.items() if key not in ignored
+    }
+    assert not any(str(path) in str(found) for _, path in files)
+    page, complaints = run_with_progress(cli, *given, status=1)
+    without_numbers = [re.sub("[0-9.]+ (s|ms)", "", each) for each in (page, text)]
+    assert without_numbers[0] == without_numbers[1]
+    (line,) = complaints
+    assert line.startswith("explorer: cannot write ")
+    assert all(str(path) in line for _, path in files)
+    assert os.strerror(errno.ENOSPC) in line
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("failing", ["design.json", "run.json"])
+def test_optimise_writes_each_file_that_it_can(
+    cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    cli.has_progress = True
+    usual = Path.replace
+
+    def replace(self: Path, target: Path) -> Path:
+        if Path(target).name == failing:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return usual(self, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    out, record = tmp_path / "design.json", tmp_path / "run.json"
+    found = cli.answer(*PAPER, "--out", out, "--record", record, status=1)
+    (left,) = tmp_path.iterdir()
+    assert found["converged"] is True
+    assert found["files"] == [str(left)]
+    assert {left.name, failing} == {"design.json", "run.json"}
+
+
+def test_optimise_without_convergence_and_disk_reports_both_in_a_line(
+    cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "fsync", fail_for_space)
+    argv = [*PAPER[:3], "--target-volume", "2000", "--iterations", "1"]
+    out, complaints = run_with_progress(cli, *argv, "--record", tmp_path / "run.json", status=1)
+    assert "best so far" in out
+    (line,) = complaints
+    assert "iteration" in line
+    assert "; cannot write " in line
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ("forces", "--position", "3", "4", "0"),
+        ("accuracy", "--position", "3", "4", "0"),
+        ("budget", "--position", "3", "4", "0"),
+        ("budget", "--over", "box"),
+        ("budget", "--typical", "--keep-actuators", "--wanted", "1e-9"),
+        ("path", "--to", "12", "8", "-7"),
+        ("forward", "--joints", "1", "2", "3", "4", "5", "600"),
+        ("optimise", "--design", "paper-initial", "--target-volume", "20000"),
+        ("export", "workspace", "--out", "x.stl", "--yaw-pitch-roll", "0", "0", "0"),
+    ],
+)
+def test_question_without_answer_gives_one_object_and_status_1(
+    cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, argv: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = cli.answer(*argv, status=1)
+    _, complaint = cli.run(*argv, status=1)
+    if not {"found", "feasible"} & set(found):
+        assert complaint == f"explorer: {found['message']}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ("path", "--from", "40", "8", "7", "--to", "12", "8", "7"),
+        ("path", "--to", "40", "8", "7"),
+        ("path", "--to", "12", "8", "0"),
+        ("path",),
+        ("inverse", "--design", "nowhere"),
+        ("optimise",),
+        ("export", "workspace", "--out", "x.stl", "--density", "3"),
+        ("sweep", "--out", "nowhere", "--summary"),
+    ],
+)
+def test_bad_input_gives_no_object_and_status_2(cli: CommandLine, argv: tuple[str, ...]) -> None:
+    assert cli.refusal(*argv, "--json", status=2)
+
+
+@pytest.mark.parametrize(
+    ("error", "status"), [(RunError("lost"), 1), (NoAnswerError("none"), 1), (InputError("no"), 2)]
+)
+@pytest.mark.parametrize("as_json", [True, False])
+def test_any_error_of_status_1_is_an_object(
+    cli: CommandLine, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int, as_json: bool
+) -> None:
+    def fail(_: Sweep) -> None:
+        raise error
+
+    monkeypatch.setattr(Sweep, "run", fail)
+    out, err = cli.run("sweep", *["--json"] * as_json, status=status)
+    assert out == (f'{{"message": "{error}"}}\n' if as_json and status == 1 else "")
+    assert err == f"explorer: {error}\n"
+
+
+PROGRAM = [sys.executable, "-m", "explorer"]
+
+
+def test_process_answer_is_one_json_object_and_status_0() -> None:
+    argv = [*PROGRAM, "inverse", "--position", "10", "5", "9", "--json"]
+    done = subprocess.run(argv, capture_output=True, encoding="utf-8", check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert set(json.loads(done.stdout)) == {"joints", "within_limits", "violations"}
+
+
+@pytest.mark.parametrize(("words", "status"), [(["1"] * 6, 1), (["1", "2", "x"], 2)])
+def test_main_without_answer_exits_with_status_and_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+    status: int,
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["explorer", "forward", "--joints", *words])
+    with pytest.raises(SystemExit) as leave:
+        main()
+    assert leave.value.code == status
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+
+
+@pytest.mark.long
+def test_installed_script_runs_the_module() -> None:
+    script = Path(sys.executable).parent / "explorer"
+    if not script.exists():
+        pytest.skip("the project is not installed here")
+    done = subprocess.run([script, "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout == f"explorer {explorer.__version__}\n"
+
+
+def test_version_and_help_are_those_of_the_package(cli: CommandLine) -> None:
+    assert cli.text("--version") == f"explorer {explorer.__version__}\n"
+    listed = cli.text("--help")
+    assert cli.text("-h") == listed
+    for name, summary in COMMANDS.items():
+        assert f"{name} " in listed
+        assert summary in listed
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_of_a_command_describes_every_option(cli: CommandLine, name: str) -> None:
+    page, command = cli.text(name, "--help"), load_command(name, COMMANDS)
+    assert page.startswith(f"usage: explorer {name} ")
+    assert COMMANDS[name] in page
+    assert (inspect.getdoc(command) or "").splitlines()[0] == COMMANDS[name]
+    for field in dataclasses.fields(command):
+        option = f"--{field.name.replace('_', '-')}"
+        is_placed = field.default is dataclasses.MISSING or f"[{field.name.upper()}]" in page
+        assert option in page or (is_placed and "positional" in page)
+
+
+def test_small_commands_import_no_slow_library() -> None:
+    code = (
+        "import sys; from explorer.cli import run; "
+        "run(['inverse']); run(['forward', '--joints', *'123456']); run(['--help']); "
+        "large = {'viser', 'numba', 'trimesh', 'manifold3d', 'playwright', 'scipy.optimize'}; "
+        "sys.stderr.write(repr(sorted(large & set(sys.modules))))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.endswith("[]")
+
+
+def raise_in_command(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    """Make each command that loads a design raise an error."""
+
+    def load(name: str) -> object:
+        raise error
+
+    monkeypatch.setattr("explorer.cli.options.load_design", load)
+
+
+def test_interrupt_is_silent_with_status_130(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    raise_in_command(monkeypatch, KeyboardInterrupt())
+    assert run(["inverse"]) == 130
+    assert capsys.readouterr() == ("", "")
+
+
+def test_internal_error_is_one_line_with_status_70(
+    cli: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    raise_in_command(monkeypatch, ZeroDivisionError("a\nb"))
+    monkeypatch.delenv("EXPLORER_DEBUG", raising=False)
+    refused = cli.refusal("inverse", "--json", status=70)
+    assert "ZeroDivisionError" in refused
+    assert "report" in refused
+    monkeypatch.setenv("EXPLORER_DEBUG", "1")
+    assert run(["inverse", "--json"]) == 70
+    assert "Traceback" in cli.capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+def test_closed_pipe_is_silent() -> None:
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run([*PROGRAM, "inverse"], stdout=write, stderr=subprocess.PIPE, check=False)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
+def test_full_streams_end_with_one_line_or_keep_answer_and_status() -> None:
+    argv, refused = [*PROGRAM, "inverse", "--json"], [*PROGRAM, "inverse", "--design", "nowhere"]
+    pipe = subprocess.PIPE
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(argv, stdout=full, stderr=pipe, check=False)
+        kept = [subprocess.run(a, stdout=pipe, stderr=full, check=False) for a in (argv, refused)]
+    assert done.returncode == 2
+    assert done.stderr.startswith(b"explorer: cannot write to standard output: ")
+    assert done.stderr.count(b"\n") == 1
+    assert [(each.returncode, each.stdout.count(b"\n")) for each in kept] == [(0, 1), (2, 0)]
+
+
+@pytest.mark.long
+@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
+def test_record_that_no_longer_fits_on_the_disk_keeps_design_and_answer(tmp_path: Path) -> None:
+    argv = ("optimise", "--design", "paper-initial", "--target-volume", "900", "--json")
+    # A file of at most 4 kB: the design fits, the record does not.
+    limit = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)); "
+    code = f"{limit}from explorer.cli import run; sys.exit(run(sys.argv[1:]))"
+    done = subprocess.run(
+        [sys.executable, "-c", code, *argv, "--out", str(tmp_path / "best.json")],
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+    assert done.returncode == 1
+    found = json.loads(done.stdout)
+    assert found["converged"] is True
+    assert found["files"] == [str(tmp_path / "best.json")]
+    assert explorer.load_design(found["files"][0]).name == found["design"]["name"]
+    assert [path.name for path in tmp_path.iterdir()] == ["best.json"]
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith(f"explorer: cannot write {str(tmp_path / 'best.record.json')!r}: ")
+
+
+ALIKE = ("−-", "–-", "⁻-", "×x", "≤<=", "≥>=", "²2", "³3", '“"', '”"', "′'", "öo", "±+-", "° deg")
+LETTERS = ("δdelta", "ΔDelta", "øo", "ŁL", "ßss", "ǿo", "ẑz", "æae")
+LIKE = {pair[0]: pair[1:] for pair in (*ALIKE, *LETTERS, "½1/2", "≠!=", "µu", "漢?")}
+
+
+def encodes(letter: str, encoding: str) -> bool:
+    try:
+        return bool(letter.encode(encoding))
+    except UnicodeEncodeError:
+        return False
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
+def test_terminal_gets_the_characters_most_like_those_that_it_lacks(encoding: str) -> None:
+    text = "−1.5 – 2×3 ≤ 4² ≥ “Größe” 漢δ 10⁻³ ±½° V′ ≠ΔøŁǿẑæµ"
+    code = (
+        "from explorer.cli import streams; streams.prepare(); "
+        f"streams.write({text!r}); streams.write_error({text!r})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"},
+        check=True,
+    )
+    shown = "".join(each if encodes(each, encoding) else LIKE[each] for each in text)
+    assert done.stdout.decode(encoding) == shown
+    assert done.stderr.decode(encoding).rstrip() == shown

@@ -43,17 +43,13 @@ def joined(tmp_path: Path) -> str:
     return str(file)
 
 
-def test_interference_pose_has_clearances_of_pairs(
-    cli: CommandLine,
-) -> None:
+def test_interference_pose_has_clearances_of_pairs(cli: CommandLine) -> None:
     found = cli.answer(*POSE, "--radii", *map(str, RADII))
     expected = explorer.evaluate(
         with_radii(RADII), explorer.Pose.of_yaw_pitch_roll(POSITION, ANGLES)
     )
     legs = expected.clearances
-    assert set(found) == {
-        *("pairs", "closest", "is_clear", "radii", "within_limits", "violations"),
-    }
+    assert set(found) == {*("pairs", "closest", "is_clear", "radii", "within_limits", "violations")}
     assert column(found, "legs") == [list(pair) for pair in explorer.PAIRS]
     assert column(found, "distance") == legs.distance.tolist()
     assert column(found, "clearance") == legs.clearance.tolist()
@@ -129,9 +125,7 @@ def test_interference_default_steps_are_within_the_node_step(
         assert farthest(found["steps"] - 1) > step
 
 
-def test_interference_move_keeps_what_is_not_given(
-    cli: CommandLine,
-) -> None:
+def test_interference_move_keeps_what_is_not_given(cli: CommandLine) -> None:
     straight = cli.answer(*POSE, "--to", "14", "-2", "6")
     assert straight["end"]["quaternion"] == straight["start"]["quaternion"]
     by_angles = cli.answer("--to-yaw-pitch-roll", "-20", "0", "15")
@@ -179,9 +173,7 @@ def test_interference_text_has_a_row_per_pair(cli: CommandLine) -> None:
             assert [row[-1] == "overlap" for row in rows] == column(found, "overlaps")
 
 
-def test_interference_verdict_separates_clear_touching_and_colliding(
-    cli: CommandLine,
-) -> None:
+def test_interference_verdict_separates_clear_touching_and_colliding(cli: CommandLine) -> None:
     assert "the legs are clear; closest 2–3" in cli.text()
     assert "legs collide: 2–3; closest 2–3" in cli.text("--radii", "0.4")
     # With the two lines perpendicular both carriages stand in one place.

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
-import json
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import CommandLine
+from machines import PRESS
 
 import explorer
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
@@ -73,9 +73,7 @@ def test_path_forms_of_a_pose_agree(cli: CommandLine, words: list[str]) -> None:
         )
 
 
-def test_path_without_solution_has_status_1_and_reason(
-    cli: CommandLine,
-) -> None:
+def test_path_without_solution_has_status_1_and_reason(cli: CommandLine) -> None:
     found = cli.answer("--to", "12", "8", "-7", status=1)
     assert found == {"found": False, "reason": "other mode", "poses": []}
     refused = cli.refusal("--to", "12", "8", "-7", status=1)
@@ -103,21 +101,6 @@ def test_path_bad_input_is_one_line_and_status_2(
     assert message in cli.refusal(*words)
 
 
-LIMITED_DESIGN = {
-    "schema": 2,
-    "name": "press",
-    "unit_mm": 10,
-    "a3": [19.1829, 7.0062],
-    "b1": [4.2892, -3.8858],
-    "b2": 2.6067,
-    "b3": 4.9094,
-    "home": {"position": [10, 5, 9], "quaternion": [0.80334, 0, 0, -0.59552]},
-    "tool": {"position": [1, 0, 2]},
-    "payload": {"mass_kg": 0.5, "centre": [1, 0, 1]},
-    "actuators": {"push_n": [150, 200, 150, 200, 150, 150]},
-    "struts": {"outer_mm": 8, "inner_mm": 6, "stress_mpa": 200},
-    "guide": {"force_n": 200, "moment_nm": 6},
-}
 # Both ends hold 40 N downwards; the straight move between them, low over the base, does not.
 LOW = (
     *("--from", "2.4", "0.2", "1.7", "-53", "-3", "2"),
@@ -130,7 +113,7 @@ DOWN = ("--load", "0", "0", "-40")
 def press(tmp_path: Path) -> tuple[str, str]:
     """Return the option of a design whose machine has limits."""
     file = tmp_path / "press.json"
-    file.write_text(json.dumps(LIMITED_DESIGN), encoding="utf-8")
+    file.write_bytes(explorer.encode_design(PRESS))
     return "--design", str(file)
 
 

@@ -39,6 +39,9 @@ SIX = ["1", "2", "3", "4", "5", "6"]
         (["serve", "--port", "http"], "explorer serve: --port must "),
         (["--port", "x"], "explorer serve: --port"),
         (["--design", "no-such"], "no-such"),
+        (["singularity", "--design", "no-such"], "paper-initial, paper-optimal"),
+        (["inverse", "--design", "/"], "directory"),
+        (["screenshot", "--quaternion", *SIX[:4], "--yaw-pitch-roll", *SIX[:3]], "not both"),
         (["screenshot", "--size", "1280*800"], "--size"),
         (["screenshot", "--size", "800x8193"], "--size"),
         (["screenshot", "--view", "below"], "isometric"),
@@ -67,14 +70,6 @@ def test_numbers_negative_and_scientific_are_values(cli: CommandLine) -> None:
     assert cli.text("inverse", "--position", *words, "--yaw-pitch-roll", "-1e2", "-.5", "-0")
 
 
-def test_pose_two_orientations_are_refused(cli: CommandLine) -> None:
-    options = ["--quaternion", "1", "0", "0", "0", "--yaw-pitch-roll", "1", "2", "3"]
-    for command in ("inverse", "singularity", "screenshot"):
-        message = cli.refusal(command, *options)
-        assert "--quaternion" in message
-        assert "--yaw-pitch-roll" in message
-
-
 def test_option_given_twice_is_refused(cli: CommandLine) -> None:
     for command in COMMANDS:
         for field in dataclasses.fields(load_command(command, COMMANDS)):
@@ -85,32 +80,6 @@ def test_option_given_twice_is_refused(cli: CommandLine) -> None:
             ):
                 message = cli.refusal(command, *first, *second)
                 assert message.startswith(f"explorer {command}: {option} is given twice; ")
-
-
-def test_unknown_preset_lists_the_presets(cli: CommandLine) -> None:
-    for command in ("inverse", "singularity", "screenshot", "serve"):
-        message = cli.refusal(command, "--design", "no-such")
-        assert "paper-initial, paper-optimal" in message
-
-
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        ("", "truncated"),
-        ("{\n\n]", "malformed"),
-        ('{"a3": [1, 2]}', "b1"),
-        ('{"a3": [1, 2], "b1": [1, 2], "b2": 1, "b3": 2, "b5": 3}', "b5"),
-        ('{"a3": [1, 0], "b1": [1, 2], "b2": 1, "b3": 2}', "a3y"),
-        ('{"a3": [1, 2], "b1": [1, 2], "b2": 1, "b3": 1}', "b3 - b2"),
-        ('{"a3": [1, 2], "b1": [1, 2], "b2": 1, "b3": "2"}', "b3"),
-    ],
-)
-def test_invalid_design_file_gives_reason(
-    cli: CommandLine, tmp_path: Path, text: str, word: str
-) -> None:
-    file = tmp_path / "design.json"
-    file.write_text(text)
-    assert word in cli.refusal("inverse", "--design", file)
 
 
 def test_design_file_of_another_editor_opens_and_its_fault_is_reported_with_line_and_field(
@@ -125,10 +94,6 @@ def test_design_file_of_another_editor_opens_and_its_fault_is_reported_with_line
         assert cli.refusal("inverse", "--design", file) == (
             f"explorer: {file}: line 6: unknown field `unitmm`; did you mean `unit_mm`?"
         )
-
-
-def test_design_folder_is_refused(cli: CommandLine, tmp_path: Path) -> None:
-    assert "directory" in cli.refusal("inverse", "--design", str(tmp_path)).lower()
 
 
 def test_screenshot_unwritable_file_is_refused_first(cli: CommandLine, tmp_path: Path) -> None:

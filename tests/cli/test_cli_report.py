@@ -15,7 +15,8 @@ from report_page import read, table_of
 import explorer
 from explorer.mechanism.design_file import encode_design
 from explorer.optimise.paper import paper_problem
-from explorer.optimise.record import Record, RunRecord, Settings, Step, encode_record
+from explorer.optimise.record import Settings, encode_record, record_of
+from explorer.optimise.solver import optimise_design
 
 COMMAND = ("report",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -59,37 +60,7 @@ def test_report_commands_reproduce_its_figures(
 
 
 def test_report_record_adds_its_history(cli: CommandLine, tmp_path: Path) -> None:
-    problem = paper_problem()
-    step = Step(
-        number=0,
-        run=0,
-        phase="solving",
-        values=problem.start.variables,
-        objective=0.5,
-        volume=4000.0,
-        worst="",
-        spare=0.0,
-    )
-    only = RunRecord(
-        start=step.values,
-        status="cancelled",
-        best=0,
-        iterations=0,
-        evaluations=1,
-        attempts=1,
-        holding="",
-        message="cancelled on request",
-    )
-    record = Record(
-        problem=problem,
-        settings=Settings(),
-        design=problem.start,
-        chosen=0,
-        runs=(only,),
-        history=(step,),
-        seconds=0.1,
-        versions={"python": "3.11"},
-    )
+    record = record_of(optimise_design(paper_problem(), iterations=2), Settings())
     file, out = tmp_path / "run.record.json", tmp_path / "report.html"
     file.write_bytes(encode_record(record))
     assert cli.text("--out", out, "--record", file) == f"{out}\n"
@@ -126,12 +97,6 @@ def test_report_degenerate_design_is_refused(cli: CommandLine, tmp_path: Path) -
         "--design", flat, "--out", str(tmp_path / "r.html")
     )
     assert [each.name for each in tmp_path.iterdir()] == ["flat.json"]
-
-
-def test_report_empty_workspace_is_written(cli: CommandLine, tmp_path: Path) -> None:
-    out = tmp_path / "report.html"
-    assert cli.text("--out", out, "--yaw-pitch-roll", "0", "0", "0") == f"{out}\n"
-    assert "The workspace is empty" in out.read_text(encoding="utf-8")
 
 
 def test_report_without_browser_refuses_pdf_only(

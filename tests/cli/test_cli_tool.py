@@ -1,4 +1,4 @@
-"""The option `--at tool`: positions, loads and results of the tool point, in every command."""
+"""`explorer orientation`, and the option `--at tool` of every command, against the functions."""
 
 from __future__ import annotations
 
@@ -110,12 +110,6 @@ def test_singularity_has_the_ellipsoids_of_the_tool(cli: CommandLine, tooled: li
         assert_allclose(found["tool_ellipsoids"][name]["gain"], getattr(expected, name).gain)
         axes = np.array(found["tool_ellipsoids"][name]["axes"])
         assert_allclose(np.abs(axes @ getattr(expected, name).axes), np.eye(3), atol=1e-9)
-    # Twists of the tool at unit speed of one actuator lie in the ellipsoid.
-    inverse = np.linalg.inv(explorer.jacobian(TOOLED, B4, TURN))
-    speeds = inverse[:3].T + np.cross(inverse[3:].T, TURN @ TOOL)
-    ellipsoid = found["tool_ellipsoids"]["translation"]
-    shares = speeds @ np.array(ellipsoid["axes"]).T / ellipsoid["gain"]
-    assert np.linalg.norm(shares, axis=-1).max() <= 1.0 + 1e-9
     # Singular poses do not depend on the tool.
     same = cli.answer("singularity", "--position", *B4.tolist(), "--yaw-pitch-roll", *ANGLES)
     for key in ("margins", "determinant", "inverse_condition", "proximity", "stratum"):
@@ -202,12 +196,6 @@ def test_path_of_the_tool_goes_straight(
     assert "tool_position" not in cli.answer("path", "--to", "11", "5", "8")["trajectory"]
 
 
-def is_within(rotation: FloatArray) -> bool:
-    """Return whether the tool can be at `PLACE` with an orientation."""
-    pose = explorer.Pose.of(np.array(PLACE) - rotation @ TOOL, rotation)
-    return not explorer.evaluate(TOOLED, pose).violations
-
-
 def test_workspace_of_the_tool_is_moved_as_a_whole(cli: CommandLine, tooled: list[str]) -> None:
     options = ["--step", "4", "--hull", "--interference", "--yaw-pitch-roll", *POSE[5:]]
     found, b4 = (cli.answer("workspace", *options, *more) for more in (tooled, tooled[:2]))
@@ -261,15 +249,7 @@ def test_capability_and_orientations_are_those_of_the_tool(
     assert found["tool_position"] == list(PLACE)
     assert "position" not in found
     assert found["greatest_tilt"] == explorer.greatest_tilt(TOOLED, PLACE, tool=TOOL).tilt
-    # The tool is in its place along each tilt, up to the limit and not beyond it.
-    for index in range(0, 72, 12):
-        azimuth, tilt = found["azimuths"][index], found["tilts"][index]
-        inside, outside = (
-            explorer.rotation_from_tilt_torsion((azimuth, tilt + more, found["torsion"]))
-            for more in (-0.01, 0.01)
-        )
-        assert is_within(inside)
-        assert not is_within(outside)
+    assert found["tilts"] == explorer.tilt_map(TOOLED, PLACE, tool=TOOL).tilts.tolist()
     home = explorer.home_pose(TOOLED)
     default = cli.answer("orientation", "--samples", "10", *tooled)
     assert_allclose(default["tool_position"], position_of(TOOLED, home, "tool"))
@@ -337,3 +317,80 @@ def test_pose_with_a_point_at_a_position_is_inverse_to_the_position_of_the_point
             there = pose_with(TOOLED, at, (x, y, z), pose)
             assert_allclose(position_of(TOOLED, there, at), (x, y, z), atol=1e-12)
             assert there.quaternion == pose.quaternion
+
+
+PRESET = explorer.PRESETS["paper-optimal"]
+POSITION = (10.0, 5.0, 9.0)
+AT = ("orientation", "--position", "10", "5", "9")
+
+
+def test_orientation_json_has_share_tilts_and_torsions(cli: CommandLine) -> None:
+    found = cli.answer(*AT, "--torsion", "-60", "--samples", "5000")
+    share = explorer.orientation_share(PRESET, POSITION, 5000)
+    assert (found["share"], found["standard_error"]) == (share.share, share.standard_error)
+    assert found["orientations"] == 5000
+    least = explorer.greatest_tilt(PRESET, POSITION, -60.0)
+    assert (found["greatest_tilt"], found["azimuth"]) == (least.tilt, least.azimuth)
+    assert (found["torsion"], found["limit"]) == (-60.0, least.limit)
+    tilts = explorer.tilt_map(PRESET, POSITION, -60.0)
+    assert found["tilts"] == tilts.tilts.tolist()
+    assert found["limits"] == list(tilts.limits)
+    torsions = explorer.torsion_range(PRESET, POSITION, -60.0)
+    assert found["torsion_range"] == [torsions.low, torsions.high]
+    assert found["torsion_limits"] == [torsions.low_limit, torsions.high_limit]
+    by_torsion = explorer.tilt_by_torsion(PRESET, POSITION)
+    assert found["torsions"] == by_torsion.torsions.tolist()
+    assert found["tilts_by_torsion"] == [
+        None if np.isnan(tilt) else tilt for tilt in by_torsion.tilts.tolist()
+    ]
+    assert found["best_tilt"] == by_torsion.best.tilt >= found["greatest_tilt"]
+    assert found["best_torsion"] == by_torsion.best.torsion
+    assert found["home_connected"] is True
+
+
+def test_orientation_text_has_a_line_for_each_azimuth(cli: CommandLine) -> None:
+    text = cli.text(*AT)
+    assert "share of all orientations" in text
+    assert "ended by margin δ1" in text
+    assert (
+        len(
+            [
+                line
+                for line in text.splitlines()
+                if line.endswith(("δ1", "δ2", "order")) and not line.startswith("greatest")
+            ]
+        )
+        == 72
+    )
+
+
+def test_orientation_where_tilt_zero_violates_a_limit_says_so(cli: CommandLine) -> None:
+    outside = ("orientation", "--position", "30", "5", "9", "--samples", "100")
+    found = cli.answer(*outside)
+    assert found["share"] == 0.0
+    assert found["greatest_tilt"] is None
+    assert found["torsion_range"] == [None, None]
+    assert found["home_connected"] is False
+    assert "none: tilt zero violates" in cli.text(*outside)
+
+
+def test_tilt_torsion_gives_the_orientation(cli: CommandLine) -> None:
+    found = cli.answer("inverse", "--position", "10", "5", "9", "--tilt-torsion", "30", "15", "-70")
+    rotation = explorer.rotation_from_tilt_torsion([30.0, 15.0, -70.0])
+    np.testing.assert_allclose(
+        found["joints"], explorer.inverse(PRESET, POSITION, rotation), rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--torsion", "nan"], "--torsion must be a finite number"),
+        (["--samples", "1"], "--samples must lie within 2"),
+        (["--position", "1", "2"], "three numbers"),
+    ],
+)
+def test_orientation_unusable_options_are_refused(
+    cli: CommandLine, words: list[str], reason: str
+) -> None:
+    assert reason in cli.refusal("orientation", *words)

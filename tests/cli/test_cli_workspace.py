@@ -68,9 +68,7 @@ def test_workspace_disagreeing_mesh_is_reported(
     assert "its volume does not agree with the exact one" in cli.text()
 
 
-def test_workspace_orientation_step_and_tolerance_are_used(
-    cli: CommandLine,
-) -> None:
+def test_workspace_orientation_step_and_tolerance_are_used(cli: CommandLine) -> None:
     found = cli.answer("--yaw-pitch-roll", "-60", "5", "2", "--step", "3", *COARSE, "--hull")
     rotation = explorer.rotation_from_yaw_pitch_roll([-60.0, 5.0, 2.0])
     assert found["volume"] == pytest.approx(workspace_volume(OPTIMAL, rotation).volume, rel=1e-9)
@@ -92,9 +90,7 @@ def test_workspace_empty_has_status_0(cli: CommandLine, tmp_path: Path) -> None:
     assert "empty because of gap |d1 − d3|" in cli.text("--design", file)
 
 
-def test_workspace_ranges_and_tilts_add_two_volumes(
-    cli: CommandLine,
-) -> None:
+def test_workspace_ranges_and_tilts_add_two_volumes(cli: CommandLine) -> None:
     found = cli.answer(
         "--yaw-range", "-80", "-65", "--roll-range", "0", "6", "--samples", "3", *COARSE
     )
@@ -119,9 +115,7 @@ def test_workspace_ranges_and_tilts_add_two_volumes(
         assert word in page
 
 
-def test_workspace_capability_is_over_the_given_orientations(
-    cli: CommandLine,
-) -> None:
+def test_workspace_capability_is_over_the_given_orientations(cli: CommandLine) -> None:
     position = ["--capability", "10", "5", "9"]
     found = cli.answer(*position, "--samples", "2000", *COARSE)
     share = orientation_capability(OPTIMAL, [10.0, 5.0, 9.0], 2000)
@@ -154,9 +148,7 @@ def test_workspace_unusable_options_are_refused(
     assert words in cli.refusal(*argv)
 
 
-def test_workspace_interference_adds_the_accessible_volume(
-    cli: CommandLine,
-) -> None:
+def test_workspace_interference_adds_the_accessible_volume(cli: CommandLine) -> None:
     found = cli.answer("--interference", "--radii", "0.2")
     assert set(found) == KEYS | {
         *("accessible_volume", "accessible_node_count", "harmless_radius", "pairs"),
@@ -177,9 +169,7 @@ def test_workspace_interference_adds_the_accessible_volume(
     assert "no radius is harmless" in text
 
 
-def test_workspace_interference_empty_workspace_has_no_accessible_volume(
-    cli: CommandLine,
-) -> None:
+def test_workspace_interference_empty_workspace_has_no_accessible_volume(cli: CommandLine) -> None:
     level = ("--yaw-pitch-roll", "0", "0", "0")
     found = cli.answer("--interference", *level)
     assert found["accessible_volume"] == found["accessible_node_count"] == 0
