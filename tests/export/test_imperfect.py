@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import msgspec
-import mujoco  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 import pytest
+from mujoco_models import at_home, engine, loops_of
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh, null_space
 from scipy.spatial.transform import Rotation
@@ -49,7 +49,6 @@ from explorer.statics.error_sources import SOURCES, source_errors
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.tool_precision import ToolPrecision
 
-engine: Any = mujoco
 TOOL = (0.5, 1.0, -2.0)
 IDEAL = msgspec.structs.replace(PRESETS["paper-optimal"], tool=Tool(TOOL))
 ERRORS: Six = (0.05, 0.02, 0.1, 0.03, 0.06, 0.04)
@@ -188,13 +187,9 @@ def test_model_of_machine_starts_closed_with_the_readings_of_home(seed: int, sha
     machine = random_machine(seed, share)
     design, home = machine.design, home_pose(machine.design)
     model = model_of(machine)
-    data = engine.MjData(model)
-    engine.mj_resetDataKeyframe(model, data, 0)
-    engine.mj_forward(model, data)
+    data = at_home(model)
     metres = 1e-3 * design.unit_mm
-    equality = np.array(data.efc_type) == int(engine.mjtConstraint.mjCNSTR_EQUALITY)
-    assert equality.sum() == 9
-    assert np.abs(np.array(data.efc_pos)[equality]).max() < 1e-14 * metres * design.reach
+    assert np.abs(loops_of(model, data)[0]).max() < 1e-14 * metres * design.reach
     assert (model.qpos0 == model.key_qpos[0]).all()
     commands = metres * inverse(design, home.position, home.rotation)
     assert_allclose(model.key_ctrl[0], commands, rtol=1e-12)
@@ -230,8 +225,7 @@ def test_model_of_machine_at_rest_has_the_tool_of_the_solved_pose() -> None:
     for each, seen in ((machine, true), (perfect, meant)):
         model = model_of(each)
         model.opt.gravity[:] = 0.0
-        data = engine.MjData(model)
-        engine.mj_resetDataKeyframe(model, data, 0)
+        data = at_home(model)
         steps = int(0.4 / model.opt.timestep)
         for step in range(2 * steps):
             share = min(1.0, step / steps)
@@ -340,17 +334,6 @@ def test_deflection_at_home_is_that_of_a_model_whose_struts_bend(actuators: Actu
         assert difference(design, model, data, home, softness, load) < 1e-3
 
 
-def loops_of(model: Any, data: Any) -> FloatArray:
-    """Return the Jacobian (9, 15) of the ball joints, which alone are constraints."""
-    if engine.mj_isSparse(model):
-        dense = np.zeros((data.nefc, model.nv))
-        engine.mju_sparse2dense(
-            dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
-        )
-        return dense
-    return np.array(data.efc_J).reshape(data.nefc, model.nv)
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_inertia_of_servos_is_that_of_the_model(seed: int) -> None:
     design = msgspec.structs.replace(
@@ -361,7 +344,7 @@ def test_inertia_of_servos_is_that_of_the_model(seed: int) -> None:
     full = np.zeros((model.nv, model.nv))
     engine.mj_fullM(model, data, full)
     full -= np.diag(model.dof_armature)
-    moves = null_space(loops_of(model, data))
+    moves = null_space(loops_of(model, data)[1])
     moves = moves @ np.linalg.inv(moves[list(ACTUATED)])
     expected = moves.T @ full @ moves
     found = joint_inertia(design, bar_masses(design, DENSITY))
@@ -382,8 +365,7 @@ def test_model_of_any_stiffness_is_stable(stiffness: float) -> None:
     )
     model = model_of(ImperfectMachine.draw(design, 0))
     model.opt.gravity[:] = 0.0
-    data = engine.MjData(model)
-    engine.mj_resetDataKeyframe(model, data, 0)
+    data = at_home(model)
     data.qvel[:] = 1e-5 * np.random.default_rng(0).normal(size=15)
     start = float(np.abs(data.qvel).max())
     steps = 4000

@@ -230,11 +230,7 @@ def test_report_precision_tells_the_errors_of_the_pose_and_ranks_their_sources()
     by = explorer.pose_error_by_source(*given(design), tool)
     bounds = explorer.source_errors(design)
     rows = table_of(section, "Errors of the tool")
-    for name, part in (
-        ("actuators", slice(6)),
-        ("dimensions", slice(6, 29)),
-        ("all", slice(29)),
-    ):
+    for name, part in (("actuators", slice(6)), ("dimensions", slice(6, 29)), ("all", slice(29))):
         worst = explorer.largest_error(by[:, part], bounds[part])
         rms = explorer.rms_of_sources(by[:, part], bounds[part])
         moved = [float(each.displacement) * design.unit_mm for each in (worst, rms)]

@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import msgspec
-import mujoco  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 import pytest
 from limited_designs import limited
+from mujoco_models import at_home, engine, loops_of
 from scipy.spatial.transform import Rotation
 from strategies import WAYS
 
@@ -38,7 +38,6 @@ from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import ACTUATED, CHAIN_JOINTS, Chains
 from explorer.prototype.mass import ball, bar, mesh_mass, total_mass
 
-engine: Any = mujoco
 OPTIMAL = PRESETS["paper-optimal"]
 POSES = 40
 
@@ -77,20 +76,6 @@ def set_pose(design: Design, data: Any, position: FloatArray, rotation: FloatArr
     data.qpos[:] = simulation_joints(design, position, rotation)
 
 
-def equality_rows(model: Any, data: Any) -> tuple[FloatArray, FloatArray]:
-    """Return the residuals (9,) of three ball joints, and their Jacobian (9, 15)."""
-    own = np.array(data.efc_type) == int(engine.mjtConstraint.mjCNSTR_EQUALITY)
-    assert own.sum() == 9
-    if engine.mj_isSparse(model):
-        dense = np.zeros((data.nefc, model.nv))
-        engine.mju_sparse2dense(
-            dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
-        )
-    else:
-        dense = np.array(data.efc_J).reshape(data.nefc, model.nv)
-    return np.array(data.efc_pos)[own], dense[own]
-
-
 def test_model_has_every_joint_and_six_servos() -> None:
     model = model_of(OPTIMAL)
     assert (model.nq, model.nv, model.nu, model.neq) == (16, 15, 6, 3)
@@ -127,7 +112,7 @@ def test_model_starts_at_home_and_its_loops_close_at_our_joint_values(design: De
     for position, rotation in zip(positions, rotations, strict=True):
         set_pose(design, data, position, rotation)
         engine.mj_forward(model, data)
-        residual, _ = equality_rows(model, data)
+        residual, _ = loops_of(model, data)
         assert np.abs(residual).max() < 1e-8 * size
         # The values are not merely consistent: they are the joints of the pose.
         actuated = data.qpos[list(ACTUATED)] / metres
@@ -135,7 +120,7 @@ def test_model_starts_at_home_and_its_loops_close_at_our_joint_values(design: De
     # And a wrong length opens its loop.
     data.qpos[ACTUATED[0]] += 1e-6 * size
     engine.mj_forward(model, data)
-    assert np.abs(equality_rows(model, data)[0]).max() > 1e-7 * size
+    assert np.abs(loops_of(model, data)[0]).max() > 1e-7 * size
 
 
 @pytest.mark.parametrize("design", DESIGNS)
@@ -163,7 +148,7 @@ def locked_jacobian(design: Design, position: FloatArray, rotation: FloatArray) 
     data = engine.MjData(model)
     set_pose(design, data, position, rotation)
     engine.mj_forward(model, data)
-    _, loops = equality_rows(model, data)
+    _, loops = loops_of(model, data)
     locks = np.eye(model.nv)[list(ACTUATED)]
     # Rates of slides are lengths over time, the others angles.
     is_length = np.append(np.isin(CHAIN_JOINTS, JOINTS), [False] * 3)
@@ -206,8 +191,7 @@ def test_locked_model_moves_at_singular_poses_alone(design: Design) -> None:
 def test_model_servos_reach_the_pose_of_forward_kinematics() -> None:
     design = OPTIMAL
     model = model_of(design)
-    data = engine.MjData(model)
-    engine.mj_resetDataKeyframe(model, data, 0)
+    data = at_home(model)
     home = home_pose(design)
     mode = int(mode_of(margins(home.position, home.rotation)))
     metres = design.unit_mm * 1e-3

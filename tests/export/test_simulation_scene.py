@@ -6,11 +6,11 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import msgspec
-import mujoco  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 import pytest
 from limited_designs import limited
 from machines import FULL, OPTIMAL, PRESS
+from mujoco_models import at_home, engine, loops_of
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from statics_cases import random_poses
@@ -29,23 +29,16 @@ from explorer import (
     home_pose,
     tool_position,
 )
-from explorer.export.simulation import (
-    DENSITY,
-    SimulationModel,
-    simulation_joints,
-    simulation_mjcf,
-)
+from explorer.export.simulation import DENSITY, SimulationModel, simulation_mjcf
 from explorer.mechanism.design import DOWN, LENGTHS, Swing
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.typical import typical_machine
-from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import ACTUATED
 from explorer.prototype.weights import bar_masses, machine_weights
 from explorer.statics.error_sources import SOURCES
 from explorer.statics.weights import carry
 
-engine: Any = mujoco
 UNLIMITED = msgspec.structs.replace(
     PRESS, actuators=Actuators(), tool=Tool((1, 0, 2), (1, 1, 0, 1))
 )
@@ -88,20 +81,6 @@ def model_of(text: str, machine: str = "") -> Any:
 
 def scene_of(ahead: str, behind: str, guest: str = f'<include file="{FILE}"/>') -> str:
     return f"<mujoco>{ahead}{guest}{THINGS}{behind}</mujoco>"
-
-
-def at_home(model: Any, key: str = "home") -> Any:
-    data = engine.MjData(model)
-    engine.mj_resetDataKeyframe(model, data, model.key(key).id)
-    engine.mj_forward(model, data)
-    return data
-
-
-def openings(data: Any) -> FloatArray:
-    """Return the residuals (9,) of the loops, in metres."""
-    own = np.array(data.efc_type) == int(engine.mjtConstraint.mjCNSTR_EQUALITY)
-    assert own.sum() == 9
-    return np.array(data.efc_pos)[own]
 
 
 def rest(model: Any, data: Any, seconds: float = 1.5, still: float = 1e-4) -> None:
@@ -194,7 +173,7 @@ def test_model_in_a_scene_is_the_model_alone(design: Design, ahead: str, behind:
             data.joint(name).qpos, alone.key_qpos[0][start : start + width], err_msg=str(k)
         )
     # The scene's keyframes are shorter by its own joints, which come first or last.
-    assert np.abs(openings(data)).max() < 1e-9
+    assert np.abs(loops_of(both, data)[0]).max() < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -233,7 +212,7 @@ def test_model_attached_anywhere_starts_closed_with_its_tool_in_place(seed: int,
         model = host.compile()
     data = at_home(model, "m-home")
     size = float(np.linalg.norm(position)) + 1e-3 * design.unit_mm * design.reach
-    assert np.abs(openings(data)).max() < min(1e-9, 1e-14 * size)
+    assert np.abs(loops_of(model, data)[0]).max() < min(1e-9, 1e-14 * size)
     pose = given.home if isinstance(given, ImperfectMachine) else home_pose(design)
     tool = 1e-3 * design.unit_mm * np.array(tool_position(pose, design.tool.position))
     site = data.site("m-tool")
@@ -284,7 +263,7 @@ def test_servos_are_stable_for_time_steps_and_integrators(integrator: str, times
         # Implicit integrators leave a tremor of the loops.
         rest(model, data, still=2e-2)
         reach = 1e-3 * design.unit_mm * design.reach
-        assert np.abs(openings(data)).max() < 1e-3 * reach
+        assert np.abs(loops_of(model, data)[0]).max() < 1e-3 * reach
         assert_allclose(data.qpos[list(ACTUATED)], data.ctrl, atol=1e-2 * reach)
 
 
@@ -306,30 +285,6 @@ def test_servos_upside_down_bear_the_weights_of_a_ceiling() -> None:
     wrench = carry(hung, position, rotation, weights).wrench
     forces = actuator_forces(hung, position, rotation, wrench)
     assert_allclose(data.actuator_force, forces, atol=1e-3 * np.abs(forces).max())
-
-
-def test_commands_with_the_change_of_forces_do_not_droop_elsewhere() -> None:
-    design = UNLIMITED
-    model_of_home = SimulationModel(design)
-    model = model_of(model_of_home.text())
-    model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
-    data = engine.MjData(model)
-    weights = machine_weights(design, bar_masses(design, DENSITY))
-    positions, rotations = random_poses(design, 2, seed=1, margin=0.2)
-    for position, rotation in zip(positions, rotations, strict=True):
-        wrench = carry(design, position, rotation, weights).wrench
-        forces = actuator_forces(design, position, rotation, wrench)
-        data = engine.MjData(model)
-        data.qpos[:] = simulation_joints(design, position, rotation)
-        servos = model_of_home.servos
-        data.ctrl[:] = data.qpos[list(ACTUATED)] + (forces - servos.forces) / servos.stiffness
-        model.opt.disableflags |= int(engine.mjtDisableBit.mjDSBL_LIMIT)
-        model.opt.disableflags |= int(engine.mjtDisableBit.mjDSBL_CLAMPCTRL)
-        engine.mj_forward(model, data)
-        start = data.site("tool").xpos.copy()
-        rest(model, data)
-        moved = np.linalg.norm(data.site("tool").xpos - start)
-        assert moved < 1e-4 * 1e-3 * design.unit_mm * design.reach
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -53,13 +53,7 @@ def test_step_shells_slabs_and_tilted_planes_have_exact_volume(index: int) -> No
 
 
 @pytest.mark.parametrize(
-    "swing",
-    [
-        Swing(a3=90.0),
-        Swing(b1=50.0, b4=70.0),
-        Swing(b2=20.0),
-        Swing(a1=100.0, b3=30.0),
-    ],
+    "swing", [Swing(a3=90.0), Swing(b1=50.0, b4=70.0), Swing(b2=20.0), Swing(a1=100.0, b3=30.0)]
 )
 def test_step_cones_and_wedges_have_exact_volume(swing: Swing) -> None:
     design = limited(OPTIMAL, swing=swing)

@@ -8,17 +8,7 @@ import msgspec
 from hypothesis import strategies as st
 from strategies import designs
 
-from explorer import (
-    Actuators,
-    Design,
-    Guide,
-    Limits,
-    Payload,
-    Pose,
-    Struts,
-    Tolerances,
-    Tool,
-)
+from explorer import Actuators, Design, Guide, Limits, Payload, Pose, Struts, Tolerances, Tool
 
 finite = st.floats(-1e3, 1e3)
 lengths = st.floats(0.0, 1e3)

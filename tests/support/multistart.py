@@ -16,11 +16,7 @@ from explorer.numerics.arrays import FloatArray
 
 
 def searched_distance(
-    design: Design,
-    position: FloatArray,
-    rotation: FloatArray,
-    incidence: int,
-    starts: int,
+    design: Design, position: FloatArray, rotation: FloatArray, incidence: int, starts: int
 ) -> float:
     """Return the least root-mean-square displacement to a pose with an incidence, 1, 2 or 3."""
 

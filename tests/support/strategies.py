@@ -95,9 +95,7 @@ def _away_from_zero(least: float = 0.1) -> st.SearchStrategy[float]:
 
 @st.composite
 def designs(
-    draw: st.DrawFn,
-    sizes: tuple[float, ...] = SIZES,
-    nearness: tuple[float, ...] = NEARNESS,
+    draw: st.DrawFn, sizes: tuple[float, ...] = SIZES, nearness: tuple[float, ...] = NEARNESS
 ) -> Design:
     """Draw a design of one of the sizes, each denominator scaled by a share."""
     size = draw(st.sampled_from(sizes))
