@@ -44,7 +44,10 @@ from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 DAY = dt.date(2026, 3, 9)
-HOSTILE = '<script>alert(1)</script><img src=x onerror="a(2)">\' b="</title></style></pre>--> &lt; ]]> <!--'
+HOSTILE = (
+    '<script>alert(1)</script><img src=x onerror="alert(2)">x" onload="alert(1)" y=\'',
+    "</title></style></pre>--> & &lt; ' \" ]]> <!--",
+)
 
 
 def page_of(design: Design, pose: Pose | None = None, record: Record | None = None) -> Node:
@@ -268,8 +271,8 @@ def test_report_search_section_holds_the_record() -> None:
     assert "not the one that this search found" in " ".join(other.text.split())
 
 
-def test_report_hostile_name_stays_text() -> None:
-    name = HOSTILE
+@pytest.mark.parametrize("name", HOSTILE)
+def test_report_hostile_name_stays_text(name: str) -> None:
     design = msgspec.structs.replace(OPTIMAL, name=name)
     page = page_of(design)
     plain = paper_page()
