@@ -348,5 +348,6 @@ def test_mesh_changed_as_its_shadow_is_switched_off_is_drawn_anew(wide: Tab) -> 
         reds = decoded(wide.picture())
         assert (reds[..., 0] - reds[..., 1] > 0.3).sum() > 500
     finally:
-        viser.scene.configure_default_lights(cast_shadow=False)
+        # The explorer has lights of its own.
+        viser.scene.configure_default_lights(enabled=False, cast_shadow=False)
         mesh.remove()

@@ -140,6 +140,9 @@ class Tab:
         session.do(Set("view", View()))
         session.travel(HistoryMove(lambda _: start_history(opened(PRESETS["paper-optimal"]))))
         page.panels.work.minimize()
+        # Cameras follow what has changed, and the scene has its size, before this one is put.
+        assert page.settle(PATIENCE_SECONDS), "the explorer is never at rest"
+        settle(self.page, self.client)
         page.point_cameras("isometric")
         self.settle()
 
