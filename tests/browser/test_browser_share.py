@@ -93,6 +93,7 @@ def test_picture_has_the_size_and_background_that_are_set_and_no_handle(tab: Tab
     assert reds(opaque) == 0
     # A picture twice as large as the scene shows the same.
     tab.page.keyboard.press("Escape")
+    tab.close_notices()
     tab.running.page.session.do(Set("view", View(handle=False)))
     shown = decoded(tab.picture())
     taken = pixels_of(tab.export("Picture", "PNG twice as shown")) / 255.0

@@ -54,8 +54,6 @@ TRACK = "[id]:has([role=slider])"
 FORGET = """() => {
     document.activeElement?.blur();
     for (const box of document.querySelectorAll("*")) box.scrollTop = 0;
-    const closing = document.querySelectorAll(".mantine-Notification-closeButton");
-    for (const button of closing) button.click();
     const enter = { key: "Enter", code: "Enter", bubbles: true };
     for (const group of document.querySelectorAll("[role=tablist]")) {
         const first = group.querySelector("[role=tab]");
@@ -63,6 +61,11 @@ FORGET = """() => {
             first.dispatchEvent(new KeyboardEvent("keydown", enter));
         }
     }
+}"""
+NOTICE = ".mantine-Notification-root"
+CLOSE_NOTICES = """() => {
+    const closing = document.querySelectorAll(".mantine-Notification-closeButton");
+    for (const button of closing) button.click();
 }"""
 # Has the page draw its scene, or hold it.
 DRAW = """(draws) => {
@@ -136,6 +139,7 @@ class Tab:
         self.page.set_viewport_size({"width": self._size[0], "height": self._size[1]})
         self.page.mouse.move(0, 0)
         self.page.evaluate(FORGET)
+        self.page.evaluate(CLOSE_NOTICES)
         # A move through the history leaves what is shown as it is.
         session.do(Set("view", View()))
         session.travel(HistoryMove(lambda _: start_history(opened(PRESETS["paper-optimal"]))))
@@ -301,6 +305,11 @@ class Tab:
         """Open a dialog by its button in the bar."""
         self.page.locator(f"[data-opens={name}]").first.click()
         self.page.get_by_role("dialog", name=name).wait_for()
+
+    def close_notices(self) -> None:
+        """Close the notices, which lie over the scene, and wait until they are gone."""
+        self.page.evaluate(CLOSE_NOTICES)
+        expect(self.page.locator(NOTICE)).to_have_count(0)
 
     def export(self, what: str, file_format: str) -> Download:
         """Download a file by the dialog Export."""

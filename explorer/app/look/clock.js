@@ -58,25 +58,31 @@ window.explorer.clock ??= (() => {
     ahead += Math.max(0, until - now());
     for (const number of pending.keys()) wait(number);
   };
+  // Ends the pause that would be over first, unless something waits for a frame.
+  const hasten = () => {
+    if (frames || !pending.size) return;
+    advance(Math.min(...[...pending.values()].map(({ due }) => due)) - now());
+  };
   const setPace = (wanted) => {
     [ahead, pace, pacedAt] = [shift(), wanted, performance.now()];
     for (const number of pending.keys()) wait(number);
   };
   const isQuiet = () => !pending.size && !frames;
-  return { after, cancel, atFrame, advance, setPace, isQuiet };
+  return { after, cancel, atFrame, advance, hasten, setPace, isQuiet };
 })();
 
 // Returns a promise that the page has come to rest: all that the server sent before a mark has
-// arrived and is laid out, and no pause is pending. Two frames in a row must find it so, as what
-// is drawn in one may ask for the next.
+// arrived and is laid out, and no pause is pending: those that are end at once. Some frames in a
+// row must find it so, as what is drawn in one may ask for the next.
 window.explorer.settled ??= (mark) =>
   new Promise((resolve) => {
     let still = 0;
     const look = () => {
       const { clock, mark: ofAll, ownMark } = window.explorer;
-      const hasArrived = ofAll >= mark && ownMark >= mark;
-      const isStill = hasArrived && clock.isQuiet() && !window.__viserMutable?.messageQueue.length;
-      still = isStill ? still + 1 : 0;
+      const hasArrived =
+        ofAll >= mark && ownMark >= mark && !window.__viserMutable?.messageQueue.length;
+      still = hasArrived && clock.isQuiet() ? still + 1 : 0;
+      if (hasArrived) clock.hasten();
       if (still > 2) resolve(true);
       else requestAnimationFrame(look);
     };
