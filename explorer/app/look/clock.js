@@ -81,8 +81,8 @@ window.explorer.settled ??= (mark) =>
       const { clock, mark: ofAll, ownMark } = window.explorer;
       const hasArrived =
         ofAll >= mark && ownMark >= mark && !window.__viserMutable?.messageQueue.length;
-      still = hasArrived && clock.isQuiet() ? still + 1 : 0;
       if (hasArrived) clock.hasten();
+      still = hasArrived && clock.isQuiet() ? still + 1 : 0;
       if (still > 2) resolve(true);
       else requestAnimationFrame(look);
     };
