@@ -106,6 +106,8 @@ class Page:
         # Looks after the cameras once nothing has been drawn for a while, or at a release.
         self._camera_timer: clock.Timer | None = None
         self._follows_at_release = False
+        # Whether `settle` is under way: then nothing waits for a pause of the user.
+        self._is_settling = False
         # Held while a timer is started, so that it is known before it is over.
         self._timer_lock = threading.Lock()
         # Other threads may ask for a frame before the last panel is there.
@@ -217,19 +219,23 @@ class Page:
     def settle(self, timeout: float) -> bool:
         """Wait until all is drawn and no pause is pending; return whether that is so.
 
-        Cameras follow at once what was drawn, rather than after a pause.
+        What waits for a pause of the user happens at once.
         """
         deadline = time.monotonic() + timeout
-        while self.wait_until_drawn(deadline - time.monotonic()):
-            timer = self._camera_timer
-            if timer is not None:
-                timer.finish()
-            if not clock.wait_until_quiet(deadline - time.monotonic()):
-                return False
-            # What happened after a pause may have changed more.
-            if not self.session.has_more and clock.wait_until_quiet(0.0):
-                return True
-        return False
+        self._is_settling = True
+        try:
+            while self.wait_until_drawn(deadline - time.monotonic()):
+                for timer in (self._redraw_timer, self._camera_timer):
+                    if timer is not None:
+                        timer.finish()
+                if not clock.wait_until_quiet(deadline - time.monotonic()):
+                    return False
+                # What happened after a pause may have changed more.
+                if not self.session.has_more and clock.wait_until_quiet(0.0):
+                    return True
+            return False
+        finally:
+            self._is_settling = False
 
     @property
     def may_follow(self) -> bool:
@@ -285,7 +291,7 @@ class Page:
         for feature in self._features:
             if feature.passing is not None:
                 self.palette.offer(feature.name, feature.passing(self.services))
-        if self._assigner.settle():
+        if self._assigner.settle(has_paused=self._is_settling):
             self._schedule_redraw()
         self._follow_soon()
 

@@ -69,8 +69,12 @@ class Assigner:
                     self._sent[id(handle), name] = handle, time.time()
         return new
 
-    def settle(self) -> bool:
-        """Send again what may have crossed, once the user pauses; return whether any wait."""
+    def settle(self, *, has_paused: bool = False) -> bool:
+        """Send again what may have crossed, once the user pauses; return whether any wait.
+
+        Args:
+            has_paused: Whether it is known that the user pauses, which else follows from the time.
+        """
         waits = False
         now = time.time()
         for key, (handle, sent) in tuple(self._sent.items()):
@@ -79,7 +83,7 @@ class Assigner:
             if not has_crossed:
                 if not sent <= now <= sent + CROSSING_SECONDS:
                     del self._sent[key]
-            elif changed <= now < changed + QUIET_SECONDS:
+            elif changed <= now < changed + QUIET_SECONDS and not has_paused:
                 waits = True
             else:
                 resend(handle, key[1])
