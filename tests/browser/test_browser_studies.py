@@ -120,6 +120,8 @@ def wait_for_plots(tab: Tab) -> None:
         return bool(tab.page.evaluate(shows, revision))
 
     tab.wait_for(are_shown, "the plots of the state")
+    # A plot that has come moves those below it.
+    tab.settle()
 
 
 def revision_in(text: str) -> int:
@@ -143,6 +145,8 @@ def test_design_is_picked_and_brushed_by_clicks_and_drags_in_the_plots(
     row = loneliest_row(results)
     place = tab.page.evaluate(POINT, ["", volume[row], reach[row]])
     tab.page.mouse.move(*place)
+    # Plotly takes a click for one on a point once it has seen the pointer there.
+    tab.page.locator(".hoverlayer .hovertext").first.wait_for()
     tab.page.mouse.click(*place)
     tab.wait_for(lambda: studies_of(tab).picked is not None, "a pick")
     assert studies_of(tab).picked == int(results.columns["index"][row])
