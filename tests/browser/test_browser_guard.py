@@ -76,6 +76,7 @@ def test_guard_pages_from_elsewhere_cannot_connect_nor_the_own_page_elsewhere(
         stop_viser(bare)
 
 
+@pytest.mark.long
 def test_guard_page_with_a_token_stays_open_until_the_token_expires(browser: Browser) -> None:
     running = start(DESIGN, host="0.0.0.0", port=0, token=TOKEN)
     port = running.viser.get_port()

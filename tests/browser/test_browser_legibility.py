@@ -52,7 +52,10 @@ def controls(tab: Tab) -> list[tuple[str, str]]:
     ]
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize(
+    "dark",
+    [pytest.param(False, id="light"), pytest.param(True, id="dark", marks=pytest.mark.long)],
+)
 def test_text_of_all_tabs_and_dialogs_is_legible(tab: Tab, *, dark: bool) -> None:
     tab.running.page.services.theme.choose(dark=dark)
     scheme = "document.documentElement.dataset.mantineColorScheme"

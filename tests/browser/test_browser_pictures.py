@@ -49,7 +49,7 @@ DRAWN_OUT = {"compare", "optimise"}
 OF_POINTS = {"tilt"}
 
 # Those that are drawn again each day: they hold every kind of thing that is drawn.
-DAILY = {"near-singular", "workspace-cut"}
+DAILY = {"near-singular"}
 
 Alteration = Callable[[Running, pytest.MonkeyPatch], None]
 VIEW = View()
@@ -91,6 +91,7 @@ def test_picture_is_that_of_a_page_which_draws_every_frame(browser: Browser) -> 
         running.stop()
 
 
+@pytest.mark.long
 def test_picture_of_the_command_has_the_handle_only_if_it_is_asked_for(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
