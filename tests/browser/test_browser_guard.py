@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from http import HTTPStatus
 
+import pytest
 from client import PROTOCOL, wait_for
 from playwright.sync_api import Browser, expect
 
