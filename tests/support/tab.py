@@ -389,6 +389,8 @@ class Tab:
         self._echo = self.client.gui.add_number("Echo", 0, visible=False)
         self._echo_id = element_id(self._echo)
         self.draw(self._draws)
+        # The scripts of the page are there, too, with what was sent before them.
+        settle(self.page, self.client)
 
     def _new(self, known: set[int]) -> set[int]:
         return set(self.running.viser.get_clients()) - known
