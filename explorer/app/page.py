@@ -177,7 +177,7 @@ class Page:
         server.on_client_connect(self._show_pending)
         server.on_client_connect(self.services.cameras.connected)
         server.on_client_disconnect(self.services.cameras.disconnected)
-        server.on_client_connect(lambda client: listen(client, presses, self._released))
+        server.on_client_connect(lambda client: listen(client, presses, self._follow_after_release))
         server.on_client_disconnect(lambda client: self._forget(client.client_id))
         self._is_complete = True
         self.session.redraw()
@@ -236,12 +236,6 @@ class Page:
             return False
         finally:
             self._is_settling = False
-
-    @property
-    def may_follow(self) -> bool:
-        """Whether cameras may still follow what was drawn last."""
-        timer = self._camera_timer
-        return self._follows_at_release or (timer is not None and not timer.is_over)
 
     def point_cameras(self, view: ViewName) -> None:
         """Point the camera of every open browser."""
@@ -319,9 +313,9 @@ class Page:
 
     def _forget(self, who: int) -> None:
         self._presses.forget(who)
-        self._released()
+        self._follow_after_release()
 
-    def _released(self) -> None:
+    def _follow_after_release(self) -> None:
         if self._follows_at_release:
             self._follow_soon()
 

@@ -235,8 +235,6 @@ def settle(page: Page, client: ClientHandle) -> None:
     Raises:
         PictureError: it does not draw in time.
     """
-    from playwright.sync_api import TimeoutError as BrowserTimeoutError
-
     from explorer.app.browser.viser_gaps import mark_broadcasts, run_script_in
 
     deadline = time.monotonic() + PATIENCE_SECONDS
@@ -244,10 +242,7 @@ def settle(page: Page, client: ClientHandle) -> None:
     mark_broadcasts(client, mark)
     # What is sent to this browser alone takes a way of its own.
     run_script_in(client, f"(window.explorer ??= {{}}).ownMark = {mark};")
-    try:
-        page.wait_for_function(SETTLED, arg=mark, timeout=1000.0 * PATIENCE_SECONDS)
-    except BrowserTimeoutError:
-        raise PictureError("the page did not come to rest in time") from None
+    _await_rest(page, SETTLED, mark)
     if not _is_size_known(page, client):
         page.evaluate(REPORT_CAMERA)
         while not _is_size_known(page, client):
@@ -275,11 +270,16 @@ def stable_picture(page: Page) -> bytes:
     Raises:
         PictureError: it keeps changing.
     """
+    _await_rest(page, IS_STILL)
+    page.evaluate(AWAIT_FRAMES, 2)
+    return page.screenshot()
+
+
+def _await_rest(page: Page, condition: str, mark: int | None = None) -> None:
+    """Wait until a condition of a page at rest holds, which is a function of a mark."""
     from playwright.sync_api import TimeoutError as BrowserTimeoutError
 
     try:
-        page.wait_for_function(IS_STILL, timeout=1000.0 * PATIENCE_SECONDS)
+        page.wait_for_function(condition, arg=mark, timeout=1000.0 * PATIENCE_SECONDS)
     except BrowserTimeoutError:
         raise PictureError("the page did not come to rest in time") from None
-    page.evaluate(AWAIT_FRAMES, 2)
-    return page.screenshot()

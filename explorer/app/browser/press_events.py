@@ -17,13 +17,13 @@ from explorer.app.session.clock import moment_of
 from explorer.app.state.presses import Presses
 
 
-def listen(client: viser.ClientHandle, presses: Presses, released: Callable[[], None]) -> None:
+def listen(client: viser.ClientHandle, presses: Presses, at_release: Callable[[], None]) -> None:
     """Record the presses of a browser that has connected.
 
     Args:
         client: The browser.
         presses: Where to record them.
-        released: Called after each release.
+        at_release: Called after each release.
     """
     field = client.gui.add_number("Press", 0, visible=False)
 
@@ -33,6 +33,6 @@ def listen(client: viser.ClientHandle, presses: Presses, released: Callable[[], 
         number, stamp = event.target.value, event.target.update_timestamp
         presses.record(client.client_id, number, moment_of(stamp))
         if number <= 0:
-            released()
+            at_release()
 
     run_script_in(client, read_script("holds", element_id(field)))

@@ -38,11 +38,6 @@ class Timer:
             _timers.add(self)
         threading.Thread(target=self._run, name="timer", daemon=True).start()
 
-    @property
-    def is_over(self) -> bool:
-        """Whether the call is done, or cancelled."""
-        return self not in _timers
-
     def postpone(self, seconds: float) -> bool:
         """Start the pause again; return whether it was not over yet."""
         with _condition:
