@@ -50,6 +50,7 @@ SCENE_ALONE = (
 # A page prepares many frames before the one that is wanted. It draws none before, and none after:
 # each takes a software renderer as long as all else together.
 HOLD = """(() => {
+    window.isReleased = false;
     const context = WebGL2RenderingContext.prototype;
     for (const name of ["clear", "drawArrays", "drawElements", "drawArraysInstanced",
                         "drawElementsInstanced", "drawRangeElements"]) {
@@ -249,8 +250,8 @@ def settle(page: Page, client: ClientHandle) -> None:
             if time.monotonic() > deadline:
                 raise PictureError("the size of the scene did not become known in time")
             page.wait_for_timeout(10)
-    # A frame that has begun may show what was before.
-    page.evaluate(AWAIT_FRAMES, 2)
+    # A frame that has begun may show what was before, where any is drawn.
+    page.evaluate(f"(count) => window.isReleased === false || ({AWAIT_FRAMES})(count)", 2)
 
 
 def _is_size_known(page: Page, client: ClientHandle) -> bool:

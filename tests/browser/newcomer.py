@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
-from likeness import decoded
 from playwright.sync_api import Locator, Page, expect
 from tab import Tab
 
@@ -33,6 +32,10 @@ SCROLL = """it => {
 PLOTS = """() => {
     const plots = [...document.querySelectorAll(".js-plotly-plot")];
     return plots.length === 2 && plots.every((plot) => plot.explorerListens);
+}"""
+GROUND = """() => {
+    const { backgroundColor } = getComputedStyle(document.body);
+    return backgroundColor.match(/[\\d.]+/g).slice(0, 3).map(Number);
 }"""
 COLOUR = "it => getComputedStyle(it).color.match(/[\\d.]+/g)?.slice(0, 3).map(Number)"
 
@@ -172,8 +175,8 @@ class Newcomer:
         self._tab.wait_for(lambda: bool(self.page.evaluate(PLOTS)), "plots")
 
     def lightness(self) -> float:
-        """Return how light the page is on the whole, from 0 to 1."""
-        return float(decoded(self.page.screenshot()).mean())
+        """Return how light the ground of the page is, from 0 to 1."""
+        return sum(self.page.evaluate(GROUND)) / (3 * 255)
 
     def wait_for_lightness(self, condition: Callable[[float], bool]) -> None:
         """Wait until the page is as light as a condition says."""

@@ -16,6 +16,7 @@ from client import PROTOCOL, wait_for
 from playwright.sync_api import Browser, expect
 
 from explorer.app.browser.viser_server import start_viser, stop_viser
+from explorer.app.screenshot import HOLD
 from explorer.app.server import Running, start
 from explorer.mechanism.design_file import PRESETS
 
@@ -58,6 +59,7 @@ def test_guard_pages_from_elsewhere_cannot_connect_nor_the_own_page_elsewhere(
 ) -> None:
     bare = start_viser("127.0.0.1", 0)
     page = browser.new_page()
+    page.add_init_script(HOLD)
     try:
         with website() as elsewhere:
             own = running.url.replace("http", "ws")
@@ -188,6 +190,7 @@ def test_guard_page_behind_a_proxy_says_what_is_missing_and_connects_once_it_is_
         (drop_upgrade, "Upgrade and Connection"),
     )
     page = browser.new_page()
+    page.add_init_script(HOLD)
     try:
         with proxy_before(running, lambda head: head) as proxy:
             answer = page.goto(f"http://other.localhost:{proxy.port}/?token={TOKEN}")

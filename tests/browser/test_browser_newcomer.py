@@ -280,7 +280,6 @@ def test_design_scene_and_report_are_shared(newcomer: Newcomer, tmp_path: Path) 
     expect(newcomer.figure("Volume")).to_contain_text(volume_of(CHANGED))
 
 
-@pytest.mark.draws
 def test_theme_palette_and_keys_are_found_in_the_bar(newcomer: Newcomer) -> None:
     dialog = newcomer.page.get_by_role("dialog")
     light = newcomer.lightness()

@@ -55,7 +55,7 @@ def pixels_of(download: Download) -> Pixels:
 
 def take_picture(tab: Tab, *, transparent: bool) -> Pixels:
     tab.switch("Transparent", on=transparent)
-    with tab.page.expect_download() as download:
+    with tab.drawing(), tab.page.expect_download() as download:
         tab.push("Download picture")
     assert download.value.suggested_filename.startswith("paper-optimal-")
     return pixels_of(download.value)
@@ -68,7 +68,6 @@ def reds(pixels: NDArray[Any]) -> int:
     return int(((red > 200) & (green < 60) & (blue < 160)).sum())
 
 
-@pytest.mark.draws
 def test_picture_has_the_size_and_background_that_are_set_and_no_handle(tab: Tab) -> None:
     tab.open_dialog("Export")
     tab.settle()
@@ -88,7 +87,10 @@ def test_picture_has_the_size_and_background_that_are_set_and_no_handle(tab: Tab
     assert np.abs(clear[..., :3] * share + 255.0 * (1.0 - share) - opaque).mean() < 0.5
     # The handle that is on the page, and red, is in no picture.
     assert tab.state.view.handle
-    with_handle = tab.client.get_render(240, 320, transport_format="png", timeout=PATIENCE_SECONDS)
+    with tab.drawing():
+        with_handle = tab.client.get_render(
+            240, 320, transport_format="png", timeout=PATIENCE_SECONDS
+        )
     assert reds(with_handle) > 0
     assert reds(opaque) == 0
     # A picture twice as large as the scene shows the same.
@@ -96,7 +98,8 @@ def test_picture_has_the_size_and_background_that_are_set_and_no_handle(tab: Tab
     tab.close_notices()
     tab.running.page.session.do(Set("view", View(handle=False)))
     shown = decoded(tab.picture())
-    taken = pixels_of(tab.export("Picture", "PNG twice as shown")) / 255.0
+    with tab.drawing():
+        taken = pixels_of(tab.export("Picture", "PNG twice as shown")) / 255.0
     height, width = shown.shape[:2]
     assert taken.shape == (2 * height, 2 * width, 3)
     # The buttons of the views lie over the scene.

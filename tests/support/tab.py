@@ -67,6 +67,8 @@ CLOSE_NOTICES = """() => {
     const closing = document.querySelectorAll(".mantine-Notification-closeButton");
     for (const button of closing) button.click();
 }"""
+# What the pointer rests on may explain itself over the scene.
+WITHOUT_TOOLTIP = "[role=tooltip] { visibility: hidden }"
 # Has the page draw its scene, or hold it.
 DRAW = """(draws) => {
     window.isReleased = draws;
@@ -361,7 +363,7 @@ class Tab:
         self.settle()
         with self.drawing():
             self.page.evaluate(AWAIT_FRAMES, 2)
-            return self.page.locator(SCENE_CANVAS).screenshot()
+            return self.page.locator(SCENE_CANVAS).screenshot(style=WITHOUT_TOOLTIP)
 
     def on_screen(self, point: FloatArray) -> tuple[float, float]:
         """Return where a point of the scene (3,) is in the page."""

@@ -24,7 +24,7 @@ from explorer.optimise.outcome import Iterate, Outcome
 # Least seconds between two iterates on the page, and most to wait for the drawing of one.
 PACE, LONGEST = 0.07, 0.25
 # Number of advances of the page that show all waiting iterates.
-STEPS = 25
+STEPS = 6
 # Seconds after which the process of a cancelled search is ended.
 PATIENCE = 0.1
 
