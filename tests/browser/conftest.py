@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, expect
 from tab import Tab
 
 from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.server import Running, start
 from explorer.app.storage.library import Library
@@ -73,12 +74,14 @@ def kept_data_tab(browser: Browser, tmp_path_factory: pytest.TempPathFactory) ->
     def open_tab() -> Tab:
         data = UserData(Library(designs), SessionFile(home / "sessions"))
         folders = StudyFolders(studies)
-        return Tab(browser, start(OPTIMAL, port=0, user_data=data, studies=folders), draws=True)
+        return Tab(browser, start(OPTIMAL, port=0, user_data=data, studies=folders))
 
     def tidy(tab: Tab) -> None:
         for folder in (designs, studies):
             shutil.rmtree(folder, ignore_errors=True)
-        tab.running.page.services.get(SavedDesigns).refresh()
+        services = tab.running.page.services
+        services.get(SavedDesigns).refresh()
+        services.get(StudiesPanel).feed.look()
 
     kept = KeptTab(open_tab, tidy)
     yield kept

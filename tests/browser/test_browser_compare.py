@@ -30,7 +30,8 @@ def press(tab: Tab, name: str, is_done: Callable[[], bool]) -> None:
 
 def purple_pixels(tab: Tab) -> int:
     """Return how much of the scene has the colour of the first pinned design."""
-    red, green, blue = (decoded(tab.picture())[..., i] for i in range(3))
+    picture = decoded(tab.picture())
+    red, green, blue = (picture[..., i] for i in range(3))
     return int(((blue > green + 0.08) & (red > green + 0.02)).sum())
 
 

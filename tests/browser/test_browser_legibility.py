@@ -52,11 +52,18 @@ def controls(tab: Tab) -> list[tuple[str, str]]:
     ]
 
 
+def nameless(tab: Tab) -> list[str]:
+    """Return the roles of the controls without a name."""
+    return [role for role, name in controls(tab) if not name]
+
+
 @pytest.mark.parametrize(
     "dark",
     [pytest.param(False, id="light"), pytest.param(True, id="dark", marks=pytest.mark.long)],
 )
-def test_text_of_all_tabs_and_dialogs_is_legible(tab: Tab, *, dark: bool) -> None:
+def test_text_is_legible_and_every_control_named_in_all_tabs_and_dialogs(
+    tab: Tab, *, dark: bool
+) -> None:
     tab.running.page.services.theme.choose(dark=dark)
     scheme = "document.documentElement.dataset.mantineColorScheme"
     tab.wait_for(lambda: tab.page.evaluate(scheme) == ("dark" if dark else "light"), "the theme")
@@ -65,19 +72,17 @@ def test_text_of_all_tabs_and_dialogs_is_legible(tab: Tab, *, dark: bool) -> Non
 
     def read(place: str, within: str = "") -> None:
         nonlocal count
-        # It may be laid out and named a moment later.
-        tab.wait_for(
-            lambda: not problems(texts_of(tab.page, within)),
-            f"legible text in {place}: {problems(texts_of(tab.page, within))}",
-        )
+        open_folders(tab.page)
+        tab.settle()
         texts = texts_of(tab.page, within)
         assert texts, place
+        assert problems(texts) == [], place
+        assert nameless(tab) == [], place
         count += len(texts)
         sizes.update({round(text.size, 1): text.text for text in texts})
 
     for name in tab.page.get_by_role("tab").all_inner_texts():
         tab.turn_to(name.strip())
-        open_folders(tab.page)
         read(name)
     assert count > 500
     assert len(texts_of(tab.page, ".ex-bar")) > 8
@@ -85,7 +90,6 @@ def test_text_of_all_tabs_and_dialogs_is_legible(tab: Tab, *, dark: bool) -> Non
     assert {"Designs", "History", "Export", "Help"} <= set(names)
     for name in names:
         tab.open_dialog(name)
-        open_folders(tab.page)
         read(name, DIALOG)
         tab.page.keyboard.press("Escape")
         expect(tab.page.get_by_role("dialog", name=name)).to_have_count(0)
@@ -93,30 +97,16 @@ def test_text_of_all_tabs_and_dialogs_is_legible(tab: Tab, *, dark: bool) -> Non
     tab.running.page.services.theme.choose(dark=False)
 
 
-def test_every_control_has_a_name_in_every_tab_and_dialog(tab: Tab) -> None:
-
-    def wait_for_names(place: str) -> None:
-        tab.wait_for(
-            lambda: all(name for _, name in controls(tab)), f"names of all controls in {place}"
-        )
-
-    for name in tab.page.get_by_role("tab").all_inner_texts():
-        tab.turn_to(name.strip())
-        open_folders(tab.page)
-        wait_for_names(name)
-    for name in ("Designs", "History", "Export", "Help"):
-        tab.open_dialog(name)
-        wait_for_names(name)
-    tab.page.keyboard.press("Escape")
-    tab.turn_to("Pose")
-    tab.wait_for(lambda: ("slider", "l1 leg 1") in controls(tab), "the first slider")
-    assert len([1 for role, _ in controls(tab) if role == "slider"]) >= 10
+def test_control_has_the_words_beside_it_as_its_name_whenever_it_comes(tab: Tab) -> None:
+    found = controls(tab)
+    assert len([1 for role, _ in found if role == "slider"]) >= 10
+    assert ("slider", "l1 leg 1") in found
     for words in ("x", "yaw (°)"):
-        assert ("slider", words) in controls(tab)
-        assert ("textbox", words) in controls(tab)
+        assert ("slider", words) in found
+        assert ("textbox", words) in found
     # Both ends of a range have names of their own.
     tab.turn_to("Design")
-    tab.wait_for(lambda: ("textbox", "l1 most") in controls(tab), "the first range")
+    tab.settle()
     found = controls(tab)
     for words in ("l1", "d1, d3", "b4 x"):
         for end in ("least", "most"):
@@ -127,7 +117,8 @@ def test_every_control_has_a_name_in_every_tab_and_dialog(tab: Tab) -> None:
     tab.running.page.session.do(Set("design.unit_mm", 0.0))
     # As the page says it.
     tab.page.get_by_text("The unit must be positive; got 0").wait_for()
-    wait_for_names("what came later")
+    tab.settle()
+    assert nameless(tab) == []
 
 
 @pytest.mark.long

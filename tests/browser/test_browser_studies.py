@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
 from tab import Tab
 
 from explorer.app.features.studies.feed import NO_PLAN, PlotJson
 from explorer.app.features.studies.panel import StudiesPanel
-from explorer.app.server import Running, start
 from explorer.app.session.session import UNDO
-from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.parts import write_part
 from explorer.sweep.results import Results, load_results
@@ -53,9 +47,9 @@ TOP = "() => document.querySelector('.js-plotly-plot').scrollIntoView({ block: '
 
 
 @pytest.fixture
-def home(tmp_path: Path) -> Path:
-    """A folder of studies with a whole one, and half of another."""
-    whole = Study(
+def folder(data_tab: Tab) -> Path:
+    """The folder of a study that the explorer offers."""
+    study = Study(
         name="Some",
         design=OPTIMAL,
         variables={"a3x": (12.0, 20.0), "b2": (-4.0, 4.0)},
@@ -64,28 +58,12 @@ def home(tmp_path: Path) -> Path:
         objectives=(Objective("volume", "max"), Objective("reach", "min")),
         chunk=COUNT,
     )
-    half = msgspec.structs.replace(whole, name="Half", chunk=COUNT // 2)
-    home = tmp_path / "studies"
-    for study in (whole, half):
-        folder = home / study.name.lower()
-        folder.mkdir(parents=True)
-        write_part(folder, study, 0, [evaluate(encode_study(study), 0, study.chunk)])
-    return home
-
-
-@pytest.fixture
-def running(home: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Running]:
-    running = start(OPTIMAL, port=0, studies=StudyFolders(home))
-    yield running
-    running.stop()
-    assert capfd.readouterr().err == ""
-
-
-@pytest.fixture
-def tab(browser: Browser, running: Running) -> Iterator[Tab]:
-    with closing(Tab(browser, running)) as tab:
-        yield tab
-        assert tab.complaints() == []
+    feed = panel_of(data_tab).feed
+    folder = feed.folders.home / "some"
+    folder.mkdir(parents=True)
+    write_part(folder, study, 0, [evaluate(encode_study(study), 0, COUNT)])
+    feed.look()
+    return folder
 
 
 def open_studies(tab: Tab) -> None:
@@ -133,9 +111,9 @@ def studies_of(tab: Tab) -> Any:
 
 
 def test_design_is_picked_and_brushed_by_clicks_and_drags_in_the_plots(
-    tab: Tab, home: Path
+    data_tab: Tab, folder: Path
 ) -> None:
-    results = load_results(home / "some")
+    tab, results = data_tab, load_results(folder)
     volume, reach = results.columns["volume"], results.columns["reach"]
     open_studies(tab)
     tab.choose("Study", "some")
