@@ -38,6 +38,9 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUM
 # themselves before any was ready: with more of them no process can start.
 STARTS, FIRST_STARTS = 10, 4
 
+# One thread at a time changes the environment, or one would restore what another has set.
+_environment = threading.Lock()
+
 # Errors of a pipe to a process that has ended.
 PIPE_ERRORS = (EOFError, OSError)
 
@@ -218,7 +221,7 @@ class ChildProcess:
         self._process: SpawnProcess = context.Process(
             target=_answer_calls, args=(child_end,), name="explorer worker", daemon=True
         )
-        with _one_thread_each():
+        with _environment, _one_thread_each():
             self._process.start()
         # While the parent holds the child's end too, it does not see the child close it.
         child_end.close()

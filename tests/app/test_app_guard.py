@@ -309,6 +309,9 @@ def test_guard_upload_is_taken_whole_and_acknowledged_to_its_sender_alone(runnin
 
             begin["source_component_uuid"] = source
             client.send({**begin, "transfer_uuid": "empty", "part_count": 0, "size_bytes": 0})
+            client.flush()
+            # The button has one value, so the next upload would replace it before it is read.
+            wait_for(lambda: taken == [b""])
             client.send({**begin, "transfer_uuid": "two", "part_count": 2, "size_bytes": 6})
             # More than was said, twice the same, and somebody else's.
             client.send(part("two", 0, b"x" * 7))

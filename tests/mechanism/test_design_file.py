@@ -250,7 +250,8 @@ def test_home_with_lines_parallel_but_for_rounding_has_no_workspace() -> None:
 
 
 @pytest.mark.parametrize(
-    ("first", "count"), [(0, 150), pytest.param(150, 3850, marks=pytest.mark.long)]
+    ("first", "count"),
+    [(0, 150), pytest.param(150, 3850, marks=[pytest.mark.long, pytest.mark.timeout(1800)])],
 )
 def test_fuzzed_files_are_opened_or_refused_with_one_line(first: int, count: int) -> None:
     usable = [attempt(fuzzed(number)) is not None for number in range(first, first + count)]

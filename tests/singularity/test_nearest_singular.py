@@ -125,6 +125,10 @@ def test_nearest_pose_of_a_singular_pose_is_itself(case: Case) -> None:
     length = PlatformPoints.of(case.design).length
     assert vanishing.any()
     assert np.isfinite(nearest.position).all()
+    # δ2 is a distance times a sine, and vanishes by rounding where both are small.
+    sine = math.hypot(case.rotation[1, 0], case.rotation[2, 0])
+    vanishing[1] &= sine > 0.01 or case.margins[1] == 0.0
+    assume(vanishing.any())
     assert nearest.distance[vanishing].max() <= 1e-12 * max(case.size, length)
 
 

@@ -584,6 +584,14 @@ def test_run_keeps_few_tasks_under_way(tmp_path: Path) -> None:
     assert workers.most == 2 * AHEAD < study.chunks
 
 
+def test_local_workers_that_start_side_by_side_leave_the_environment_as_it_was() -> None:
+    before = dict(os.environ)
+    with LocalWorkers(8) as workers:
+        results = [workers.submit(abs, -k) for k in range(8)]
+        assert [each.result() for each in results] == [*range(8)]
+    assert dict(os.environ) == before
+
+
 def test_local_workers_return_results_raise_errors_and_survive_deaths() -> None:
     with LocalWorkers(2) as workers:
         assert [f.result() for f in [workers.submit(pow, k, 2) for k in range(9)]] == [

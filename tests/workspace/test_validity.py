@@ -24,7 +24,7 @@ from explorer import (
     poses_between,
 )
 from explorer.mechanism.design import Swing
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import poses_are_valid
@@ -173,6 +173,23 @@ def test_move_to_another_mode_is_invalid() -> None:
     free = limited(OPTIMAL, box=None)
     x, y, z = home.position
     assert not moves_are_valid(free, (x, y, z), home.rotation, (x, y, -z), home.rotation)
+
+
+def test_move_of_half_a_turn_which_has_no_shorter_way_is_invalid() -> None:
+    rng, count = np.random.default_rng(0), 40_000
+    free = limited(OPTIMAL, box=None, carriage_order="any")
+    start = 10.0 * rng.normal(size=(count, 3))
+    end = start + 3.0 * rng.normal(size=(count, 3))
+    first = Rotation.from_quat(rng.normal(size=(count, 4)))
+    axis = rng.normal(size=(count, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+
+    def is_valid(angle: float) -> BoolArray:
+        last = Rotation.from_rotvec(angle * axis) * first
+        return moves_are_valid(free, start, first.as_matrix(), end, last.as_matrix())
+
+    assert is_valid(math.pi - 1e-6).any()
+    assert not is_valid(math.pi).any()
 
 
 def test_poses_and_moves_few_or_many_have_the_same_answers() -> None:

@@ -30,6 +30,8 @@ from explorer.workspace.limits.valid_poses import Rules, is_valid, write_ends
 
 # The share of the reach by which a limit may be exceeded between poses that satisfy it.
 DEFAULT_TOLERANCE = 1e-4
+# The largest turn of a move, in radians: of half a turn neither way is the shorter one.
+LARGEST_TURN = math.pi - 1e-9
 # A move that needs more steps than this follows a limit all the way.
 MOST_STEPS = 20_000
 
@@ -49,7 +51,8 @@ def moves_are_valid(
 
     One point of the platform moves on a straight line and the platform turns about one axis the
     shorter way, as in `explorer.legs.moves`. True is a proof, but for the tolerance. A move whose
-    clearances or signs hold by less than a 100th of the tolerance may be refused.
+    clearances or signs hold by less than a 100th of the tolerance may be refused, and one of half a
+    turn, which has no shorter way, is.
 
     Args:
         design: The manipulator.
@@ -216,6 +219,8 @@ def valid_move_rows(
         write_line(start[index], start_rotation[index], end[index], end_rotation[index], tool,
                    first, step)  # fmt: skip
         angle = write_turn(start_rotation[index], end_rotation[index], axis)
+        if angle > LARGEST_TURN:
+            continue
         write_speeds(row, first, start_rotation[index], step, axis, angle, tool, speeds)
         t = 0.0
         for _ in range(MOST_STEPS):
