@@ -187,11 +187,6 @@ class Newcomer:
         presses, self.presses = self.presses, 0
         return presses
 
-    def resize(self, size: tuple[int, int]) -> None:
-        """Give the window another size."""
-        self.page.set_viewport_size({"width": size[0], "height": size[1]})
-        self._tab.settle()
-
     def reload(self) -> None:
         """Load the page again."""
         self.presses += 1

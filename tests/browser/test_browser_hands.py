@@ -83,8 +83,7 @@ def press(tab: Tab, key: str) -> None:
 
 def test_command_is_run_by_the_palette_and_by_its_key_but_not_while_one_types(tab: Tab) -> None:
     # In a smaller window the drawer lies over the end of the right panel.
-    tab.page.set_viewport_size({"width": SIZES[0][0], "height": SIZES[0][1]})
-    tab.settle()
+    tab.resize(SIZES[0])
     press(tab, "g")
     tab.wait_for(lambda: not tab.state.view.grid, "no grid")
     press(tab, "n")
@@ -186,18 +185,13 @@ def box_of(each: Locator) -> FloatRect:
     return found
 
 
-def resize(tab: Tab, size: tuple[int, int]) -> None:
-    tab.page.set_viewport_size({"width": size[0], "height": size[1]})
-    tab.settle()
-
-
 def height_of(each: Locator) -> float:
     return box_of(each)["height"]
 
 
 def test_drawer_is_as_wide_as_the_scene_which_ends_above_it(tab: Tab) -> None:
     width, height = SIZES[0]
-    resize(tab, SIZES[0])
+    tab.resize(SIZES[0])
     drawer, scene = open_drawer(tab), tab.page.locator(SCENE_CANVAS)
 
     def is_below_the_scene() -> bool:
@@ -234,7 +228,7 @@ def test_drawer_is_as_wide_as_the_scene_which_ends_above_it(tab: Tab) -> None:
 
 
 def test_scene_and_camera_recover_from_what_a_loading_page_does_late(tab: Tab) -> None:
-    resize(tab, SIZES[0])
+    tab.resize(SIZES[0])
     scene = tab.page.locator(SCENE_CANVAS)
     beside = scene.bounding_box()
     assert beside is not None
@@ -260,7 +254,7 @@ def is_framed(tab: Tab) -> bool:
 
 
 def test_page_in_a_small_window_has_room_and_cuts_nothing_off(tab: Tab) -> None:
-    resize(tab, SIZES[0])
+    tab.resize(SIZES[0])
     assert_has_room_and_cuts_nothing_off(tab, SIZES[0])
 
 

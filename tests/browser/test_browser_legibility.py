@@ -24,8 +24,7 @@ ROLES = {"slider", "spinbutton", "textbox", "searchbox", "combobox", "checkbox",
 @pytest.fixture
 def tab(data_tab: Tab) -> Tab:
     """A tab of an explorer that offers saved designs, in a window of a small laptop."""
-    data_tab.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
-    data_tab.settle()
+    data_tab.resize(SIZE)
     return data_tab
 
 

@@ -35,9 +35,8 @@ BRUSH = (50.0, 80.0)
 @pytest.fixture
 def newcomer(data_tab: Tab) -> Newcomer:
     """A newcomer at the start page in a window of a small laptop."""
-    newcomer = Newcomer(data_tab)
-    newcomer.resize(SIZE)
-    return newcomer
+    data_tab.resize(SIZE)
+    return Newcomer(data_tab)
 
 
 def volume_of(design: Design) -> str:
@@ -339,8 +338,10 @@ def test_mistakes_are_refused_with_a_reason_and_lose_nothing(
     expect(volume).to_contain_text(volume_of(OPTIMAL))
 
 
-def test_bar_tabs_and_main_buttons_are_in_view_in_a_larger_window(newcomer: Newcomer) -> None:
-    newcomer.resize(LARGER)
+def test_bar_tabs_and_main_buttons_are_in_view_in_a_larger_window(
+    newcomer: Newcomer, data_tab: Tab
+) -> None:
+    data_tab.resize(LARGER)
     for name in ("Volume", "Nearest singular pose"):
         expect(newcomer.figure(name)).to_be_in_viewport(ratio=1.0)
     for tab in newcomer.page.get_by_role("tab").all():

@@ -152,6 +152,11 @@ class Tab:
         page.point_cameras("isometric")
         self.settle()
 
+    def resize(self, size: tuple[int, int]) -> None:
+        """Give the window another size, in pixels, and wait until all is laid out in it."""
+        self.page.set_viewport_size({"width": size[0], "height": size[1]})
+        self.settle()
+
     def draw(self, draws: bool) -> None:
         """Have the page draw its scene from now on, or not."""
         self._draws = draws

@@ -23,8 +23,8 @@ from explorer.optimise.outcome import Iterate, Outcome
 
 # Least seconds between two iterates on the page, and most to wait for the drawing of one.
 PACE, LONGEST = 0.07, 0.25
-# Number of advances of the page that show all waiting iterates.
-STEPS = 6
+# About the most advances of the page in a search: with more iterates each shows several.
+STEPS = 25
 # Seconds after which the process of a cancelled search is ended.
 PATIENCE = 0.1
 
@@ -137,7 +137,7 @@ class Optimiser(Runner):
             count = len(self._waiting)
             is_hasty = self._is_cancelled or isinstance(self._ending, str)
             is_over = self._ending is not None and (count == 0 or is_hasty)
-            taken = count if is_over else math.ceil(count / STEPS)
+            taken = count if is_over else math.ceil((len(run.iterates) + count) / STEPS)
             shown, self._waiting = tuple(self._waiting[:taken]), self._waiting[taken:]
             if not is_over or self._ending is None:
                 return Advance(run.number, shown)
