@@ -45,6 +45,7 @@ from .mechanism.design_file import (
     encode_design as encode_design,
     load_design as load_design,
 )
+from .mechanism.folds import from_folds as from_folds, to_folds as to_folds
 from .mechanism.home import home_pose as home_pose
 from .mechanism.kinematics import (
     attachment_points as attachment_points,

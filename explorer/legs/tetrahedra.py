@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.legs.segments import Vector, closest_shares, dot3, minus
-from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
+from explorer.numerics.arrays import (
+    BoolArray,
+    FloatArray,
+    batch_shape,
+    finite_array,
+    rows_for_kernel,
+)
 from explorer.numerics.compiled import helper, kernel
 
 # Share of the largest coordinate up to which a gap is rounding, so that two bodies touch.
@@ -223,10 +229,7 @@ def tetrahedra_overlap(p: ArrayLike, q: ArrayLike) -> BoolArray:
     """
     a, b = finite_array("p", p, (4, 3)), finite_array("q", q, (4, 3))
     batch = batch_shape((a, 2), (b, 2))
-    a_rows, b_rows = (
-        for_kernel(np.broadcast_to(vertices, (*batch, 4, 3)).reshape(-1, 4, 3))
-        for vertices in (a, b)
-    )
+    a_rows, b_rows = rows_for_kernel(a, batch, 2), rows_for_kernel(b, batch, 2)
     overlap = np.empty(len(a_rows), dtype=np.bool_)
     overlap_rows(len(a_rows), a_rows, b_rows, overlap)
     return overlap.reshape(batch)

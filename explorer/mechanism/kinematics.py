@@ -1,7 +1,8 @@
 """Inverse and forward kinematics in closed form, over any batch, in the order of `JOINTS`.
 
-The inverse kinematics is four distances and two projections. The forward kinematics is the
-three trilaterations of `explorer.mechanism.trilateration` and has eight assembly modes.
+The inverse kinematics is four distances and two projections. The forward kinematics finds the
+folds of `explorer.mechanism.folds` by the three trilaterations, each the cosine of one fold, and
+has eight assembly modes.
 """
 
 from __future__ import annotations

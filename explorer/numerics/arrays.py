@@ -5,6 +5,7 @@ Leading axes are batch axes everywhere; docstrings give the shapes of the traili
 
 from __future__ import annotations
 
+import math
 from typing import TypeAlias
 
 import numpy as np
@@ -55,6 +56,21 @@ def for_kernel(array: FloatArray) -> FloatArray:
     """Return the array contiguous and writeable, as the signatures of compiled kernels require."""
     contiguous = np.ascontiguousarray(array)
     return contiguous if contiguous.flags.writeable else contiguous.copy()
+
+
+def rows_for_kernel(array: FloatArray, batch: tuple[int, ...], trailing: int) -> FloatArray:
+    """Return an array of any batch as one row for each entry of a common batch, for a kernel.
+
+    Args:
+        array: Shape (..., *own).
+        batch: Batch axes to which those of the array are broadcast.
+        trailing: Number of own axes.
+    """
+    own = array.shape[array.ndim - trailing :]
+    shape = (*batch, *own)
+    # A broadcast array is read-only and would be copied, also if it is as it was.
+    spread = array if array.shape == shape else np.broadcast_to(array, shape)
+    return for_kernel(spread.reshape(math.prod(batch), *own))
 
 
 def batch_shape(*arrays: tuple[FloatArray, int]) -> tuple[int, ...]:

@@ -20,7 +20,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.displacement import PlatformPoints
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose, checked_rotation
-from explorer.numerics.arrays import FloatArray, batch_shape, finite_array
+from explorer.numerics.arrays import FloatArray, batch_shape, finite_array, rows_for_kernel
 from explorer.numerics.compiled import helper, kernel
 from explorer.singularity.nearest_lines import (
     ROOM,
@@ -122,8 +122,7 @@ def nearest_singular_poses(
     platform = PlatformPoints.of(design)
     # In units of the platform's own length no product of lengths can over- or underflow.
     unit = platform.length
-    p_rows = (np.broadcast_to(p, (*batch, 3)) / unit).reshape(-1, 3)
-    r_rows = np.broadcast_to(r, (*batch, 3, 3)).reshape(-1, 3, 3).copy()
+    p_rows, r_rows = rows_for_kernel(p / unit, batch, 1), rows_for_kernel(r, batch, 2)
     count = len(p_rows)
     distance, bound = np.empty((count, 3)), np.empty((count, 3))
     near_p, near_r = np.empty((count, 3, 3)), np.empty((count, 3, 3, 3))

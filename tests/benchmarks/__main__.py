@@ -19,7 +19,7 @@ TESTS = Path(__file__).resolve().parents[1]
 sys.path[:1] = [str(folder) for folder in (TESTS, TESTS / "support", TESTS.parent)]
 
 BENCHMARKS: Mapping[str, str] = {
-    "forward": "the forward kinematics: a batch on one core, and one call",
+    "forward": "the forward kinematics and the folds: a batch on one core, and one call",
     "workspace": "exact volume, solid, and the region that holds a load",
     "slider": "from the arrival of a slider's event to the last message of the scene",
     "interference": "overlap of tetrahedra, clearances of the legs, moves, accessible workspace",

@@ -1,4 +1,4 @@
-"""The forward kinematics: a batch on one core, and one call, beside a root of the loop equations.
+"""The forward kinematics and the folds, beside a root of the loop equations and plain NumPy.
 
 `scipy.optimize.root` finds the pose nearest to where it starts; seven other modes stay
 unknown. The equations are written here anew, from the drawing of the mechanism.
@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.samples import DESIGN, SIZE, around_home
 from benchmarks.table import Row, per_second, seconds, times
 from benchmarks.timing import best_of
-from explorer import Design, forward
+from explorer import Design, forward, to_folds
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 
@@ -67,9 +67,17 @@ class LoopEquations:
 
 def run() -> Iterator[Row]:
     """Yield the rows."""
-    joints = around_home(COUNT).joints
+    positions, rotations, joints = around_home(COUNT)
     rows = [tuple(row) for row in joints[:CALLS].tolist()]
     warm()
+    fold = best_of(ROUNDS, lambda: to_folds(positions, rotations)) / COUNT
+    plain = best_of(ROUNDS, lambda: fold_in_numpy(positions, rotations)) / COUNT
+    yield Row(
+        f"folds of a pose, batch of {COUNT:,}, one core",
+        seconds(fold),
+        "60 ns",
+        f"the same in NumPy, without a check: {seconds(plain)}; {times(plain / fold)}",
+    )
     rate = COUNT / best_of(ROUNDS, lambda: forward(DESIGN, joints))
     once = best_of(ROUNDS, lambda: [forward(DESIGN, row) for row in rows]) / CALLS
     search = searches()
@@ -87,6 +95,22 @@ def run() -> Iterator[Row]:
         f"scipy.optimize.root: {seconds(search.seconds_each)}, 1 mode; "
         f"{times(search.seconds_each / once)}",
     )
+
+
+def fold_in_numpy(position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return the fold coordinates (n, 6) of poses off the walls, column by column."""
+    x, y, z = position.T
+    h, r = np.hypot(y, z), np.hypot(np.hypot(x, y), z)
+    cos3, sin3, cos_b, sin_b = (column[:, None] for column in (y / h, z / h, x / r, h / r))
+    level = cos3 * rotation[:, 1] + sin3 * rotation[:, 2]
+    up = cos3 * rotation[:, 2] - sin3 * rotation[:, 1]
+    along = cos_b[:, 0] * rotation[:, 0, 0] + sin_b[:, 0] * level[:, 0]
+    across = cos_b * level - sin_b * rotation[:, 0]
+    sine = np.hypot(across[:, 0], up[:, 0])
+    cos2, sin2 = across[:, 0] / sine, -up[:, 0] / sine
+    phi1 = np.arctan2(-sin2 * across[:, 1] - cos2 * up[:, 1], sin2 * across[:, 2] + cos2 * up[:, 2])
+    phi2, phi3 = np.arctan2(sin2, cos2), np.arctan2(z, y)
+    return np.stack([r, np.arctan2(h, x), np.arctan2(sine, along), phi1, phi2, phi3], axis=-1)
 
 
 class Searches(NamedTuple):

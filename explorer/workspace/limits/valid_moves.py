@@ -16,7 +16,14 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
+from explorer.numerics.arrays import (
+    BoolArray,
+    FloatArray,
+    batch_shape,
+    finite_array,
+    for_kernel,
+    rows_for_kernel,
+)
 from explorer.numerics.compiled import helper, kernel
 from explorer.workspace.limits.safe_shares import (
     LEAST_SHARE,
@@ -76,8 +83,8 @@ def moves_are_valid(
     r, s = checked_rotation(start_rotation), checked_rotation(end_rotation)
     batch = batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
     rows = [
-        np.array(np.broadcast_to(value, (*batch, *shape)).reshape(-1, *shape))
-        for value, shape in ((p, (3,)), (r, (3, 3)), (q, (3,)), (s, (3, 3)))
+        rows_for_kernel(value, batch, trailing)
+        for value, trailing in ((p, 1), (r, 2), (q, 1), (s, 2))
     ]
     valid = np.empty(len(rows[0]), dtype=np.bool_)
     design_rules = rules or Rules.of(design)

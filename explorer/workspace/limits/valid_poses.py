@@ -18,7 +18,13 @@ from explorer.legs.segments import Vector, closest_shares, minus, square_at
 from explorer.mechanism.design import LENGTHS, TOLERANCE, Design
 from explorer.mechanism.home import home_signs
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
+from explorer.numerics.arrays import (
+    BoolArray,
+    FloatArray,
+    batch_shape,
+    finite_array,
+    rows_for_kernel,
+)
 from explorer.numerics.compiled import helper, kernel
 from explorer.workspace.limits.constraints import demanded_order
 from explorer.workspace.limits.joint_cones import joint_cones
@@ -130,16 +136,15 @@ def poses_are_valid(
     """
     p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
     batch = batch_shape((p, 1), (r, 2))
-    p_rows = np.broadcast_to(p, (*batch, 3)).reshape(-1, 3)
-    r_rows = np.broadcast_to(r, (*batch, 3, 3)).reshape(-1, 3, 3)
+    p_rows, r_rows = rows_for_kernel(p, batch, 1), rows_for_kernel(r, batch, 2)
     valid = np.empty(len(p_rows), dtype=np.bool_)
     design_rules = rules or Rules.of(design)
     valid_rows(
         len(p_rows),
         design_rules.row,
         design_rules.cones,
-        for_kernel(p_rows),
-        for_kernel(r_rows),
+        p_rows,
+        r_rows,
         valid,
     )
     return valid.reshape(batch)

@@ -1,0 +1,142 @@
+"""The folds: six coordinates of a pose in which every singularity is a flat fold.
+
+The mechanism is a strip of four leaves, hinged along three lines. The base plane is folded at the
+guide into the plane of the guide and b4, that one at the line a1b4 into the plane of a1 and the
+line b2b3, and that one at the line b2b3 into the platform. With rotations X(·) and Z(·) about x
+and z, a pose is
+
+    p = X(φ3) Z(β) (r, 0, 0),    R = X(φ3) Z(β) X(−φ2) Z(ε) X(−φ1)
+
+and its margins are products of sines with one fold in each:
+
+    δ1 = r sin ε sin φ1,    δ2 = r sin β sin ε sin φ2,    δ3 = r sin β sin φ3.
+
+So each assembly mode is the open box r > 0, 0 < β, ε < π with each fold between 0 and π or between
+−π and 0, and a pose is singular exactly on a wall of it. log |δi| is concave in the coordinates, so
+that along a straight line between two poses of one mode each |δi| stays at or above the smaller of
+its two ends.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.errors import InputError
+from explorer.mechanism.pose import checked_rotation
+from explorer.numerics.arrays import FloatArray, batch_shape, finite_array, rows_for_kernel
+from explorer.numerics.compiled import kernel
+
+FOLDS = ("r", "β", "ε", "φ1", "φ2", "φ3")
+"""The names of the coordinates: a distance, two angles and three folds."""
+
+# Number of poses of which sines and cosines stay in the processor's nearest memory.
+BLOCK = 1024
+
+
+def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """Return the fold coordinates (r, β, ε, φ1, φ2, φ3) of a pose, shape (..., 6).
+
+    r is a distance in design units, the others are angles in radians: β and ε from 0 to π, the
+    folds above −π and up to π. On lower strata some are undefined and chosen: where b4 is on the
+    guide φ3 is 0, where a1 is on the line b2b3 φ2 is 0, and where a1 and b4 coincide β is 0 too.
+    What follows takes up the rest of the rotation.
+
+    Args:
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+
+    Raises:
+        InputError: The position is not finite, or the rotation is not one.
+    """
+    p = finite_array("position", position, (3,))
+    r = checked_rotation(rotation)
+    shape = batch_shape((p, 1), (r, 2))
+    positions, rotations = rows_for_kernel(p, shape, 1), rows_for_kernel(r, shape, 2)
+    count = len(positions)
+    coordinates = np.empty((count, 6))
+    sines, cosines = np.empty((2, min(count, BLOCK), 5))
+    for start in range(0, count, BLOCK):
+        rows = coordinates[start : start + BLOCK]
+        part = slice(start, start + len(rows))
+        write_angles(len(rows), positions[part], rotations[part], rows, sines, cosines)
+        np.arctan2(sines[: len(rows)], cosines[: len(rows)], out=rows[:, 1:])
+    return coordinates.reshape(*shape, 6)
+
+
+def from_folds(coordinates: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return position (..., 3) and rotation (..., 3, 3) of fold coordinates.
+
+    Args:
+        coordinates: (r, β, ε, φ1, φ2, φ3), shape (..., 6), in design units and radians.
+
+    Raises:
+        InputError: The coordinates are not six finite numbers, or r is negative.
+    """
+    array = finite_array(f"folds ({', '.join(FOLDS)})", coordinates, (6,))
+    if (array[..., 0] < 0.0).any():
+        raise InputError(f"r is a distance and must not be negative; got {array[..., 0].min():g}")
+    r = array[..., 0]
+    (cb, ce, c1, c2, c3), (sb, se, s1, s2, s3) = (
+        np.moveaxis(function(array[..., 1:]), -1, 0) for function in (np.cos, np.sin)
+    )
+    position = np.stack([r * cb, r * sb * c3, r * sb * s3], axis=-1)
+    # The columns of X(−φ2) Z(ε) X(−φ1), turned by X(φ3) Z(β).
+    columns = (
+        (ce, se * c2, -se * s2),
+        (-se * c1, ce * c1 * c2 - s1 * s2, -ce * c1 * s2 - s1 * c2),
+        (-se * s1, ce * s1 * c2 + c1 * s2, c1 * c2 - ce * s1 * s2),
+    )
+    rotation = np.empty((*array.shape[:-1], 3, 3))
+    for index, (x, y, z) in enumerate(columns):
+        turned = sb * x + cb * y
+        rotation[..., 0, index] = cb * x - sb * y
+        rotation[..., 1, index] = c3 * turned - s3 * z
+        rotation[..., 2, index] = s3 * turned + c3 * z
+    return position, rotation
+
+
+@kernel("void(f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1])")
+def write_angles(
+    positions: FloatArray,
+    rotations: FloatArray,
+    coordinates: FloatArray,
+    sines: FloatArray,
+    cosines: FloatArray,
+) -> None:
+    """Write the distance, and sines and cosines of the angles and folds, of each row.
+
+    Args:
+        positions: b4 in the base frame, shape (n, 3).
+        rotations: Platform to base, shape (n, 3, 3).
+        coordinates: Output, r in its first column, shape (n, 6).
+        sines: Output, of β, ε, φ1, φ2, φ3, shape (n or more, 5); no zero is a negative one.
+        cosines: Output, shape (n or more, 5).
+    """
+    for row in range(positions.shape[0]):
+        # A negative zero would turn a fold of π into −π.
+        px, py, pz = positions[row, 0], positions[row, 1], positions[row, 2] + 0.0
+        h = math.sqrt(py * py + pz * pz)
+        r = math.sqrt(px * px + h * h)
+        c3, s3 = (py / h, pz / h) if h > 0.0 else (1.0, 0.0)
+        cb, sb = (px / r, h / r) if r > 0.0 else (1.0, 0.0)
+        # The platform's axes, turned back by X(φ3) Z(β): parts along a1b4, across it in the leaf
+        # of the guide, and across both.
+        ux, uy, uz = rotations[row, 0, 0], rotations[row, 1, 0], rotations[row, 2, 0]
+        vx, vy, vz = rotations[row, 0, 1], rotations[row, 1, 1], rotations[row, 2, 1]
+        nx, ny, nz = rotations[row, 0, 2], rotations[row, 1, 2], rotations[row, 2, 2]
+        uy, uz = c3 * uy + s3 * uz, c3 * uz - s3 * uy
+        vy, vz = c3 * vy + s3 * vz, c3 * vz - s3 * vy
+        ny, nz = c3 * ny + s3 * nz, c3 * nz - s3 * ny
+        along, across = cb * ux + sb * uy, cb * uy - sb * ux
+        se = math.sqrt(across * across + uz * uz)
+        c2, s2 = (across / se, (0.0 - uz) / se) if se > 0.0 else (1.0, 0.0)
+        coordinates[row, 0] = r
+        sines[row, 0], cosines[row, 0] = sb, cb
+        sines[row, 1], cosines[row, 1] = se, along
+        sines[row, 2] = 0.0 - (s2 * (cb * vy - sb * vx) + c2 * vz)
+        cosines[row, 2] = s2 * (cb * ny - sb * nx) + c2 * nz
+        sines[row, 3], cosines[row, 3] = s2, c2
+        sines[row, 4], cosines[row, 4] = s3, c3
