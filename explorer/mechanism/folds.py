@@ -26,12 +26,20 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import FloatArray, batch_shape, finite_array, rows_for_kernel
-from explorer.numerics.compiled import kernel
+from explorer.numerics.arrays import (
+    FloatArray,
+    batch_shape,
+    finite_array,
+    for_kernel,
+    rows_for_kernel,
+)
+from explorer.numerics.compiled import helper, kernel
 
 FOLDS = ("r", "β", "ε", "φ1", "φ2", "φ3")
 """The names of the coordinates: a distance, two angles and three folds."""
 
+# The cosine and the sine of an angle.
+Direction = tuple[float, float]
 # Number of poses of which sines and cosines stay in the processor's nearest memory.
 BLOCK = 1024
 
@@ -78,24 +86,54 @@ def from_folds(coordinates: ArrayLike) -> tuple[FloatArray, FloatArray]:
     array = finite_array(f"folds ({', '.join(FOLDS)})", coordinates, (6,))
     if (array[..., 0] < 0.0).any():
         raise InputError(f"r is a distance and must not be negative; got {array[..., 0].min():g}")
-    r = array[..., 0]
-    (cb, ce, c1, c2, c3), (sb, se, s1, s2, s3) = (
-        np.moveaxis(function(array[..., 1:]), -1, 0) for function in (np.cos, np.sin)
-    )
-    position = np.stack([r * cb, r * sb * c3, r * sb * s3], axis=-1)
-    # The columns of X(−φ2) Z(ε) X(−φ1), turned by X(φ3) Z(β).
+    rows = for_kernel(array.reshape(-1, 6))
+    positions, rotations = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3))
+    write_poses(len(rows), rows, positions, rotations)
+    batch = array.shape[:-1]
+    return positions.reshape(*batch, 3), rotations.reshape(*batch, 3, 3)
+
+
+@helper
+def write_rotation(
+    angles: tuple[Direction, Direction],
+    folds: tuple[Direction, Direction, Direction],
+    rotation: FloatArray,
+) -> None:
+    """Write the rotation (3, 3) of cosines and sines of β and ε, and of φ1, φ2 and φ3."""
+    (cos_b, sin_b), (cos_e, sin_e) = angles
+    (cos1, sin1), (cos2, sin2), (cos3, sin3) = folds
+    # The columns of X(−φ2) Z(ε) X(−φ1).
     columns = (
-        (ce, se * c2, -se * s2),
-        (-se * c1, ce * c1 * c2 - s1 * s2, -ce * c1 * s2 - s1 * c2),
-        (-se * s1, ce * s1 * c2 + c1 * s2, c1 * c2 - ce * s1 * s2),
+        (cos_e, sin_e * cos2, -sin_e * sin2),
+        (-sin_e * cos1, cos_e * cos1 * cos2 - sin1 * sin2, -cos_e * cos1 * sin2 - sin1 * cos2),
+        (-sin_e * sin1, cos_e * sin1 * cos2 + cos1 * sin2, cos1 * cos2 - cos_e * sin1 * sin2),
     )
-    rotation = np.empty((*array.shape[:-1], 3, 3))
-    for index, (x, y, z) in enumerate(columns):
-        turned = sb * x + cb * y
-        rotation[..., 0, index] = cb * x - sb * y
-        rotation[..., 1, index] = c3 * turned - s3 * z
-        rotation[..., 2, index] = s3 * turned + c3 * z
-    return position, rotation
+    for column in range(3):
+        x, y, z = columns[column]
+        x, y = cos_b * x - sin_b * y, sin_b * x + cos_b * y
+        rotation[0, column] = x
+        rotation[1, column] = cos3 * y - sin3 * z
+        rotation[2, column] = sin3 * y + cos3 * z
+
+
+@helper
+def write_pose(coordinates: FloatArray, position: FloatArray, rotation: FloatArray) -> None:
+    """Write the position (3,) and the rotation (3, 3) of fold coordinates (6,)."""
+    r, b, e = coordinates[0], coordinates[1], coordinates[2]
+    f1, f2, f3 = coordinates[3], coordinates[4], coordinates[5]
+    cos_b, sin_b = math.cos(b), math.sin(b)
+    fold1, fold2 = (math.cos(f1), math.sin(f1)), (math.cos(f2), math.sin(f2))
+    cos3, sin3 = math.cos(f3), math.sin(f3)
+    angles = (cos_b, sin_b), (math.cos(e), math.sin(e))
+    write_rotation(angles, (fold1, fold2, (cos3, sin3)), rotation)
+    position[0], position[1], position[2] = r * cos_b, r * sin_b * cos3, r * sin_b * sin3
+
+
+@kernel("void(f8[:,::1], f8[:,::1], f8[:,:,::1])")
+def write_poses(coordinates: FloatArray, positions: FloatArray, rotations: FloatArray) -> None:
+    """Write the positions (n, 3) and the rotations (n, 3, 3) of fold coordinates (n, 6)."""
+    for row in range(coordinates.shape[0]):
+        write_pose(coordinates[row], positions[row], rotations[row])
 
 
 @kernel("void(f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1])")

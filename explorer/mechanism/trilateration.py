@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 
+from explorer.mechanism.folds import write_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import kernel
 
@@ -103,35 +104,17 @@ def solve_rows(
             sin_e = cos2 * (cos_b * sine - sin_b * c)
         cos1 = min(1.0, max(-1.0, -across / (r * sin_e))) if r * sin_e > 0.0 else 1.0
         cos3 = min(1.0, max(-1.0, py / h)) if h > 0.0 else 1.0
-        sines = (
-            math.sqrt((1.0 - cos1) * (1.0 + cos1)),
-            math.sqrt((1.0 - cos2) * (1.0 + cos2)),
-            math.sqrt((1.0 - cos3) * (1.0 + cos3)),
-        )
+        sin1 = math.sqrt((1.0 - cos1) * (1.0 + cos1))
+        sin2 = math.sqrt((1.0 - cos2) * (1.0 + cos2))
+        sin3 = math.sqrt((1.0 - cos3) * (1.0 + cos3))
+        angles = (cos_b, sin_b), (cos_e, sin_e)
         for mode in range(8):
-            sin1 = sines[0] if mode & 4 else -sines[0]
-            sin2 = sines[1] if mode & 2 else -sines[1]
-            sin3 = sines[2] if mode & 1 else -sines[2]
+            folds = (
+                (cos1, sin1 if mode & 4 else -sin1),
+                (cos2, sin2 if mode & 2 else -sin2),
+                (cos3, sin3 if mode & 1 else -sin3),
+            )
             positions[row, mode, 0] = px * scale
             positions[row, mode, 1] = h * cos3 * scale
-            positions[row, mode, 2] = h * sin3 * scale
-            # The columns of X(−φ2) Z(ε) X(−φ1), turned by X(φ3) Z(β).
-            for column in range(3):
-                if column == 0:
-                    x, y, z = cos_e, sin_e * cos2, -sin_e * sin2
-                elif column == 1:
-                    x, y, z = (
-                        -sin_e * cos1,
-                        cos_e * cos1 * cos2 - sin1 * sin2,
-                        -cos_e * cos1 * sin2 - sin1 * cos2,
-                    )
-                else:
-                    x, y, z = (
-                        -sin_e * sin1,
-                        cos_e * sin1 * cos2 + cos1 * sin2,
-                        cos1 * cos2 - cos_e * sin1 * sin2,
-                    )
-                x, y = cos_b * x - sin_b * y, sin_b * x + cos_b * y
-                rotations[row, mode, 0, column] = x
-                rotations[row, mode, 1, column] = cos3 * y - sin3 * z
-                rotations[row, mode, 2, column] = sin3 * y + cos3 * z
+            positions[row, mode, 2] = h * folds[2][1] * scale
+            write_rotation(angles, folds, rotations[row, mode])

@@ -4,8 +4,10 @@ A load can be demanded too: every pose of the path then holds it within the limi
 struts and guide.
 
 Poses without a path are refused before any search: those of different modes, and those between
-which two legs would have to pass each other on the guide. Other poses are joined by a straight
-move or by `explorer.paths.tree_search`; in both cases a proof covers every move as a whole.
+which two legs would have to pass each other on the guide. Other poses are joined by the straight
+line in the folds, which meets no singularity and keeps the margins of its ends. Only where another
+limit ends that line does `explorer.paths.tree_search` look for a way round. In both cases a proof
+covers every move as a whole.
 """
 
 from __future__ import annotations
@@ -23,21 +25,26 @@ from explorer.errors import InputError, NoAnswerError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.margins import INCIDENCES, mode_name
+from explorer.mechanism.folds import from_folds, to_folds, write_poses
+from explorer.mechanism.margins import INCIDENCES, margins, mode_name
 from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
 from explorer.paths.loads import TOLERANCE, DemandedLoad
 from explorer.paths.move_shares import share_rows_of_moves
+from explorer.paths.proofs import Proofs, divide_line, positions_and_rotations
 from explorer.paths.smoothing import Smoother
-from explorer.paths.tree_search import TreeSearch, compile_checks, search_is_possible
+from explorer.paths.tree_search import TreeSearch
 from explorer.singularity.bruhat import incidences
 from explorer.statics.reactions import PART_NAMES
 from explorer.statics.weights import Weights
 from explorer.workspace.limits.broken import violations
-from explorer.workspace.limits.valid_poses import Rules
+from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_rows
+from explorer.workspace.limits.valid_poses import Rules, valid_rows
 
 DEFAULT_SECONDS = 2.0
-# Preferred margin and clearance as a share of the reach; at most a share of those of the ends.
-PREFERRED, SHARE_OF_ENDS = 0.02, 0.5
+# Preferred margin and clearance as a share of those of the ends; the clearance at most a share of
+# the reach.
+SHARE_OF_ENDS, PREFERRED_CLEARANCE = 0.5, 0.02
 # Share of the time for a search with the preferred margin and clearance.
 SHARE_FOR_PREFERRED = 0.5
 D1, D3 = JOINTS.index("d1"), JOINTS.index("d3")
@@ -79,12 +86,12 @@ class PlannedPath:
         poses: Corners, from the start to the goal.
         unsmoothed: Corners before smoothing.
         length: Root-mean-square distance that b1 to b4 travel, in design units.
-        margin: Lower bound of |δ1|, |δ2| and |δ3| along the path, in design units, to the
+        margin: Proven lower bound of |δ1|, |δ2| and |δ3| along the path, in design units, to the
             tolerance of moves.
-        clearance: Lower bound of the clearance of any two legs along the path, in design
+        clearance: Proven lower bound of the clearance of any two legs along the path, in design
             units.
         seconds: Time for search and smoothing.
-        checked: Number of moves checked in the search.
+        checked: Number of lines checked in the search.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
     """
 
@@ -133,7 +140,7 @@ def plan_path(
         EndError: the start or the goal is singular, outside the limits or does not hold the load.
         InputError: `seconds` is not a positive number, or the load is not six finite numbers.
         NoPathError: there is no path, or the search ended without one.
-        MissingExtraError: the straight move is not valid, and OMPL is not installed.
+        MissingExtraError: the straight line in the folds is not valid, and OMPL is not installed.
     """
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InputError(f"planning needs a time above zero, in seconds; got {seconds:g}")
@@ -148,20 +155,19 @@ def plan_path(
         if demanded_load is not None:
             _check_held(name, snapshot.pose, demanded_load)
     _check_same_order(*ends)
+    # Compiling takes seconds, once on a machine; they do not count as search.
+    for kernel in (divide_line, valid_move_rows, valid_rows, write_poses, share_rows_of_moves):
+        kernel.compile()
     started = time.perf_counter()
     planner = _Planner(design, start, goal, seed, tool, demanded_load)
     demanded = Rules.of(design, ends[0].signs, _order(ends[0]))
     margin, clearance = _preferred(*ends)
     preferred = demanded.tighten(margin, clearance)
-    path = planner.plan_straight(preferred, margin, clearance)
-    if path is None and search_is_possible():
-        # Compiling takes seconds, once on a machine; they do not count as search.
-        compile_checks()
-        if demanded_load is not None:
-            share_rows_of_moves.compile()
-        started = time.perf_counter()
-        path = planner.search(preferred, margin, clearance, SHARE_FOR_PREFERRED * seconds)
-    path = path or planner.plan_straight(demanded, 0.0, 0.0)
+    path = (
+        planner.line(preferred, margin, clearance)
+        or planner.line(demanded, 0.0, 0.0)
+        or planner.search(preferred, margin, clearance, SHARE_FOR_PREFERRED * seconds)
+    )
     if path is None:
         remaining = seconds - (time.perf_counter() - started)
         path = planner.search(demanded, 0.0, 0.0, max(remaining, 0.0))
@@ -169,7 +175,7 @@ def plan_path(
         raise NoPathError(
             "out of time",
             f"no path {'' if load is None else 'that holds the load '}was found within "
-            f"{seconds:g} s ({planner.checked} moves tried); there may be one: allow more time, "
+            f"{seconds:g} s ({planner.checked} lines tried); there may be one: allow more time, "
             "or go by a pose in between",
         )
     return dataclasses.replace(path, seconds=time.perf_counter() - started, checked=planner.checked)
@@ -179,7 +185,7 @@ class _Planner:
     """Searches for paths between two poses, under one set of rules after another.
 
     Attributes:
-        checked: Number of moves checked so far.
+        checked: Number of lines checked so far.
     """
 
     def __init__(
@@ -194,29 +200,47 @@ class _Planner:
         self.checked = 0
         self._design = design
         self._ends = start, goal
+        self._folds = to_folds(*positions_and_rotations(self._ends))
         self._seed = seed
         self._tool = tool
         self._load = load
+        # The signs of margins have to be certain, also of ends with small ones.
+        least = float(np.abs(margins(*positions_and_rotations(self._ends))).min())
+        self._tolerance = min(DEFAULT_TOLERANCE * design.reach, least)
 
-    def plan_straight(self, rules: Rules, margin: float, clearance: float) -> PlannedPath | None:
-        """Return the straight move if it is valid."""
+    def line(self, rules: Rules, margin: float, clearance: float) -> PlannedPath | None:
+        """Return the straight line in the folds if it is valid."""
         self.checked += 1
-        smoother = Smoother(self._design, rules, self._seed, self._tool, self._load)
-        if not smoother.is_valid(*self._ends):
+        proofs = self._proofs(rules)
+        corners = proofs.line(*self._folds)
+        if corners is None:
             return None
-        return self._path(smoother, self._ends, self._ends, margin, clearance)
+        poses = self._poses(corners)
+        return self._path(Smoother(proofs), poses, poses, margin, clearance)
 
     def search(
         self, rules: Rules, margin: float, clearance: float, seconds: float
     ) -> PlannedPath | None:
         """Return a smoothed path of OMPL's search, or None if the time was too short."""
-        tree = TreeSearch(self._design, rules, self._tool, self._load)
-        unsmoothed = tree.path(*self._ends, seconds)
+        proofs = self._proofs(rules)
+        tree = TreeSearch(proofs)
+        first, last = self._folds
+        corners = tree.path(first, last, seconds)
         self.checked += tree.checked
-        if unsmoothed is None:
+        if corners is None:
             return None
-        smoother = Smoother(self._design, rules, self._seed, self._tool, self._load)
+        unsmoothed = self._poses(corners)
+        smoother = Smoother(proofs, self._seed)
         return self._path(smoother, unsmoothed, smoother.smooth(unsmoothed), margin, clearance)
+
+    def _proofs(self, rules: Rules) -> Proofs:
+        return Proofs(self._design, rules, self._tolerance, self._tool, self._load)
+
+    def _poses(self, corners: FloatArray) -> tuple[Pose, ...]:
+        """Return the poses of corners, with the given ends, from which they differ by rounding."""
+        between = zip(*from_folds(corners[1:-1]), strict=True)
+        start, goal = self._ends
+        return (start, *(Pose.of(p, r) for p, r in between), goal)
 
     def _path(
         self,
@@ -230,7 +254,7 @@ class _Planner:
             poses=poses,
             unsmoothed=unsmoothed,
             length=float(smoother.lengths(poses).sum()),
-            margin=max(smoother.design.limits.margin or 0.0, margin),
+            margin=max(self._design.limits.margin or 0.0, margin),
             clearance=clearance,
             seconds=0.0,
             checked=0,
@@ -240,10 +264,10 @@ class _Planner:
 
 def _preferred(start: Snapshot, goal: Snapshot) -> tuple[float, float]:
     """Return the margin and the clearance to prefer on a path; both ends have more."""
-    preferred = PREFERRED * start.design.reach
     margin = min(float(np.abs(end.margins).min()) for end in (start, goal))
     clearance = min(float(end.clearances.clearance.min()) for end in (start, goal))
-    return min(preferred, SHARE_OF_ENDS * margin), min(preferred, SHARE_OF_ENDS * clearance)
+    preferred = PREFERRED_CLEARANCE * start.design.reach
+    return SHARE_OF_ENDS * margin, min(preferred, SHARE_OF_ENDS * clearance)
 
 
 def _check_not_singular(name: str, snapshot: Snapshot) -> None:

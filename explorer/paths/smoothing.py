@@ -13,13 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from explorer.legs.moves import poses_between
-from explorer.mechanism.design import Design
 from explorer.mechanism.displacement import displacement
-from explorer.mechanism.pose import Pose, Triple
+from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.paths.loads import DemandedLoad
-from explorer.workspace.limits.valid_moves import moves_are_valid
-from explorer.workspace.limits.valid_poses import Rules
+from explorer.paths.proofs import Proofs, positions_and_rotations
 
 # Shortcuts tried in a round, rounds without gain that end the search, and the most rounds.
 TRIES, PATIENCE, MOST_ROUNDS = 24, 4, 60
@@ -31,21 +28,15 @@ CUTS, CUT_ROUNDS = (0.25, 0.08), 3
 
 @dataclass(frozen=True)
 class Smoother:
-    """A smoother of paths under one set of rules.
+    """A smoother of paths.
 
     Attributes:
-        design: The manipulator.
-        rules: Rules that every pose keeps.
+        proofs: Proofs that moves are valid.
         seed: Seed of the random shortcuts.
-        tool: Point that moves straight in the platform frame, in design units; None for b4.
-        load: Load that every pose holds, for a path of the same tool; None for none.
     """
 
-    design: Design
-    rules: Rules
+    proofs: Proofs
     seed: int = 0
-    tool: Triple | None = None
-    load: DemandedLoad | None = None
 
     def smooth(self, poses: Sequence[Pose]) -> tuple[Pose, ...]:
         """Return a path with the same ends, shorter and with its corners cut off."""
@@ -53,19 +44,8 @@ class Smoother:
 
     def lengths(self, poses: Sequence[Pose]) -> FloatArray:
         """Return the root-mean-square displacement over each move, shape (n,)."""
-        p, r = _positions_and_rotations(poses)
-        return displacement(self.design, p[:-1], r[:-1], p[1:], r[1:])
-
-    def is_valid(self, start: Pose, end: Pose) -> bool:
-        """Return whether the straight move between two poses is valid."""
-        return self._are_valid([(start, end)])[0]
-
-    def _are_valid(self, pieces: Sequence[tuple[Pose, Pose]]) -> list[bool]:
-        (p, r), (q, s) = (_positions_and_rotations(ends) for ends in zip(*pieces, strict=True))
-        valid = moves_are_valid(self.design, p, r, q, s, rules=self.rules, tool=self.tool)
-        if self.load is not None and valid.any():
-            valid[valid] = self.load.holds_along(p[valid], r[valid], q[valid], s[valid])
-        return valid.tolist()
+        p, r = positions_and_rotations(poses)
+        return displacement(self.proofs.design, p[:-1], r[:-1], p[1:], r[1:])
 
     def _shorten(self, poses: list[Pose]) -> list[Pose]:
         rng = np.random.default_rng(self.seed)
@@ -83,7 +63,7 @@ class Smoother:
             shortened: list[Pose] | None = None
             if worthwhile:
                 worthwhile.sort(key=lambda cut: -cut.gain)
-                valid = self._are_valid([cut.piece for cut in worthwhile])
+                valid = self.proofs.hold([cut.piece for cut in worthwhile])
                 checked = zip(worthwhile, valid, strict=True)
                 shortened = next((cut.poses for cut, is_valid in checked if is_valid), None)
             idle_rounds = 0 if shortened else idle_rounds + 1
@@ -114,7 +94,7 @@ class Smoother:
         )
 
     def _pose_between(self, start: Pose, end: Pose, share: float) -> Pose:
-        return Pose.of(*poses_between(start, end, share, self.tool))
+        return Pose.of(*poses_between(start, end, share, self.proofs.tool))
 
     def _cut_corners(self, poses: list[Pose]) -> list[Pose]:
         for _ in range(CUT_ROUNDS):
@@ -128,7 +108,7 @@ class Smoother:
                 ]
                 for a, b, c in corners
             ]
-            valid = iter(self._are_valid([cut for choices in cuts for cut in choices]))
+            valid = iter(self.proofs.hold([cut for choices in cuts for cut in choices]))
             path: list[Pose] = [poses[0]]
             for corner, choices in zip(corners, cuts, strict=True):
                 possible = [cut for cut in choices if next(valid)]
@@ -144,10 +124,6 @@ class _Shortcut:
     poses: list[Pose]
     piece: tuple[Pose, Pose]
     gain: float
-
-
-def _positions_and_rotations(poses: Sequence[Pose]) -> tuple[FloatArray, FloatArray]:
-    return np.array([pose.position for pose in poses]), np.array([pose.rotation for pose in poses])
 
 
 def _without_repeats(poses: list[Pose]) -> list[Pose]:

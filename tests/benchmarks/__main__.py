@@ -27,7 +27,7 @@ BENCHMARKS: Mapping[str, str] = {
     "statics": "forces, bending, errors and compliance in many poses",
     "optimise": "optimal designs: iterations, precision, time, random starts",
     "studies": "many designs: a second, on two workers; memory of a million",
-    "planning": "paths between random poses that keep everything",
+    "planning": "lines in the folds and paths between random poses of one mode",
     "orientation": "shares of orientations, greatest tilts at a position and over many",
     "page": "a frame, and from the address to a page that has drawn all, over viser's",
     "first_minute": "the first searches on a machine that has never run the explorer",

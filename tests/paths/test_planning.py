@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from limited_designs import limited
 from long_cases import long_after
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from tool_moves import tool_move
 
@@ -28,22 +29,25 @@ from explorer import (
     inverse,
     move_clearances,
     moves_are_clear,
+    to_folds,
 )
 from explorer.paths.crossings import path_margins
 from explorer.paths.planning import EndError, NoPathError, PlannedPath, plan_path
+from explorer.paths.proofs import Proofs, positions_and_rotations
 from explorer.paths.smoothing import Smoother
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 DESIGN = limited(PRESETS["paper-optimal"], leg_radii=(0.2,) * 4)
 HOME = home_pose(DESIGN)
+PROOFS = Proofs.of(DESIGN, Rules.of(DESIGN))
 needs_ompl = pytest.mark.skipif(find_spec("ompl") is None, reason="OMPL is not installed")
 
 
 @cache
 def valid_poses(design: Design = DESIGN) -> tuple[Pose, ...]:
     rng = np.random.default_rng(3)
-    positions = rng.uniform([0, -12, 0], [20, 22, 18], (4000, 3))
-    rotations = Rotation.random(4000, random_state=rng).as_matrix()
+    positions = rng.uniform([0, -12, 0], [20, 22, 18], (40_000, 3))
+    rotations = Rotation.random(40_000, random_state=rng).as_matrix()
     valid = poses_are_valid(design, positions, rotations)
     pairs = zip(positions[valid], rotations[valid], strict=True)
     return tuple(Pose.of(p, r) for p, r in pairs)
@@ -55,15 +59,16 @@ def order(pose: Pose) -> list[int]:
 
 
 @cache
-def pairs() -> tuple[tuple[Pose, Pose], ...]:
-    """Return pairs of poses of one order that no straight valid move joins."""
-    smoother = Smoother(DESIGN, Rules.of(DESIGN))
-    found = [
-        (a, b)
-        for a, b in itertools.pairwise(valid_poses())
-        if order(a) == order(b) and not smoother.is_valid(a, b)
-    ]
-    return tuple(found[:12])
+def pairs(moves: int) -> tuple[tuple[Pose, Pose], ...]:
+    """Return pairs of poses of one order whose line in the folds has so many moves, 0 for none."""
+    found: list[tuple[Pose, Pose]] = []
+    for a, b in itertools.pairwise(valid_poses()):
+        if order(a) == order(b) and len(found) < 12:
+            folds = to_folds(*positions_and_rotations((a, b)))
+            corners = PROOFS.line(*folds)
+            if moves == (0 if corners is None else len(corners) - 1):
+                found.append((a, b))
+    return tuple(found)
 
 
 def assert_keeps_everything(path: PlannedPath, poses: tuple[Pose, ...]) -> None:
@@ -87,19 +92,19 @@ def test_plan_path_between_valid_ends_keeps_everything_and_is_shorter_when_smoot
     index: int,
 ) -> None:
     """Every other move is that of a tool."""
-    start, goal = pairs()[index]
+    start, goal = pairs(0)[index]
     tool = (1.0, -0.5, 3.0) if index % 2 else None
     path = plan_path(DESIGN, start, goal, seconds=60.0, tool=tool)
     assert path.tool == tool
-    assert len(path.unsmoothed) > 2
-    assert path.checked >= 2
     # Half the room that both ends have is kept, or else none.
     ends = [evaluate(DESIGN, each) for each in (start, goal)]
-    margin = min(0.02 * DESIGN.reach, *(0.5 * float(abs(e.margins).min()) for e in ends))
+    margin = min(0.5 * float(abs(e.margins).min()) for e in ends)
     assert path.margin in (pytest.approx(margin), 0.0)
     assert (path.clearance > 0.0) == (path.margin > 0.0)
     if tool is None:
-        lengths = Smoother(DESIGN, Rules.of(DESIGN)).lengths
+        assert len(path.unsmoothed) > 2
+        assert path.checked > 2
+        lengths = Smoother(PROOFS).lengths
         assert path.length == pytest.approx(float(lengths(path.poses).sum()))
         assert path.length <= float(lengths(path.unsmoothed).sum()) + 1e-9
     for poses in (path.poses, path.unsmoothed):
@@ -112,9 +117,8 @@ def test_smooth_detour_in_free_space_becomes_straight() -> None:
     x, y, z = HOME.position
     corner = Pose((x, y + 2.0, z), HOME.quaternion)
     end = Pose((x + 2.0, y + 2.0, z), HOME.quaternion)
-    smoother = Smoother(DESIGN, Rules.of(DESIGN))
-    assert smoother.is_valid(HOME, end)
-    assert smoother.smooth([HOME, corner, end]) == (HOME, end)
+    assert PROOFS.hold([(HOME, end)]) == [True]
+    assert Smoother(PROOFS).smooth([HOME, corner, end]) == (HOME, end)
 
 
 def test_plan_path_valid_straight_move_needs_no_search(
@@ -130,10 +134,41 @@ def test_plan_path_valid_straight_move_needs_no_search(
     assert plan_path(DESIGN, HOME, HOME).length == 0.0
 
 
+def test_line_in_the_folds_joins_nearly_all_pairs_within_the_limits_of_the_optimum() -> None:
+    design = PRESETS["paper-optimal"]
+    proofs = Proofs.of(design, Rules.of(design))
+    poses = valid_poses(design)
+    lines = [
+        proofs.line(*to_folds(*positions_and_rotations(ends))) is not None
+        for ends in itertools.pairwise(poses)
+        if order(ends[0]) == order(ends[1])
+    ]
+    assert len(lines) > 1000
+    assert np.mean(lines) > 0.95
+
+
+@pytest.mark.parametrize("moves", [2, 3])
+def test_plan_path_line_in_the_folds_of_some_moves_needs_no_search(
+    moves: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "ompl.base", None)
+    for start, goal in pairs(moves):
+        path = plan_path(DESIGN, start, goal)
+        assert path.poses == path.unsmoothed
+        assert path.poses[0] is start
+        assert path.poses[-1] is goal
+        # The corners lie on the line, at its halves, quarters and so on.
+        folds = to_folds(*positions_and_rotations(path.poses))
+        shares = np.divide(folds - folds[:1], folds[-1:] - folds[:1])
+        fractions = np.round(4096.0 * shares[:, :1]) / 4096.0
+        assert_allclose(shares, np.broadcast_to(fractions, shares.shape), rtol=0, atol=1e-9)
+        assert_keeps_everything(path, path.poses)
+
+
 def test_plan_path_without_ompl_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ompl.util", None)
     with pytest.raises(MissingExtraError, match=r"flagged-explorer\[planning\]"):
-        plan_path(DESIGN, *pairs()[0])
+        plan_path(DESIGN, *pairs(0)[0])
 
 
 @pytest.mark.parametrize("mode", [0, 3, 7])
@@ -167,7 +202,7 @@ def test_plan_path_other_carriage_order_names_both_orders(demanded: str) -> None
 @needs_ompl
 def test_plan_path_too_little_time_names_it() -> None:
     with pytest.raises(NoPathError, match="1e-09 s") as caught:
-        plan_path(DESIGN, *pairs()[0], seconds=1e-9)
+        plan_path(DESIGN, *pairs(0)[0], seconds=1e-9)
     assert caught.value.reason == "out of time"
 
 

@@ -42,6 +42,10 @@ LARGEST_TURN = math.pi - 1e-9
 # A move that needs more steps than this follows a limit all the way.
 MOST_STEPS = 20_000
 
+Scratch = tuple[
+    FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray
+]
+
 
 def moves_are_valid(
     design: Design,
@@ -195,6 +199,70 @@ def write_line(
         step[i] -= first[i]
 
 
+@helper
+def make_scratch() -> Scratch:
+    """Return arrays that `is_move_valid` writes into.
+
+    They are the legs' base ends and platform ends, a position, a rotation, the step and the axis
+    of the move, the start of the tool, and the speeds.
+    """
+    return (
+        np.zeros((4, 3)),
+        np.zeros((4, 3)),
+        np.zeros(3),
+        np.zeros((3, 3)),
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros(SPEEDS),
+    )
+
+
+@helper
+def is_move_valid(
+    row: FloatArray,
+    cones: FloatArray,
+    start: FloatArray,
+    start_rotation: FloatArray,
+    end: FloatArray,
+    end_rotation: FloatArray,
+    tool: FloatArray,
+    tolerance: float,
+    scratch: Scratch,
+) -> bool:
+    """Return whether a move satisfies all rules, limits to a tolerance in design units.
+
+    Start and end are positions of b4; the tool, in platform coordinates, moves straight.
+    """
+    base, ends, p, r, step, axis, first, speeds = scratch
+    if not is_valid(row, cones, end, end_rotation, base, ends):
+        return False
+    if not is_valid(row, cones, start, start_rotation, base, ends):
+        return False
+    write_line(start, start_rotation, end, end_rotation, tool, first, step)
+    angle = write_turn(start_rotation, end_rotation, axis)
+    if angle > LARGEST_TURN:
+        return False
+    write_speeds(row, first, start_rotation, step, axis, angle, tool, speeds)
+    t, reach = 0.0, math.hypot(row[0], row[1])
+    for _ in range(MOST_STEPS):
+        write_pose_at(t, first, start_rotation, step, axis, angle, p, r)
+        move_by_arm(-1.0, r, tool, p)
+        write_ends(row, p, r, base, ends)
+        share = safe_share_of_limits(row, p, r, base, ends, speeds, tolerance)
+        if share > 0.0:
+            share = min(share, safe_share_of_cones(cones, r, base, ends, speeds, tolerance / reach))
+        if share > 0.0:
+            least = LEAST_SHARE * tolerance
+            share = min(share, safe_share_of_clearances(row, base, ends, speeds, least))
+        if share <= 0.0:
+            return False
+        t += share
+        if t >= 1.0:
+            return True
+    return False
+
+
 @kernel(
     "void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,:,::1], f8[::1], f8, b1[::1])"
 )
@@ -209,41 +277,8 @@ def valid_move_rows(
     tolerance: float,
     valid: BoolArray,
 ) -> None:
-    """Write whether n moves satisfy all rules, limits to a tolerance in design units.
-
-    Starts and ends are positions of b4; the tool, in platform coordinates, moves straight.
-    """
-    base, ends, p, r = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(3), np.zeros((3, 3))
-    step, axis, speeds = np.zeros(3), np.zeros(3), np.zeros(SPEEDS)
-    first = np.zeros(3)
-    reach, least = math.hypot(row[0], row[1]), LEAST_SHARE * tolerance
+    """Write whether n moves satisfy all rules, see `is_move_valid`."""
+    scratch = make_scratch()
     for index in range(start.shape[0]):
-        valid[index] = False
-        if not is_valid(row, cones, end[index], end_rotation[index], base, ends):
-            continue
-        if not is_valid(row, cones, start[index], start_rotation[index], base, ends):
-            continue
-        write_line(start[index], start_rotation[index], end[index], end_rotation[index], tool,
-                   first, step)  # fmt: skip
-        angle = write_turn(start_rotation[index], end_rotation[index], axis)
-        if angle > LARGEST_TURN:
-            continue
-        write_speeds(row, first, start_rotation[index], step, axis, angle, tool, speeds)
-        t = 0.0
-        for _ in range(MOST_STEPS):
-            write_pose_at(t, first, start_rotation[index], step, axis, angle, p, r)
-            move_by_arm(-1.0, r, tool, p)
-            write_ends(row, p, r, base, ends)
-            share = safe_share_of_limits(row, p, r, base, ends, speeds, tolerance)
-            if share > 0.0:
-                share = min(
-                    share, safe_share_of_cones(cones, r, base, ends, speeds, tolerance / reach)
-                )
-            if share > 0.0:
-                share = min(share, safe_share_of_clearances(row, base, ends, speeds, least))
-            if share <= 0.0:
-                break
-            t += share
-            if t >= 1.0:
-                valid[index] = True
-                break
+        first, last = (start[index], start_rotation[index]), (end[index], end_rotation[index])
+        valid[index] = is_move_valid(row, cones, *first, *last, tool, tolerance, scratch)

@@ -1,0 +1,153 @@
+"""Proofs that straight moves, and straight lines in the folds, keep rules and hold a load.
+
+A straight line in fold coordinates between two poses of one mode meets no singularity, and along
+it no |δi| is below the smaller of its two ends (see `explorer.mechanism.folds`). It is cut into
+straight moves, which come the closer to it the shorter they are, until each is proven valid: only
+limits other than the margins can end that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.folds import from_folds, write_pose
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.compiled import kernel
+from explorer.paths.loads import DemandedLoad
+from explorer.workspace.limits.valid_moves import (
+    DEFAULT_TOLERANCE,
+    is_move_valid,
+    make_scratch,
+    moves_are_valid,
+)
+from explorer.workspace.limits.valid_poses import Rules
+
+# The shortest move is this share of a line; a line has at most so many moves.
+SHORTEST, MOST_MOVES = 2.0**-12, 256
+# Number of poses that take as long as a line.
+ROWS_OF_LINE = 400
+
+
+@dataclass(frozen=True)
+class Proofs:
+    """Proofs under one set of rules.
+
+    Attributes:
+        design: The manipulator.
+        rules: Rules that every pose keeps.
+        tolerance: Length by which limits may be exceeded between poses that keep them, in design
+            units.
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
+        load: Load that every pose holds, for moves of the same tool; None for none.
+    """
+
+    design: Design
+    rules: Rules
+    tolerance: float
+    tool: Triple | None = None
+    load: DemandedLoad | None = None
+
+    @staticmethod
+    def of(
+        design: Design, rules: Rules, tool: Triple | None = None, load: DemandedLoad | None = None
+    ) -> Proofs:
+        """Return the proofs to the usual tolerance."""
+        return Proofs(design, rules, DEFAULT_TOLERANCE * design.reach, tool, load)
+
+    def hold(self, moves: Sequence[tuple[Pose, Pose]]) -> list[bool]:
+        """Return whether straight moves are valid."""
+        (p, r), (q, s) = (positions_and_rotations(ends) for ends in zip(*moves, strict=True))
+        rules, tolerance = self.rules, self.tolerance
+        valid = moves_are_valid(
+            self.design, p, r, q, s, rules=rules, tolerance=tolerance, tool=self.tool
+        )
+        if self.load is not None and valid.any():
+            valid[valid] = self.load.holds_along(p[valid], r[valid], q[valid], s[valid])
+        return valid.tolist()
+
+    def line(self, first: FloatArray, last: FloatArray) -> FloatArray | None:
+        """Return the corners of a straight line in the folds, or None if it is not proven valid.
+
+        The moves between the corners are straight, and as long as is proven.
+
+        Args:
+            first: Fold coordinates at the start, shape (6,).
+            last: Fold coordinates at the end, shape (6,), in the same mode.
+
+        Returns:
+            Fold coordinates from the start to the end, shape (n, 6).
+        """
+        tool = np.zeros(3) if self.tool is None else np.array(self.tool)
+        shares, count = np.zeros(MOST_MOVES + 1), np.zeros(1, dtype=np.int64)
+        row, cones = self.rules.row, self.rules.cones
+        divide_line(ROWS_OF_LINE, row, cones, first, last, tool, self.tolerance, shares[1:], count)
+        if not count[0]:
+            return None
+        share = shares[: count[0] + 1, None]
+        corners = (1.0 - share) * first + share * last
+        if self.load is not None:
+            p, r = from_folds(corners)
+            if not self.load.holds_along(p[:-1], r[:-1], p[1:], r[1:]).all():
+                return None
+        return corners
+
+
+def positions_and_rotations(poses: Sequence[Pose]) -> tuple[FloatArray, FloatArray]:
+    """Return the positions (n, 3) and the rotations (n, 3, 3) of poses."""
+    return np.array([pose.position for pose in poses]), np.array([pose.rotation for pose in poses])
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], i8[::1])")
+def divide_line(
+    row: FloatArray,
+    cones: FloatArray,
+    first: FloatArray,
+    last: FloatArray,
+    tool: FloatArray,
+    tolerance: float,
+    shares: FloatArray,
+    count: IntArray,
+) -> None:
+    """Halve a straight line in the folds until each piece is a valid straight move.
+
+    Args:
+        row: Row of the rules.
+        cones: Cones of the rules.
+        first: Fold coordinates at the start, shape (6,).
+        last: Fold coordinates at the end, shape (6,).
+        tool: Point that moves straight, in platform coordinates, shape (3,).
+        tolerance: Length by which limits may be exceeded, in design units.
+        shares: Output, shares of the line at which its pieces end, shape (MOST_MOVES,).
+        count: Output, number of pieces, 0 if the line is not proven valid, shape (1,).
+    """
+    scratch = make_scratch()
+    p, r, q, s = np.zeros(3), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
+    corner = np.zeros(6)
+    count[0] = 0
+    low, size, pieces = 0.0, 1.0, 0
+    write_pose(first, p, r)
+    while low < 1.0:
+        high = low + size
+        for i in range(6):
+            corner[i] = (1.0 - high) * first[i] + high * last[i]
+        write_pose(corner, q, s)
+        if is_move_valid(row, cones, p, r, q, s, tool, tolerance, scratch):
+            if pieces == shares.shape[0]:
+                return
+            shares[pieces] = high
+            pieces += 1
+            low = high
+            write_pose(corner, p, r)
+            # The next piece is as long as halving allows; powers of two are exact.
+            while size < 1.0 and low % (2.0 * size) == 0.0:
+                size *= 2.0
+        else:
+            size *= 0.5
+            if size < SHORTEST:
+                return
+    count[0] = pieces
