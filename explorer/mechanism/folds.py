@@ -38,6 +38,9 @@ from explorer.numerics.compiled import helper, kernel
 FOLDS = ("r", "β", "ε", "φ1", "φ2", "φ3")
 """The names of the coordinates: a distance, two angles and three folds."""
 
+FOLD_LINES = ("line b2b3", "line a1b4", "guide")
+"""The line at which the mechanism folds, in the order φ1, φ2, φ3."""
+
 # The cosine and the sine of an angle.
 Direction = tuple[float, float]
 # Number of poses of which sines and cosines stay in the processor's nearest memory.

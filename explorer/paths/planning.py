@@ -25,7 +25,7 @@ from explorer.errors import InputError, NoAnswerError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.folds import from_folds, to_folds, write_poses
+from explorer.mechanism.folds import FOLD_LINES, from_folds, to_folds, write_poses
 from explorer.mechanism.margins import INCIDENCES, margins, mode_name
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
@@ -281,13 +281,16 @@ def _check_not_singular(name: str, snapshot: Snapshot) -> None:
 def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
     if start.mode == goal.mode:
         return
-    signs = zip(start.signs, goal.signs, strict=True)
-    differ = [f"δ{index}" for index, (a, b) in enumerate(signs, 1) if a != b]
+    flat = [
+        f"fold φ{index + 1} at the {FOLD_LINES[index]} is flat ({INCIDENCES[index]})"
+        for index in range(3)
+        if start.signs[index] != goal.signs[index]
+    ]
     raise NoPathError(
         "other mode",
         f"the start is in mode {start.mode} ({mode_name(start.mode)}), the goal in mode "
-        f"{goal.mode} ({mode_name(goal.mode)}): any path between them is singular where "
-        f"{' and where '.join(differ)} vanishes",
+        f"{goal.mode} ({mode_name(goal.mode)}): every path between them passes a pose where "
+        f"{' and one where '.join(flat)}",
     )
 
 

@@ -172,16 +172,21 @@ def test_plan_path_without_ompl_names_its_extra(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize("mode", [0, 3, 7])
-def test_plan_path_other_mode_names_the_margins(mode: int) -> None:
+def test_plan_path_other_mode_names_the_folds_and_their_incidences(mode: int) -> None:
     modes = forward(DESIGN, inverse(DESIGN, HOME.position, HOME.rotation))
     goal = Pose.of(modes.position[mode], modes.rotation[mode])
     with pytest.raises(NoPathError, match="is in mode") as caught:
         plan_path(DESIGN, HOME, goal)
     assert caught.value.reason == "other mode"
     assert isinstance(caught.value, NoAnswerError)
-    differ = {k for k, bit in ((1, 4), (2, 2), (3, 1)) if (1 ^ mode) & bit}
-    named = {k for k in (1, 2, 3) if f"δ{k}" in str(caught.value)}
-    assert named == differ
+    flat = [
+        "fold φ1 at the line b2b3 is flat (a1 on the platform plane)",
+        "fold φ2 at the line a1b4 is flat (lines a1a2 and b2b3 meeting)",
+        "fold φ3 at the guide is flat (b4 on the base plane)",
+    ]
+    differ = [words for words, bit in zip(flat, (4, 2, 1), strict=True) if (1 ^ mode) & bit]
+    poses = " and one where ".join(differ)
+    assert f": every path between them passes a pose where {poses}" in str(caught.value)
 
 
 @pytest.mark.parametrize("demanded", ["home", "any"])
