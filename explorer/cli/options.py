@@ -14,11 +14,13 @@ import numpy as np
 import tyro
 
 from explorer.cli.output import write_json, write_lines
-from explorer.cli.values import DESIGN_NAME, Flag, hint, numbers
+from explorer.cli.values import DESIGN_NAME, Flag, fold_numbers, hint, numbers
 from explorer.errors import DesignError, ExplorerError, InputError, StorageError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design
+from explorer.mechanism.folds import from_folds
 from explorer.mechanism.home import home_pose
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion
 from explorer.mechanism.tool_point import Point, offset_of, tool_offset, tool_position
@@ -174,22 +176,25 @@ def make_pose(
     quaternion: Quadruple | None,
     yaw_pitch_roll: Triple | None,
     tilt_torsion: Triple | None,
+    folds: Six | None = None,
     tool: Triple | None = None,
 ) -> Pose:
     """Return the pose that options give, completed from a default pose.
 
     Args:
-        option: Start of the names of the options for the orientation, such as ``--to-``.
+        option: Start of the names of the options for orientation and folds, such as ``--to-``.
         default: Pose that completes what is not given.
         position: Position of b4 or the tool in the base frame, in design units.
         quaternion: Orientation as (w, x, y, z), of any length but zero.
         yaw_pitch_roll: Orientation as angles in degrees.
         tilt_torsion: Orientation as azimuth, tilt and torsion in degrees.
+        folds: The whole pose as r in design units and five angles in degrees.
         tool: Tool point in the platform frame, in design units; None if the position is that of
             b4. Without a position the tool stays where it is in the default pose.
 
     Raises:
-        InputError: There are two orientations, the quaternion is zero, or b4 is too far away.
+        InputError: The pose or its orientation is given twice, the quaternion is zero, r is
+            negative, or b4 is too far away.
     """
     orientations = {
         "quaternion": quaternion,
@@ -199,6 +204,13 @@ def make_pose(
     given = [f"{option}{name}" for name, value in orientations.items() if value is not None]
     if len(given) > 1:
         raise InputError(f"give one of {given[0]} and {given[1]}, not both")
+    if folds is not None:
+        if position is not None:
+            given.insert(0, "the position")
+        if given:
+            raise InputError(f"{option}folds is a whole pose; leave {' and '.join(given)} out")
+        r, *angles = folds
+        return Pose.of(*from_folds([r, *np.radians(angles)]))
     at = default.position if position is None else position
     if tilt_torsion is not None:
         pose = pose_of_tilt_torsion(at, tilt_torsion)
@@ -255,7 +267,13 @@ class PoseOptions(OrientationOptions, PointOptions):
     position: Annotated[Triple | None, numbers("--position", "x y z"), _HOME_HINT] = None
     """Position of b4, or of the tool, in the base frame, in design units."""
 
+    folds: Annotated[
+        Six | None, fold_numbers("--folds"), hint("instead of position and orientation")
+    ] = None
+    """Folds of the pose: the distance r of a1 and b4 in design units, then angles in degrees, beta
+    and epsilon from 0 to 180, phi1, phi2 and phi3 from -180 to 180."""
+
     def pose(self, design: Design) -> Pose:
         """Return the given pose completed from the home pose, as `make_pose` does."""
-        given = (home_pose(design), self.position, *self._orientation)
+        given = (home_pose(design), self.position, *self._orientation, self.folds)
         return make_pose("--", *given, self.tool(design))

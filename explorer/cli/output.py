@@ -11,12 +11,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from explorer.cli.streams import write
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
+from explorer.mechanism.folds import FOLDS, to_folds
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.mechanism.tool_point import tool_position
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_ascii, format_fixed
 
 if TYPE_CHECKING:
@@ -52,13 +57,21 @@ def tool_json(pose: Pose, tool: Triple | None) -> dict[str, object]:
 
 
 def pose_json(pose: Pose, tool: Triple | None = None) -> dict[str, object]:
-    """Return positions, quaternion, and azimuth, tilt and torsion in degrees of a pose."""
+    """Return positions, quaternion, and in degrees azimuth, tilt, torsion and folds of a pose."""
     return {
         "position": pose.position,
         **tool_json(pose, tool),
         "quaternion": pose.quaternion,
         "tilt_torsion": tilt_torsion_of(pose.rotation),
+        "folds": folds_in_degrees(pose.position, pose.rotation),
     }
+
+
+def folds_in_degrees(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """Return the fold coordinates of poses as `--folds` takes them, shape (..., 6)."""
+    folds = to_folds(position, rotation)
+    folds[..., 1:] = np.degrees(folds[..., 1:])
+    return folds
 
 
 def finite(value: float) -> float | None:
@@ -157,8 +170,9 @@ def assumed_lines(assumed: Sequence[str]) -> Iterator[str]:
 
 
 def pose_table(design: Design, pose: Pose, tool: Triple | None = None) -> str:
-    """Return the position, the quaternion and the angles of a pose, and where its tool is."""
+    """Return position, quaternion, angles and folds of a pose, and where its tool is."""
     angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
+    r, *folds = folds_in_degrees(pose.position, pose.rotation).tolist()
     positions = [("position", _position(design, pose.position))]
     if tool is not None:
         positions.append(("tool position", _position(design, tool_position(pose, tool))))
@@ -168,6 +182,7 @@ def pose_table(design: Design, pose: Pose, tool: Triple | None = None) -> str:
             ("quaternion", "  ".join(figures(pose.quaternion))),
             ("yaw pitch roll", "  ".join(degrees(angles))),
             ("azimuth tilt torsion", "  ".join(degrees(tilt_torsion_of(pose.rotation)))),
+            (" ".join(FOLDS), "  ".join([figure(r), *degrees(folds)])),
         ],
         "<<",
     )

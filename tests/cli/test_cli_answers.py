@@ -36,10 +36,16 @@ def snapshot() -> explorer.Snapshot:
     return explorer.evaluate(PRESET, explorer.Pose.of_yaw_pitch_roll(POSITION, ANGLES))
 
 
+def folds_of(pose: explorer.Pose) -> list[float]:
+    """Return the folds of a pose, angles in degrees."""
+    r, *angles = explorer.to_folds(pose.position, pose.rotation).tolist()
+    return [r, *np.degrees(angles).tolist()]
+
+
 def test_inverse_has_joints_in_order_and_text_their_millimetres(cli: CommandLine) -> None:
     found = cli.answer("inverse", *POSE)
     expected = snapshot()
-    assert set(found) == {"joints", "within_limits", "violations"}
+    assert set(found) == {"joints", "folds", "within_limits", "violations"}
     assert found["joints"] == expected.joints.tolist()
     assert found["violations"] == [str(each) for each in expected.violations]
     assert found["within_limits"] is (not expected.violations)
@@ -80,6 +86,7 @@ def test_singularity_json_has_the_snapshot(cli: CommandLine) -> None:
         "mode": expected.mode,
         "signs": list(expected.signs),
         "proximity": expected.proximity,
+        "folds": folds_of(expected.pose),
         "incidences": [],
         "nearest": [
             {
@@ -88,6 +95,7 @@ def test_singularity_json_has_the_snapshot(cli: CommandLine) -> None:
                 "position": list(expected.nearest[index].pose.position),
                 "quaternion": list(expected.nearest[index].pose.quaternion),
                 "tilt_torsion": list(tilt_torsion_of(expected.nearest[index].pose.rotation)),
+                "folds": folds_of(expected.nearest[index].pose),
             }
             for index in range(3)
         ],
@@ -124,13 +132,44 @@ def test_forward_joints_of_inverse_give_the_pose_in_its_mode(cli: CommandLine) -
         np.testing.assert_allclose(mode["margins"], margins, atol=1e-12)
         assert np.sign(mode["margins"]).tolist() == mode["signs"]
     mode = found["modes"][expected.mode]
-    assert set(mode) == {"mode", "signs", "position", "quaternion", "tilt_torsion", "margins"}
+    keys = "mode signs position quaternion tilt_torsion margins folds"
+    assert set(mode) == set(keys.split())
     np.testing.assert_allclose(mode["position"], POSITION, rtol=1e-9)
     rotation = explorer.rotation_from_quaternion(mode["quaternion"])
     np.testing.assert_allclose(rotation, expected.rotation, atol=1e-9)
     rows = [line.split() for line in cli.text(*argv).splitlines()[-8:]]
     assert [row[0] for row in rows] == list("01234567")
     assert [float(value) for value in rows[expected.mode][4:7]] == pytest.approx(POSITION)
+
+
+def test_folds_of_an_answer_give_its_pose(cli: CommandLine) -> None:
+    joints = snapshot().joints
+    argv = ["forward", "--joints", *map(repr, joints.tolist())]
+    modes = cli.answer(*argv)["modes"]
+    rows = [line.split() for line in cli.text(*argv).splitlines()[-8:]]
+    for mode, row in zip(modes, rows, strict=True):
+        given = ["--folds", *map(repr, mode["folds"])]
+        found = cli.answer("inverse", *given)
+        np.testing.assert_allclose(found["joints"], joints, rtol=1e-9)
+        np.testing.assert_allclose(found["folds"], mode["folds"], rtol=1e-9)
+        singularity = cli.answer("singularity", *given)
+        assert singularity["signs"] == np.sign(mode["folds"][3:]).tolist()
+        np.testing.assert_allclose(singularity["folds"], mode["folds"], rtol=1e-9)
+        shown = [float(word.rstrip("°")) for word in row[-3:]]
+        np.testing.assert_allclose(shown, mode["folds"][3:], atol=6e-4)
+        # r, β and ε are the same in all modes.
+        np.testing.assert_allclose(mode["folds"][:3], modes[0]["folds"][:3], rtol=1e-9)
+    r, *angles = folds_of(snapshot().pose)
+    words = "  ".join([f"{r:.4f}", *(f"{angle:.3f}°" for angle in angles)])
+    for command in ("inverse", "singularity"):
+        assert f"r β ε φ1 φ2 φ3        {words}\n" in cli.text(command, *POSE)
+    between = "  ".join([f"{r:.4f}", *(f"{angle:.3f}°" for angle in angles[:2])])
+    assert f"r β ε  {between}, in every mode\n" in cli.text(*argv)
+
+
+def test_folds_at_the_ends_of_their_ranges_are_poses(cli: CommandLine) -> None:
+    walls = ["--folds", "0", "0", "180", "-180", "180", "180"]
+    assert cli.answer("singularity", *walls)["incidences"] == [1, 2, 3]
 
 
 def test_forward_infeasible_joints_suggested_value_is_feasible(cli: CommandLine) -> None:
@@ -353,7 +392,7 @@ def test_process_answer_is_one_json_object_and_status_0() -> None:
     argv = [*PROGRAM, "inverse", "--position", "10", "5", "9", "--json"]
     done = subprocess.run(argv, capture_output=True, encoding="utf-8", check=False)
     assert (done.returncode, done.stderr) == (0, "")
-    assert set(json.loads(done.stdout)) == {"joints", "within_limits", "violations"}
+    assert set(json.loads(done.stdout)) == {"joints", "folds", "within_limits", "violations"}
 
 
 @pytest.mark.parametrize(("words", "status"), [(["1"] * 6, 1), (["1", "2", "x"], 2)])

@@ -294,6 +294,9 @@ def test_export_scene_is_one_page_with_its_title(cli: CommandLine, tmp_path: Pat
     assert [each.name for each in tmp_path.iterdir()] == [out.name]
 
 
+FOLDS = ["--folds", "14", "45", "98", "-140", "-120", "60"]
+
+
 @pytest.mark.parametrize(
     ("what", "name", "options", "words"),
     [
@@ -315,6 +318,10 @@ def test_export_scene_is_one_page_with_its_title(cli: CommandLine, tmp_path: Pat
         ("simulation", "model.xml", ["--errors", "-1"], "--errors must lie within 0 to 2147483647"),
         ("simulation", "model.xml", ["--errors", "x"], "--errors must be a whole number; got 'x'"),
         ("simulation", "model.xml", ["--typical"], "give --errors SEED"),
+        ("simulation", "model.xml", FOLDS, "--folds is not"),
+        ("mechanism", "parts.3mf", FOLDS, "--folds is not"),
+        ("workspace", "file.stl", FOLDS, "--folds is not"),
+        ("hull", "hull.stl", FOLDS, "--folds is not"),
         ("hull", "hull.stl", ["--typical"], "--typical is not for hull"),
         ("mechanism", "parts.stl", [], "there are 3mf, glb, stl-zip, step"),
         ("mechanism", "parts.3mf", ["--yaw-pitch-roll", "1", "2", "3"], "--yaw-pitch-roll is not"),

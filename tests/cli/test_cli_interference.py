@@ -89,6 +89,14 @@ def test_interference_pose_outside_limits_names_them(cli: CommandLine) -> None:
     assert "the end is outside the limits" in shown
 
 
+def test_interference_move_to_folds_is_the_move_to_their_pose(cli: CommandLine) -> None:
+    r, *angles = explorer.to_folds(END.position, END.rotation).tolist()
+    found = cli.answer("--to-folds", r, *np.degrees(angles).tolist(), "--steps", "3")
+    expected = cli.answer(*MOVE, "--steps", "3")
+    np.testing.assert_allclose(column(found, "clearance"), column(expected, "clearance"), rtol=1e-9)
+    np.testing.assert_allclose(found["end"]["position"], END.position, atol=1e-12)
+
+
 def test_interference_move_has_exact_and_swept_tests(cli: CommandLine) -> None:
     found = cli.answer(*MOVE, "--steps", "3", "--radii", *map(str, RADII))
     expected = explorer.move_clearance(with_radii(RADII), HOME, END, steps=3)

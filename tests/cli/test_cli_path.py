@@ -19,6 +19,7 @@ from explorer.statics.reactions import LIMITED
 COMMAND = ("path",)
 PRESET = explorer.PRESETS["paper-optimal"]
 HOME = explorer.home_pose(PRESET)
+SIX = ("14", "45", "98", "-140", "-120", "60")
 
 
 def test_path_json_has_poses_and_trajectory(cli: CommandLine, tmp_path: Path) -> None:
@@ -28,10 +29,12 @@ def test_path_json_has_poses_and_trajectory(cli: CommandLine, tmp_path: Path) ->
     assert found["found"] is True
     assert found["reason"] is None
     assert found["poses"][0]["position"] == list(HOME.position)
+    r, *angles = explorer.to_folds([12.0, 8.0, 7.0], HOME.rotation).tolist()
     assert found["poses"][-1] == {
         "position": [12.0, 8.0, 7.0],
         "quaternion": list(HOME.quaternion),
         "tilt_torsion": list(tilt_torsion_of(HOME.rotation)),
+        "folds": [r, *np.degrees(angles).tolist()],
     }
     course = found["trajectory"]
     assert course["time"][-1] == found["duration"] > 0.0
@@ -73,6 +76,15 @@ def test_path_forms_of_a_pose_agree(cli: CommandLine, words: list[str]) -> None:
         )
 
 
+def test_path_by_the_folds_of_its_ends_is_the_same(cli: CommandLine) -> None:
+    found = cli.answer("--from", "9", "6", "8", "-70", "5", "3", "--to", "10", "6", "8")
+    first, last = found["poses"]
+    same = cli.answer("--from-folds", *first["folds"], "--to-folds", *last["folds"])
+    for expected, pose in zip((first, last), same["poses"], strict=True):
+        np.testing.assert_allclose(pose["position"], expected["position"], atol=1e-12)
+        np.testing.assert_allclose(pose["quaternion"], expected["quaternion"], atol=1e-12)
+
+
 def test_path_without_solution_has_status_1_and_reason(cli: CommandLine) -> None:
     found = cli.answer("--to", "12", "8", "-7", status=1)
     assert found == {"found": False, "reason": "other mode", "poses": []}
@@ -89,6 +101,8 @@ def test_path_without_solution_has_status_1_and_reason(cli: CommandLine) -> None
         (["--to", "1", "2"], "--to needs a position x y z"),
         ([], "say where the path ends with --to"),
         (["--to", "12", "8", "7", "0", "0", "0", "--to-quaternion", "1", "0", "0", "0"], "already"),
+        (["--to", "12", "8", "7", "0", "0", "0", "--to-folds", *SIX], "leave --to-folds out"),
+        (["--to", "12", "8", "7", "--to-folds", *SIX], "whole pose; leave the position out"),
         (["--to", "12", "8", "7", "--seconds", "0"], "--seconds must be a positive number"),
         (["--to", "12", "8", "7", "--samples", "1"], "--samples must lie within"),
         (["--to", "12", "8", "7", "--out", "/nowhere/path.csv"], "there is no folder"),

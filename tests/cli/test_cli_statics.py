@@ -362,6 +362,7 @@ def test_accuracy_has_totals_of_dimensions_and_of_all_sources(
         (["--out", "some.json"], "need a displacement with --wanted"),
         ([*OVER_BOX, "--over", "pose"], "--required-box needs --over box; got --over pose"),
         ([*OVER_BOX, "--position", "1", "2", "3"], "--position is one position"),
+        ([*OVER_BOX, "--folds", "1", "2", "3", "4", "5", "6"], "--folds is one position"),
         (["--required-box", "1", "1", "1", "2", "2", "0"], "three lows, then highs above them"),
         (["--required-box", "1", "1"], "--required-box needs six numbers"),
         (["--over", "everywhere"], "--over"),

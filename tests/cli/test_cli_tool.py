@@ -50,6 +50,13 @@ def test_positions_are_those_of_the_tool(cli: CommandLine, tooled: list[str]) ->
     assert "tool position         9.00000  3.00000  12.5000" in cli.text("inverse", *POSE, *tooled)
 
 
+def test_folds_are_those_of_b4(cli: CommandLine, tooled: list[str]) -> None:
+    found = cli.answer("inverse", *POSE, *tooled)
+    same = cli.answer("inverse", "--folds", *found["folds"], *tooled)
+    assert_allclose(same["position"], B4)
+    assert_allclose(same["tool_position"], PLACE)
+
+
 def test_poses_are_completed_from_the_tool_at_home(cli: CommandLine, tooled: list[str]) -> None:
     home = explorer.home_pose(TOOLED)
     at_home = np.array(home.position) + home.rotation @ TOOL

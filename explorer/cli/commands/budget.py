@@ -152,8 +152,9 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
         over = self.over or ("pose" if given is None else "box")
         if over != "box" and given is not None:
             raise UsageError(f"--required-box needs --over box; got --over {over}", PROGRAM)
-        if over != "pose" and self.position is not None:
-            raise UsageError(f"--position is one position; leave out --over {over}", PROGRAM)
+        for option, value in (("--position", self.position), ("--folds", self.folds)):
+            if over != "pose" and value is not None:
+                raise UsageError(f"{option} is one position; leave out --over {over}", PROGRAM)
         if given is None:
             return over, None
         lows, highs = given[:3], given[3:]

@@ -140,7 +140,7 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
     if command.what == "workspace" and file_format in ("step", "stp"):
         return _step(command)
-    command.refuse("density", "masses", *ERRORS, "position")
+    command.refuse("density", "masses", *ERRORS, "position", "folds")
     check_format(file_format)
     design = command.read_design()
     from explorer.workspace.solids.solids import convex_hull, workspace_solid
@@ -181,7 +181,7 @@ def _step(command: Export) -> tuple[bytes, Facts]:
             "STEP takes exact faces, and the surface along which a part takes its limit consists "
             "of facets: write 3mf, stl, glb, obj or ply"
         )
-    command.refuse("tolerance", "density", "masses", *ERRORS, "position")
+    command.refuse("tolerance", "density", "masses", *ERRORS, "position", "folds")
     check_extra()
     design = command.read_design()
     home = command.oriented_home(design)
@@ -202,7 +202,7 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
     command.refuse(
         *("tolerance", "masses", *ERRORS, "position", "quaternion"),
-        *("yaw_pitch_roll", "tilt_torsion", "at", "load"),
+        *("yaw_pitch_roll", "tilt_torsion", "folds", "at", "load"),
     )
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     if file_format == "step":
@@ -239,7 +239,8 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.export.simulation import DENSITY, SimulationModel
 
     command.refuse(
-        *("tolerance", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion", "at", "load")
+        *("tolerance", "position", "quaternion"),
+        *("yaw_pitch_roll", "tilt_torsion", "folds", "at", "load"),
     )
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
 from explorer.cli.options import DesignOptions, JsonOptions, PointOptions
-from explorer.cli.output import degrees, figures, heading, table, write_json, write_lines
+from explorer.cli.output import (
+    degrees,
+    figure,
+    figures,
+    folds_in_degrees,
+    heading,
+    table,
+    write_json,
+    write_lines,
+)
 from explorer.cli.values import numbers
 from explorer.errors import NoAnswerError
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
+from explorer.mechanism.folds import FOLDS
 from explorer.mechanism.kinematics import (
     ForwardKinematics,
     checked_joints,
@@ -58,7 +69,7 @@ class Forward(JsonOptions, PointOptions, DesignOptions):
             write_json(answer)
         elif modes.feasible:
             rows = [("joint", *JOINTS), ("units", *figures(self.joints))]
-            write_lines(heading(design), table(rows, "<>>>>>>"), "", _mode_table(modes, tool))
+            write_lines(heading(design), table(rows, "<>>>>>>"), *_mode_lines(modes, tool))
         if not modes.feasible:
             raise NoAnswerError(_failure_message(design, joints, squares))
 
@@ -67,6 +78,7 @@ def _modes_json(modes: ForwardKinematics, tool: Triple | None) -> list[dict[str,
     quaternion = quaternion_from_rotation(modes.rotation)
     tilt_torsion = tilt_torsion_from_rotation(modes.rotation)
     margin = margins(modes.position, modes.rotation)
+    folds = folds_in_degrees(modes.position, modes.rotation)
     at_tool = modes.position + tool_offset(modes.rotation, tool)
     return [
         {
@@ -77,17 +89,22 @@ def _modes_json(modes: ForwardKinematics, tool: Triple | None) -> list[dict[str,
             "quaternion": quaternion[mode],
             "tilt_torsion": tilt_torsion[mode],
             "margins": margin[mode],
+            "folds": folds[mode],
         }
         for mode in range(len(margin))
     ]
 
 
-def _mode_table(modes: ForwardKinematics, tool: Triple | None) -> str:
+def _mode_lines(modes: ForwardKinematics, tool: Triple | None) -> Iterator[str]:
     angles = yaw_pitch_roll_from_rotation(modes.rotation)
     margin = margins(modes.position, modes.rotation)
+    folds = folds_in_degrees(modes.position, modes.rotation)
+    r, *between = folds[0, :3].tolist()
+    yield f"{' '.join(FOLDS[:3])}  {'  '.join([figure(r), *degrees(between)])}, in every mode"
     at_tool = modes.position + tool_offset(modes.rotation, tool)
     names = () if tool is None else ("tool x", "tool y", "tool z")
-    rows = [("mode", "signs", *"xyz", *names, "yaw", "pitch", "roll", "δ1", "δ2", "δ3")]
+    heads = *names, "yaw", "pitch", "roll", "δ1", "δ2", "δ3", *FOLDS[3:]
+    rows = [("mode", "signs", *"xyz", *heads)]
     rows += [
         (
             str(mode),
@@ -96,10 +113,11 @@ def _mode_table(modes: ForwardKinematics, tool: Triple | None) -> str:
             *(figures(at_tool[mode].tolist()) if names else ()),
             *degrees(angles[mode].tolist()),
             *figures(margin[mode].tolist()),
+            *degrees(folds[mode, 3:].tolist()),
         )
         for mode in range(len(margin))
     ]
-    return table(rows, "<<" + ">" * (len(rows[0]) - 2))
+    yield from ("", table(rows, "<<" + ">" * (len(rows[0]) - 2)))
 
 
 def _failure_message(design: Design, joints: FloatArray, squares: FloatArray) -> str:

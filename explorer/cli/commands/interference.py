@@ -16,11 +16,12 @@ from explorer.cli.options import (
     RadiiOptions,
     make_pose,
 )
-from explorer.cli.values import OPTIONAL, hint, numbers, whole_number
+from explorer.cli.values import OPTIONAL, fold_numbers, hint, numbers, whole_number
 from explorer.errors import InputError
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import platform_points
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.mechanism.tool_point import tool_position
 
@@ -58,6 +59,9 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
     ] = None
     """Rotate the platform to this azimuth, tilt and torsion on the move, in degrees."""
 
+    to_folds: Annotated[Six | None, fold_numbers("--to-folds"), hint("instead of --to")] = None
+    """Move the platform to the pose of these folds; r in design units, angles in degrees."""
+
     steps: Annotated[
         int | None,
         whole_number("--steps", 1, MOST_STEPS),
@@ -70,12 +74,18 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
         design = self.with_radii(self.read_design())
         start, tool = self.pose(design), self.tool(design)
         here = evaluate(design, start)
-        target = (self.to, self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion)
-        if target == (None, None, None, None):
+        target = (
+            self.to,
+            self.to_quaternion,
+            self.to_yaw_pitch_roll,
+            self.to_tilt_torsion,
+            self.to_folds,
+        )
+        if target == (None,) * 5:
             if self.steps is not None:
                 raise InputError(
                     "--steps divides a move; say where it goes with --to, --to-quaternion, "
-                    "--to-yaw-pitch-roll or --to-tilt-torsion"
+                    "--to-yaw-pitch-roll, --to-tilt-torsion or --to-folds"
                 )
             self.write(lambda: pose_json(here, tool), lambda: pose_lines(here, tool))
             return

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
 from explorer.cli.output import (
+    folds_in_degrees,
     heading,
     lengths,
     limits_json,
@@ -35,7 +36,8 @@ class Inverse(JsonOptions, PoseOptions, DesignOptions):
 
 
 def _as_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
-    answer = {"joints": snapshot.joints, **limits_json(snapshot)}
+    folds = folds_in_degrees(snapshot.pose.position, snapshot.rotation)
+    answer = {"joints": snapshot.joints, "folds": folds, **limits_json(snapshot)}
     return answer if tool is None else {**answer, **pose_json(snapshot.pose, tool)}
 
 

@@ -32,6 +32,7 @@ from explorer.cli.output import (
 from explorer.cli.values import (
     OPTIONAL,
     Numbers,
+    fold_numbers,
     hint,
     load_numbers,
     numbers,
@@ -89,6 +90,11 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
     ] = None
     """Azimuth, tilt and torsion of the platform at the start, in degrees."""
 
+    from_folds: Annotated[Six | None, fold_numbers("--from-folds"), hint("instead of --from")] = (
+        None
+    )
+    """Folds of the pose at the start; r in design units, angles in degrees."""
+
     to: Annotated[Numbers | None, pose_numbers("--to"), OPTIONAL] = None
     """End of the path; lengths are in design units."""
 
@@ -112,6 +118,9 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
         hint("instead of --to-quaternion"),
     ] = None
     """Azimuth, tilt and torsion of the platform at the end, in degrees."""
+
+    to_folds: Annotated[Six | None, fold_numbers("--to-folds"), hint("instead of --to")] = None
+    """Folds of the pose at the end; r in design units, angles in degrees."""
 
     load: Annotated[Six | None, load_numbers("--load"), OPTIONAL] = None
     """Force in N and moment in N × unit at the tool, along the axes of the base, besides the
@@ -153,13 +162,20 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
             self.from_quaternion,
             self.from_yaw_pitch_roll,
             self.from_tilt_torsion,
+            self.from_folds,
         )
-        ends = (self.to, self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion)
+        ends = (
+            self.to,
+            self.to_quaternion,
+            self.to_yaw_pitch_roll,
+            self.to_tilt_torsion,
+            self.to_folds,
+        )
         start = _pose("--from", home_pose(design), *starts, tool)
-        if ends == (None, None, None, None):
+        if ends == (None,) * 5:
             raise InputError(
-                "say where the path ends with --to, --to-quaternion, --to-yaw-pitch-roll "
-                "or --to-tilt-torsion"
+                "say where the path ends with --to, --to-quaternion, --to-yaw-pitch-roll, "
+                "--to-tilt-torsion or --to-folds"
             )
         goal = _pose("--to", start, *ends, tool)
         if self.load is not None:
@@ -193,6 +209,7 @@ def _pose(
     quaternion: Quadruple | None,
     yaw_pitch_roll: Triple | None,
     tilt_torsion: Triple | None,
+    folds: Six | None,
     tool: Triple | None,
 ) -> Pose:
     """Return the pose of an option whose position an orientation may follow."""
@@ -204,6 +221,7 @@ def _pose(
             "quaternion": quaternion,
             "yaw-pitch-roll": yaw_pitch_roll,
             "tilt-torsion": tilt_torsion,
+            "folds": folds,
         }
         given = [name for name, value in others.items() if value is not None]
         if rest and len(given) == 1:
@@ -214,7 +232,7 @@ def _pose(
                 yaw_pitch_roll = (rest[0], rest[1], rest[2])
             else:
                 quaternion = (rest[0], rest[1], rest[2], rest[3])
-    given = (position, quaternion, yaw_pitch_roll, tilt_torsion)
+    given = (position, quaternion, yaw_pitch_roll, tilt_torsion, folds)
     return make_pose(f"{option}-", default, *given, tool)
 
 

@@ -13,6 +13,7 @@ from explorer.cli.output import (
     figure,
     figures,
     finite,
+    folds_in_degrees,
     heading,
     lengths,
     pose_json,
@@ -51,6 +52,7 @@ def _as_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
     names = "margins volumes determinant inverse_condition smallest_singular_value proximity"
     return {
         **attributes(snapshot, f"{names} stratum stratum_dimension mode signs"),
+        "folds": folds_in_degrees(snapshot.pose.position, snapshot.rotation),
         "incidences": incidences(snapshot.stratum),
         "nearest": [
             {
