@@ -272,7 +272,7 @@ def _as_lines(
         ("moves", f"{len(path.poses) - 1}, each proved to keep limits and clearances"),
         ("length", f"{figure(path.length)} (root mean square of b1 to b4)"),
         ("keeps", f"|δ| {figure(path.margin)}, clearance {figure(path.clearance)} or more"),
-        ("planned in", f"{path.seconds:.3g} s, {path.checked} moves checked"),
+        ("planned in", f"{path.seconds:.3g} s, {path.checked} lines tried"),
         ("takes", f"{figure(timed.duration)} s"),
         ("least |δ|", "  ".join(f"δ{i + 1} {figure(v)}" for i, v in enumerate(least))),
     ]
