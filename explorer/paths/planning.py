@@ -42,9 +42,9 @@ from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_
 from explorer.workspace.limits.valid_poses import Rules, valid_rows
 
 DEFAULT_SECONDS = 2.0
-# Preferred margin and clearance as a share of those of the ends; the clearance at most a share of
-# the reach.
-SHARE_OF_ENDS, PREFERRED_CLEARANCE = 0.5, 0.02
+# Preferred margin and clearance, as shares of those of the ends. The line in the folds has all of the
+# margin, and the moves along it nearly all. The clearance is at most a share of the reach.
+SHARE_OF_MARGIN, SHARE_OF_CLEARANCE, PREFERRED_CLEARANCE = 0.9, 0.5, 0.02
 # Share of the time for a search with the preferred margin and clearance.
 SHARE_FOR_PREFERRED = 0.5
 D1, D3 = JOINTS.index("d1"), JOINTS.index("d3")
@@ -267,7 +267,7 @@ def _preferred(start: Snapshot, goal: Snapshot) -> tuple[float, float]:
     margin = min(float(np.abs(end.margins).min()) for end in (start, goal))
     clearance = min(float(end.clearances.clearance.min()) for end in (start, goal))
     preferred = PREFERRED_CLEARANCE * start.design.reach
-    return SHARE_OF_ENDS * margin, min(preferred, SHARE_OF_ENDS * clearance)
+    return SHARE_OF_MARGIN * margin, min(preferred, SHARE_OF_CLEARANCE * clearance)
 
 
 def _check_not_singular(name: str, snapshot: Snapshot) -> None:

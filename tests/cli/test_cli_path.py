@@ -50,7 +50,7 @@ def test_path_json_has_poses_and_trajectory(cli: CommandLine, tmp_path: Path) ->
     assert found["file"] == str(file)
     text = cli.text(*words[:4])
     assert "moves       1, each proved to keep limits and clearances" in text
-    assert "least |δ|" in text
+    assert "1 line tried" in text
 
 
 @pytest.mark.parametrize(

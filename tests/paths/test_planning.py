@@ -96,9 +96,9 @@ def test_plan_path_between_valid_ends_keeps_everything_and_is_shorter_when_smoot
     tool = (1.0, -0.5, 3.0) if index % 2 else None
     path = plan_path(DESIGN, start, goal, seconds=60.0, tool=tool)
     assert path.tool == tool
-    # Half the room that both ends have is kept, or else none.
+    # Nearly all of the margin, and half of the clearance, that both ends have is kept, or else none.
     ends = [evaluate(DESIGN, each) for each in (start, goal)]
-    margin = min(0.5 * float(abs(e.margins).min()) for e in ends)
+    margin = min(0.9 * float(abs(e.margins).min()) for e in ends)
     assert path.margin in (pytest.approx(margin), 0.0)
     assert (path.clearance > 0.0) == (path.margin > 0.0)
     if tool is None:

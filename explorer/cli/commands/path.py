@@ -262,9 +262,7 @@ def _as_lines(
     largest: LargestShare | None,
     out: File | None,
 ) -> Iterator[str]:
-    from explorer.paths.crossings import path_margins
-
-    least = np.abs(path_margins(path.poses, tool=path.tool).margins).min(axis=0).tolist()
+    plural = "" if path.checked == 1 else "s"
     yield heading(design)
     for name, pose in (("from", path.poses[0]), ("to", path.poses[-1])):
         yield from (name, *indented(pose_table(design, pose, path.tool)))
@@ -272,9 +270,8 @@ def _as_lines(
         ("moves", f"{len(path.poses) - 1}, each proved to keep limits and clearances"),
         ("length", f"{figure(path.length)} (root mean square of b1 to b4)"),
         ("keeps", f"|δ| {figure(path.margin)}, clearance {figure(path.clearance)} or more"),
-        ("planned in", f"{path.seconds:.3g} s, {path.checked} lines tried"),
+        ("planned in", f"{path.seconds:.3g} s, {path.checked} line{plural} tried"),
         ("takes", f"{figure(timed.duration)} s"),
-        ("least |δ|", "  ".join(f"δ{i + 1} {figure(v)}" for i, v in enumerate(least))),
     ]
     if largest is not None:
         words = f"held, with {100.0 * largest.share:.1f} % of a limit at most"
