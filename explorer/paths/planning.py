@@ -42,8 +42,8 @@ from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_
 from explorer.workspace.limits.valid_poses import Rules, valid_rows
 
 DEFAULT_SECONDS = 2.0
-# Preferred margin and clearance, as shares of those of the ends. The line in the folds has all of the
-# margin, and the moves along it nearly all. The clearance is at most a share of the reach.
+# Preferred margin and clearance, as shares of those of the ends. The line in the folds keeps all of
+# the margin, the moves along it nearly all. The clearance is at most a share of the reach.
 SHARE_OF_MARGIN, SHARE_OF_CLEARANCE, PREFERRED_CLEARANCE = 0.9, 0.5, 0.02
 # Share of the time for a search with the preferred margin and clearance.
 SHARE_FOR_PREFERRED = 0.5
@@ -234,7 +234,7 @@ class _Planner:
         return self._path(smoother, unsmoothed, smoother.smooth(unsmoothed), margin, clearance)
 
     def _proofs(self, rules: Rules) -> Proofs:
-        return Proofs(self._design, rules, self._tolerance, self._tool, self._load)
+        return Proofs(self._design, rules, self._tool, self._load, self._tolerance)
 
     def _poses(self, corners: FloatArray) -> tuple[Pose, ...]:
         """Return the poses of corners, with the given ends, from which they differ by rounding."""

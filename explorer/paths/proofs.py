@@ -40,31 +40,24 @@ class Proofs:
     Attributes:
         design: The manipulator.
         rules: Rules that every pose keeps.
-        tolerance: Length by which limits may be exceeded between poses that keep them, in design
-            units.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
         load: Load that every pose holds, for moves of the same tool; None for none.
+        tolerance: Length by which limits may be exceeded between poses that keep them, in design
+            units; a 10,000th of the reach if None.
     """
 
     design: Design
     rules: Rules
-    tolerance: float
     tool: Triple | None = None
     load: DemandedLoad | None = None
-
-    @staticmethod
-    def of(
-        design: Design, rules: Rules, tool: Triple | None = None, load: DemandedLoad | None = None
-    ) -> Proofs:
-        """Return the proofs to the usual tolerance."""
-        return Proofs(design, rules, DEFAULT_TOLERANCE * design.reach, tool, load)
+    tolerance: float | None = None
 
     def hold(self, moves: Sequence[tuple[Pose, Pose]]) -> list[bool]:
         """Return whether straight moves are valid."""
         (p, r), (q, s) = (positions_and_rotations(ends) for ends in zip(*moves, strict=True))
-        rules, tolerance = self.rules, self.tolerance
+        rules, tool, tolerance = self.rules, self.tool, self.tolerance
         valid = moves_are_valid(
-            self.design, p, r, q, s, rules=rules, tolerance=tolerance, tool=self.tool
+            self.design, p, r, q, s, rules=rules, tolerance=tolerance, tool=tool
         )
         if self.load is not None and valid.any():
             valid[valid] = self.load.holds_along(p[valid], r[valid], q[valid], s[valid])
@@ -84,8 +77,10 @@ class Proofs:
         """
         tool = np.zeros(3) if self.tool is None else np.array(self.tool)
         shares, count = np.zeros(MOST_MOVES + 1), np.zeros(1, dtype=np.int64)
-        row, cones = self.rules.row, self.rules.cones
-        divide_line(ROWS_OF_LINE, row, cones, first, last, tool, self.tolerance, shares[1:], count)
+        row, cones, tolerance = self.rules.row, self.rules.cones, self.tolerance
+        if tolerance is None:
+            tolerance = DEFAULT_TOLERANCE * self.design.reach
+        divide_line(ROWS_OF_LINE, row, cones, first, last, tool, tolerance, shares[1:], count)
         if not count[0]:
             return None
         share = shares[: count[0] + 1, None]

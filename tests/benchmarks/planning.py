@@ -58,7 +58,7 @@ def lines_of_a_mode() -> Iterator[Row]:
     mode = np.flatnonzero(mode_of(margins(position, rotation)) == MODE)[: 2 * LINES]
     p, r = position[mode], rotation[mode]
     rules = free_rules(signs_of(MODE))
-    proofs = Proofs.of(DESIGN, rules)
+    proofs = Proofs(DESIGN, rules)
     ends = list(zip(*np.split(to_folds(p, r), 2), strict=True))
     found = [proofs.line(*each) is not None for each in ends]
     took = best_of(3, lambda: [proofs.line(*each) for each in ends]) / LINES
@@ -74,7 +74,7 @@ def lines_of_a_mode() -> Iterator[Row]:
 def lines_within_limits() -> Iterator[Row]:
     """Yield the row of lines between random poses within all limits of the optimum."""
     rng, pairs = np.random.default_rng(1), 0
-    proofs = Proofs.of(DESIGN, Rules.of(DESIGN))
+    proofs = Proofs(DESIGN, Rules.of(DESIGN))
     found = straight = 0
     while pairs < PAIRS:
         p = rng.uniform(LOWS, HIGHS, (100_000, 3))

@@ -39,7 +39,7 @@ from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 DESIGN = limited(PRESETS["paper-optimal"], leg_radii=(0.2,) * 4)
 HOME = home_pose(DESIGN)
-PROOFS = Proofs.of(DESIGN, Rules.of(DESIGN))
+PROOFS = Proofs(DESIGN, Rules.of(DESIGN))
 needs_ompl = pytest.mark.skipif(find_spec("ompl") is None, reason="OMPL is not installed")
 
 
@@ -96,7 +96,7 @@ def test_plan_path_between_valid_ends_keeps_everything_and_is_shorter_when_smoot
     tool = (1.0, -0.5, 3.0) if index % 2 else None
     path = plan_path(DESIGN, start, goal, seconds=60.0, tool=tool)
     assert path.tool == tool
-    # Nearly all of the margin, and half of the clearance, that both ends have is kept, or else none.
+    # Nearly all of the ends' margin and half of their clearance is kept, or else none.
     ends = [evaluate(DESIGN, each) for each in (start, goal)]
     margin = min(0.9 * float(abs(e.margins).min()) for e in ends)
     assert path.margin in (pytest.approx(margin), 0.0)
@@ -136,7 +136,7 @@ def test_plan_path_valid_straight_move_needs_no_search(
 
 def test_line_in_the_folds_joins_nearly_all_pairs_within_the_limits_of_the_optimum() -> None:
     design = PRESETS["paper-optimal"]
-    proofs = Proofs.of(design, Rules.of(design))
+    proofs = Proofs(design, Rules.of(design))
     poses = valid_poses(design)
     lines = [
         proofs.line(*to_folds(*positions_and_rotations(ends))) is not None

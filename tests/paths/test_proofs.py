@@ -36,7 +36,7 @@ def poses_of_mode(count: int) -> tuple[FloatArray, FloatArray]:
 def proofs(margin: float, tolerance: float) -> Proofs:
     """Return proofs that demand a margin and the signs of the mode, and nothing else."""
     rules = Rules.of(FREE, signs_of(MODE)).without_clearances().tighten(margin, 0.0)
-    return Proofs(FREE, rules, tolerance)
+    return Proofs(FREE, rules, tolerance=tolerance)
 
 
 @pytest.mark.parametrize("count", [1000, pytest.param(10_000, marks=pytest.mark.long)])
