@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import suppress
 from dataclasses import replace
 from importlib.util import find_spec
@@ -31,8 +31,16 @@ from explorer.app.features.paths.actions import (
     ends_of,
     goal_of,
 )
+from explorer.app.features.paths.incidence_plots import (
+    FOLDS,
+    MARGINS,
+    IncidencePlot,
+    Quantity,
+    columns_of,
+    crossing_time,
+    crossing_words,
+)
 from explorer.app.features.paths.loads import PathShares
-from explorer.app.features.paths.margin_plot import columns_of, crossing_time, crossing_words
 from explorer.app.features.paths.panel import (
     ENDS,
     MODES,
@@ -53,9 +61,12 @@ from explorer.app.state.paths import STRAIGHT_SECONDS, End, Journey
 from explorer.app.state.state import State, angles_of, joints_of, opened
 from explorer.app.state.values import value_at
 from explorer.app.widgets.assigning import Assigner
+from explorer.app.widgets.charts import ORANGE
+from explorer.app.widgets.colours import css
 from explorer.app.widgets.pieces import widgets
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.folds import to_folds
 from explorer.mechanism.kinematics import forward
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.margins import margins, mode_of
@@ -235,25 +246,57 @@ def test_runner_plays_in_real_time_until_it_is_paused(bench: Bench) -> None:
     assert bench.times == sorted(bench.times)
 
 
-# The chart
+# The charts
 
 
-def test_chart_shows_the_margins_over_time() -> None:
-    state = SetPathTime(3.0).apply(start_between(0, 7))
-    journey = journey_of(state)
-    x, k1, k2, k3, zero, crossed, now = columns_of(journey)
+def folds_of(pose: Pose) -> FloatArray:
+    return np.abs(np.degrees(to_folds(pose.position, pose.rotation)[3:]))
+
+
+def margins_of(pose: Pose) -> FloatArray:
+    return margins(pose.position, pose.rotation)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "value_of"), [(MARGINS, margins_of), (FOLDS, folds_of)], ids=["margins", "folds"]
+)
+@pytest.mark.parametrize(("first", "last"), [(0, 7), (1, 4), (1, 5)])
+def test_chart_shows_margins_or_folds_of_the_poses_over_time(
+    quantity: Quantity, value_of: Callable[[Pose], FloatArray], first: int, last: int
+) -> None:
+    journey = journey_of(SetPathTime(3.0).apply(start_between(first, last)))
+    x, *curves, singular, now = columns_of(journey, quantity)
     assert (np.diff(x) >= 0.0).all()
-    assert not zero.any()
-    shown = np.stack([k1, k2, k3], axis=1)
-    poses = [journey.pose_at(float(t)) for t in x]
-    exact = np.array([margins(pose.position, pose.rotation) for pose in poses])
-    np.testing.assert_allclose(shown, exact, atol=2e-2 * np.abs(exact).max())
-    times = [crossing_time(journey, i) for i in range(len(journey.margins.crossings))]
-    assert x[np.isfinite(crossed)].tolist() == pytest.approx(sorted(times))
-    for crossing, t in zip(journey.margins.crossings, times, strict=True):
-        pose = journey.pose_at(t)
-        assert abs(margins(pose.position, pose.rotation)[crossing.incidence - 1]) < 1e-2
+    shown, is_singular = np.stack(curves, axis=1), np.isfinite(singular)
+    for t, values in zip(x[~is_singular], shown[~is_singular], strict=True):
+        np.testing.assert_allclose(values, value_of(journey.pose_at(float(t))), atol=1e-6)
+    crossings = journey.margins.crossings
+    times = [crossing_time(journey, i) for i in range(len(crossings))]
+    assert x[is_singular].tolist() == pytest.approx(times)
+    # A singular pose is marked where its curve meets the line of a flat fold.
+    for crossing, values, marked in zip(
+        crossings, shown[is_singular], singular[is_singular], strict=True
+    ):
+        np.testing.assert_allclose(values, value_of(crossing.pose), atol=1e-12)
+        assert marked == values[crossing.incidence - 1]
+        assert np.abs(np.subtract(quantity.flat, marked)).min() < 1e-5
     assert x[np.isfinite(now)].tolist() == [journey.at, journey.at]
+    low, high = now[np.isfinite(now)]
+    assert low < min(shown.min(), *quantity.flat) < max(shown.max(), *quantity.flat) < high
+
+
+@pytest.mark.parametrize(("quantity", "flat"), [(MARGINS, (0.0,)), (FOLDS, (0.0, 180.0))])
+def test_flat_ends_are_lines_with_a_name_even_without_a_path(
+    services: Services, quantity: Quantity, flat: tuple[float, ...]
+) -> None:
+    plot = IncidencePlot(services.gui, quantity)
+    updates: Any = plot.updates(Frame(opened(OPTIMAL)))
+    chart, scales = {name: (handle, value) for handle, name, value in updates}["scales"]
+    levels, (low, high) = chart.axes[-1], scales["y"]["range"]
+    assert levels["splits"] == flat
+    assert set(levels["values"]) == {"flat"}
+    assert levels["grid"]["stroke"] == css(ORANGE)
+    assert low < min(flat) <= max(flat) < high
 
 
 def test_path_and_its_crossings_are_drawn(services: Services) -> None:

@@ -23,10 +23,10 @@ SIZE, LARGER = (1280, 720), (1440, 900)
 A3X = 18.0
 CHANGED = OPTIMAL.with_variables((A3X, *OPTIMAL.variables[1:]))
 READING = re.compile(r"y ([−\d.]+), z ([−\d.]+) units: min \|δ\| ([\d.]+) \(δ(\d)\)")
-# Distance between two numbers on the chart's axis of time, in pixels; 0 if it has none.
-SPACE_OF_NUMBERS = """() => {
-  const [{ chart }] = Object.values(window.__viserTestpoints.uplots);
-  return chart.axes[0]._found[1];
+# Texts at the axes of each chart; null for an axis that is not drawn.
+AXIS_TEXTS = """() => {
+  const plots = Object.values(window.__viserTestpoints.uplots);
+  return plots.map(({ chart }) => chart.axes.map((axis) => axis._values ?? null));
 }"""
 # Pixels below the words of an axis at which it is pressed and released.
 BRUSH = (50.0, 80.0)
@@ -185,8 +185,10 @@ def test_path_is_planned_and_played(newcomer: Newcomer, monkeypatch: pytest.Monk
     expect(newcomer.field("Time (s)")).not_to_have_value(re.compile(r"^0(\.0*)?$"))
     newcomer.press_running("Pause")
     newcomer.sees("Singular 2 times")
-    # The time of its chart has numbers, though the chart was given data all along.
-    assert newcomer.page.evaluate(SPACE_OF_NUMBERS) > 0.0
+    # The axis of time has numbers, though the charts were given data all along.
+    of_margins, of_folds = newcomer.page.evaluate(AXIS_TEXTS)
+    assert [of_margins[0], of_margins[2]] == [[], ["flat"]]
+    assert of_folds == [["0", "20", "40", "60"], ["0", "90", "180"], ["flat", "flat"]]
     assert 0.0 < float(newcomer.field("Time (s)").input_value()) < 60.0
     newcomer.button("Play").wait_for()
     assert newcomer.presses_for() == 5

@@ -43,6 +43,21 @@ def axis(label: str, *, label_size: int, size: int, space: int = 30) -> uplot.Ax
     }
 
 
+def level_axis(levels: tuple[float, ...], name: str, colour: Rgb) -> uplot.Axis:
+    """Return a vertical axis at the right whose levels are lines with one name beside each."""
+    return {
+        "side": 1,
+        "splits": levels,
+        "values": (name,) * len(levels),
+        "stroke": css(colour),
+        "size": 32,
+        "gap": 3,
+        "font": FONT,
+        "grid": {"stroke": css(colour), "width": 1.0},
+        "ticks": {"show": False},
+    }
+
+
 def line(
     label: str, colour: Rgb, *, width: float = 2.0, dash: tuple[float, ...] = ()
 ) -> uplot.Series:
@@ -76,7 +91,7 @@ def dots(label: str, colour: Rgb, size: float) -> uplot.Series:
 def add_chart(
     gui: viser.GuiApi,
     series: tuple[uplot.Series, ...],
-    axes: tuple[uplot.Axis, uplot.Axis],
+    axes: tuple[uplot.Axis, ...],
     *,
     height: int,
     padding: tuple[int, int, int, int],
@@ -86,7 +101,7 @@ def add_chart(
     Args:
         gui: Where it is added.
         series: Its columns but that of the horizontal axis.
-        axes: The horizontal and the vertical axis.
+        axes: The horizontal axis and the vertical ones.
         height: Its height in pixels.
         padding: Room above, at the right, below and at the left, in pixels.
     """

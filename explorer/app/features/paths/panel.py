@@ -19,9 +19,14 @@ from explorer.app.features.paths.actions import (
     goal_of,
     pose_of_end,
 )
+from explorer.app.features.paths.incidence_plots import (
+    FOLDS,
+    MARGINS,
+    IncidencePlot,
+    crossing_words,
+)
 from explorer.app.features.paths.load_plot import LoadPlot
 from explorer.app.features.paths.loads import JourneyLoads, PathShares, demand_note, load_words
-from explorer.app.features.paths.margin_plot import MarginPlot, crossing_words
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.tracks import Span
@@ -128,8 +133,11 @@ class PathsPanel:
                 _time_span,
                 disabled=lambda state: state.journey is None,
             )
-            self._plot = MarginPlot(gui)
-            self._load_plot = LoadPlot(gui, self._shares)
+            self._plots = (
+                IncidencePlot(gui, MARGINS, has_times=False),
+                IncidencePlot(gui, FOLDS),
+                LoadPlot(gui, self._shares),
+            )
         self._add_buttons(services.buttons)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -147,8 +155,8 @@ class PathsPanel:
         demand = demand_note(state, self._shares.is_limited(frame))
         yield self._demand, "visible", bool(demand)
         yield self._demand, "content", demand
-        yield from self._plot.updates(frame)
-        yield from self._load_plot.updates(frame)
+        for plot in self._plots:
+            yield from plot.updates(frame)
         yield from self._controls.updates(frame)
 
     def _add_end(self, gui: viser.GuiApi, end: EndName) -> viser.GuiHtmlHandle:

@@ -1,7 +1,8 @@
-"""What the charts over the time of a path share: axes, scales, and the line at the present time."""
+"""What the charts over the time of a path share: axes, levels, and the line at the present time."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -9,63 +10,70 @@ import viser
 from numpy.typing import NDArray
 from viser import uplot
 
-from explorer.app.widgets.charts import add_chart, axis
-from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.charts import NEUTRAL, add_chart, axis, line
+from explorer.numerics.arrays import FloatArray
 
 
 def add_time_chart(
-    gui: viser.GuiApi, series: tuple[uplot.Series, ...], label: str, *, height: int, space: int
+    gui: viser.GuiApi,
+    series: tuple[uplot.Series, ...],
+    vertical: uplot.Axis,
+    levels: uplot.Axis,
+    *,
+    height: int,
+    has_times: bool = True,
 ) -> viser.GuiUplotHandle:
     """Add a chart without words at its axis of time, which the slider above it names.
 
     Args:
         gui: Controls of the page.
-        series: Its lines and dots.
-        label: Quantity and unit of its other axis.
-        height: Its height, in pixels.
-        space: Least distance of two numbers of the other axis, in pixels.
+        series: Its lines and dots, without the line at the present time.
+        vertical: Its vertical axis.
+        levels: The axis of its levels, at the right.
+        height: Height between its axes, in pixels.
+        has_times: Whether the axis of time has numbers; those of a chart below serve it too.
     """
-    axes = axis("", label_size=0, size=26), axis(label, label_size=18, size=40, space=space)
-    return add_chart(gui, series, axes, height=height, padding=(8, 12, 0, 0))
+    room = 26 if has_times else 8
+    time = axis("", label_size=0, size=room)
+    if not has_times:
+        time["values"] = ()
+    return add_chart(
+        gui,
+        (*series, line("now", NEUTRAL, width=1.5)),
+        (time, vertical, levels),
+        height=8 + height + room,
+        padding=(8, 0, 0, 0),
+    )
 
 
-def no_columns(series: int) -> tuple[NDArray[Any], ...]:
-    """Return the columns of a chart while there is no path: a second without values."""
-    return (np.array([0.0, 1.0]), *(np.full(2, np.nan) for _ in range(series)))
-
-
-def time_scales(duration: float, low: float, high: float) -> dict[str, uplot.Scale]:
-    """Return the scales of a chart from time 0 to a duration, in seconds."""
-    return {
-        "x": {"time": False, "range": (0.0, max(duration, 1e-9))},
-        "y": {"range": (low, high)},
-    }
-
-
-def with_now(times: FloatArray, now: float) -> tuple[FloatArray, IntArray]:
-    """Return times in their order with two rows more at the present one, and this order.
+def time_columns(
+    times: FloatArray, curves: Iterable[FloatArray], now: float, span: tuple[float, float]
+) -> tuple[NDArray[Any], ...]:
+    """Return the columns of a chart: times in their order, the curves, the line at the present.
 
     Args:
         times: Times of the rows, shape (n,), in seconds.
+        curves: Values of the rows, and twice that at the present time, shape (n + 2,) each.
         now: The present time, in seconds.
-
-    Returns:
-        The times (n + 2,), and for each the number of its row; those of the present time are n and
-        n + 1.
+        span: Values at the bottom and the top of the chart, between which the line goes.
     """
-    rows = np.concatenate([times, [now, now]])
-    order = np.argsort(rows, kind="stable")
-    return rows[order], order
+    x = np.concatenate([times, [now, now]])
+    order = np.argsort(x, kind="stable")
+    present = np.concatenate([np.full(len(times), np.nan), span])
+    return tuple(column[order] for column in (x, *curves, present))
 
 
-def line_at_now(order: IntArray, low: float, high: float) -> FloatArray:
-    """Return the column of the line at the present time, which goes from one value to another.
+def blank_columns(curves: int, span: tuple[float, float]) -> tuple[NDArray[Any], ...]:
+    """Return the columns of a chart while there is no path: a second without values."""
+    return time_columns(np.ones(1), np.full((curves, 3), np.nan), 0.0, span)
 
-    Args:
-        order: Order of the rows, see `with_now`.
-        low: Value at its lower end.
-        high: Value at its upper end.
-    """
-    cursor = np.full(len(order), np.nan)
-    cursor[order == len(order) - 2], cursor[order == len(order) - 1] = low, high
-    return cursor
+
+def time_updates(
+    chart: viser.GuiUplotHandle, columns: tuple[NDArray[Any], ...]
+) -> Iterator[Update]:
+    """Yield the updates that make a chart show its columns."""
+    duration = max(float(columns[0][-1]), 1e-9)
+    span = float(np.nanmin(columns[-1])), float(np.nanmax(columns[-1]))
+    yield chart, "scales", {"x": {"time": False, "range": (0.0, duration)}, "y": {"range": span}}
+    yield chart, "data", columns
