@@ -76,16 +76,17 @@ def ends_of(state: State) -> tuple[Pose, Pose]:
     Raises:
         InputError: an end is a mode that the present leg lengths do not have.
     """
-    start, goal = state.paths.start, goal_of(state)
-    return state.pose if start is None else pose_of_end(state, start), pose_of_end(state, goal)
+    return pose_of_end(state, state.paths.start), pose_of_end(state, goal_of(state))
 
 
-def pose_of_end(state: State, end: Pose | int) -> Pose:
-    """Return the pose of an end: itself, or a mode of the present leg lengths.
+def pose_of_end(state: State, end: End) -> Pose:
+    """Return the pose of an end: itself, a mode of the present leg lengths, or the present pose.
 
     Raises:
         InputError: the present leg lengths do not close in other modes, to rounding.
     """
+    if end is None:
+        return state.pose
     if isinstance(end, Pose):
         return end
     solution = forward(state.design, _legs(state))

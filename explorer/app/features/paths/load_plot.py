@@ -19,6 +19,7 @@ from explorer.app.features.paths.time_chart import (
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, axis, level_axis, line
+from explorer.statics.reactions import has_limits
 
 HEIGHT = 62
 # Least and greatest top of the chart, in percent; beyond it shares leave the chart.
@@ -47,7 +48,7 @@ class LoadPlot:
             columns = columns_of(loads, journey.at)
         yield from time_updates(self._chart, columns)
         # It does not wait for a path, as those of margins and folds.
-        yield self._chart, "visible", self._shares.is_limited(frame)
+        yield self._chart, "visible", has_limits(frame.state.design)
 
 
 def columns_of(loads: JourneyLoads, now: float) -> tuple[NDArray[Any], ...]:

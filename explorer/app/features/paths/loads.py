@@ -46,10 +46,6 @@ class PathShares:
         self._loads = services.get(Loads)
         self._kept: tuple[tuple[object, ...], JourneyLoads] | None = None
 
-    def is_limited(self, frame: Frame) -> bool:
-        """Return whether a part of the design has a limit."""
-        return has_limits(frame.state.design)
-
     def of(self, frame: Frame) -> JourneyLoads | None:
         """Return the shares along the path of a frame; None without a path or without limits."""
         journey, loaded = frame.state.journey, self._loads.of(frame)
@@ -83,9 +79,9 @@ def load_words(loads: JourneyLoads) -> str:
     return f'<div class="ex-{share_look(share)}">{escape(words)}</div>'
 
 
-def demand_note(state: State, is_limited: bool) -> str:
+def demand_note(state: State) -> str:
     """Return what the demand for a load means if nothing has a limit, as HTML; "" otherwise."""
     paths = state.paths
-    if is_limited or not paths.holds_load or paths.kind != "planned":
+    if has_limits(state.design) or not paths.holds_load or paths.kind != "planned":
         return ""
     return note("No part has a limit, so every load is held: see the tab Machine.")

@@ -152,7 +152,7 @@ class PathsPanel:
         yield self._kinds, "content", box(chips, f'<div class="ex-small">{kind_note(state)}</div>')
         yield self.go, "disabled", state.paths.is_planning
         yield self._title, "content", plan_words(state) or path_title(state, self._shares.of(frame))
-        demand = demand_note(state, self._shares.is_limited(frame))
+        demand = demand_note(state)
         yield self._demand, "visible", bool(demand)
         yield self._demand, "content", demand
         for plot in self._plots:
@@ -224,9 +224,8 @@ class PathsPanel:
 
 def end_numbers(state: State, end: EndName) -> str:
     """Return the six numbers of an end that is not typed, as HTML."""
-    chosen = _end(state, end)
     try:
-        pose = state.pose if chosen is None else pose_of_end(state, chosen)
+        pose = pose_of_end(state, _end(state, end))
     except InputError as error:
         return f'<div class="ex-note ex-close">{escape(sentence(str(error)))}</div>'
     there = position_of(state.design, pose, state.view.at)
@@ -313,8 +312,7 @@ def _choose(state: State, end: EndName, option: str) -> Action:
     if option in MODES:
         value = MODES.index(option)
     elif option == TYPED:
-        chosen = _end(state, end)
-        value = state.pose if chosen is None else pose_of_end(state, chosen)
+        value = pose_of_end(state, _end(state, end))
     elif end == "goal":
         # It is of use once the platform has moved away.
         value = state.pose
@@ -349,8 +347,7 @@ def _as_typed(value: float, size: float) -> float:
 def _set_typed(
     state: State, end: EndName, position: Triple | None, angles: Triple | None
 ) -> Action:
-    before = _end(state, end)
-    pose = before if isinstance(before, Pose) else state.pose
+    pose = pose_of_end(state, _end(state, end))
     there = position_of(state.design, pose, state.view.at) if position is None else position
     if angles is not None:
         pose = Pose.of_yaw_pitch_roll(pose.position, angles)
