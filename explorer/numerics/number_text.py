@@ -28,6 +28,18 @@ def drop_rounding(value: float, size: float) -> float:
     return 0.0 if abs(value) <= ROUNDING * size else value
 
 
+def snap_to_decimals(value: float, decimals: int, size: float) -> float:
+    """Return a number, or the one of so many decimals from which rounding errors alone part it.
+
+    Args:
+        value: The number.
+        decimals: Number of decimals.
+        size: Magnitude of the numbers from which it was computed.
+    """
+    rounded = round(value, decimals)
+    return rounded + drop_rounding(value - rounded, size)
+
+
 def format_ascii(value: float, digits: int, *, size: float = 0.0, padded: bool = False) -> str:
     """Return a number with at most `digits` significant digits and an ASCII minus sign.
 

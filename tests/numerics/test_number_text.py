@@ -26,6 +26,7 @@ from explorer.numerics.number_text import (
     format_decimals,
     format_fixed,
     format_number,
+    snap_to_decimals,
 )
 
 NEGATIVE_ZERO = re.compile(r"(?<![\d.])[-−]0(\.0*)?(?![\d.e])")
@@ -60,6 +61,13 @@ def test_number_text_of_rounding_reads_zero_and_of_small_numbers_above_it_does_n
     assert format_number(1e-9 * size, size=size) != "0"
     assert format_number(1e-30 * size) != "0"
     assert share(1.651e-9) == "1.65 × 10⁻⁹"
+
+
+@given(st.integers(-(10**6), 10**6), st.floats(-1e-13, 1e-13))
+def test_number_snaps_to_decimals_across_rounding_alone(hundredths: int, error: float) -> None:
+    typed = hundredths / 100
+    assert snap_to_decimals(typed + error, 2, 1e4) == typed
+    assert snap_to_decimals(typed + 1e-6, 2, 1e4) == typed + 1e-6
 
 
 @pytest.mark.parametrize("incidence", [1, 2, 3])

@@ -21,7 +21,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.mechanism.design import Pair
-from explorer.numerics.number_text import drop_rounding
+from explorer.numerics.number_text import snap_to_decimals
 
 Condition = Callable[[State], bool]
 """A function that tells whether a condition holds in a state."""
@@ -120,8 +120,8 @@ class Slider(Control[float]):
         is_own = self._is_own(value)
         span = self._track.span(frame.state, (value,), tinted, is_own=is_own)
         # A field would show rounding as −0.00, or as 5.00 where 5 was meant.
-        shown = round(value, decimals(span.step))
-        value = shown + drop_rounding(value - shown, max(abs(span.low), abs(span.high)))
+        size = max(abs(span.low), abs(span.high))
+        value = snap_to_decimals(value, decimals(span.step), size)
         yield from self._track.updates(span)
         if self._tinted is not None:
             yield self._marks, "marks", tint_marks(tinted, span)

@@ -45,7 +45,7 @@ from explorer.export.trajectory import trajectory_csv
 from explorer.mechanism.margins import margins, mode_name, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tool_point import position_of
-from explorer.numerics.number_text import drop_rounding, format_number
+from explorer.numerics.number_text import format_number, snap_to_decimals
 
 EndName = Literal["start", "goal"]
 ENDS: tuple[EndName, ...] = ("start", "goal")
@@ -75,7 +75,7 @@ KINDS: dict[PathKind, tuple[str, str]] = {
         "Search for a path that keeps all limits, margins and clearances.",
     ),
 }
-# Decimals at which typed angles and coordinates stop: beyond them is rounding.
+# Decimals of typed angles and coordinates.
 DECIMALS = 9
 
 
@@ -331,17 +331,10 @@ def typed_numbers(state: State, end: EndName) -> tuple[Triple, Triple]:
     chosen = _end(state, end)
     if not isinstance(chosen, Pose):
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    yaw, pitch, roll = (round(angle, DECIMALS) for angle in angles_of(chosen))
-    x, y, z = position_of(state.design, chosen, state.view.at)
-    if state.view.at == "tool":
-        x, y, z = (_as_typed(value, state.design.reach) for value in (x, y, z))
+    there = position_of(state.design, chosen, state.view.at)
+    x, y, z = (snap_to_decimals(coordinate, DECIMALS, state.design.reach) for coordinate in there)
+    yaw, pitch, roll = (snap_to_decimals(angle, DECIMALS, 180.0) for angle in angles_of(chosen))
     return (x, y, z), (yaw, pitch, roll)
-
-
-def _as_typed(value: float, size: float) -> float:
-    """Return the round number that a coordinate was typed as, if it differs by rounding."""
-    typed = round(value, DECIMALS)
-    return typed + drop_rounding(value - typed, size)
 
 
 def _set_typed(
