@@ -6,7 +6,7 @@ A fold is drawn without its sign, which is that of its margin: so there are two 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from html import escape
 from typing import Any, NamedTuple
 
@@ -141,13 +141,13 @@ def columns_of(journey: Journey | None, quantity: Quantity) -> tuple[NDArray[Any
     crossing_times = [crossing_time(journey, index) for index in range(len(crossings))]
     times = np.concatenate([timed.time, crossing_times])
     # Without the present pose: the axis must not change while the path is played.
-    span = span_of([*values[: len(times)].ravel(), *quantity.flat])
+    span = span_of(np.append(values[: len(times)], quantity.flat))
     return time_columns(times, (*values.T, singular), journey.at, span)
 
 
-def span_of(values: Sequence[float]) -> tuple[float, float]:
+def span_of(values: ArrayLike) -> tuple[float, float]:
     """Return the bottom and the top of a chart of some values, with room beyond them."""
-    low, high = min(values), max(values)
+    low, high = float(np.min(values)), float(np.max(values))
     room = ROOM * (high - low) or 1.0
     return low - room, high + room
 
