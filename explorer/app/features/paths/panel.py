@@ -344,8 +344,7 @@ def _set_typed(
     there = position_of(state.design, pose, state.view.at) if position is None else position
     if angles is not None:
         pose = Pose.of_yaw_pitch_roll(pose.position, angles)
-    pose = state.pose_at(there, pose)
-    return Set(f"paths.{end}", pose, end.capitalize(), "typed numbers")
+    return Set(f"paths.{end}", state.pose_at(there, pose), end.capitalize(), "typed numbers")
 
 
 def _is_planned(state: State) -> bool:
