@@ -13,6 +13,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,6 +67,7 @@ class PathMargins:
         poses: Corners of the path.
         at: Place of the samples: number of the move plus the share of it, shape (n,).
         margins: (δ1, δ2, δ3) of the samples, in design units, shape (n, 3).
+        least: Least |δ1|, |δ2| and |δ3| over the path, not of the samples, in design units.
         crossings: Singular poses in the order of the path.
         lies_in: Incidences (1, 2, 3) that hold over some whole move, such as 3 for one in the
             base plane; such a move has no crossings of that margin.
@@ -74,6 +76,7 @@ class PathMargins:
     poses: tuple[Pose, ...]
     at: FloatArray
     margins: FloatArray
+    least: tuple[float, float, float]
     crossings: tuple[Crossing, ...]
     lies_in: tuple[int, ...]
 
@@ -98,18 +101,23 @@ def path_margins(
     values: list[FloatArray] = []
     crossings: list[Crossing] = []
     lies_in: set[int] = set()
+    leasts: list[list[float]] = []
     shares = np.linspace(0.0, 1.0, samples, dtype=np.float64)
     for index, (start, end) in enumerate(itertools.pairwise(poses)):
         # A corner is a sample of the move that ends there.
         new_shares = shares if index == 0 else shares[1:]
         at.append(index + new_shares)
         values.append(margins(*poses_between(start, end, new_shares, tool)))
-        of_move, lasting = _find_crossings_of_move(start, end, index, tool)
+        along = _move_margins(start, end, tool)
+        leasts.append([margin.least() for margin in along])
+        of_move, lasting = _find_crossings_of_move(along, start, end, index, tool)
         crossings += of_move
         lies_in.update(lasting)
     merged = tuple(_merge_corners(crossings))
     samples_at = np.concatenate(at), np.concatenate(values)
-    return PathMargins(tuple(poses), *samples_at, merged, tuple(sorted(lies_in)))
+    least1, least2, least3 = map(min, zip(*leasts, strict=True))
+    least = least1, least2, least3
+    return PathMargins(tuple(poses), *samples_at, least, merged, tuple(sorted(lies_in)))
 
 
 def _merge_corners(crossings: list[Crossing]) -> list[Crossing]:
@@ -133,16 +141,16 @@ def _merge_corners(crossings: list[Crossing]) -> list[Crossing]:
 
 
 def _find_crossings_of_move(
-    start: Pose, end: Pose, index: int, tool: ArrayLike | None
+    along: Sequence[_MoveMargin], start: Pose, end: Pose, index: int, tool: ArrayLike | None
 ) -> tuple[list[Crossing], list[int]]:
     """Return the crossings of a move in order, and the incidences that hold all along it."""
     crossings: list[Crossing] = []
     lasting: list[int] = []
-    for number, margin in enumerate(_move_margins(start, end, tool)):
+    for number, margin in enumerate(along):
         if margin.is_zero:
             lasting.append(number + 1)
             continue
-        for share, changes in margin.roots():
+        for share, changes in margin.roots:
             position, rotation = poses_between(start, end, share, tool)
             aside = share - ASIDE if share > NEAREST_ROOTS else share + ASIDE
             side = 1 if margin.at(aside)[0] > 0.0 else -1
@@ -185,8 +193,27 @@ class _MoveMargin:
         rates = math.hypot(self.db, self.dc)
         return self.angle * (self.angle * math.hypot(b, c) + 2.0 * rates)
 
+    def least(self) -> float:
+        """Return the least magnitude over the move: at an end, a root or where the rate is zero."""
+        if self.is_zero or self.roots:
+            return 0.0
+        w = self.angle
+        rate = _MoveMargin(
+            a=self.da,
+            da=0.0,
+            b=self.db + w * self.c,
+            db=w * self.dc,
+            c=self.dc - w * self.b,
+            dc=-w * self.db,
+            angle=w,
+            size=(1.0 + w) * self.size,
+        )
+        stationary = [] if rate.is_zero else [t for t, _ in rate.roots]
+        return min(abs(self.at(t)[0]) for t in (0.0, 1.0, *stationary))
+
+    @cached_property
     def roots(self) -> list[tuple[float, bool]]:
-        """Return all roots in ascending order, with whether the sign changes there."""
+        """All roots in ascending order, with whether the sign changes there."""
         curvature, zero = self.curvature_bound(), ROUNDING * self.size
         roots: list[tuple[float, bool]] = []
         queue = [(0.0, 1.0)]

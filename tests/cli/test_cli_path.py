@@ -51,6 +51,7 @@ def test_path_json_has_poses_and_trajectory(cli: CommandLine, tmp_path: Path) ->
     text = cli.text(*words[:4])
     assert "moves       1, each proved to keep limits and clearances" in text
     assert "1 line tried" in text
+    assert "least |δ|" in text
 
 
 @pytest.mark.parametrize(

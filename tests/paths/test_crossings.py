@@ -37,10 +37,15 @@ def test_path_margins_move_of_b4_or_a_tool_has_all_crossings(seed: int, size: fl
         np.testing.assert_allclose(each.pose.position, position[0], atol=1e-12 * (5.0 + size))
     samples = margins(*tool_move(start, end, np.linspace(0.0, 1.0, len(found.at)), tool))
     np.testing.assert_allclose(found.margins, samples, atol=1e-12 * (5.0 + size))
-    signs = margins(*tool_move(start, end, np.linspace(0.0, 1.0, 4001), tool)) > 0.0
+    finely = margins(*tool_move(start, end, np.linspace(0.0, 1.0, 4001), tool))
+    signs = finely > 0.0
     changes = (signs[1:] != signs[:-1]).sum(axis=0).tolist()
     crossed = [sum(c.incidence == k for c in found.crossings) for k in (1, 2, 3)]
     assert crossed == changes
+    sampled = np.where(changes, 0.0, np.abs(finely).min(axis=0))
+    least = np.array(found.least)
+    assert (least <= sampled + 1e-12 * (5.0 + size)).all()
+    np.testing.assert_allclose(least, sampled, atol=1e-5 * (5.0 + size))
 
 
 @given(cases(), st.integers(0, 4), st.integers(0, 2**32))

@@ -262,6 +262,9 @@ def _as_lines(
     largest: LargestShare | None,
     out: File | None,
 ) -> Iterator[str]:
+    from explorer.paths.crossings import path_margins
+
+    least = path_margins(path.poses, tool=path.tool).least
     plural = "" if path.checked == 1 else "s"
     yield heading(design)
     for name, pose in (("from", path.poses[0]), ("to", path.poses[-1])):
@@ -272,6 +275,7 @@ def _as_lines(
         ("keeps", f"|δ| {figure(path.margin)}, clearance {figure(path.clearance)} or more"),
         ("planned in", f"{path.seconds:.3g} s, {path.checked} line{plural} tried"),
         ("takes", f"{figure(timed.duration)} s"),
+        ("least |δ|", "  ".join(f"δ{i + 1} {figure(v)}" for i, v in enumerate(least))),
     ]
     if largest is not None:
         words = f"held, with {100.0 * largest.share:.1f} % of a limit at most"

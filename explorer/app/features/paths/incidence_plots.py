@@ -182,11 +182,10 @@ def crossing_words(journey: Journey) -> str:
     ]
     places += [f"δ{index} = 0 along a whole move" for index in along_path.lies_in]
     if not places:
-        least = np.abs(along_path.margins).min(axis=0)
-        index = int(least.argmin())
+        index = int(np.argmin(along_path.least))
         return (
             f'<div class="ex-within" title="{MARGIN_KINDS}">No singular pose; '
-            f"least |δ{index + 1}| = {format_number(float(least[index]), 3)} units</div>"
+            f"least |δ{index + 1}| = {format_number(along_path.least[index], 3)} units</div>"
         )
     more = len(places) - MOST_LISTED
     listed = "; ".join(places[:MOST_LISTED]) + (f"; and {more} more" if more > 0 else "")
