@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 
 from explorer.errors import InputError
+from explorer.reproduce.charts import chart
 from explorer.reproduce.claim import Claim, Result
 from explorer.reproduce.comparison import large_workspace, orientations
-from explorer.reproduce.flags import chart, strata, uncoupled
-from explorer.reproduce.interference import clear_optimum, lower_risk
+from explorer.reproduce.flags import strata, uncoupled
+from explorer.reproduce.interference import FROM, clear_optimum, lower_risk
 from explorer.reproduce.kinematics import closed_form, same_kinematics
 from explorer.reproduce.mode_paths import mode_paths
 from explorer.reproduce.search import search
@@ -37,9 +38,12 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
             Claim(
                 "same-kinematics",
                 "The 4-4 has the kinematic properties of the 6-4.",
-                "The original 6-4 parallel robot becomes a simpler 4-legged parallel robot with "
-                "the same kinematic properties …",
-                "",
+                "The set of actuated variables in both platforms are in a one-to-one "
+                "correspondence, so both platforms are kinematically equivalent … the original 6-4 "
+                "parallel robot becomes a simpler 4-legged parallel robot with the same kinematic "
+                "properties …",
+                "The properties are read as the actuated variables, the assembly modes and the "
+                "singular poses. Workspaces at equal strokes differ, and are claims of their own.",
                 "explorer forward --joints 11.7 10.8 9.3 11.4 9.0 13.0",
                 same_kinematics,
             ),
@@ -48,7 +52,9 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
                 "The 4-4 has a lower risk of leg interference than the 6-4.",
                 "… and a lower risk of leg interference.",
                 "The paper gives no measure of the risk and no place of a2. Here it is clearances "
-                "and swept tetrahedra over the workspace of the optimum, for a range of a2.",
+                "and swept tetrahedra over the workspace of the optimum at the orientation of its "
+                f"home, from z = {FROM:g} on, for a range of a2. Legs with a common joint do not "
+                "count as a pair.",
                 "explorer interference --design paper-optimal --position 10 5 9",
                 lower_risk,
             ),
@@ -58,8 +64,7 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
                 "assembly modes.",
                 "Its forward kinematics can be solved by a sequence of three trilaterations … so "
                 "that they give a total of 8 assembly modes.",
-                "The system of quadratic equations of [6] is not printed; here it is that of the "
-                "nine squared distances.",
+                "",
                 "explorer forward --joints 11.7 10.8 9.3 11.4 9.0 13.0",
                 closed_form,
             ),
@@ -89,7 +94,8 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
                 "The singularities correspond to uncoupled translations and rotations.",
                 "The singularities of flagged manipulators correspond to uncoupled translations "
                 "and/or rotations in the workspace of the manipulator.",
-                "A motion is uncoupled if it changes one of the three margins alone.",
+                "A motion is uncoupled if it changes one of the three margins alone. A singularity "
+                "corresponds to the motion that changes its margin, and to the one that it frees.",
                 "explorer reproduce --claim uncoupled-motions",
                 uncoupled,
             ),
@@ -99,9 +105,12 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
                 "Each cell can be characterized using a single local chart whose coordinates "
                 "directly correspond to uncoupled translations and/or rotations in the workspace "
                 "of the manipulator.",
-                "The charts are those of another paper, which is not at hand. Here the "
-                "coordinates are the amounts of the six uncoupled motions, and the cell is an "
-                "assembly mode.",
+                "The charts are those of another paper, which is not at hand. Here a cell is a "
+                "stratum or, if it is not connected, a connected part of it, and a coordinate is "
+                "the amount of one of the platform's uncoupled motions, made one after the other. "
+                "r is the distance a1b4, β and ε are the angles of the line a1b4 with the guide "
+                "and with the line b2b3, and φ1, φ2 and φ3 are the angles by which the mechanism "
+                "is folded at the line b2b3, at a1b4 and at the guide.",
                 "explorer reproduce --claim charts",
                 chart,
             ),
@@ -133,9 +142,9 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
             Claim(
                 "search",
                 "Sequential quadratic programming matches a volume of 8000.",
-                "The proposed optimum design algorithm takes 220 iterations to converge to an "
-                "optim[al] solution.",
-                OUR_READING,
+                "[The] proposed optimum design algorithm takes 220 iterations to converge to a[n "
+                "optimal] solution.",
+                f"{OUR_READING} The demanded volume, 8d@0 in the scan, is read as 8000.",
                 "explorer optimise --design paper-initial --target-volume 8000 "
                 "--box 0 -12 0 20 22 18",
                 search,

@@ -39,6 +39,8 @@ STEPS = (0.5, 1.0, 2.0)
 """Lengths of steps along x, y and z whose swept tetrahedra are tested; 2 is our reading of the step
 of the optimum's nodes."""
 
+# Clearance of legs that touch, in design units.
+TOUCHING = 1e-9
 # Share of colliding steps below which an interval counts as short enough.
 RARE = 0.001
 
@@ -67,9 +69,24 @@ class Interference:
     steps: tuple[tuple[float, ...], ...]
 
 
+@dataclass(frozen=True)
+class Touching:
+    """The nodes at which legs touch.
+
+    Attributes:
+        count: Number of these nodes.
+        nodes: Number of all nodes.
+        highest: Largest z of these nodes, in design units.
+    """
+
+    count: int
+    nodes: int
+    highest: float
+
+
 def lower_risk() -> Measurement:
     """Compare clearances and swept steps of the 4-4 and of its 6-4 twin over a workspace."""
-    nodes = _nodes()
+    nodes = _nodes(NODE_STEP, LOWEST[0])
     pairs = leg_clearances(OPTIMAL, nodes, ROTATION).clearance
     four = pairs.min(axis=1)
     ours = _interference("4-4", nodes, four, four, _four_collides)
@@ -109,15 +126,16 @@ def judge_risk(
     relation = "at least as many" if is_as_free(thin) else "not always as many"
     text = (
         f"Legs 2 and 3 of the 4-4 are {apart:.3f} units apart everywhere, (b3 − b2) times the "
-        f"cosine of the yaw. With radii below half of that its legs have {relation} positions free "
-        "of collisions as those of every 6-4 whose a2 lies within the reach; with thicker ones "
-        f"they have none. The least clearance of thin legs at z ≥ {LOWEST[1]:g} is "
-        f"{ours.least[1]:.3f}, beside {min(least):.3f} to {max(least):.3f}, and "
-        f"{beyond.least[1]:.3f} with a2x = {BEYOND:g}. Yet at {min(clearer):.0%} to "
+        "cosine of the yaw. With each radius of the table below half of that its legs have "
+        f"{relation} positions free of collisions as those of every 6-4 whose a2 lies within the "
+        "reach; with thicker ones they have none. The least clearance of thin legs at "
+        f"z ≥ {LOWEST[1]:g} is {ours.least[1]:.3f}, beside {min(least):.3f} to {max(least):.3f}, "
+        f"and {beyond.least[1]:.3f} with a2x = {BEYOND:g}. Yet at {min(clearer):.0%} to "
         f"{max(clearer):.0%} of the nodes the 6-4 is the clearer one: the median of the clearance "
         f"is {ours.median:.3f}, beside {min(medians):.3f} to {max(medians):.3f}. By the paper's "
-        "test of swept tetrahedra the 4-4 collides on fewer steps along z, and on every step along "
-        "x that is longer than the distance of legs 2 and 3, where the 6-4 collides on none."
+        "test of swept tetrahedra the 4-4 collides on fewer steps along z than a 6-4 with a2 "
+        "within the reach, and on every step along x that is longer than the distance of legs 2 "
+        "and 3, where the 6-4 collides on none."
     )
     mechanisms = (ours, *twins, beyond)
     values = {"legs_2_and_3_apart": apart, "mechanisms": [asdict(each) for each in mechanisms]}
@@ -126,22 +144,37 @@ def judge_risk(
         return Measurement(text, "confirmed", values, table)
     if thin and is_as_free(thin):
         condition = (
-            f"for legs with radii below {0.5 * apart:.2f} units and a2 within the reach, by the "
-            "share of positions free of collisions"
+            f"for legs with radii below {0.5 * apart:.2f} units and a2 within the reach, at home's "
+            "orientation, by the share of positions free of collisions"
         )
         return Measurement(text, "confirmed within", values, table, condition)
     return Measurement(text, "not confirmed", values, table)
 
 
 def clear_optimum() -> Measurement:
-    """Test steps of the paper's optimum by swept tetrahedra, for each axis and length."""
-    nodes = _nodes()
+    """Test steps of the paper's optimum by swept tetrahedra, and its nodes by clearances."""
+    nodes = _nodes(NODE_STEP, LOWEST[0])
     apart = float(leg_clearances(OPTIMAL, nodes, ROTATION).clearance[:, PAIRS.index((2, 3))].min())
-    return judge_optimum(_shares_of_steps(nodes, _four_collides), apart)
+    of_table = _nodes(STEPS[-1], 0.0)
+    clearance = leg_clearances(OPTIMAL, of_table, ROTATION).clearance.min(axis=1)
+    touching = of_table[clearance < TOUCHING]
+    return judge_optimum(
+        _shares_of_steps(nodes, _four_collides),
+        apart,
+        Touching(len(touching), len(of_table), float(touching[:, 2].max(initial=0.0))),
+    )
 
 
-def judge_optimum(steps: tuple[tuple[float, ...], ...], apart: float) -> Measurement:
-    """Return the measurement of shares of colliding steps, by length as in `STEPS` and by axis."""
+def judge_optimum(
+    steps: tuple[tuple[float, ...], ...], apart: float, touching: Touching
+) -> Measurement:
+    """Return the measurement of the optimum.
+
+    Args:
+        steps: Shares of colliding steps, by length as in `STEPS` and by axis.
+        apart: Distance of legs 2 and 3, in design units.
+        touching: The nodes by which Table 1 is read.
+    """
     lines = [f"{'step':>8}" + "".join(f"{axis:>8}" for axis in "xyz")]
     lines += [
         f"{length:8g}" + "".join(f"{share:8.1%}" for share in shares)
@@ -154,10 +187,16 @@ def judge_optimum(steps: tuple[tuple[float, ...], ...], apart: float) -> Measure
         f"those of {STEPS[-1]:g} units, our reading of the step of the optimum's nodes. Legs 2 and "
         f"3 are {apart:.3f} units apart: on a longer step along the guide each passes where the "
         "other was or will be, though they never touch. The answer depends on the sampling "
-        "interval, which the paper does not print."
+        f"interval, which the paper does not print. Whatever it is, legs touch at {touching.count} "
+        f"of the {touching.nodes} nodes by which we read the volume, none of them above z = "
+        f"{touching.highest:g}; the paper does not say whether it counts such nodes."
     )
-    values = {"steps": dict(zip(map(str, STEPS), steps, strict=True)), "apart": apart}
-    if shortest == longest == 0.0:
+    values = {
+        "steps": dict(zip(map(str, STEPS), steps, strict=True)),
+        "apart": apart,
+        "touching": asdict(touching),
+    }
+    if shortest == longest == touching.count == 0:
         return Measurement(text, "confirmed", values, tuple(lines))
     if shortest < RARE < longest:
         return Measurement(text, "not testable from the paper", values, tuple(lines))
@@ -218,16 +257,12 @@ def _table(mechanisms: Sequence[Interference]) -> list[str]:
     return lines
 
 
-def _nodes() -> FloatArray:
-    """Return the nodes of a grid in the workspace of the optimum, off the base plane, (n, 3)."""
-    reach = OPTIMAL.reach
-    lows, highs = OPTIMAL.limits.box or ((-reach,) * 3, (reach,) * 3)
-    axes = [
-        np.arange(low, high + 0.5 * NODE_STEP, NODE_STEP)
-        for low, high in zip(lows, highs, strict=True)
-    ]
+def _nodes(step: float, lowest: float) -> FloatArray:
+    """Return the nodes of a grid in the workspace of the optimum from a least z on, (n, 3)."""
+    lows, highs = OPTIMAL.limits.box or ((-OPTIMAL.reach,) * 3, (OPTIMAL.reach,) * 3)
+    axes = [np.arange(low, high + 0.5 * step, step) for low, high in zip(lows, highs, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    grid = grid[grid[:, 2] >= LOWEST[0]]
+    grid = grid[grid[:, 2] >= lowest]
     return grid[_within(grid)]
 
 

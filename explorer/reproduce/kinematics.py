@@ -2,219 +2,174 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import asdict, dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import forward, inverse
-from explorer.mechanism.margins import margins
-from explorer.numerics.arrays import FloatArray
+from explorer.mechanism.margins import margins, mode_of
+from explorer.numerics.arrays import FloatArray, dot
 from explorer.reproduce.claim import Measurement, below
 from explorer.reproduce.samples import random_design, random_poses
 from explorer.reproduce.six_legs import six_four_twin
-from explorer.singularity.jacobian import jacobian
 
-DESIGNS, POSES, STARTS, STEPS = 6, 4, 400, 80
-# Residual of joints over the reach that counts as a solution, and distance that counts as the same.
-SOLVED, SAME = 1e-11, 1e-6
-# Accuracy that counts as exact, over the reach.
-EXACT = 1e-9
-TWIN_POSES, A2X = 500, (5.0, 12.0, 26.0)
+DESIGNS, POSES, A2X = 6, 500, (5.0, 12.0, 26.0)
+# Errors that count as none, of joints over the reach and of poses.
+EXACT, SAME = 1e-9, 1e-6
 
 
 @dataclass
-class Search:
-    """The solutions that a search from random starts finds, beside those of the closed form.
+class FormErrors:
+    """The errors of the closed form.
 
     Attributes:
-        starts: Number of starts.
-        converged: Number of starts from which the search converged.
-        modes: Number of modes of the closed form.
-        found: Number of these modes to which the search converged.
-        others: Number of starts from which it converged to anything else.
+        joints: Largest error of the joints of its poses, over the reach.
+        pose: Largest distance of a pose from the nearest of those with its joints.
+        modes: Least number of triples of signs of the margins in these.
     """
 
-    starts: int = 0
-    converged: int = 0
-    modes: int = 0
-    found: int = 0
-    others: int = 0
-
-    def add(self, is_mode: FloatArray, starts: int) -> None:
-        """Add converged starts, given as truths (converged, modes) of what each is close to."""
-        self.starts += starts
-        self.converged += len(is_mode)
-        self.modes += is_mode.shape[1]
-        self.found += int(is_mode.any(axis=0).sum())
-        self.others += int((~is_mode.any(axis=1)).sum())
-
-    def words(self, what: str) -> str:
-        """Return what was found, in words."""
-        return (
-            f"Newton's method on the {what} converged from {self.converged / self.starts:.0%} of "
-            f"{self.starts:,} random starts, to {self.found} of the {self.modes} modes and "
-            f"{self.others} times to anything else"
-        )
+    joints: float = 0.0
+    pose: float = 0.0
+    modes: int = 8
 
 
 def closed_form() -> Measurement:
-    """Solve the forward kinematics by Newton's method in two forms, beside the closed form."""
+    """Solve the forward kinematics by the paper's three trilaterations, one after the other."""
     random = np.random.default_rng(4)
-    designs = [*PRESETS.values(), *(random_design(random) for _ in range(DESIGNS))]
-    loops, squares, worst = Search(), Search(), 0.0
-    for design in designs:
-        positions, rotations = random_poses(random, POSES, 0.7 * design.reach)
-        for position, rotation in zip(positions, rotations, strict=True):
-            joints = inverse(design, position, rotation)
-            p, r, _ = forward(design, joints)
-            back = np.abs(inverse(design, p, r) - joints).max() / design.reach
-            worst = max(worst, float(back))
-            loops.add(_solve_loops(design, joints, p, r, random), STARTS)
-            squares.add(_solve_squares(design, joints, p, r, random), STARTS)
-    return judge_closed_form(worst, loops, squares, len(designs) * POSES)
+    errors = FormErrors()
+    for design in (*PRESETS.values(), *(random_design(random) for _ in range(DESIGNS))):
+        position, rotation = random_poses(random, POSES, 0.7 * design.reach)
+        joints = inverse(design, position, rotation)
+        p, r = solve_by_trilaterations(design, joints)
+        off = np.abs(inverse(design, p, r) - joints[:, None]).max() / design.reach
+        errors.joints = max(errors.joints, float(off))
+        apart = np.abs(p - position[:, None]).max(axis=-1) / design.reach
+        apart += np.abs(r - rotation[:, None]).max(axis=(-2, -1))
+        errors.pose = max(errors.pose, float(apart.min(axis=1).max()))
+        modes = np.sort(mode_of(margins(p, r)), axis=1)
+        errors.modes = min(errors.modes, 1 + int((np.diff(modes) > 0).sum(axis=1).min()))
+    return judge_closed_form(errors)
 
 
-def judge_closed_form(worst: float, loops: Search, squares: Search, count: int) -> Measurement:
-    """Return the measurement of the closed form.
-
-    Args:
-        worst: Largest difference of the joints of its modes from the given ones, over the reach.
-        loops: Search on the six loop equations.
-        squares: Search on the nine quadratic equations.
-        count: Number of joint vectors.
-    """
+def judge_closed_form(errors: FormErrors) -> Measurement:
+    """Return the measurement of the closed form."""
     text = (
-        f"For {count} joint vectors of random poses, the eight modes of the closed form have the "
-        f"joints to {below(worst, EXACT)} of the reach. {loops.words('six loop equations')}. "
-        f"{squares.words('nine quadratic equations')}."
+        f"For the joints of {POSES} random poses of each of {len(PRESETS) + DESIGNS} designs, "
+        "trilaterations of a1, a2 and a3 in turn, with two mirror points each, lead to eight poses "
+        f"with these joints to {below(errors.joints, EXACT)} of the reach. Their margins have "
+        f"{errors.modes} triples of signs. Each of the random poses is one of the eight of its "
+        f"joints, to {below(errors.pose, SAME)}: there are no others."
     )
-    searches = (loops, squares)
-    is_complete = all(each.found == each.modes and each.others == 0 for each in searches)
-    return Measurement(
-        text,
-        "confirmed" if is_complete and worst < EXACT else "not confirmed",
-        {"closed_form_error": worst, "loops": vars(loops), "quadratic": vars(squares)},
-    )
+    is_so = errors.joints < EXACT and errors.pose < SAME and errors.modes == 8
+    return Measurement(text, "confirmed" if is_so else "not confirmed", asdict(errors))
 
 
-def _solve_loops(
-    design: Design,
-    joints: FloatArray,
-    modes: FloatArray,
-    rotations: FloatArray,
-    random: np.random.Generator,
-) -> FloatArray:
-    """Return which mode each converged start of Newton's method is close to, shape (n, 8)."""
-    reach = design.reach
-    p, r = random_poses(random, STARTS, 1.5 * reach)
-    for _ in range(STEPS):
-        missed = joints - inverse(design, p, r)
-        system = jacobian(design, p, r) + 1e-14 * np.eye(6)
-        step = np.linalg.solve(system, missed[..., None])[..., 0]
-        # Far from a solution a whole step may lead anywhere.
-        length = np.abs(step[:, :3]).max(axis=1) / (0.3 * reach)
-        turn = np.linalg.norm(step[:, 3:], axis=1) / 0.5
-        step /= np.maximum(1.0, np.maximum(length, turn))[:, None]
-        p = p + step[:, :3]
-        r = Rotation.from_rotvec(step[:, 3:]).as_matrix() @ r
-    ok = np.abs(joints - inverse(design, p, r)).max(axis=1) < SOLVED * reach
-    off = np.abs(p[ok][:, None] - modes).max(axis=-1) / reach
-    off += np.abs(r[ok][:, None] - rotations).max(axis=(-2, -1))
-    return off < SAME
+def solve_by_trilaterations(design: Design, joints: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the poses of joints (n, 6) by the paper's Figure 2: (n, 8, 3) and (n, 8, 3, 3).
 
-
-def _solve_squares(
-    design: Design,
-    joints: FloatArray,
-    modes: FloatArray,
-    rotations: FloatArray,
-    random: np.random.Generator,
-) -> FloatArray:
-    """Return which mode each converged start on the nine quadratic equations is close to, (n, 8).
-
-    The unknowns are a1, a2 and a3 in the platform frame, and the equations their squared distances
-    to the points of the three trilaterations. The lengths h1 to h4 follow from d1 to d4 by the
-    theorem of Pythagoras.
+    a1 follows from b1, b2 and b3, then a2 from a1, b2 and b3, and a3 from b4, a1 and a2, in the
+    frame of the platform. The lengths h1 to h4 follow from d1 to d4 by the theorem of Pythagoras.
     """
-    l1, d1, d2, d3, d4, l4 = joints.tolist()
-    a2x = design.a2x
-    base = np.array([[0.0, 0.0, 0.0], [a2x, 0.0, 0.0], [*design.a3, 0.0]])
+    l1, d1, d2, d3, d4, l4 = joints.T
+    a2x, (a3x, a3y) = design.a2x, design.a3
     b1, b4 = np.array([*design.b1, 0.0]), np.zeros(3)
     b2, b3 = np.array([design.b2, 0.0, 0.0]), np.array([design.b3, 0.0, 0.0])
-    to_points = (
-        (0, b1, l1**2),
-        (0, b2, d1**2 + d2**2),
-        (0, b3, d3**2 + d4**2),
-        (1, b2, (d1 - a2x) ** 2 + d2**2),
-        (1, b3, (d3 - a2x) ** 2 + d4**2),
-        (2, b4, l4**2),
-    )
-    between = [(i, j, float(((base[i] - base[j]) ** 2).sum())) for i, j in ((0, 1), (0, 2), (1, 2))]
-    size = max(design.reach, a2x, float(np.abs(joints).max()))
-    a = random.uniform(-1.5 * size, 1.5 * size, (STARTS, 3, 3))
+    one = _trilaterate((b1, b2, b3), (l1, np.hypot(d1, d2), np.hypot(d3, d4)))
+    h2, h4 = np.hypot(d1 - a2x, d2), np.hypot(d3 - a2x, d4)
+    two = _trilaterate((one, b2, b3), (a2x, h2[:, None], h4[:, None]))
+    one = np.broadcast_to(one[:, :, None], two.shape)
+    to_a2 = math.hypot(a3x - a2x, a3y)
+    three = _trilaterate((b4, one, two), (l4[:, None, None], design.reach, to_a2))
+    one, two = (np.broadcast_to(a[:, :, :, None], three.shape) for a in (one, two))
+    x = (two - one) / a2x
+    y = (three - one - a3x * x) / a3y
+    rotation = np.stack([x, y, np.cross(x, y)], axis=-2).reshape(-1, 8, 3, 3)
+    return -(rotation @ one.reshape(-1, 8, 3, 1))[..., 0], rotation
 
-    def equations() -> tuple[FloatArray, FloatArray]:
-        """Return the residuals (n, 9) and their derivatives by the unknowns (n, 9, 9)."""
-        residual, slopes = np.empty((STARTS, 9)), np.zeros((STARTS, 9, 3, 3))
-        for k, (i, point, square) in enumerate(to_points):
-            apart = a[:, i] - point
-            residual[:, k] = (apart**2).sum(axis=-1) - square
-            slopes[:, k, i] = 2.0 * apart
-        for k, (i, j, square) in enumerate(between, start=len(to_points)):
-            apart = a[:, i] - a[:, j]
-            residual[:, k] = (apart**2).sum(axis=-1) - square
-            slopes[:, k, i], slopes[:, k, j] = 2.0 * apart, -2.0 * apart
-        return residual, slopes.reshape(STARTS, 9, 9)
 
-    for _ in range(2 * STEPS):
-        residual, slopes = equations()
-        system = slopes + 1e-13 * size * np.eye(9)
-        step = np.linalg.solve(system, residual[..., None])[..., 0]
-        step /= np.maximum(1.0, np.abs(step).max(axis=1) / (0.5 * size))[:, None]
-        a = a - step.reshape(STARTS, 3, 3)
-    ok = np.abs(equations()[0]).max(axis=1) < SOLVED * size**2
-    found = np.swapaxes(rotations, -1, -2)[:, None] @ (base - modes[:, None])[..., None]
-    off = np.abs(a[ok][:, None] - found[..., 0]).max(axis=(-2, -1)) / size
-    return off < SAME
+def _trilaterate(
+    centres: tuple[FloatArray, FloatArray, FloatArray], radii: tuple[FloatArray | float, ...]
+) -> FloatArray:
+    """Return the two points at three distances from three centres, shape (..., 2, 3)."""
+    origin, second, third = np.broadcast_arrays(*centres)
+    r0, r1, r2 = radii
+    x = second - origin
+    d = np.linalg.norm(x, axis=-1)
+    x = x / d[..., None]
+    i = dot(third - origin, x)
+    y = third - origin - i[..., None] * x
+    j = np.linalg.norm(y, axis=-1)
+    y = y / j[..., None]
+    along = (r0 * r0 - r1 * r1 + d * d) / (2.0 * d)
+    across = (r0 * r0 - r2 * r2 + i * i + j * j - 2.0 * i * along) / (2.0 * j)
+    height = np.sqrt(np.maximum(r0 * r0 - along * along - across * across, 0.0))
+    foot = origin + along[..., None] * x + across[..., None] * y
+    normal = height[..., None] * np.cross(x, y)
+    return np.stack([foot + normal, foot - normal], axis=-2)
+
+
+@dataclass
+class TwinErrors:
+    """The largest differences of the 4-4 and its 6-4 twin.
+
+    Attributes:
+        lengths: Difference of the twin's lengths in the eight modes of the 4-4, over the reach.
+        joints: Difference of the joints that these lengths give, over the reach.
+        determinant: Relative error of the determinant of the twin by the margins.
+    """
+
+    lengths: float = 0.0
+    joints: float = 0.0
+    determinant: float = 0.0
 
 
 def same_kinematics() -> Measurement:
-    """Compare the modes and the singular poses of the 4-4 and of its 6-4 twin."""
+    """Compare the actuated variables, modes and singular poses of the 4-4 and its 6-4 twin."""
     random = np.random.default_rng(11)
-    lengths, ratio = 0.0, 0.0
+    errors = TwinErrors()
     for design in (*PRESETS.values(), *(random_design(random) for _ in range(DESIGNS))):
-        positions, rotations = random_poses(random, TWIN_POSES, design.reach)
-        p, r, _ = forward(design, inverse(design, positions, rotations))
+        reach = design.reach
+        positions, rotations = random_poses(random, POSES, reach)
+        joints = inverse(design, positions, rotations)
+        p, r, _ = forward(design, joints)
         for a2x in A2X:
             twin = six_four_twin(design, a2x)
             given = twin.lengths(positions, rotations)
-            modes = [twin.lengths(p[:, k], r[:, k]) for k in range(8)]
-            lengths = max(lengths, float(np.abs(np.array(modes) - given).max()) / design.reach)
+            modes = np.array([twin.lengths(p[:, k], r[:, k]) for k in range(8)])
+            errors.lengths = max(errors.lengths, float(np.abs(modes - given).max()) / reach)
+            back = np.abs(_joints_of(given, a2x) - joints).max() / reach
+            errors.joints = max(errors.joints, float(back))
             # The determinant over the margins is a constant of the design.
             own = twin.determinant(positions, rotations) * given.prod(axis=1)
             product = margins(positions, rotations).prod(axis=-1)
             constant = float(np.median(own / product))
-            size = np.abs(constant) * design.reach**3
-            ratio = max(ratio, float(np.abs(own - constant * product).max()) / size)
-    return judge_same_kinematics(lengths, ratio)
+            off = np.abs(own - constant * product).max() / (np.abs(constant) * reach**3)
+            errors.determinant = max(errors.determinant, float(off))
+    return judge_same_kinematics(errors)
 
 
-def judge_same_kinematics(lengths: float, ratio: float) -> Measurement:
-    """Return the measurement of the twin, given relative errors of lengths and determinants."""
+def judge_same_kinematics(errors: TwinErrors) -> Measurement:
+    """Return the measurement of the twin."""
     text = (
-        f"For {TWIN_POSES} random poses of each of {len(PRESETS) + DESIGNS} designs and a2x = "
-        f"{', '.join(f'{x:g}' for x in A2X)}, all eight modes of the 4-4 give the six legs of the "
-        f"6-4 the same lengths to {below(lengths, EXACT)} of the reach, and the determinant of "
-        f"the 6-4 times its lengths is a constant times δ1 δ2 δ3 to {below(ratio, EXACT)}: both "
-        "have the same "
-        "modes and the same singular poses."
+        f"For {POSES} random poses of each of {len(PRESETS) + DESIGNS} designs and a2x = "
+        f"{', '.join(f'{x:g}' for x in A2X)}, the lengths of the 6-4 and the joints of the 4-4 "
+        "determine each other: all eight modes of the 4-4 give the six legs the same lengths, to "
+        f"{below(errors.lengths, EXACT)} of the reach, and these give back the joints by the "
+        f"theorem of Pythagoras, to {below(errors.joints, EXACT)}. The determinant of the 6-4 "
+        "times its lengths is a constant times δ1 δ2 δ3, to "
+        f"{below(errors.determinant, EXACT)}. So both have the same modes and the same singular "
+        "poses."
     )
-    is_same = lengths < EXACT and ratio < EXACT
-    return Measurement(
-        text,
-        "confirmed" if is_same else "not confirmed",
-        {"largest_length_difference": lengths, "determinant_error": ratio},
-    )
+    is_same = max(errors.lengths, errors.joints, errors.determinant) < EXACT
+    return Measurement(text, "confirmed" if is_same else "not confirmed", asdict(errors))
+
+
+def _joints_of(lengths: FloatArray, a2x: float) -> FloatArray:
+    """Return the joints (n, 6) of the 4-4 by the lengths of its twin, in the order of `TWIN`."""
+    l1, h1, h3, h2, h4, l4 = lengths.T
+    d1, d3 = ((a * a - b * b + a2x * a2x) / (2.0 * a2x) for a, b in ((h1, h2), (h3, h4)))
+    d2, d4 = (np.sqrt(h * h - d * d) for h, d in ((h1, d1), (h3, d3)))
+    return np.stack([l1, d1, d2, d3, d4, l4], axis=-1)

@@ -11,8 +11,7 @@ from explorer.mechanism.kinematics import attachment_points, inverse
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.reproduce.claim import Measurement, below
-from explorer.reproduce.samples import random_design, random_poses
-from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.reproduce.samples import PHI1, PHI2, PHI3, flatten, random_design, random_poses
 from explorer.singularity.jacobian import (
     determinant,
     inverse_condition,
@@ -61,10 +60,9 @@ def flat_tetrahedra() -> Measurement:
         condition = inverse_condition(j, design.reach)
         is_off = np.abs(delta).min(axis=-1) >= OFF * design.reach
         errors.off_planes = min(errors.off_planes, float(condition[is_off].min()))
-        for index in range(3):
-            flat = _on_plane(p, r, index)
-            at_plane = inverse_condition(jacobian(design, flat, r), design.reach)
-            errors.on_planes = max(errors.on_planes, float(at_plane.max()))
+        for column in (PHI1, PHI2, PHI3):
+            flat = inverse_condition(jacobian(design, *flatten(p, r, column)), design.reach)
+            errors.on_planes = max(errors.on_planes, float(flat.max()))
     return judge_flat(errors)
 
 
@@ -99,13 +97,3 @@ def _volumes(design: Design, position: FloatArray, rotation: FloatArray) -> Floa
         ],
         axis=-1,
     )
-
-
-def _on_plane(position: FloatArray, rotation: FloatArray, index: int) -> FloatArray:
-    """Return the nearest positions at which a margin vanishes, shape (n, 3)."""
-    normal = planes_of_singularity(rotation)[..., index, :]
-    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    # The second projection removes the rounding of the first.
-    for _ in range(2):
-        position = position - (position * normal).sum(axis=-1, keepdims=True) * normal
-    return position

@@ -146,20 +146,24 @@ def six_four_twin(design: Design, a2x: float) -> SixLegs:
     )
 
 
-def octahedral(design: Design) -> SixLegs:
+def octahedral(design: Design, size: float = 1.0) -> SixLegs:
     """Return the octahedral Stewart-Gough platform of the same reach.
 
     Base and platform are equilateral triangles with the areas of a1 a2 a3 and b1 b2 b3, turned
     against each other by 60°; neighbouring legs share their joints.
+
+    Args:
+        design: The design with these areas.
+        size: Factor of the edges of the base.
     """
-    base = _circumradius(0.5 * abs(design.a2x * design.a3[1]))
+    base = size * _circumradius(0.5 * abs(design.a2x * design.a3[1]))
     platform = _circumradius(0.5 * abs((design.b3 - design.b2) * design.b1[1]))
     corners = np.radians([0.0, 120.0, 240.0])
     tips = np.radians([60.0, 180.0, 300.0])
     a = base * np.column_stack([np.cos(corners), np.sin(corners), np.zeros(3)])
     b = platform * np.column_stack([np.cos(tips), np.sin(tips), np.zeros(3)])
     return SixLegs(
-        "octahedral",
+        "octahedral" if size == 1.0 else f"octahedral × {size:g}",
         a[[0, 1, 1, 2, 2, 0]],
         b[[0, 0, 1, 1, 2, 2]],
         design.reach,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,23 +11,28 @@ import claims_page
 import numpy as np
 import pytest
 from command_line import CommandLine
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, InputError
+from explorer import PRESETS, InputError, from_folds, to_folds
 from explorer.files.manual import read_page
 from explorer.files.packaged import packaged_file
 from explorer.legs.segments import write_closest
+from explorer.mechanism.folds import FOLDS
 from explorer.mechanism.home import home_pose
-from explorer.mechanism.kinematics import attachment_points, inverse
-from explorer.mechanism.margins import margins
+from explorer.mechanism.kinematics import attachment_points, forward, inverse
+from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.reproduce import comparison, flags, interference, kinematics, singularities
+from explorer.reproduce import charts, comparison, flags, interference, kinematics, singularities
 from explorer.reproduce.claim import VERDICTS, Measurement, Result
 from explorer.reproduce.claims import CLAIMS, measure_claims
 from explorer.reproduce.interference import Interference
-from explorer.reproduce.mode_paths import Paths, judge_paths, least_condition_on, random_paths
+from explorer.reproduce.mode_paths import Paths, conditions_at_crossings, judge_paths, random_paths
+from explorer.reproduce.samples import random_design, random_poses
 from explorer.reproduce.six_legs import SixLegs, octahedral, six_four_twin
+from explorer.singularity.bruhat import is_below
+from explorer.singularity.strata import STRATA
 from explorer.singularity.uncoupled import UNCOUPLED
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
@@ -36,7 +42,7 @@ OPTIMAL = PRESETS["paper-optimal"]
 
 
 # Claims whose measurement searches long.
-LONG = ("closed-form", "search", "orientations")
+LONG = ("search", "orientations")
 
 
 @pytest.fixture(scope="module")
@@ -68,14 +74,18 @@ def test_manual_and_report_are_made_of_all_claims_and_conditions_stand_where_nee
         assert bool(measurement.condition) == (measurement.verdict == "confirmed within")
 
 
-@pytest.mark.long
-def test_every_mode_is_found_and_nothing_else() -> None:
-    (closed_form,) = measure_claims(["closed-form"])
-    values: Any = closed_form.measurement.values
-    for search in (values["loops"], values["quadratic"]):
-        assert search["others"] == 0
-        assert search["found"] == search["modes"] == 256
-        assert search["converged"] > 0.9 * search["starts"]
+def test_trilaterations_lead_to_the_eight_modes_of_the_forward_kinematics() -> None:
+    random = np.random.default_rng(0)
+    for design in (*PRESETS.values(), random_design(random)):
+        joints = inverse(design, *random_poses(random, 100, 0.7 * design.reach))
+        p, r = kinematics.solve_by_trilaterations(design, joints)
+        order = np.argsort(mode_of(margins(p, r)), axis=1)
+        position, rotation, feasible = forward(design, joints)
+        assert feasible.all()
+        p = np.take_along_axis(p, order[..., None], axis=1)
+        r = np.take_along_axis(r, order[..., None, None], axis=1)
+        np.testing.assert_allclose(p, position, atol=1e-9)
+        np.testing.assert_allclose(r, rotation, atol=1e-9)
 
 
 def test_single_actuators_of_uncoupled_motions_are_l1_and_l4(results: dict[str, Result]) -> None:
@@ -86,25 +96,59 @@ def test_single_actuators_of_uncoupled_motions_are_l1_and_l4(results: dict[str, 
     assert all(len(which) > 1 for which in moves.values())
 
 
-def test_counterexample_of_the_charts_is_one(results: dict[str, Result]) -> None:
-    values: Any = results["charts"].measurement.values
-    rotation = Rotation.from_quat(values["quaternion"], scalar_first=True).as_matrix()
-    position = np.array(values["position"])
-    assert np.abs(margins(position, rotation)).min() > 0.01 * OPTIMAL.reach
-    # Points of the platform, moved a little along each motion, span one dimension too few.
-    step = 1e-6
-    here = Pose.of(tuple(values["position"]), rotation)
+# A pose within all limits of the optimum and off all singularities, in general position.
+DEPENDENT = Pose((3.36818, 9.35633, 4.83913), (0.835148, -0.486356, -0.178114, -0.185095))
 
-    def moved(k: int, amount: float) -> FloatArray:
-        other = UNCOUPLED[k].moved(here, amount)
-        points = np.vstack([np.eye(3), np.zeros((1, 3))]) * OPTIMAL.reach
-        return (np.array(other.position) + points @ other.rotation.T).ravel()
 
-    columns = [(moved(k, step) - moved(k, -step)) / (2.0 * step) for k in range(6)]
-    scaled = np.column_stack([c / np.linalg.norm(c) for c in columns])
-    values = np.linalg.svd(scaled, compute_uv=False)
-    assert values[5] < 1e-6 * values[0]
-    assert values[4] > 1e-4 * values[0]
+@pytest.mark.parametrize(("pose", "least"), [(home_pose(OPTIMAL), 1e-9), (DEPENDENT, 1e-4)])
+def test_folds_are_regular_where_the_six_motions_made_once_are_no_chart(
+    pose: Pose, least: float
+) -> None:
+    assert np.abs(margins(pose.position, pose.rotation)).min() > 0.1 * OPTIMAL.reach
+
+    def singular_values(points_at: Callable[[int, float], FloatArray]) -> FloatArray:
+        """Return the singular values of the directions in which points of the platform move."""
+        step = 1e-5
+        moves = [points_at(k, step) - points_at(k, -step) for k in range(6)]
+        directions = np.array([move / np.linalg.norm(move) for move in moves])
+        return np.asarray(np.linalg.svd(directions, compute_uv=False), dtype=np.float64)
+
+    def points(position: ArrayLike, rotation: FloatArray) -> FloatArray:
+        corners = np.vstack([np.eye(3), np.zeros((1, 3))]) * OPTIMAL.reach
+        return (np.asarray(position) + corners @ rotation.T).ravel()
+
+    def by_motion(k: int, amount: float) -> FloatArray:
+        after = UNCOUPLED[k].moved(pose, amount)
+        return points(after.position, after.rotation)
+
+    def by_fold(k: int, amount: float) -> FloatArray:
+        folds = to_folds(pose.position, pose.rotation)
+        folds[k] += amount
+        return points(*from_folds(folds))
+
+    *_, fifth, sixth = singular_values(by_motion)
+    assert sixth < least < 1e-2 < fifth
+    assert singular_values(by_fold).min() > 0.05
+
+
+def test_table_of_the_charts_states_the_margins_that_each_coordinate_changes() -> None:
+    random = np.random.default_rng(4)
+    folds = to_folds(*random_poses(random, 100, 1.0))
+    before = margins(*from_folds(folds))
+    for line in charts.TABLE[1:]:
+        name, *_ = line.removeprefix("−").split()
+        other = folds.copy()
+        column = FOLDS.index(name)
+        # Within the range of its box, so that no sign changes.
+        other[:, column] *= 0.9
+        after = margins(*from_folds(other))
+        changes = np.abs(after - before).max(axis=0) > 1e-9
+        assert [f"δ{k + 1}" in line for k in range(3)] == changes.tolist()
+        assert (np.sign(after) == np.sign(before)).all()
+        if column >= 3:
+            other[:, column] = -folds[:, column]
+            flipped = (np.sign(margins(*from_folds(other))) != np.sign(before)).all(axis=0)
+            assert flipped.tolist() == [f"δ{k + 1}" in line for k in range(3)]
 
 
 def test_table_one_is_the_printed_one(results: dict[str, Result]) -> None:
@@ -191,7 +235,7 @@ def test_volume_of_the_twin_is_that_of_a_plain_count(results: dict[str, Result])
     values: Any = results["workspace"].measurement.values
     for mechanism, told in zip(
         (six_four_twin(OPTIMAL, OPTIMAL.reach), octahedral(OPTIMAL)),
-        values["mechanisms"][2:],
+        values["mechanisms"][2:5:2],
         strict=True,
     ):
         lows, highs = mechanism.box
@@ -238,33 +282,41 @@ def judge_risk(**changes: Any) -> Measurement:
     return interference.judge_risk(interference_of(**changes), [TWIN], TWIN, 0.65)
 
 
-def judge_optimum(*shares: float) -> Measurement:
-    return interference.judge_optimum(tuple((x, 0.0, 0.0) for x in shares), 0.6)
+def judge_optimum(*shares: float, touching: int = 0) -> Measurement:
+    steps = tuple((x, 0.0, 0.0) for x in shares)
+    return interference.judge_optimum(steps, 0.6, interference.Touching(touching, 999, 0.0))
 
 
-def judge_workspace(ours: float, *others: float) -> Measurement:
-    found = [comparison.Workspace(str(volume), volume, 0.0) for volume in others]
-    return comparison.judge_workspace(comparison.Workspace("4-4", ours, 0.0), found)
+def judge_workspace(ours: float, twin: float, *octahedra: float) -> Measurement:
+    four, six, *eight = (
+        comparison.Workspace(str(volume), volume, 0.0) for volume in (ours, twin, *octahedra)
+    )
+    return comparison.judge_workspace(four, [six], eight)
 
 
 def judge_orientations(share: float, tilt: float) -> Measurement:
     ours, other = (comparison.Abilities("", s, 0.01, t, 1.0) for s, t in ((share, tilt), (0.1, 20)))
-    return comparison.judge_orientations(ours, [other])
+    return comparison.judge_orientations(ours, ours, [other])
 
 
 EXACT = singularities.Errors(1e-16, 1e-16, 1e-15, 1e-3)
-EVERY = kinematics.Search(10, 9, 8, 8, 0)
+FORM = kinematics.FormErrors(1e-15, 1e-12, 8)
+TWINS = kinematics.TwinErrors(1e-15, 1e-15, 1e-15)
+CHART = charts.ChartErrors(1e-15, 1e-15, 24, 1e-15, 1e-15, 1e-10, 0.7)
+BORDERS = {(w, other) for w in STRATA for other in STRATA if is_below(w, other)}
 VERDICTS_OF_VALUES = [
     ("confirmed", judge_risk()),
     ("confirmed within", judge_risk(free=THICK)),
     ("not confirmed", judge_risk(free=(0.4, *THICK[1:]))),
     ("confirmed", judge_optimum(0.0, 0.0, 0.0)),
+    ("not confirmed", judge_optimum(0.0, 0.0, 0.0, touching=1)),
     ("not testable from the paper", judge_optimum(0.0005, 1.0, 1.0)),
     ("not confirmed", judge_optimum(0.1, 1.0, 1.0)),
     ("confirmed", judge_workspace(1.0, 0.5, 0.9)),
-    ("confirmed within", judge_workspace(1.0, 0.5, 0.999)),
+    ("confirmed within", judge_workspace(1.0, 0.5, 0.9, 1.1)),
+    ("not confirmed", judge_workspace(1.0, 0.5, 0.999)),
     ("not confirmed", judge_workspace(1.0, 0.5, 1.1)),
-    ("not confirmed", judge_workspace(1.0, 1.0, 1.001)),
+    ("not confirmed", judge_workspace(1.0, 1.0, 0.9)),
     # More than the error is needed.
     ("confirmed", judge_orientations(0.2, 40.0)),
     ("confirmed within", judge_orientations(0.2, 20.0)),
@@ -275,21 +327,30 @@ VERDICTS_OF_VALUES = [
     ("not confirmed", singularities.judge_flat(replace(EXACT, identity=1e-6))),
     ("not confirmed", singularities.judge_flat(replace(EXACT, on_planes=1e-6))),
     ("not confirmed", singularities.judge_flat(replace(EXACT, off_planes=1e-9))),
-    ("confirmed", flags.judge_strata(24, 0, is_bruhat=True)),
-    ("not confirmed", flags.judge_strata(23, 0, is_bruhat=True)),
-    ("not confirmed", flags.judge_strata(24, 1, is_bruhat=True)),
-    ("not confirmed", flags.judge_strata(24, 0, is_bruhat=False)),
-    ("confirmed", flags.judge_uncoupled(0.1, 1e-16, {})),
-    ("not confirmed", flags.judge_uncoupled(0.0, 1e-16, {})),
-    ("not confirmed", flags.judge_uncoupled(0.1, 1e-3, {})),
-    ("not testable from the paper", flags.judge_chart(None)),
-    ("confirmed", kinematics.judge_same_kinematics(1e-15, 1e-15)),
-    ("not confirmed", kinematics.judge_same_kinematics(1e-3, 1e-15)),
-    ("confirmed", judge_paths(np.array([1e-12, 1e-10]))),
-    ("not confirmed", judge_paths(np.array([1e-12, 1e-3]))),
-    ("confirmed", kinematics.judge_closed_form(1e-15, EVERY, EVERY, 1)),
-    ("not confirmed", kinematics.judge_closed_form(1e-15, EVERY, replace(EVERY, found=7), 1)),
-    ("not confirmed", kinematics.judge_closed_form(1e-15, EVERY, replace(EVERY, others=1), 1)),
+    ("confirmed", flags.judge_strata(BORDERS, 1)),
+    ("not confirmed", flags.judge_strata(BORDERS - {(STRATA[0], STRATA[0])}, 1)),
+    ("not confirmed", flags.judge_strata(BORDERS | {(STRATA[-1], STRATA[0])}, 1)),
+    ("confirmed", flags.judge_uncoupled(0.1, 1e-16, {}, 1e-15)),
+    ("not confirmed", flags.judge_uncoupled(0.0, 1e-16, {}, 1e-15)),
+    ("not confirmed", flags.judge_uncoupled(0.1, 1e-3, {}, 1e-15)),
+    ("not confirmed", flags.judge_uncoupled(0.1, 1e-16, {}, 1e-3)),
+    ("confirmed", charts.judge_chart(CHART)),
+    *(
+        ("not confirmed", charts.judge_chart(replace(CHART, **{name: 1e-6})))
+        for name in ("poses", "folds", "motions", "margins", "determinant", "at_home")
+    ),
+    ("not confirmed", charts.judge_chart(replace(CHART, strata=23))),
+    ("confirmed", kinematics.judge_same_kinematics(TWINS)),
+    ("not confirmed", kinematics.judge_same_kinematics(replace(TWINS, lengths=1e-3))),
+    ("not confirmed", kinematics.judge_same_kinematics(replace(TWINS, joints=1e-3))),
+    ("not confirmed", kinematics.judge_same_kinematics(replace(TWINS, determinant=1e-3))),
+    ("confirmed", judge_paths(1e-12, 1.0)),
+    ("not confirmed", judge_paths(1e-3, 1.0)),
+    ("not confirmed", judge_paths(1e-12, 0.99)),
+    ("confirmed", kinematics.judge_closed_form(FORM)),
+    ("not confirmed", kinematics.judge_closed_form(replace(FORM, joints=1e-6))),
+    ("not confirmed", kinematics.judge_closed_form(replace(FORM, pose=1e-3))),
+    ("not confirmed", kinematics.judge_closed_form(replace(FORM, modes=7))),
 ]
 
 
@@ -301,21 +362,17 @@ def test_verdict_follows_from_the_values(verdict: str, measurement: Measurement)
 def test_paths_join_two_modes_of_the_same_joints() -> None:
     count = 200
     found = random_paths(np.random.default_rng(3), count)
-    which = np.arange(count)
-    (p, r), (q, s) = (found.poses(which, np.full(count, share)) for share in (0.0, 1.0))
+    (p, r), (q, s) = (found.at(np.full(count, share)) for share in (0.0, 1.0))
     np.testing.assert_allclose(inverse(OPTIMAL, p, r), inverse(OPTIMAL, q, s), atol=1e-6)
     assert (np.sign(margins(p, r)) != np.sign(margins(q, s))).any(axis=1).all()
 
 
 def test_path_that_stays_in_a_mode_has_no_singular_pose() -> None:
     home = home_pose(OPTIMAL)
-    points = np.tile(home.position, (1, 3, 1)) + [[[0.0] * 3, [0.5] * 3, [1.0, 0.0, 0.0]]]
-    still = np.zeros((1, 3))
-    path = Paths(points, home.rotation[None], still, still)
-    shares = np.linspace(0.0, 1.0, 2000)
-    least = path.conditions(np.zeros(2000, dtype=np.int64), shares).min()
-    assert least_condition_on(path)[0] == pytest.approx(least, rel=1e-3)
-    assert least > 1e-3
+    way, detour = np.zeros((2, 1, 6))
+    way[0, 0], detour[0, :3] = 1.0, 0.5
+    path = Paths(np.array([home.position]), home.rotation[None], way, detour)
+    assert conditions_at_crossings(path)[0] > 1e-3
 
 
 def test_command_writes_the_keys_of_the_contract_and_refuses_an_unknown_claim(
