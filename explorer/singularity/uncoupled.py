@@ -1,10 +1,9 @@
-"""The six motions that change exactly one margin, and their travel to the singularity.
+"""The six motions that change exactly one margin.
 
 On the axes of each of the two frames there are three: the translation along x moves the flag's
 point on its line, the rotation about x turns its plane about the line, and the rotation about z
 turns its line in the plane. Every motion leaves the other two elements of the flag where they
-are, so it changes the margin of one incidence alone. Along a translation the margin is linear;
-in a rotation by an angle θ it is δ cos θ + δ' sin θ, which vanishes every half turn.
+are, so it changes the margin of one incidence alone.
 """
 
 from __future__ import annotations
@@ -17,27 +16,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
-from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-
-# Change of a margin per unit of translation up to which it is rounding.
-NO_RATE = 1e-12
-# Longest travel over the distance of b4 from a1; a longer one counts as infinite.
-FARTHEST = 1e6
-
-
-@dataclass(frozen=True)
-class Travel:
-    """The travel of a motion to the singularity on either side, in design units or radians.
-
-    Attributes:
-        low: Travel backwards, at most zero; −inf if there is no singularity.
-        high: Travel forwards, at least zero; inf if there is no singularity.
-    """
-
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -75,25 +55,19 @@ class UncoupledMotion:
 
         Args:
             pose: Pose before the motion.
-            amount: Travel in design units (translation) or radians (rotation).
+            amount: Distance in design units (translation) or angle in radians (rotation).
 
         Raises:
             InputError: The amount is not finite.
         """
         if not math.isfinite(amount):
             raise InputError(f"a motion {self.name} needs a finite amount; got {amount}")
+        point, direction = self.line(pose)
         if self.kind == "translation":
-            direction = self.line(pose)[1]
             x, y, z = (np.array(pose.position) + amount * direction).tolist()
             return Pose((x, y, z), pose.quaternion)
-        return Pose.of(*_turned(self, pose, amount))
-
-    def travel(self, pose: Pose) -> Travel:
-        """Return the travel until the margin is zero, backwards and forwards.
-
-        Both are zero if the margin is. The two of a rotation differ by half a turn.
-        """
-        return _travels(pose, (self,))[0]
+        turn = Rotation.from_rotvec(amount * direction).as_matrix()
+        return Pose.of(point + turn @ (np.array(pose.position) - point), turn @ pose.rotation)
 
 
 UNCOUPLED = (
@@ -105,49 +79,3 @@ UNCOUPLED = (
     UncoupledMotion("base", "rotation", "x", 3),
 )
 """The six motions: three of each frame, in the order of the margins that they change."""
-
-
-def travels(pose: Pose) -> tuple[Travel, ...]:
-    """Return the travel of each of the six motions from a pose, in the order of `UNCOUPLED`."""
-    return _travels(pose, UNCOUPLED)
-
-
-def _travels(pose: Pose, motions: tuple[UncoupledMotion, ...]) -> tuple[Travel, ...]:
-    poses = [_pose_of_rate(motion, pose) for motion in motions]
-    positions = [np.array(pose.position), *(position for position, _ in poses)]
-    rotations = [pose.rotation, *(rotation for _, rotation in poses)]
-    here, *rates = margins(np.stack(positions), np.stack(rotations)).tolist()
-    farthest = FARTHEST * math.hypot(*pose.position)
-    return tuple(
-        _travel(motion.kind, here[motion.incidence - 1], rate[motion.incidence - 1], farthest)
-        for motion, rate in zip(motions, rates, strict=True)
-    )
-
-
-def _travel(
-    kind: Literal["translation", "rotation"], margin: float, rate: float, farthest: float
-) -> Travel:
-    if margin == 0.0:
-        return Travel(0.0, 0.0)
-    if kind == "rotation":
-        high = math.atan2(-margin, rate) % math.pi
-        return Travel(high - math.pi, high)
-    if abs(rate) <= NO_RATE or abs(margin) > farthest * abs(rate):
-        return Travel(-math.inf, math.inf)
-    end = -margin / rate
-    return Travel(end, math.inf) if end < 0.0 else Travel(-math.inf, end)
-
-
-def _pose_of_rate(motion: UncoupledMotion, pose: Pose) -> tuple[FloatArray, FloatArray]:
-    """Return a position and rotation at which the margin equals its derivative at a pose."""
-    # Along the axis every change is linear; a quarter turn about it makes δ equal to δ'.
-    if motion.kind == "rotation":
-        return _turned(motion, pose, 0.5 * math.pi)
-    return motion.line(pose)[1], pose.rotation
-
-
-def _turned(motion: UncoupledMotion, pose: Pose, angle: float) -> tuple[FloatArray, FloatArray]:
-    """Return the position and rotation after a turn about the axis by an angle in radians."""
-    point, direction = motion.line(pose)
-    turn = Rotation.from_rotvec(angle * direction).as_matrix()
-    return point + turn @ (np.array(pose.position) - point), turn @ pose.rotation

@@ -20,7 +20,6 @@ from explorer.app.features.optimise.actions import (
     StartRun,
 )
 from explorer.app.features.paths.actions import Go, Play, SetPathTime
-from explorer.app.features.singularity.actions import Jog
 from explorer.app.features.studies.actions import BrushAxis
 from explorer.app.session.gestures import UserAction
 from explorer.app.state.action import Action
@@ -180,7 +179,6 @@ MAKERS: tuple[Make, ...] = (
     lambda state, i, share: Open(list(PRESETS.values())[i % 2]),
     _limited,
     _view,
-    lambda state, i, share: Jog(i, _length(share)),
     lambda state, i, share: Go(),
     lambda state, i, share: SetPathTime(8.0 * share),
     lambda state, i, share: Play(on=i > 2),
@@ -275,7 +273,6 @@ def rich_state() -> State:
         StartRun(),
         lambda state: _end(state, 6),
         Accept(),
-        Jog(2, 1 / 3),
         Change("paths", {"start": 3, "goal": 5}),
         Go(),
         SetPathTime(10 / 3),

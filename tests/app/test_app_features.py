@@ -31,7 +31,6 @@ from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
 from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
 from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
 from explorer.app.features.precision.actions import SetTolerances
-from explorer.app.features.singularity.actions import Jog
 from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
 from explorer.app.features.view.camera_buttons import HINTS as CAMERA_HINTS
 from explorer.app.features.workspace.panel import KEYS as CHIP_KEYS
@@ -264,7 +263,7 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
 
 
 OF_VALUES = (
-    SetJoint, SetPosition, SetAngle, SetPose, Jog, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
+    SetJoint, SetPosition, SetAngle, SetPose, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
     SetVariable, SetName, SetPathTime, PickDesign, BrushAxis, BrushBox,
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map or a handle gives."""

@@ -19,7 +19,7 @@ from socket_tab import SocketTab
 import explorer.app
 from explorer.app.features.optimise.actions import CancelRun, EndRun, StartRun
 from explorer.app.features.paths.actions import Advance, CancelPlan, Go, Play, SetPathTime
-from explorer.app.features.singularity.actions import GoToSingularity, Jog
+from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.server import Running
 from explorer.app.session import gestures, history
@@ -64,7 +64,6 @@ actions = st.one_of(
     st.builds(Set, st.just("design.unit_mm"), st.floats(0.1, 100.0)),
     st.builds(Set, st.just("hold"), st.sampled_from(["pose", "legs"])),
     st.builds(Open, st.sampled_from([OPTIMAL, OTHER])),
-    st.builds(Jog, st.integers(0, 5), st.floats(-3.0, 3.0)),
     st.builds(GoToSingularity, st.sampled_from([None, 1, 2, 3])),
     st.sampled_from([GoHome(), Reset(), Play(on=True), Play(on=False), Advance(0.5)]),
     st.builds(Go),

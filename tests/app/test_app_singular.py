@@ -1,4 +1,4 @@
-"""Singularities and assembly modes on the page: strata, motions, distances, tables; no browser."""
+"""Singularities and assembly modes on the page: strata, distances, tables; no browser."""
 
 from __future__ import annotations
 
@@ -17,16 +17,9 @@ from strategies import Case, all_cases
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.marks import Ghosts, ghost_points
 from explorer.app.features.mechanism.modes import MODES, HoveredMode, ModesPanel, modes_table
-from explorer.app.features.singularity.actions import (
-    GoToSingularity,
-    GoToStratum,
-    Jog,
-    stratum_name,
-)
+from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum, stratum_name
 from explorer.app.features.singularity.distance import DistancePanel, distance_table
 from explorer.app.features.singularity.feed import StrataFeed
-from explorer.app.features.singularity.jog_panel import jog_amount
-from explorer.app.features.singularity.jog_scene import JogScene
 from explorer.app.features.singularity.panel import SingularityPanel, summary
 from explorer.app.features.singularity.performance import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene, NearestGhost
@@ -48,10 +41,8 @@ from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_stratum
 from explorer.singularity.strata import GENERIC, STRATA
 from explorer.singularity.turning import least_turns
-from explorer.singularity.uncoupled import UNCOUPLED
 
 OPTIMAL = PRESETS["paper-optimal"]
-MOTIONS = range(len(UNCOUPLED))
 BATCHED = ("batched_positions", "batched_scales")
 
 
@@ -134,22 +125,6 @@ def test_distances_come_from_the_worker_but_those_of_one_incidence_at_once() -> 
         assert distance == pytest.approx(every[stratum], rel=1e-9, abs=1e-12)
 
 
-# Uncoupled motions
-
-
-@pytest.mark.parametrize("motion", MOTIONS)
-def test_jog_counts_from_its_start_and_leads_back_there(motion: int) -> None:
-    start = random_states(1)[0]
-    state = start
-    for amount in (3.0, -7.5, 20.0):
-        state = Jog(motion, amount).apply(state)
-        assert jog_amount(state, motion) == amount
-        assert [jog_amount(state, other) for other in MOTIONS if other != motion] == [0.0] * 5
-    direct = Jog(motion, 20.0).apply(start)
-    assert state.pose == direct.pose
-    assert Jog(motion, 0.0).apply(state).pose == start.pose
-
-
 # Distances
 
 
@@ -210,9 +185,7 @@ def test_buttons_lead_to_the_nearest_pose_and_refuse_where_it_is_reached(
 def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
     services: Services, desk: Desk, state: State
 ) -> None:
-    shown = viewed(
-        state, ghost="nearest", strata=True, arrows="all six", ellipsoid="speed", ball=True
-    )
+    shown = viewed(state, ghost="nearest", strata=True, ellipsoid="speed", ball=True)
     frame = Frame(shown)
     words = plain(summary(frame))
     for index in incidences(frame.snapshot.stratum):
@@ -222,12 +195,7 @@ def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
     assert not any(re.search(r"\b(nan|inf)\b", plain(text)) for text in texts)
     assert "none: δ" in plain(performance_table(frame))
     placed = Placed(frame)
-    for scene in (
-        EllipsoidScene(services),
-        BallScene(services),
-        NearestGhost(services),
-        JogScene(services),
-    ):
+    for scene in (EllipsoidScene(services), BallScene(services), NearestGhost(services)):
         for _, name, value in scene.updates(placed):
             if name in ("points", "scale", "position", "wxyz", *BATCHED):
                 assert np.isfinite(np.asarray(value, dtype=np.float64)).all()

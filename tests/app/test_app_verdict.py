@@ -15,7 +15,7 @@ from services import StubWorker, services_for
 from strategies import Case, all_cases
 
 from explorer.app.features.mechanism.modes import modes_table
-from explorer.app.features.singularity.actions import GoToSingularity, Jog
+from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.features.singularity.distance import distance_table
 from explorer.app.features.singularity.feed import StrataFeed
 from explorer.app.features.singularity.panel import summary
@@ -30,24 +30,20 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import describe_modes
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.singularity.bruhat import COVERED, OF_INCIDENCES, incidences
 from explorer.singularity.colours import WARN_SHARE, css
 from explorer.singularity.jacobian import scaled_margins
-from explorer.singularity.uncoupled import UNCOUPLED
 from explorer.workspace.position_bands import position_bands
 
 OPTIMAL = PRESETS["paper-optimal"]
-ABOUT_PLATFORM_Z = next(
-    index
-    for index, motion in enumerate(UNCOUPLED)
-    if (motion.frame, motion.kind, motion.axis) == ("platform", "rotation", "z")
-)
 
 
 def test_verdict_seven_degrees_from_an_incidence_is_near_and_so_is_its_margin() -> None:
     # Where the lines nearly meet every margin is long.
-    frame = Frame(Jog(ABOUT_PLATFORM_Z, 66.0).apply(opened(OPTIMAL)))
+    home = home_pose(OPTIMAL)
+    turn = rotation_from_yaw_pitch_roll((66.0, 0.0, 0.0))
+    frame = Frame(opened(OPTIMAL, Pose.of(home.position, home.rotation @ turn)))
     assert np.abs(frame.snapshot.margins).min() > frame.state.warn_below
     text = summary(frame)
     assert "Near a singularity" in text

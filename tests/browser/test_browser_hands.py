@@ -109,8 +109,8 @@ def test_command_is_run_by_the_palette_and_by_its_key_but_not_while_one_types(ta
     tab.wait_for(lambda: not ball.evaluate("e => e === document.activeElement"), "let go")
     press(tab, "g")
     tab.wait_for(lambda: tab.state.view.grid, "the grid")
-    tab.choose("Arrows", "all six")
-    tab.wait_for(lambda: tab.state.view.singular.arrows == "all six", "arrows")
+    tab.choose("Ellipsoid", "speed")
+    tab.wait_for(lambda: tab.state.view.singular.ellipsoid == "speed", "the ellipsoid")
     active = "document.activeElement.tagName"
     tab.wait_for(lambda: tab.page.evaluate(active) != "INPUT", "let go")
     press(tab, "g")

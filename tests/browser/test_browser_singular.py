@@ -1,4 +1,4 @@
-"""Singularities in a real page: the diagram to click on, one margin alone, the gap."""
+"""Singularities in a real page: the diagram to click on, and the gap."""
 
 from __future__ import annotations
 
@@ -16,17 +16,10 @@ from explorer.app.features.mechanism.marks import (
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
-from explorer.mechanism.home import home_pose
-from explorer.mechanism.margins import INCIDENCES, margins
-from explorer.numerics.arrays import FloatArray
+from explorer.mechanism.margins import INCIDENCES
 
 
-def deltas(tab: Tab) -> FloatArray:
-    pose = tab.state.pose
-    return margins(pose.position, pose.rotation)
-
-
-def test_stratum_is_entered_from_the_diagram_and_left_by_a_jog_of_one_margin(tab: Tab) -> None:
+def test_stratum_is_entered_from_the_diagram(tab: Tab) -> None:
     nodes = tab.page.locator("button[title^='(']")
     # It is open from the start.
     expect(nodes).to_have_count(23)
@@ -37,24 +30,6 @@ def test_stratum_is_entered_from_the_diagram_and_left_by_a_jog_of_one_margin(tab
     tab.page.get_by_role("button", name="Go to (3, 4, 1, 2)").click()
     tab.wait_for(lambda: Frame(tab.state).snapshot.stratum == (3, 4, 1, 2), "the stratum")
     expect(tab.page.get_by_text("δ3 = 0: b4 on the base plane", exact=False).first).to_be_visible()
-    assert np.abs(deltas(tab)[[0, 2]]).max() < 1e-9
-    tab.push("Home pose")
-    home = home_pose(tab.state.design)
-    tab.wait_for(lambda: tab.state.pose == home, "the home pose")
-    tab.wait_until_shown("δ2: about z (°)", 0.0)
-    tab.settle()
-    before = deltas(tab)
-    tab.drag("δ2: about z (°)", 0.6)
-    tab.wait_for(lambda: tab.state.jog_in_use is not None, "a jog")
-    tab.type("δ2: about z (°)", "-30\n")
-    tab.wait_for(
-        lambda: tab.state.jog_in_use is not None and tab.state.jog_in_use.amount == -30.0, "-30°"
-    )
-    after = deltas(tab)
-    np.testing.assert_allclose(after[[0, 2]], before[[0, 2]], atol=1e-12)
-    assert abs(after[1] - before[1]) > 0.1
-    tab.push("Home pose")
-    tab.wait_until_shown("δ2: about z (°)", 0.0)
 
 
 def test_margin_that_is_pointed_at_fills_its_tetrahedron(tab: Tab) -> None:

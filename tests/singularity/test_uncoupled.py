@@ -6,23 +6,21 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given, strategies as st
+from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
 from refusals import refusal
 from scipy.spatial.transform import Rotation
 from strategies import Case, all_cases, ordinary_cases
 
-from explorer import PRESETS, UNCOUPLED, Pose, forward, home_pose, inverse, margins
+from explorer import PRESETS, UNCOUPLED, Pose, home_pose, inverse, margins
 from explorer.errors import InputError
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import jacobian, scaled_margins
 from explorer.singularity.turning import least_turns
-from explorer.singularity.uncoupled import Travel, travels
 
 DESIGN = PRESETS["paper-optimal"]
 HOME = home_pose(DESIGN)
 GENERIC = Pose((3.0, 4.0, 5.0), (0.8, 0.3, -0.4, 0.2))
-UNLIMITED = Travel(-math.inf, math.inf)
 
 
 def margins_of(pose: Pose) -> FloatArray:
@@ -55,51 +53,6 @@ def test_motions_change_no_other_margin_and_move_along_or_about_their_lines(
         others = np.arange(3) != motion.incidence - 1
         assert_allclose(margins_of(after)[others], case.margins[others], atol=1e-13 * size)
         assert_allclose(margins_of(motion.moved(after, -amount)), margins_of(pose), atol=1e-11)
-
-
-@given(all_cases())
-@example(Case(DESIGN, np.array([1.0, 0.0, 0.0]), np.eye(3)))
-def test_travels_end_on_the_singular_set_and_not_before(case: Case) -> None:
-    pose = case.pose
-    for motion, travel in zip(UNCOUPLED, travels(pose), strict=True):
-        index, is_translation = motion.incidence - 1, motion.kind == "translation"
-        before = float(margins_of(pose)[index])
-        assert travel == motion.travel(pose)
-        assert travel.low <= 0.0 <= travel.high
-        if not is_translation and travel != Travel(0.0, 0.0):
-            assert travel.high - travel.low == pytest.approx(math.pi, abs=1e-15)
-        for end in (travel.low, travel.high):
-            # Beyond a thousand times the size the rounding of the travel itself matters.
-            if abs(end) > (1e3 * case.size if is_translation else 4.0):
-                continue
-            span = case.size + (abs(end) if is_translation else 0.0)
-            assert abs(margins_of(motion.moved(pose, end))[index]) <= 1e-14 * span
-            between = margins_of(motion.moved(pose, 0.9 * end))[index]
-            assert abs(before) <= 1e-9 * case.size or between * before > 0.0
-
-
-def test_travel_of_a_level_platform_is_unlimited_along_lines_and_zero_on_the_base() -> None:
-    travel = {motion.name: motion.travel(HOME) for motion in UNCOUPLED}
-    assert travel["along the platform's x"] == travel["along the base's x"] == UNLIMITED
-    assert math.isfinite(travel["about the platform's z"].high)
-    on_base = Pose((3.0, 4.0, 0.0), HOME.quaternion)
-    third = [motion for motion in UNCOUPLED if motion.incidence == 3]
-    assert {motion.travel(on_base) for motion in third} == {Travel(0.0, 0.0)}
-
-
-def test_travel_of_a_platform_level_but_for_rounding_is_unlimited() -> None:
-    start = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-40.0, 0.0, 0.0))
-    modes = forward(DESIGN, inverse(DESIGN, start.position, start.rotation))
-    translations = [
-        motion.travel(Pose.of(modes.position[mode], modes.rotation[mode]))
-        for mode in range(8)
-        for motion in UNCOUPLED
-        if motion.kind == "translation"
-    ]
-    assert UNLIMITED in translations
-    for travel in translations:
-        ends = [end for end in (travel.low, travel.high) if math.isfinite(end)]
-        assert travel == UNLIMITED or max(map(abs, ends)) < 1e6 * DESIGN.reach
 
 
 def test_rotation_about_the_guide_changes_l4_alone() -> None:
@@ -170,8 +123,10 @@ def test_turns_do_not_depend_on_the_unit_and_no_uncoupled_rotation_is_shorter(ca
     np.testing.assert_allclose(least_turns(smaller.position, smaller.rotation), turns, atol=1e-7)
     for motion in UNCOUPLED:
         if motion.kind == "rotation":
-            travel = motion.travel(case.pose)
-            assert turns[motion.incidence - 1] <= min(-travel.low, travel.high) + 1e-6
+            # Its margin is δ cos θ + δ' sin θ, with δ' that after a quarter turn.
+            index, quarter = motion.incidence - 1, motion.moved(case.pose, 0.5 * math.pi)
+            zero_at = math.atan2(abs(case.margins[index]), abs(margins_of(quarter)[index]))
+            assert turns[index] <= zero_at + 1e-6
 
 
 def test_turns_of_a_pose_that_is_not_finite_are_refused() -> None:

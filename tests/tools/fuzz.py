@@ -131,7 +131,7 @@ def attempt(data: bytes) -> State | None:
         assert 0.0 <= seen.inverse_condition <= 1.0
         assert not math.isnan(frame.free_ball.radius)
         follows = (seen.intervals, seen.modes, seen.nearest, seen.clearances)
-        assert None not in (*follows, frame.performance, frame.travels)
+        assert None not in (*follows, frame.performance)
     except ExplorerError as error:
         message = str(error)
         assert len(message.splitlines()) == 1, f"a message of several lines: {message!r}"

@@ -26,7 +26,6 @@ from explorer.app.browser.headless import headless_browser
 from explorer.app.features.compare.actions import Pin
 from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.sharing.reporting import make_report
-from explorer.app.features.singularity.actions import Jog
 from explorer.app.features.studies.actions import BrushAxis, OpenStudy, PickDesign
 from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.scene.camera import ViewName
@@ -114,12 +113,11 @@ SCENES = {
         actions=(bare(ghosts=True, flags=False, grid=False),), view="side", size=(900, 800)
     ),
     "unclosed": Scene(actions=(SetJoint(JOINTS.index("l1"), 20.0),), panels=True),
-    # Tall, so that the whole diagram is in it, and the motions below.
+    # Tall, so that the whole diagram is in it.
     "strata": Scene(
         pose=Pose.of_yaw_pitch_roll((10, 5, 9), (-73.1, 12, 0)),
         actions=(
             Set("view", View(handle=False, singular=SingularView(strata=True, ghost="nearest"))),
-            Jog(0, 20.0),
         ),
         panels=True,
         size=(1280, 1200),

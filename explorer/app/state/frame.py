@@ -16,7 +16,6 @@ from explorer.singularity.ellipsoids import (
     performance,
     singularity_free_ball,
 )
-from explorer.singularity.uncoupled import Travel, travels
 
 
 @dataclass(frozen=True)
@@ -39,11 +38,6 @@ class Frame:
     def performance(self) -> Performance:
         """How fast and how strong the platform is in its pose, at the point that is shown."""
         return performance(self.state.design, self.state.pose, self.state.tool)
-
-    @cached_property
-    def travels(self) -> tuple[Travel, ...]:
-        """How far each of the six uncoupled motions may go from here to the singularity."""
-        return travels(self.state.pose)
 
     @cached_property
     def free_ball(self) -> SingularityFreeBall:

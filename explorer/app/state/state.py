@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.app.state.compared import Compared
-from explorer.app.state.jog import Jog
 from explorer.app.state.optimisation import Comparison, OptimisationRequest, SearchResult
 from explorer.app.state.parts import STAYS, TRANSIENT
 from explorer.app.state.paths import Journey, Mode, Paths
@@ -218,7 +217,6 @@ class State:
         taken: The length that was last taken in the place of one that does not close.
         gesture: The gesture that led to the pose; None if none did, as after a change of the
             design.
-        jog: The uncoupled motion that was last used.
         paths: The path that is played, and the settings of the next one.
         optimisation: The request for an optimisation, and its last run.
         compared: The designs that this one is compared with.
@@ -240,7 +238,6 @@ class State:
     view: View = field(default_factory=View, metadata=STAYS)
     taken: Taken | None = field(default=None, compare=False, metadata=TRANSIENT)
     gesture: Gesture | None = field(default=None, metadata=TRANSIENT)
-    jog: Jog | None = None
     paths: Paths = field(default_factory=Paths)
     optimisation: Optimisation = field(
         default_factory=Optimisation, metadata={"on_open": Optimisation.without_run}
@@ -256,11 +253,6 @@ class State:
         if optimisation.run is None or not optimisation.is_on:
             return self
         return replace(optimisation.run.own, optimisation=optimisation.without_run())
-
-    @property
-    def jog_in_use(self) -> Jog | None:
-        """The uncoupled motion that brought the platform here; None once it is elsewhere."""
-        return self.jog if self.jog is not None and self.jog.pose == self.pose else None
 
     @property
     def tilt_torsion(self) -> TiltTorsion:

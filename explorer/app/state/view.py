@@ -182,7 +182,6 @@ class PrecisionView:
 
 DrawnAs = Literal["schematic", "prototype", "6-4 twin"]
 Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
-Arrows = Literal["one in use", "all six", "none"]
 Gain = Literal["none", "speed", "force"]
 
 
@@ -193,14 +192,12 @@ class SingularView:
     Attributes:
         ghost: Which of the nearest singular poses is drawn.
         strata: Whether the diagram of the strata is drawn.
-        arrows: Which of the six uncoupled motions are drawn.
         ellipsoid: Which ellipsoid is drawn at the point, that of speeds or that of forces.
         ball: Whether the largest ball without singular positions is drawn.
     """
 
     ghost: Ghost = "none"
     strata: bool = True
-    arrows: Arrows = "one in use"
     ellipsoid: Gain = "none"
     ball: bool = False
 

@@ -40,6 +40,9 @@ _FORMER_KINDS = {"modes": "straight", "plan": "planned"}
 # Fields of the view of an older explorer.
 _FORMER_VIEW = frozenset({"twin", "prototype"})
 
+# Fields of an older explorer of which nothing is left.
+_FORMER_FIELDS = frozenset({"jog", "arrows"})
+
 # Present words of fields by those in files of older explorers.
 _FORMER_WORDS: dict[str, Mapping[str, str]] = {
     "region": {"reachable": "accessible"},
@@ -126,9 +129,10 @@ class Unpacker:
                 value = _convert(raw, kind, where)
             else:
                 types = _types_of(part)
-                for name in fields:
+                present = {n: v for n, v in fields.items() if n not in _FORMER_FIELDS}
+                for name in present:
                     _check_known(name, types, where)
-                read = {n: self._read(v, types[n], f"{where}.{n}") for n, v in fields.items()}
+                read = {n: self._read(v, types[n], f"{where}.{n}") for n, v in present.items()}
                 value = cast("Callable[..., Any]", part)(**read)
                 if isinstance(value, State):
                     value = _restore(value)

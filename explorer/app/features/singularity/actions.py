@@ -1,55 +1,17 @@
-"""Actions on singularities: to go to one, and to change one margin alone."""
+"""Actions on singularities: to go to one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from explorer.app.state.action import Action
 from explorer.app.state.actions import moved
-from explorer.app.state.jog import make_jog
 from explorer.app.state.state import State
 from explorer.errors import InputError
 from explorer.mechanism.margins import INCIDENCES
-from explorer.mechanism.pose import Pose
-from explorer.numerics.number_text import format_number
 from explorer.singularity.bruhat import Stratum, codimension, describe_stratum
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_stratum, seen_stratum
-from explorer.singularity.uncoupled import UNCOUPLED
-
-
-@dataclass(frozen=True)
-class Jog(Action):
-    """Set the amount of one of the six uncoupled motions.
-
-    Attributes:
-        motion: Index of the motion in `UNCOUPLED`.
-        amount: Amount from the start of the motion, in design units or degrees.
-    """
-
-    motion: int
-    amount: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: there is no such motion, or the amount is not finite.
-        """
-        jog = make_jog(self.motion, jog_start(state, self.motion), self.amount)
-        return replace(moved(state, jog.pose), jog=jog)
-
-    def words(self) -> str:
-        """Return what the action does."""
-        motion = UNCOUPLED[self.motion]
-        unit = "°" if motion.kind == "rotation" else ""
-        return f"δ{motion.incidence} alone, by {format_number(self.amount, 4)}{unit}"
-
-
-def jog_start(state: State, motion: int) -> Pose:
-    """Return the pose at the start of a motion: the present pose if it is not in use."""
-    jog = state.jog_in_use
-    return jog.start if jog is not None and jog.motion == motion else state.pose
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The proximity to singularities, and the motions that change one margin alone."""
+"""The proximity to singularities."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
 from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.features.singularity.distance_figure import distance_figure
 from explorer.app.features.singularity.feed import StrataFeed
-from explorer.app.features.singularity.jog_scene import JogScene
 from explorer.app.features.singularity.panel import SingularityPanel
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene, NearestGhost
 from explorer.app.features.singularity.tasks import strata_distances
@@ -18,7 +17,7 @@ SINGULARITY = Feature(
     "singularity",
     tabs=(Tab("analyse", "Singularity", SingularityPanel, viser.Icon.ALERT_TRIANGLE),),
     bar=(InBar("middle", lambda _: distance_figure),),
-    scene=(NearestGhost, EllipsoidScene, BallScene, JogScene),
+    scene=(NearestGhost, EllipsoidScene, BallScene),
     later_feeds=(StrataFeed,),
     tasks=(strata_distances,),
     commands=(
@@ -29,5 +28,5 @@ SINGULARITY = Feature(
             keys=(shift("G"),),
         ),
     ),
-    lists=("Arrows", "Ghost", "Ellipsoid"),
+    lists=("Ghost", "Ellipsoid"),
 )

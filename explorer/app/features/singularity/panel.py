@@ -1,4 +1,4 @@
-"""The panel of singularities: the verdict and the margins; then strata, motions, performance."""
+"""The panel of singularities: the verdict and the margins; then strata and performance."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from html import escape
 
 from explorer.app.features.feature import Services
 from explorer.app.features.singularity.distance import DistancePanel
-from explorer.app.features.singularity.jog_panel import JogPanel
 from explorer.app.features.singularity.performance import PerformancePanel
 from explorer.app.features.singularity.strata import StrataPanel
 from explorer.app.inputs.bindings import At
@@ -40,7 +39,7 @@ LOOKS: dict[Kind, Look] = {"clear": "within", "near": "close", "singular": "beyo
 
 
 class SingularityPanel:
-    """The verdict and the margins; then folders for strata, single margins and performance."""
+    """The verdict and the margins; then folders for strata and performance."""
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
@@ -49,8 +48,6 @@ class SingularityPanel:
         self._distances = DistancePanel(services)
         with gui.add_folder("Stratum of the two flags"):
             self._strata = StrataPanel(services)
-        with gui.add_folder("One margin alone"):
-            self._jogs = JogPanel(services)
         with gui.add_folder("Performance"):
             self._measures = gui.add_html("")
             self._performance = PerformancePanel(services)
@@ -68,7 +65,6 @@ class SingularityPanel:
         yield self._summary, "content", summary(frame)
         yield from self._distances.updates(frame)
         yield from self._strata.updates(frame)
-        yield from self._jogs.updates(frame)
         yield self._measures, "content", measures_table(frame)
         yield from self._performance.updates(frame)
         yield from self._controls.updates(frame)
