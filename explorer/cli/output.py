@@ -86,13 +86,14 @@ def limits_json(snapshot: Snapshot) -> dict[str, object]:
 
 
 def limits_lines(snapshot: Snapshot, subject: str = "") -> Iterator[str]:
-    """Yield whether a pose is within the limits, and the limits that it violates.
+    """Yield whether a pose is within the limits or singular, and the limits that it violates.
 
     Args:
         snapshot: Snapshot of the pose.
         subject: Words before the verdict, such as "the start is ".
     """
-    yield f"{subject}outside the limits:" if snapshot.violations else f"{subject}within the limits"
+    kept = "within the limits, but singular" if snapshot.is_singular else "within the limits"
+    yield f"{subject}{'outside the limits:' if snapshot.violations else kept}"
     yield from (f"  {violation}" for violation in snapshot.violations)
 
 

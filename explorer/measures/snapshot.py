@@ -25,6 +25,7 @@ from explorer.mechanism.margins import describe_modes, margins, mode_name, mode_
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.bruhat import incidences
+from explorer.singularity.freedoms import Freedoms, freedoms
 from explorer.singularity.gaps import FlagGaps, flag_gaps
 from explorer.singularity.jacobian import (
     determinant,
@@ -39,7 +40,7 @@ from explorer.singularity.nearest import (
     nearest_singular_poses,
     singularities_of,
 )
-from explorer.singularity.strata import inversions, stratum
+from explorer.singularity.strata import GENERIC, inversions, stratum
 from explorer.singularity.turning import least_turns
 from explorer.workspace.limits.broken import Violation, violations
 
@@ -137,6 +138,16 @@ class Snapshot:
         """The stratum: the permutation of the relative position of the two flags."""
         permutation = stratum(self.pose.position, self.rotation, self.design.reach)
         return tuple(permutation.tolist())
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether an incidence of the flags holds, to rounding."""
+        return self.stratum != GENERIC
+
+    @cached_property
+    def freedoms(self) -> Freedoms:
+        """The freedoms of the platform with all actuators locked; none unless it is singular."""
+        return freedoms(self.design, self.pose)
 
     @property
     def stratum_dimension(self) -> int:

@@ -80,6 +80,16 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Return the pose with this position (3,) and these angles (3,), in degrees."""
         return Pose.of(position, rotation_from_yaw_pitch_roll(yaw_pitch_roll))
 
+    def turn(self, point: FloatArray, vector: FloatArray) -> Pose:
+        """Return the pose after a turn about an axis through a point of the base frame.
+
+        Args:
+            point: Point of the axis, shape (3,), in design units.
+            vector: Rotation vector in the base frame, shape (3,), in radians.
+        """
+        turn = Rotation.from_rotvec(vector).as_matrix()
+        return Pose.of(point + turn @ (np.array(self.position) - point), turn @ self.rotation)
+
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
     """Return rotation matrices (..., 3, 3) of quaternions (w, x, y, z) of any length but zero.

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
 from explorer.mechanism.pose import Pose
@@ -66,8 +65,7 @@ class UncoupledMotion:
         if self.kind == "translation":
             x, y, z = (np.array(pose.position) + amount * direction).tolist()
             return Pose((x, y, z), pose.quaternion)
-        turn = Rotation.from_rotvec(amount * direction).as_matrix()
-        return Pose.of(point + turn @ (np.array(pose.position) - point), turn @ pose.rotation)
+        return pose.turn(point, amount * direction)
 
 
 UNCOUPLED = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Generator
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -15,18 +16,29 @@ from services import StubWorker, services_for
 from strategies import Case, all_cases
 
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.figures import limits_figure
 from explorer.app.features.mechanism.marks import Ghosts, ghost_points
 from explorer.app.features.mechanism.modes import MODES, HoveredMode, ModesPanel, modes_table
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum, stratum_name
 from explorer.app.features.singularity.distance import DistancePanel, distance_table
 from explorer.app.features.singularity.feed import StrataFeed
+from explorer.app.features.singularity.freedom import (
+    AMPLITUDE,
+    FRAME_SECONDS,
+    PERIOD,
+    PERIODS,
+    FreeMotion,
+    freedom_words,
+)
 from explorer.app.features.singularity.panel import SingularityPanel, summary
 from explorer.app.features.singularity.performance import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene, NearestGhost
 from explorer.app.features.singularity.strata import GOALS, StrataPanel, distances_of
 from explorer.app.features.singularity.tasks import StrataRequest, strata_distances
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import Set, SetMode
+from explorer.app.session import clock
+from explorer.app.session.session import UNDO
+from explorer.app.state.actions import Set, SetMode, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import SingularView
@@ -190,15 +202,135 @@ def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
     words = plain(summary(frame))
     for index in incidences(frame.snapshot.stratum):
         assert f"δ{index} = 0: {INCIDENCES[index - 1]}" in words
+    freedoms = frame.snapshot.freedoms
+    assert "With all actuators locked the platform" in words
+    assert words.count("it turns") == words.count("Show the motion") == len(freedoms.turns)
+    assert ("by any angle" in words) == any(turn.is_finite for turn in freedoms.turns)
     panel = SingularityPanel(services)
     texts = [str(v) for _, n, v in panel.updates(frame) if n == "content"]
     assert not any(re.search(r"\b(nan|inf)\b", plain(text)) for text in texts)
     assert "none: δ" in plain(performance_table(frame))
     placed = Placed(frame)
-    for scene in (EllipsoidScene(services), BallScene(services), NearestGhost(services)):
+    motion = FreeMotion(services)
+    list(motion.updates(placed))
+    desk.press(services.buttons, "singular.show", freedoms.turns[0].incidence)
+    for scene in (EllipsoidScene(services), BallScene(services), NearestGhost(services), motion):
         for _, name, value in scene.updates(placed):
             if name in ("points", "scale", "position", "wxyz", *BATCHED):
                 assert np.isfinite(np.asarray(value, dtype=np.float64)).all()
+
+
+@pytest.mark.parametrize(
+    ("incidence", "line", "through"),
+    [(1, "the line b2b3", "b4"), (2, "the line a1b4", "a1"), (3, "the guide", "a1")],
+)
+def test_singular_pose_says_about_which_line_locked_actuators_let_the_platform_turn(
+    incidence: int, line: str, through: str
+) -> None:
+    assert freedom_words(Frame(opened(OPTIMAL))) == ""
+    frame = Frame(GoToSingularity(incidence).apply(random_states(1)[0]))
+    words = plain(freedom_words(frame))
+    place, rotation = np.array(frame.state.pose.position), frame.state.pose.rotation
+    found = re.fullmatch(
+        f"With all actuators locked the platform can still move: it turns about {line}, pitch 0 "
+        rf"Show the motion through {through}(?: \((.*)\) units)?, along \((.*)\)",
+        words,
+    )
+    assert found is not None
+    point, along = ([number(each) for each in (text or "0").split(", ")] for text in found.groups())
+    np.testing.assert_allclose(point, place if incidence == 1 else [0.0], atol=0.06)
+    expected = [rotation[:, 0], place / np.linalg.norm(place), [1.0, 0.0, 0.0]][incidence - 1]
+    np.testing.assert_allclose(along, expected, atol=0.006)
+
+
+def test_pose_within_the_limits_looks_safe_unless_it_is_singular() -> None:
+    regular = opened(OPTIMAL)
+    singular = GoToSingularity(2).apply(regular)
+    for state, kept, here in (
+        (regular, "kept", "Within all limits"),
+        (singular, "kept, but singular", "Limits kept"),
+    ):
+        frame = Frame(state)
+        assert not frame.snapshot.violations
+        assert plain(limits_figure(frame)) == f"Limits {kept}"
+        assert here in plain(summary(frame))
+        for html in (limits_figure(frame), summary(frame), modes_table(frame, "")):
+            assert ("ex-within" in html) == (state == regular)
+
+
+@pytest.fixture
+def still_clock() -> Generator[None]:
+    """A clock that stands all but still unless it is advanced."""
+    clock.set_pace(1e-6)
+    yield
+    clock.set_pace(1.0)
+
+
+@pytest.mark.usefixtures("still_clock")
+def test_motion_swings_a_ghost_by_a_share_of_the_reach_and_leaves_the_state_alone(
+    services: Services, desk: Desk
+) -> None:
+    desk.session.do(GoToSingularity(2))
+    motion, before, steps = FreeMotion(services), desk.state, desk.session.history
+    frames: list[Frame] = []
+
+    def keep(frame: Frame) -> None:
+        frames.append(frame)
+
+    desk.draw = keep
+
+    def tips() -> Any:
+        """Return b1 to b4 of the ghost in the scene; None if none is drawn."""
+        scene = by_name(motion.updates(Placed(Frame(desk.state))))
+        shown = {name: values["visible"] for name, values in scene.items()}
+        assert len(set(shown.values())) == 1
+        return scene["/freedom/legs"]["points"][:, 1] if shown["/freedom/legs"] else None
+
+    assert tips() is None
+    # No turn about the line b2b3 is free here.
+    desk.press(services.buttons, "singular.show", "1")
+    assert tips() is None
+    desk.press(services.buttons, "singular.show", "2")
+    placed = Placed(Frame(before))
+    ways: list[Any] = []
+    for _ in range(4):
+        ways.append(tips() - placed.struts[1])
+        assert "turns about the line a1b4" in str(
+            by_name(motion.updates(placed))["/freedom/label"]["text"]
+        )
+        clock.advance(0.25 * PERIOD)
+    sizes = [np.linalg.norm(way, axis=1).max() / placed.reach for way in ways]
+    np.testing.assert_allclose(sizes, [0.0, AMPLITUDE, 0.0, AMPLITUDE], atol=2e-3)
+    # To either side.
+    assert float(np.sum(ways[1] * ways[3])) < 0.0
+    drawn = len(frames)
+    clock.advance(FRAME_SECONDS)
+    desk.wait(lambda _: len(frames) > drawn)
+    clock.advance(PERIODS * PERIOD)
+    assert clock.wait_until_quiet(60.0)
+    assert tips() is None
+    assert desk.state == before
+    assert desk.session.history == steps
+
+
+@pytest.mark.usefixtures("still_clock")
+def test_motion_ends_once_the_platform_is_moved(services: Services, desk: Desk) -> None:
+    desk.session.do(GoToSingularity(3))
+    motion = FreeMotion(services)
+
+    def is_shown() -> bool:
+        scene = by_name(motion.updates(Placed(Frame(desk.state))))
+        return bool(scene["/freedom/axis"]["visible"])
+
+    assert not is_shown()
+    desk.press(services.buttons, "singular.show", "3")
+    assert is_shown()
+    desk.session.do(SetPosition(0, 9.0))
+    assert not is_shown()
+    desk.session.travel(UNDO)
+    assert not is_shown()
+    clock.advance(FRAME_SECONDS)
+    assert clock.wait_until_quiet(60.0)
 
 
 # Assembly modes

@@ -19,7 +19,7 @@ from explorer.app.state.frame import Frame
 from explorer.mechanism.margins import INCIDENCES
 
 
-def test_stratum_is_entered_from_the_diagram(tab: Tab) -> None:
+def test_stratum_is_entered_from_the_diagram_and_shows_its_motions(tab: Tab) -> None:
     nodes = tab.page.locator("button[title^='(']")
     # It is open from the start.
     expect(nodes).to_have_count(23)
@@ -30,6 +30,15 @@ def test_stratum_is_entered_from_the_diagram(tab: Tab) -> None:
     tab.page.get_by_role("button", name="Go to (3, 4, 1, 2)").click()
     tab.wait_for(lambda: Frame(tab.state).snapshot.stratum == (3, 4, 1, 2), "the stratum")
     expect(tab.page.get_by_text("δ3 = 0: b4 on the base plane", exact=False).first).to_be_visible()
+    # Both turns that are free there are offered, and swing a ghost until it is moved.
+    buttons = tab.page.get_by_role("button", name="Show the motion")
+    expect(buttons).to_have_count(2)
+    with tab.slow_time():
+        buttons.first.click()
+        tab.wait_for(lambda: is_visible(tab, "/freedom/platform"), "the ghost")
+    tab.push("Home pose")
+    tab.wait_for(lambda: not is_visible(tab, "/freedom/platform"), "no ghost")
+    expect(buttons).to_have_count(0)
 
 
 def test_margin_that_is_pointed_at_fills_its_tetrahedron(tab: Tab) -> None:

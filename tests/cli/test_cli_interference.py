@@ -80,7 +80,8 @@ def test_interference_pose_outside_limits_names_them(cli: CommandLine) -> None:
     shown = cli.text(*words)
     assert "outside the limits" in shown
     assert all(each in shown for each in found["violations"])
-    assert "the pose is within the limits" in cli.text()
+    assert "the pose is within the limits" in cli.text().splitlines()
+    assert "the pose is within the limits, but singular" in cli.text("--position", "10", "5", "0")
     moved = cli.answer("--to", *words[1:])
     assert moved["within_limits"] is moved["end"]["within_limits"] is False
     assert moved["start"]["within_limits"] is True

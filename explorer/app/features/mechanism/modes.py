@@ -96,7 +96,9 @@ def _row(frame: Frame, mode: int) -> str:
     if solution.feasible:
         there = solution.position[mode] + frame.state.offset(solution.rotation[mode])
         place = "".join(f"<span>{fitted(value, reach, 3)}</span>" for value in there.tolist())
-        limits, hint = _limits(frame.snapshot.mode_violations[mode])
+        # The modes of a singular pose are all singular, so that none of them looks safe.
+        look = "" if frame.snapshot.is_singular else "ex-within"
+        limits, hint = _limits(frame.snapshot.mode_violations[mode], look)
     else:
         place, hint = '<span class="ex-dim is-wide">does not close</span>', ""
         limits = ""
@@ -114,10 +116,15 @@ def _row(frame: Frame, mode: int) -> str:
     )
 
 
-def _limits(broken: tuple[Violation, ...]) -> tuple[str, str]:
-    """Return the cell that says which limits are broken, and the sentence on them."""
+def _limits(broken: tuple[Violation, ...], look: str) -> tuple[str, str]:
+    """Return the cell that says which limits are broken, and the sentence on them.
+
+    Args:
+        broken: The limits that are broken.
+        look: Class of the cell where none is.
+    """
     if not broken:
-        return '<span class="ex-within">within</span>', "It is within all limits."
+        return f'<span class="{look}">within</span>', "It is within all limits."
     first = broken[0].limit
     words = SHORT.get(first, first.removeprefix("margin ").removeprefix("swing "))
     more = f" +{len(broken) - 1}" if len(broken) > 1 else ""

@@ -8,6 +8,7 @@ from html import escape
 
 from explorer.app.features.feature import Services
 from explorer.app.features.singularity.distance import DistancePanel
+from explorer.app.features.singularity.freedom import freedom_words
 from explorer.app.features.singularity.performance import PerformancePanel
 from explorer.app.features.singularity.strata import StrataPanel
 from explorer.app.inputs.bindings import At
@@ -27,7 +28,6 @@ from explorer.app.widgets.markup import (
     table,
     ticks,
 )
-from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import Kind, warnings
 from explorer.mechanism.margins import MARGIN_KINDS
 
@@ -71,7 +71,7 @@ class SingularityPanel:
 
 
 def summary(frame: Frame) -> str:
-    """Return the verdict, the mode and the limits as HTML."""
+    """Return the verdict, the mode, the limits and what a singular pose allows as HTML."""
     verdict, snapshot = frame.verdict, frame.snapshot
     look = LOOKS[verdict.kind]
     reason = escape(verdict.reason(frame.state.design.unit_mm))
@@ -80,14 +80,17 @@ def summary(frame: Frame) -> str:
         f'<div class="{"ex-dim" if look == "within" else f"ex-{look}"} ex-two-lines" '
         f'title="{VERDICT_HINT}">{reason}</div>',
         f'<div class="ex-line"><span>{snapshot.mode_words.capitalize()}</span>'
-        f"{_within(snapshot)}</div>",
+        f"{_within(frame)}</div>",
         *(f'<div class="ex-beyond">{escape(str(limit))}</div>' for limit in snapshot.violations),
+        freedom_words(frame),
     )
 
 
-def _within(snapshot: Snapshot) -> str:
-    if snapshot.violations:
+def _within(frame: Frame) -> str:
+    if frame.snapshot.violations:
         return '<span class="ex-beyond ex-strong">Outside the limits</span>'
+    if frame.snapshot.is_singular:
+        return '<span class="ex-strong">Limits kept</span>'
     return '<span class="ex-within ex-strong">Within all limits</span>'
 
 

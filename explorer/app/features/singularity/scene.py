@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import platform_plate
@@ -16,6 +17,7 @@ from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent, sphere
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import FAR, GHOST, SINGULAR, Rgb, proximity_colour
+from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.nearest import NearestSingularity
@@ -31,38 +33,65 @@ SPEED: Rgb = (24, 128, 118)
 FORCE: Rgb = (92, 60, 156)
 
 
+class PlatformGhost:
+    """The platform in another pose than the present one, and its legs.
+
+    Args:
+        scene: Where they are added.
+        name: Their node.
+    """
+
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        self._plate = add_translucent(
+            scene, f"{name}/platform", NO_MESH, GHOST_OPACITY, colour=SINGULAR
+        )
+        self._legs = add_lines(scene, f"{name}/legs", 4, GHOST, 1.5)
+
+    def show(self, visible: bool) -> Iterator[Update]:
+        """Yield the updates that show or hide the ghost."""
+        yield self._plate, "visible", visible
+        yield self._legs, "visible", visible
+
+    def draw(self, placed: Placed, pose: Pose) -> Iterator[Update]:
+        """Yield the updates that draw the ghost in a pose."""
+        vertices, faces = platform_plate(placed)
+        yield self._plate, "vertices", vertices.astype(np.float32)
+        yield self._plate, "faces", faces.astype(np.uint32)
+        yield self._plate, "position", tuple((placed.scale * np.array(pose.position)).tolist())
+        yield self._plate, "wxyz", pose.quaternion
+        tips = platform_tips(placed, pose)
+        bases = np.zeros((4, 3))
+        bases[1:3, 0] = tips[1:3, 0]
+        bases[3] = placed.points["a3"]
+        yield self._legs, "points", np.stack([bases, tips], axis=1).astype(np.float32)
+
+
+def platform_tips(placed: Placed, pose: Pose) -> FloatArray:
+    """Return b1 to b4 in a pose, in scene units, shape (4, 3)."""
+    local = np.array(list(placed.platform_points.values()))
+    return placed.scale * np.array(pose.position) + local @ pose.rotation.T
+
+
 class NearestGhost(ScenePart):
     """The platform in the nearest singular pose, its legs, and the displacements of b1 to b4."""
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
-        self._plate = add_translucent(
-            scene, "/nearest/platform", NO_MESH, GHOST_OPACITY, colour=SINGULAR
-        )
-        self._legs = add_lines(scene, "/nearest/legs", 4, GHOST, 1.5)
+        self._ghost = PlatformGhost(scene, "/nearest")
         self._displacements = add_lines(scene, "/nearest/ways", 4, SINGULAR, 3.0)
         self._label = add_label(scene, "/nearest/label", "δ1 = 0", visible=False)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the singular pose of this frame."""
         nearest = chosen_ghost(placed)
-        for handle in (self._plate, self._legs, self._displacements, self._label):
+        yield from self._ghost.show(nearest is not None)
+        for handle in (self._displacements, self._label):
             yield handle, "visible", nearest is not None
         if nearest is None:
             return
-        position = placed.scale * np.array(nearest.pose.position)
-        vertices, faces = platform_plate(placed)
-        yield self._plate, "vertices", vertices.astype(np.float32)
-        yield self._plate, "faces", faces.astype(np.uint32)
-        yield self._plate, "position", tuple(position.tolist())
-        yield self._plate, "wxyz", nearest.pose.quaternion
-        local = np.array(list(placed.platform_points.values()))
-        tips = position + local @ nearest.pose.rotation.T
+        yield from self._ghost.draw(placed, nearest.pose)
+        tips = platform_tips(placed, nearest.pose)
         here = np.array([placed.points[name] for name in placed.platform_points])
-        bases = np.zeros((4, 3))
-        bases[1:3, 0] = tips[1:3, 0]
-        bases[3] = placed.points["a3"]
-        yield self._legs, "points", np.stack([bases, tips], axis=1).astype(np.float32)
         yield self._displacements, "points", np.stack([here, tips], axis=1).astype(np.float32)
         distance = format_number(nearest.distance, size=placed.frame.state.design.reach)
         yield self._label, "text", f"δ{nearest.incidence} = 0: {distance} away"

@@ -1,0 +1,188 @@
+"""What a singular pose means: the motions that locked actuators allow, in words and as a ghost.
+
+A press on a motion has a ghost of the platform swing to and fro about its line. It is no part of
+the state, and ends once the platform or the design is another one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from explorer.app.features.feature import Services
+from explorer.app.features.singularity.scene import PlatformGhost
+from explorer.app.scene.labels import add_label
+from explorer.app.scene.part import ScenePart
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import add_lines
+from explorer.app.session.clock import now, start_timer
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.colours import SINGULAR
+from explorer.app.widgets.markup import fitted
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.freedoms import FOLD_LINES, FreeTurn
+
+SHOW = "singular.show"
+SHOW_HINT = "Swing a ghost of the platform about this line, by up to 5 % of the reach."
+# Seconds of a swing to and fro, number of swings, and seconds between two frames.
+PERIOD, PERIODS, FRAME_SECONDS = 1.8, 2, 0.04
+# Way of the fastest of b1 to b4 from its place, over the reach, and the largest angle.
+AMPLITUDE, LARGEST_ANGLE = 0.05, math.radians(30.0)
+# Length of the axis beyond the points of the mechanism, over the reach.
+OVERHANG = 0.15
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """A motion that is shown, of a design in a pose, since a time of the clock."""
+
+    turn: FreeTurn
+    design: Design
+    pose: Pose
+    begun: float
+
+    @property
+    def is_over(self) -> bool:
+        return now() - self.begun >= PERIODS * PERIOD
+
+    @property
+    def angle(self) -> float:
+        """The angle of the ghost at present, in radians."""
+        share = math.sin(2.0 * math.pi * (now() - self.begun) / PERIOD)
+        return share * largest_angle(self.design, self.pose, self.turn)
+
+
+class FreeMotion(ScenePart):
+    """The ghost of the platform that shows a motion, and the line about which it turns."""
+
+    def __init__(self, services: Services) -> None:
+        scene, self._session = services.scene, services.session
+        self._ghost = PlatformGhost(scene, "/freedom")
+        self._axis = add_lines(scene, "/freedom/axis", 1, SINGULAR, 3.0)
+        self._label = add_label(scene, "/freedom/label", "", visible=False)
+        self._frame: Frame | None = None
+        self._shown: _Shown | None = None
+        services.buttons.on(SHOW, self._begin, values={"1", "2", "3"})
+        for incidence, line in enumerate(FOLD_LINES, 1):
+            services.buttons.offer(
+                f"Singularity › Show the turn about {line}",
+                f"{SHOW_HINT} It is one that locked actuators allow where δ{incidence} = 0.",
+                SHOW,
+                str(incidence),
+                lambda incidence=incidence: self._turn(incidence) is not None,
+            )
+        services.at_end(self._end)
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the motion at this time."""
+        self._frame, shown, state = placed.frame, self._shown, placed.frame.state
+        if shown is not None and (
+            shown.is_over or shown.pose != state.pose or shown.design != state.design
+        ):
+            shown = self._shown = None
+        yield from self._ghost.show(shown is not None)
+        yield self._axis, "visible", shown is not None
+        yield self._label, "visible", shown is not None
+        if shown is None:
+            return
+        yield from self._ghost.draw(placed, shown.turn.move(shown.pose, shown.angle))
+        low, high = _ends_of_axis(placed, shown.turn)
+        yield self._axis, "points", np.stack([low, high])[None].astype(np.float32)
+        yield self._label, "text", f"turns about {shown.turn.line}"
+        yield self._label, "position", tuple(high.tolist())
+
+    def _turn(self, incidence: int) -> FreeTurn | None:
+        """Return the turn of an incidence in the last frame; None if it is not free there."""
+        turns = () if self._frame is None else free_turns(self._frame)
+        return next((turn for turn in turns if turn.incidence == incidence), None)
+
+    def _begin(self, value: str, client: viser.ClientHandle) -> None:
+        del client
+        frame, turn = self._frame, self._turn(int(value))
+        if frame is not None and turn is not None:
+            self._shown = _Shown(turn, frame.state.design, frame.state.pose, now())
+            self._draw_on(self._shown)
+
+    def _draw_on(self, shown: _Shown) -> None:
+        """Draw a motion again and again until it is over, or another one is shown."""
+        self._session.redraw()
+        if shown is self._shown and not shown.is_over:
+            start_timer(FRAME_SECONDS, self._draw_on, shown)
+
+    def _end(self) -> None:
+        self._shown = None
+
+
+def free_turns(frame: Frame) -> tuple[FreeTurn, ...]:
+    """Return the turns that locked actuators allow in a frame; none unless it is singular."""
+    return frame.snapshot.freedoms.turns if frame.snapshot.is_singular else ()
+
+
+def largest_angle(design: Design, pose: Pose, turn: FreeTurn) -> float:
+    """Return the angle at which the fastest of b1 to b4 is as far as the ghost goes, in radians."""
+    local = np.array([(*design.b1, 0.0), (design.b2, 0.0, 0.0), (design.b3, 0.0, 0.0), (0, 0, 0)])
+    arms = np.array(pose.position) + local @ pose.rotation.T - turn.point
+    longest = float(np.linalg.norm(np.cross(arms, turn.direction), axis=1).max())
+    way = AMPLITUDE * design.reach
+    return way / longest if way < LARGEST_ANGLE * longest else LARGEST_ANGLE
+
+
+def _ends_of_axis(placed: Placed, turn: FreeTurn) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of the part of the line that is drawn, beyond all points beside it."""
+    foot = placed.scale * turn.point
+    along = (np.array(list(placed.points.values())) - foot) @ turn.direction
+    overhang = OVERHANG * placed.reach
+    low, high = float(along.min()) - overhang, float(along.max()) + overhang
+    return foot + low * turn.direction, foot + high * turn.direction
+
+
+def freedom_words(frame: Frame) -> str:
+    """Return what a singular pose lets the platform do as HTML; "" if the pose is not singular."""
+    if not frame.snapshot.is_singular:
+        return ""
+    found = frame.snapshot.freedoms
+    if found.count == 0:
+        return (
+            '<div class="ex-after">A leg has length zero and holds its end: with all actuators '
+            "locked the platform cannot move.</div>"
+        )
+    can = "can still move" if found.count == 1 else f"still has {found.count} freedoms"
+    among = ", among them" if len(found.turns) < found.count else ""
+    turns = "".join(_turn_words(frame, turn) for turn in found.turns)
+    return (
+        f'<div class="ex-after">With all actuators locked the platform {can}{among}:</div>{turns}'
+    )
+
+
+def _turn_words(frame: Frame, turn: FreeTurn) -> str:
+    reach = frame.state.design.reach
+    place = ", ".join(fitted(value, reach, 3) for value in turn.point.tolist())
+    through = f"b4 ({place}) units" if turn.incidence == 1 else "a1"
+    along = ", ".join(fitted(value, 1.0, 3) for value in turn.direction.tolist())
+    hint = "Along the axes of the base. Pitch 0: the platform does not slide along the line. " + (
+        "No joint changes at any angle."
+        if turn.is_finite
+        else "Joints change with the square of the angle only, so that play lets it turn a little."
+    )
+    button = press_button(
+        SHOW,
+        turn.incidence,
+        "Show the motion",
+        hint=SHOW_HINT,
+        label=f"Show the motion: turn about {turn.line}",
+        class_name="ex-link",
+    )
+    freely = " by any angle" if turn.is_finite else ""
+    return (
+        f'<div class="ex-line"><span>it turns{freely} about {turn.line}, pitch 0</span>'
+        f'{button}</div><div class="ex-dim ex-small" title="{hint}">'
+        f"through {through}, along ({along})</div>"
+    )

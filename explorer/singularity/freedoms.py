@@ -1,0 +1,125 @@
+"""The freedoms that a singular pose leaves the platform while all actuators are locked.
+
+The mechanism folds along three lines (`explorer.mechanism.folds`). Where the fold along one is
+flat, a turn about that line changes no joint at first order, whatever the design:
+
+- δ1 = 0: a turn about the line b2b3. Legs 2 to 4 end on it, and leg 1, which lies in the platform
+  plane with it, meets it.
+- δ2 = 0: a turn about the line a1b4. Legs 2 and 3 push within the plane of the lines a1a2 and b2b3,
+  in which it lies; it meets leg 1 at a1 and leg 4 at b4.
+- δ3 = 0: a turn about the guide. Legs 1 to 3 meet it, and leg 4 lies in the base plane with it.
+
+These are pure turns: the pitch is zero. Where one incidence holds, the turn is the only freedom.
+Some deeper strata have more freedoms than these turns; all of them are turns about lines of one
+plane. A leg of length zero holds its end in every direction, so that there may be none.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.kinematics import attachment_points, inverse
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.bruhat import incidences
+from explorer.singularity.jacobian import jacobian
+from explorer.singularity.strata import stratum
+
+# Joint rates of a twist of length one, and changes of joints, with lengths over the reach, that
+# count as zero; a pose is singular to 1e-9 of the reach.
+ZERO = 1e-7
+FOLD_LINES = ("the line b2b3", "the line a1b4", "the guide")
+"""The line about which the platform turns where δ1, δ2 or δ3 is zero."""
+
+
+@dataclass(frozen=True)
+class FreeTurn:
+    """A turn about a line that changes no joint at first order.
+
+    Attributes:
+        incidence: Number 1, 2 or 3 of the incidence that frees it.
+        point: Point of the line in the base frame, shape (3,), in design units: b4 of the line
+            b2b3, a1 of the others.
+        direction: Unit vector along the line in the base frame, shape (3,).
+        is_finite: Whether it changes no joint at any angle, to rounding.
+    """
+
+    incidence: int
+    point: FloatArray
+    direction: FloatArray
+    is_finite: bool
+
+    @property
+    def line(self) -> str:
+        """The name of the line."""
+        return FOLD_LINES[self.incidence - 1]
+
+    def move(self, pose: Pose, angle: float) -> Pose:
+        """Return a pose after the turn by an angle in radians."""
+        return pose.turn(self.point, angle * self.direction)
+
+
+@dataclass(frozen=True)
+class Freedoms:
+    """The freedoms of the platform with all actuators locked.
+
+    Attributes:
+        count: Number of independent freedoms; 0 unless the pose is singular.
+        turns: Independent turns among them, at most one for each incidence.
+    """
+
+    count: int
+    turns: tuple[FreeTurn, ...]
+
+
+def freedoms(design: Design, pose: Pose) -> Freedoms:
+    """Return the freedoms that a pose leaves the platform with all actuators locked."""
+    p, r, reach = np.array(pose.position), pose.rotation, design.reach
+    holding = incidences(tuple(stratum(p, r, reach).tolist()))
+    if not holding:
+        return Freedoms(0, ())
+    a1, distance = np.zeros(3), math.hypot(*pose.position)
+    lines = {1: (p, r[:, 0]), 3: (a1, np.array([1.0, 0.0, 0.0]))}
+    # Where a1 and b4 coincide they have no line.
+    if distance > ZERO * reach:
+        lines[2] = a1, p / distance
+    locked = _locked_rates(design, pose)
+    values = np.linalg.svd(locked, compute_uv=False)
+    joints = inverse(design, p, r)
+    turns: list[FreeTurn] = []
+    twists: list[FloatArray] = []
+    for incidence in sorted(lines.keys() & set(holding)):
+        point, direction = lines[incidence]
+        twist = np.concatenate([np.cross(direction, p - point) / reach, direction])
+        twist /= np.linalg.norm(twist)
+        is_free = np.abs(locked @ twist).max() <= ZERO
+        # Two of the lines coincide where a1 is on the line b2b3, or b4 on the guide.
+        if is_free and np.linalg.matrix_rank(np.array([*twists, twist]), ZERO) > len(twists):
+            # Squares of joints have one harmonic in the angle: half a turn tells all others.
+            half = pose.turn(point, math.pi * direction)
+            change = np.abs(inverse(design, half.position, half.rotation) - joints).max()
+            turns.append(FreeTurn(incidence, point, direction, bool(change <= ZERO * reach)))
+            twists.append(twist)
+    return Freedoms(int(np.sum(values <= ZERO)), tuple(turns))
+
+
+def _locked_rates(design: Design, pose: Pose) -> FloatArray:
+    """Return the rates that locked actuators hold at zero, by the twist (v over the reach; ω).
+
+    They are those of the joints over the reach and, for a leg of length zero, the velocity of its
+    end, shape (6 or more, 6).
+    """
+    p, r, reach = np.array(pose.position), pose.rotation, design.reach
+    points = attachment_points(design, p, r)
+    rows = [jacobian(design, p, r)]
+    lengths = inverse(design, p, r)[[0, 2, 4, 5]]
+    for end, length in zip((points.b1, points.b2, points.b3, points.b4), lengths, strict=True):
+        if length <= ZERO * reach:
+            # The columns are those of v + ω × arm.
+            turned = np.cross(np.eye(3), end - p).T
+            rows.append(np.hstack([np.eye(3), turned]))
+    return np.vstack(rows) / np.array([1.0, 1.0, 1.0, reach, reach, reach])
