@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from explorer.app.security.client_messages import ControlValue
 from explorer.numerics.arrays import FloatArray
 
-Mark = tuple[float, str]
 SceneMessage = dict[str, Any]
 """A message that makes or changes a part of the scene: its type, its fields by name."""
 
@@ -28,15 +27,15 @@ class SliderMarks:
         self._slider: Any = slider
 
     @property
-    def marks(self) -> tuple[Mark, ...]:
-        """Position and label of each mark."""
-        return tuple((mark.value, mark.label) for mark in self._slider._marks)
+    def marks(self) -> tuple[float, ...]:
+        """Position of each mark."""
+        return tuple(mark.value for mark in self._slider._marks)
 
     @marks.setter
-    def marks(self, marks: tuple[Mark, ...]) -> None:
+    def marks(self, marks: tuple[float, ...]) -> None:
         from viser import _messages
 
-        self._slider._marks = tuple(_messages.GuiSliderMark(value, label) for value, label in marks)
+        self._slider._marks = tuple(_messages.GuiSliderMark(value, "") for value in marks)
 
 
 def place(node: viser.SceneNodeHandle, name: str, value: ArrayLike) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Generic, cast
 
 import viser
 
-from explorer.app.browser.viser_gaps import Mark, SliderMarks
+from explorer.app.browser.viser_gaps import SliderMarks
 from explorer.app.inputs.bindings import Bound, Value
 from explorer.app.inputs.tracks import Intervals, Span, Track, decimals, tint_marks
 from explorer.app.session.session import Session
@@ -103,14 +103,12 @@ class Slider(Control[float]):
         span: Span | Callable[[State], Span],
         disabled: Condition | None,
         tinted: Callable[[Frame], Intervals] | None,
-        ends: Callable[[Frame], tuple[Mark, ...]] | None = None,
         *,
         closes_up: bool = False,
     ) -> None:
         super().__init__(session, handle, bound, disabled=disabled)
         self._track = Track(handle, span, closes_up=closes_up)
         self._tinted = tinted
-        self._ends = ends
         self._marks = SliderMarks(handle)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -125,8 +123,6 @@ class Slider(Control[float]):
         yield from self._track.updates(span)
         if self._tinted is not None:
             yield self._marks, "marks", tint_marks(tinted, span)
-        elif self._ends is not None:
-            yield self._marks, "marks", self._ends(frame)
         yield from self._show(frame.state, value)
 
 

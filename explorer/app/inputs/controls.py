@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 import viser
 
-from explorer.app.browser.viser_gaps import Mark
 from explorer.app.inputs.bindings import Bound, Source, Value, bound_to
 from explorer.app.inputs.control import Condition, Control, Ends, Number, Slider
 from explorer.app.inputs.tracks import Intervals, Span
@@ -51,7 +50,6 @@ class Controls:
         *,
         disabled: Condition | None = None,
         tinted: Callable[[Frame], Intervals] | None = None,
-        ends: Callable[[Frame], tuple[Mark, ...]] | None = None,
         closes_up: bool = False,
     ) -> Slider:
         """Add a slider with a number field.
@@ -63,8 +61,6 @@ class Controls:
             span: Range of its track, which may follow the state; values beyond can be typed.
             disabled: Condition in which it is disabled; None for never.
             tinted: Function that returns the feasible parts of the track; None to tint none.
-            ends: Function that returns the ends of these parts with words below them, in place
-                of `tinted`; None for no words.
             closes_up: Whether the track shows only the surroundings of its tinted parts.
         """
         handle = self._gui.add_slider(
@@ -77,9 +73,7 @@ class Controls:
             marks=(),
         )
         bound = bound_to(at, label)
-        slider = Slider(
-            self._session, handle, bound, span, disabled, tinted, ends, closes_up=closes_up
-        )
+        slider = Slider(self._session, handle, bound, span, disabled, tinted, closes_up=closes_up)
         self._controls.append(slider)
         return slider
 

@@ -9,7 +9,6 @@ from typing import TypeAlias
 
 import viser
 
-from explorer.app.browser.viser_gaps import Mark
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.mechanism.feasible_intervals import Interval
@@ -84,7 +83,7 @@ class Track:
         yield self._handle, "precision", decimals(span.step)
 
 
-def tint_marks(intervals: Intervals, span: Span) -> tuple[Mark, ...]:
+def tint_marks(intervals: Intervals, span: Span) -> tuple[float, ...]:
     """Return the ends of intervals within a range as marks, from which a stylesheet tints a track.
 
     The track is tinted from each mark of odd number to the next one.
@@ -94,7 +93,7 @@ def tint_marks(intervals: Intervals, span: Span) -> tuple[Mark, ...]:
         span: Range of the slider.
     """
     return tuple(
-        (min(max(end, span.low), span.high), "")
+        min(max(end, span.low), span.high)
         for low, high in intervals
         if low < span.high and high > span.low
         for end in (low, high)
