@@ -205,7 +205,7 @@ def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
     freedoms = frame.snapshot.freedoms
     assert "With all actuators locked the platform" in words
     assert words.count("it turns") == words.count("Show the motion") == len(freedoms.turns)
-    assert ("by any angle" in words) == any(turn.is_finite for turn in freedoms.turns)
+    assert ("at any angle" in words) == any(turn.is_finite for turn in freedoms.turns)
     panel = SingularityPanel(services)
     texts = [str(v) for _, n, v in panel.updates(frame) if n == "content"]
     assert not any(re.search(r"\b(nan|inf)\b", plain(text)) for text in texts)

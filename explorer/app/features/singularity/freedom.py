@@ -25,8 +25,6 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import SINGULAR
 from explorer.app.widgets.markup import fitted
-from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.freedoms import FOLD_LINES, FreeTurn
 
@@ -42,11 +40,10 @@ OVERHANG = 0.15
 
 @dataclass(frozen=True)
 class _Shown:
-    """A motion that is shown, of a design in a pose, since a time of the clock."""
+    """A motion that is shown: a turn of the platform in a frame, since a time of the clock."""
 
+    frame: Frame
     turn: FreeTurn
-    design: Design
-    pose: Pose
     begun: float
 
     @property
@@ -56,8 +53,12 @@ class _Shown:
     @property
     def angle(self) -> float:
         """The angle of the ghost at present, in radians."""
-        share = math.sin(2.0 * math.pi * (now() - self.begun) / PERIOD)
-        return share * largest_angle(self.design, self.pose, self.turn)
+        points = self.frame.snapshot.points
+        arms = np.array([points.b1, points.b2, points.b3, points.b4]) - self.turn.point
+        longest = float(np.linalg.norm(np.cross(arms, self.turn.direction), axis=1).max())
+        way = AMPLITUDE * self.frame.state.design.reach
+        largest = way / longest if way < LARGEST_ANGLE * longest else LARGEST_ANGLE
+        return largest * math.sin(2.0 * math.pi * (now() - self.begun) / PERIOD)
 
 
 class FreeMotion(ScenePart):
@@ -83,17 +84,15 @@ class FreeMotion(ScenePart):
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the motion at this time."""
-        self._frame, shown, state = placed.frame, self._shown, placed.frame.state
-        if shown is not None and (
-            shown.is_over or shown.pose != state.pose or shown.design != state.design
-        ):
+        self._frame, shown = placed.frame, self._shown
+        if shown is not None and (shown.is_over or not _is_same(shown.frame, placed.frame)):
             shown = self._shown = None
         yield from self._ghost.show(shown is not None)
         yield self._axis, "visible", shown is not None
         yield self._label, "visible", shown is not None
         if shown is None:
             return
-        yield from self._ghost.draw(placed, shown.turn.move(shown.pose, shown.angle))
+        yield from self._ghost.draw(placed, shown.turn.move(shown.frame.state.pose, shown.angle))
         low, high = _ends_of_axis(placed, shown.turn)
         yield self._axis, "points", np.stack([low, high])[None].astype(np.float32)
         yield self._label, "text", f"turns about {shown.turn.line}"
@@ -101,14 +100,16 @@ class FreeMotion(ScenePart):
 
     def _turn(self, incidence: int) -> FreeTurn | None:
         """Return the turn of an incidence in the last frame; None if it is not free there."""
-        turns = () if self._frame is None else free_turns(self._frame)
+        if self._frame is None or not self._frame.snapshot.is_singular:
+            return None
+        turns = self._frame.snapshot.freedoms.turns
         return next((turn for turn in turns if turn.incidence == incidence), None)
 
     def _begin(self, value: str, client: viser.ClientHandle) -> None:
         del client
         frame, turn = self._frame, self._turn(int(value))
         if frame is not None and turn is not None:
-            self._shown = _Shown(turn, frame.state.design, frame.state.pose, now())
+            self._shown = _Shown(frame, turn, now())
             self._draw_on(self._shown)
 
     def _draw_on(self, shown: _Shown) -> None:
@@ -121,18 +122,9 @@ class FreeMotion(ScenePart):
         self._shown = None
 
 
-def free_turns(frame: Frame) -> tuple[FreeTurn, ...]:
-    """Return the turns that locked actuators allow in a frame; none unless it is singular."""
-    return frame.snapshot.freedoms.turns if frame.snapshot.is_singular else ()
-
-
-def largest_angle(design: Design, pose: Pose, turn: FreeTurn) -> float:
-    """Return the angle at which the fastest of b1 to b4 is as far as the ghost goes, in radians."""
-    local = np.array([(*design.b1, 0.0), (design.b2, 0.0, 0.0), (design.b3, 0.0, 0.0), (0, 0, 0)])
-    arms = np.array(pose.position) + local @ pose.rotation.T - turn.point
-    longest = float(np.linalg.norm(np.cross(arms, turn.direction), axis=1).max())
-    way = AMPLITUDE * design.reach
-    return way / longest if way < LARGEST_ANGLE * longest else LARGEST_ANGLE
+def _is_same(one: Frame, other: Frame) -> bool:
+    """Whether two frames have the same design in the same pose."""
+    return one.state.pose == other.state.pose and one.state.design == other.state.design
 
 
 def _ends_of_axis(placed: Placed, turn: FreeTurn) -> tuple[FloatArray, FloatArray]:
@@ -167,10 +159,10 @@ def _turn_words(frame: Frame, turn: FreeTurn) -> str:
     place = ", ".join(fitted(value, reach, 3) for value in turn.point.tolist())
     through = f"b4 ({place}) units" if turn.incidence == 1 else "a1"
     along = ", ".join(fitted(value, 1.0, 3) for value in turn.direction.tolist())
-    hint = "Along the axes of the base. Pitch 0: the platform does not slide along the line. " + (
-        "No joint changes at any angle."
-        if turn.is_finite
-        else "Joints change with the square of the angle only, so that play lets it turn a little."
+    hint = (
+        "Along the axes of the base. Pitch 0: the platform does not slide along the line. Joints "
+        "change with the square of the angle only, so that play lets it turn a little; or not at "
+        "all where a point of one flag lies on the line of the other."
     )
     button = press_button(
         SHOW,
@@ -180,9 +172,9 @@ def _turn_words(frame: Frame, turn: FreeTurn) -> str:
         label=f"Show the motion: turn about {turn.line}",
         class_name="ex-link",
     )
-    freely = " by any angle" if turn.is_finite else ""
+    at_all = "; no joint changes at any angle" if turn.is_finite else ""
     return (
-        f'<div class="ex-line"><span>it turns{freely} about {turn.line}, pitch 0</span>'
+        f'<div class="ex-line"><span>it turns about {turn.line}, pitch 0</span>'
         f'{button}</div><div class="ex-dim ex-small" title="{hint}">'
-        f"through {through}, along ({along})</div>"
+        f"through {through}, along ({along}){at_all}</div>"
     )
