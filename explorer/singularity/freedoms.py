@@ -99,12 +99,13 @@ def freedoms(design: Design, pose: Pose) -> Freedoms:
         is_free = np.abs(locked @ twist).max() <= ZERO
         # Two of the lines coincide where a1 is on the line b2b3, or b4 on the guide.
         if is_free and np.linalg.matrix_rank(np.array([*twists, twist]), ZERO) > len(twists):
-            # Squares of joints have one harmonic in the angle: half a turn tells all others.
+            # Joints depend on the cosine of the angle alone, so that half a turn is the test.
             half = pose.turn(point, math.pi * direction)
             change = np.abs(inverse(design, half.position, half.rotation) - joints).max()
             turns.append(FreeTurn(incidence, point, direction, bool(change <= ZERO * reach)))
             twists.append(twist)
-    return Freedoms(int(np.sum(values <= ZERO)), tuple(turns))
+    # A nearly degenerate design has singular values near the limit.
+    return Freedoms(max(int(np.sum(values <= ZERO)), len(turns)), tuple(turns))
 
 
 def _locked_rates(design: Design, pose: Pose) -> FloatArray:

@@ -10,7 +10,6 @@ from explorer.app.features.feature import Services
 from explorer.app.features.singularity.tasks import StrataDistances, StrataRequest, strata_distances
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
-from explorer.singularity.strata import GENERIC
 
 
 class StrataFeed(Feed[StrataRequest, StrataDistances]):
@@ -21,6 +20,6 @@ class StrataFeed(Feed[StrataRequest, StrataDistances]):
 
 
 def _request_for(frame: Frame) -> StrataRequest | None:
-    if not frame.state.view.singular.strata and frame.snapshot.stratum == GENERIC:
+    if not frame.state.view.singular.strata and not frame.snapshot.is_singular:
         return None
     return StrataRequest(frame.state.design, frame.state.pose)

@@ -21,6 +21,7 @@ from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import add_lines
 from explorer.app.session.clock import now, start_timer
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import SINGULAR
@@ -50,6 +51,11 @@ class _Shown:
     def is_over(self) -> bool:
         return now() - self.begun >= PERIODS * PERIOD
 
+    def is_of(self, state: State) -> bool:
+        """Whether a state has its design and pose."""
+        own = self.frame.state
+        return state.pose == own.pose and state.design == own.design
+
     @property
     def angle(self) -> float:
         """The angle of the ghost at present, in radians."""
@@ -78,14 +84,14 @@ class FreeMotion(ScenePart):
                 f"{SHOW_HINT} It is one that locked actuators allow where δ{incidence} = 0.",
                 SHOW,
                 str(incidence),
-                lambda incidence=incidence: self._turn(incidence) is not None,
+                lambda incidence=incidence: self._motion(incidence) is not None,
             )
         services.at_end(self._end)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the motion at this time."""
         self._frame, shown = placed.frame, self._shown
-        if shown is not None and (shown.is_over or not _is_same(shown.frame, placed.frame)):
+        if shown is not None and (shown.is_over or not shown.is_of(placed.frame.state)):
             shown = self._shown = None
         yield from self._ghost.show(shown is not None)
         yield self._axis, "visible", shown is not None
@@ -98,19 +104,20 @@ class FreeMotion(ScenePart):
         yield self._label, "text", f"turns about {shown.turn.line}"
         yield self._label, "position", tuple(high.tolist())
 
-    def _turn(self, incidence: int) -> FreeTurn | None:
-        """Return the turn of an incidence in the last frame; None if it is not free there."""
-        if self._frame is None or not self._frame.snapshot.is_singular:
+    def _motion(self, incidence: int) -> _Shown | None:
+        """Return the motion that begins now in the last frame; None if it is not free there."""
+        frame = self._frame
+        if frame is None or not frame.snapshot.is_singular:
             return None
-        turns = self._frame.snapshot.freedoms.turns
-        return next((turn for turn in turns if turn.incidence == incidence), None)
+        motions = (_Shown(frame, turn, now()) for turn in frame.snapshot.freedoms.turns)
+        return next((each for each in motions if each.turn.incidence == incidence), None)
 
     def _begin(self, value: str, client: viser.ClientHandle) -> None:
         del client
-        frame, turn = self._frame, self._turn(int(value))
-        if frame is not None and turn is not None:
-            self._shown = _Shown(frame, turn, now())
-            self._draw_on(self._shown)
+        motion = self._motion(int(value))
+        if motion is not None:
+            self._shown = motion
+            self._draw_on(motion)
 
     def _draw_on(self, shown: _Shown) -> None:
         """Draw a motion again and again until it is over, or another one is shown."""
@@ -120,11 +127,6 @@ class FreeMotion(ScenePart):
 
     def _end(self) -> None:
         self._shown = None
-
-
-def _is_same(one: Frame, other: Frame) -> bool:
-    """Whether two frames have the same design in the same pose."""
-    return one.state.pose == other.state.pose and one.state.design == other.state.design
 
 
 def _ends_of_axis(placed: Placed, turn: FreeTurn) -> tuple[FloatArray, FloatArray]:
@@ -148,10 +150,11 @@ def freedom_words(frame: Frame) -> str:
         )
     can = "can still move" if found.count == 1 else f"still has {found.count} freedoms"
     among = ", among them" if len(found.turns) < found.count else ""
+    lead = f"With all actuators locked the platform {can}"
+    if not found.turns:
+        return f'<div class="ex-after">{lead}.</div>'
     turns = "".join(_turn_words(frame, turn) for turn in found.turns)
-    return (
-        f'<div class="ex-after">With all actuators locked the platform {can}{among}:</div>{turns}'
-    )
+    return f'<div class="ex-after">{lead}{among}:</div>{turns}'
 
 
 def _turn_words(frame: Frame, turn: FreeTurn) -> str:

@@ -12,7 +12,6 @@ from explorer.app.state.view import Gain
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.markup import box, dim, format_number, row, table
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.strata import GENERIC
 
 # Gain beyond which a pose counts as singular in a direction: J is known to fewer digits.
 LARGEST_GAIN = 1e9
@@ -64,7 +63,7 @@ def performance_table(frame: Frame) -> str:
     radius = (
         f"{format_number(ball.radius)} "
         + dim(f"= {format_number(ball.radius * unit, 3)} mm, to δ{ball.incidence} = 0")
-        if frame.snapshot.stratum == GENERIC
+        if not frame.snapshot.is_singular
         else f"none: δ{ball.incidence} = 0 here"
     )
     return box(

@@ -21,7 +21,6 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.nearest import NearestSingularity
-from explorer.singularity.strata import GENERIC
 
 GHOST_OPACITY, BALL_OPACITY = 0.4, 0.14
 # Semi-axes of an ellipsoid in scene units: for a gain of one, of speeds and of forces; and the
@@ -156,7 +155,7 @@ class BallScene(ScenePart):
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the ball of this frame."""
         frame = placed.frame
-        shown = frame.state.view.singular.ball and frame.snapshot.stratum == GENERIC
+        shown = frame.state.view.singular.ball and not frame.snapshot.is_singular
         for handle in (self._ball, self._touch, self._line, self._label):
             yield handle, "visible", shown
         if not shown:
