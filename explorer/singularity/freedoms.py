@@ -69,7 +69,8 @@ class Freedoms:
 
     Attributes:
         count: Number of independent freedoms; 0 unless the pose is singular.
-        turns: Independent turns among them, at most one for each incidence.
+        turns: Independent turns among them, at most one for each incidence, in the order δ1, δ3,
+            δ2.
     """
 
     count: int
@@ -92,12 +93,13 @@ def freedoms(design: Design, pose: Pose) -> Freedoms:
     joints = inverse(design, p, r)
     turns: list[FreeTurn] = []
     twists: list[FloatArray] = []
-    for incidence in sorted(lines.keys() & set(holding)):
-        point, direction = lines[incidence]
+    for incidence, (point, direction) in lines.items():
+        if incidence not in holding:
+            continue
         twist = np.concatenate([np.cross(direction, p - point) / reach, direction])
         twist /= np.linalg.norm(twist)
         is_free = np.abs(locked @ twist).max() <= ZERO
-        # Two of the lines coincide where a1 is on the line b2b3, or b4 on the guide.
+        # The line a1b4 is the line b2b3 where a1 is on that one, the guide where b4 is.
         if is_free and np.linalg.matrix_rank(np.array([*twists, twist]), ZERO) > len(twists):
             # Joints depend on the cosine of the angle alone, so that half a turn is the test.
             half = pose.turn(point, math.pi * direction)
