@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from explorer.mechanism.design import Design
+from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.kinematics import attachment_points, inverse
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
@@ -32,8 +33,6 @@ from explorer.singularity.strata import stratum
 # Joint rates of a twist of length one, and changes of joints, with lengths over the reach, that
 # count as zero; a pose is singular to 1e-9 of the reach.
 ZERO = 1e-7
-FOLD_LINES = ("the line b2b3", "the line a1b4", "the guide")
-"""The line about which the platform turns where δ1, δ2 or δ3 is zero."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class FreeTurn:
     @property
     def line(self) -> str:
         """The name of the line."""
-        return FOLD_LINES[self.incidence - 1]
+        return f"the {FOLD_LINES[self.incidence - 1]}"
 
     def move(self, pose: Pose, angle: float) -> Pose:
         """Return a pose after the turn by an angle in radians."""

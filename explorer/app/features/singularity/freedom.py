@@ -26,8 +26,9 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import SINGULAR
 from explorer.app.widgets.markup import fitted
+from explorer.mechanism.folds import FOLD_LINES
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.freedoms import FOLD_LINES, FreeTurn
+from explorer.singularity.freedoms import FreeTurn
 
 SHOW = "singular.show"
 SHOW_HINT = "Swing a ghost of the platform about this line, by up to 5 % of the reach."
@@ -80,7 +81,7 @@ class FreeMotion(ScenePart):
         services.buttons.on(SHOW, self._begin, values={"1", "2", "3"})
         for incidence, line in enumerate(FOLD_LINES, 1):
             services.buttons.offer(
-                f"Singularity › Show the turn about {line}",
+                f"Singularity › Show the turn about the {line}",
                 f"{SHOW_HINT} It is one that locked actuators allow where δ{incidence} = 0.",
                 SHOW,
                 str(incidence),
