@@ -35,6 +35,7 @@ from explorer.app.state.actions import (
     check_free,
 )
 from explorer.app.state.compared import Look
+from explorer.app.state.folds import SetFold
 from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
 from explorer.app.state.state import Run, State, opened
 from explorer.app.state.studies import Studies
@@ -171,6 +172,7 @@ MAKERS: tuple[Make, ...] = (
     lambda state, i, share: SetJoint(i, _length(share)),
     lambda state, i, share: SetPosition(i % 3, _length(share)),
     lambda state, i, share: SetAngle(i % 3, 360.0 * share - 180.0),
+    lambda state, i, share: SetFold(i, 180.0 * share if i < 3 else 360.0 * share - 180.0),
     lambda state, i, share: SetMode(i),
     lambda state, i, share: SetVariable(VARIABLES[i], _length(share)),
     lambda state, i, share: Change("", {"hold": "pose" if share < 0.5 else "legs"}),
@@ -287,6 +289,7 @@ def rich_state() -> State:
             "optimisation.request",
             {"held": True, "error": 1 / 3, "deflection": 2 / 3, "tilt": 10 / 3},
         ),
+        SetFold(4, 100 / 3),
         SetJoint(0, 99.1),
     ]
     for action in actions:

@@ -55,6 +55,7 @@ from explorer.app.state.actions import (
     SetVariable,
     StartThere,
 )
+from explorer.app.state.folds import SetFold
 from explorer.app.state.frame import Frame
 from explorer.app.state.values import value_at, with_value
 from explorer.app.state.view import OrientationView
@@ -264,7 +265,7 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
 
 OF_VALUES = (
     SetJoint, SetPosition, SetAngle, SetPose, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
-    SetVariable, SetName, SetPathTime, PickDesign, BrushAxis, BrushBox,
+    SetFold, SetVariable, SetName, SetPathTime, PickDesign, BrushAxis, BrushBox,
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map or a handle gives."""
 

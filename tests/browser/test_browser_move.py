@@ -220,6 +220,35 @@ def test_track_is_tinted_where_the_legs_close_and_stays_while_it_is_dragged(tab:
     tab.wait_for(lambda: thumb.get_attribute("aria-valuemax") == "21", "the track of before")
 
 
+def test_fold_is_dragged_to_its_walls_on_a_track_coloured_by_its_margin(tab: Tab) -> None:
+    tab.page.get_by_role("button", name="Folds", exact=True).click()
+    tab.slider("φ2 (°)").wait_for()
+    expect(tab.slider("x")).to_have_count(0)
+    before = Frame(tab.state).folds
+    tab.settle()
+    row = tab.row("φ2 (°)")
+    track, strip = row.locator(".mantine-Slider-track").bounding_box(), None
+    for each in tab.page.locator(".ex-track").all():
+        box = each.bounding_box()
+        if box and track and abs(box["y"] - track["y"]) < 2.0:
+            strip = box
+    assert track is not None
+    assert strip is not None
+    # Its colours go on a little beyond both ends of the track.
+    end = track["height"]
+    assert strip["x"] == pytest.approx(track["x"] - end, abs=0.2)
+    assert strip["width"] == pytest.approx(track["width"] + 2.0 * end, abs=0.2)
+    assert strip["height"] == pytest.approx(end, abs=0.2)
+    for share, wall in ((0.0, -180.0), (1.0, 0.0)):
+        tab.drag("φ2 (°)", share)
+        tab.wait_until_shown("φ2 (°)", wall)
+        after = Frame(tab.state).folds
+        assert after == (*before[:4], wall, before[5])
+    tab.type("φ2 (°)", "-47.2\n")
+    tab.wait_for(lambda: Frame(tab.state).folds[4] == -47.2, "the fold that was typed")
+    assert Frame(tab.state).folds == (*before[:4], -47.2, before[5])
+
+
 def test_arrow_of_the_gizmo_moves_the_platform_along_it(tab: Tab) -> None:
     # Large enough for the hand to be as exact as asked for below.
     tab.page.set_viewport_size({"width": 1280, "height": 720})

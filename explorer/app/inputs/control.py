@@ -20,6 +20,7 @@ from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.markup import colour_strip
 from explorer.mechanism.design import Pair
 from explorer.numerics.number_text import snap_to_decimals
 
@@ -103,16 +104,24 @@ class Slider(Control[float]):
         span: Span | Callable[[State], Span],
         disabled: Condition | None,
         tinted: Callable[[Frame], Intervals] | None,
+        colours: tuple[viser.GuiHtmlHandle, Callable[[Frame, Span], str]] | None = None,
         *,
+        visible: Condition | None = None,
         closes_up: bool = False,
     ) -> None:
-        super().__init__(session, handle, bound, disabled=disabled)
+        super().__init__(session, handle, bound, disabled=disabled, visible=visible)
         self._track = Track(handle, span, closes_up=closes_up)
         self._tinted = tinted
+        self._colours = colours
         self._marks = SliderMarks(handle)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the slider show the frame, its range first."""
+        if self._visible is not None and not self._visible(frame.state):
+            yield self.handle, "visible", False
+            if self._colours is not None:
+                yield self._colours[0], "visible", False
+            return
         value = self._bound.read(frame)
         tinted = () if self._tinted is None else self._tinted(frame)
         is_own = self._is_own(value)
@@ -123,6 +132,10 @@ class Slider(Control[float]):
         yield from self._track.updates(span)
         if self._tinted is not None:
             yield self._marks, "marks", tint_marks(tinted, span)
+        if self._colours is not None:
+            strip, stops = self._colours
+            yield strip, "visible", True
+            yield strip, "content", colour_strip(stops(frame, span))
         yield from self._show(frame.state, value)
 
 

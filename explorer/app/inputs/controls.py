@@ -49,7 +49,9 @@ class Controls:
         span: Span | Callable[[State], Span],
         *,
         disabled: Condition | None = None,
+        visible: Condition | None = None,
         tinted: Callable[[Frame], Intervals] | None = None,
+        coloured: Callable[[Frame, Span], str] | None = None,
         closes_up: bool = False,
     ) -> Slider:
         """Add a slider with a number field.
@@ -60,9 +62,14 @@ class Controls:
             at: Source of its value.
             span: Range of its track, which may follow the state; values beyond can be typed.
             disabled: Condition in which it is disabled; None for never.
+            visible: Condition in which it is visible; None for always.
             tinted: Function that returns the feasible parts of the track; None to tint none.
+            coloured: Function that returns the colours of the track for its range, as stops of a
+                CSS gradient; None for grey.
             closes_up: Whether the track shows only the surroundings of its tinted parts.
         """
+        # The stylesheet puts the colours on the track.
+        colours = None if coloured is None else (self._gui.add_html(""), coloured)
         handle = self._gui.add_slider(
             label,
             min=0.0,
@@ -73,7 +80,17 @@ class Controls:
             marks=(),
         )
         bound = bound_to(at, label)
-        slider = Slider(self._session, handle, bound, span, disabled, tinted, closes_up=closes_up)
+        slider = Slider(
+            self._session,
+            handle,
+            bound,
+            span,
+            disabled,
+            tinted,
+            colours,
+            visible=visible,
+            closes_up=closes_up,
+        )
         self._controls.append(slider)
         return slider
 

@@ -51,6 +51,7 @@ class Track:
         self._span = span
         self._closes_up = closes_up
         self._shown: Span | None = None
+        self._whole: Span | None = None
 
     def span(
         self, state: State, values: tuple[float, ...], tinted: Intervals = (), *, is_own: bool
@@ -62,14 +63,15 @@ class Track:
             values: Values of the thumbs.
             tinted: The tinted parts.
             is_own: Whether the slider itself was changed last: then its range may only grow, so
-                that it holds still under the pointer.
+                that it holds still under the pointer, unless `span` itself has changed.
         """
-        span = self._span if isinstance(self._span, Span) else self._span(state)
+        span = whole = self._span if isinstance(self._span, Span) else self._span(state)
         if self._closes_up:
             span = close_up(span, tinted, self._shown)
         low, high = min(span.low, *values), max(span.high, *values)
-        if is_own and self._shown is not None:
+        if is_own and self._shown is not None and whole == self._whole:
             low, high = min(low, self._shown.low), max(high, self._shown.high)
+        self._whole = whole
         return Span(low, high, span.step)
 
     def updates(self, span: Span) -> Iterator[Update]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from explorer.app.state.state import State
+from explorer.app.state.folds import folds_of
+from explorer.app.state.state import Folds, State
 from explorer.errors import InputError
 from explorer.legs.moves import MoveClearance, move_clearance
 from explorer.measures.snapshot import Snapshot, evaluate
@@ -28,6 +29,11 @@ class Frame:
     def snapshot(self) -> Snapshot:
         """The design in its pose."""
         return evaluate(self.state.design, self.state.pose)
+
+    @cached_property
+    def folds(self) -> Folds:
+        """The folds of the pose: r in design units and β, ε, φ1, φ2, φ3 in degrees."""
+        return folds_of(self.state)
 
     @cached_property
     def verdict(self) -> Verdict:

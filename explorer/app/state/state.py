@@ -45,6 +45,7 @@ from explorer.optimise.record import Record
 from explorer.singularity.colours import WARN_SHARE
 
 Joints = tuple[float, float, float, float, float, float]
+Folds = tuple[float, float, float, float, float, float]
 Hold = Literal["pose", "legs"]
 # Difference of the entries of rotation matrices up to which they are the same but for rounding.
 SAME_ROTATION = 1e-12
@@ -94,6 +95,19 @@ class Taken:
 
     joints: Joints
     words: str
+
+
+@dataclass(frozen=True)
+class GivenFolds:
+    """The folds of a pose as the user set them.
+
+    Attributes:
+        folds: r in design units and β, ε, φ1, φ2, φ3 in degrees.
+        pose: The pose that they led to; they count while it is the present one.
+    """
+
+    folds: Folds
+    pose: Pose
 
 
 @dataclass(frozen=True)
@@ -225,6 +239,7 @@ class State:
             count while they give the rotation of the pose; None if none were set.
         set_tool_angles: Yaw, pitch and roll of the tool in degrees as the user last set them, which
             count while they give the tool's orientation; None if none were set.
+        set_folds: The folds as the user last set them; None if none were set.
     """
 
     design: Design
@@ -246,6 +261,7 @@ class State:
     studies: Studies = field(default_factory=Studies, metadata=STAYS)
     set_tilt_torsion: TiltTorsion | None = None
     set_tool_angles: Triple | None = None
+    set_folds: GivenFolds | None = None
 
     def for_file(self) -> State:
         """Return the state as a file holds it: while a run goes on, the state before the run."""

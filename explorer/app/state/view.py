@@ -180,6 +180,7 @@ class PrecisionView:
                 raise InputError(f"the {name} must be positive; got {format_number(value)}")
 
 
+Coordinates = Literal["position", "folds"]
 DrawnAs = Literal["schematic", "prototype", "6-4 twin"]
 Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
 Gain = Literal["none", "speed", "force"]
@@ -208,10 +209,13 @@ class View:
 
     Attributes:
         at: The point whose position is shown and set, and about which the platform turns.
+        coordinates: The coordinates by which the pose is shown and set: the position of that point
+            with three angles, or the six folds.
         drawn_as: What is drawn: the schematic mechanism, the parts of its prototype in place of
             legs and bodies, or its 6-4 twin, with six legs in place of the four.
         flags, bodies, legs, labels, grid, handle: Whether each is drawn.
         tetrahedra: Whether each of the three is drawn, and the gap that is left to its incidence.
+        leaves: Whether the two inner leaves are drawn, with the folds beside them.
         clearance: Whether the closest pair of legs is marked.
         machine: Whether the tool and the payload of the design are drawn.
         swept: Whether the tetrahedra are drawn that the legs swept in the last move.
@@ -232,6 +236,7 @@ class View:
     """
 
     at: Point = "b4"
+    coordinates: Coordinates = "position"
     drawn_as: DrawnAs = "schematic"
     flags: bool = True
     bodies: bool = True
@@ -240,6 +245,7 @@ class View:
     grid: bool = True
     handle: bool = True
     tetrahedra: tuple[bool, bool, bool] = (True, True, True)
+    leaves: bool = False
     clearance: bool = False
     machine: bool = True
     swept: bool = False

@@ -126,6 +126,11 @@ def meter(
     return f'<div class="{look}" style="--share:{percent:.2f}%{set_colours}"></div>'
 
 
+def colour_strip(stops: str) -> str:
+    """Return the colours of the track of the slider below, as stops of a CSS gradient."""
+    return f'<div class="ex-track" style="--colours:{stops}"></div>'
+
+
 def _title(hint: str) -> str:
     return f' title="{escape(hint)}"' if hint else ""
 

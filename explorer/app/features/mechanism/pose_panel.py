@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import viser
 
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.fold_sliders import add_fold_sliders
 from explorer.app.features.mechanism.modes import ModesPanel
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
@@ -23,6 +24,7 @@ from explorer.app.state.actions import (
 )
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.state.view import Coordinates
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.chips import Chip, Chips, Effect
@@ -71,10 +73,12 @@ class MovePanel:
                 icon=viser.Icon.MAGNET,
                 main=True,
             )
+        self._coordinates = coordinate_chips(services.buttons, services.session)
         self._points = point_chips(services.buttons, services.session)
         self._pose = gui.add_folder("")
         with self._pose:
-            self._point = gui.add_html("")
+            self._choices = gui.add_html("")
+            add_fold_sliders(controls)
             for axis, name in enumerate("xyz"):
                 self._add_position(axis, name)
             for axis, (name, order, edge) in enumerate(ANGLES):
@@ -108,6 +112,7 @@ class MovePanel:
                 lambda _, value: SetPosition(axis, value),
             ),
             lambda state: position_span(state, axis),
+            visible=_is_by_position,
         )
 
     def _add_angle(self, axis: int, name: str, order: str, edge: float) -> None:
@@ -119,18 +124,61 @@ class MovePanel:
                 lambda _, value: SetAngle(axis, value),
             ),
             Span(-edge, edge, 0.1),
+            visible=_is_by_position,
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
         state, unclosed = frame.state, frame.state.unclosed
-        yield self._pose, "label", f"Pose of {state.point} (design units, degrees)"
+        is_by_position = _is_by_position(state)
+        pose = f"Pose of {state.point}" if is_by_position else "Pose by its folds"
+        choices = self._coordinates.html(state) + (self._points.html(state) * is_by_position)
+        yield self._pose, "label", f"{pose} (design units, degrees)"
         yield self._mode_folder, "label", f"Assembly modes: {state.point} (design units)"
-        yield self._point, "content", box(self._points.html(state))
+        yield self._choices, "content", box(choices)
         yield self._message, "content", message(state)
         yield self._nearest, "disabled", unclosed is None or unclosed.nearest is None
         yield from self._controls.updates(frame)
         yield from self._modes.updates(frame)
+
+
+def _is_by_position(state: State) -> bool:
+    return state.view.coordinates == "position"
+
+
+def coordinate_chips(buttons: Buttons, session: Session) -> Chips:
+    """Return the choice of the coordinates by which the pose is shown and set."""
+
+    def chip(value: Coordinates, words: str, hint: str) -> Chip:
+        return Chip(
+            words,
+            f"Pose › Set as › {words}",
+            hint,
+            Effect(
+                lambda _: Set("view.coordinates", value, "Set as", words),
+                lambda state: state.view.coordinates == value,
+            ),
+        )
+
+    return Chips(
+        buttons,
+        session,
+        "pose.coordinates",
+        "Set as",
+        {
+            "position": chip(
+                "position",
+                "Position and angles",
+                "Show and set the position of a point, and yaw, pitch and roll.",
+            ),
+            "folds": chip(
+                "folds",
+                "Folds",
+                "Show and set a distance, two angles and the three folds, each of which changes "
+                "one margin alone. The ends of the sliders are singular.",
+            ),
+        },
+    )
 
 
 def point_chips(buttons: Buttons, session: Session) -> Chips:

@@ -1,0 +1,96 @@
+"""The folds of the pose as the page shows and sets them, in degrees and with the signs of the mode.
+
+A fold of 0 or 180° is a wall between two assembly modes. There it has the sign of the present one:
+180° in a mode with a positive margin is −180° in its neighbour with a negative one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from explorer.app.state.action import Action
+from explorer.app.state.actions import FULL_TURN, moved
+from explorer.app.state.state import Folds, GivenFolds, State
+from explorer.errors import InputError
+from explorer.mechanism.folds import FOLDS, from_folds, to_folds
+from explorer.mechanism.margins import MODE_BITS, signs_of
+from explorer.mechanism.pose import Pose
+from explorer.numerics.number_text import format_number
+
+HALF_TURN = 180.0
+# Degrees from 0 or 180 up to which a fold is flat but for rounding.
+FLAT = 1e-9
+# Index of φ1.
+FIRST_FOLD = FOLDS.index("φ1")
+
+
+@dataclass(frozen=True)
+class SetFold(Action):
+    """Set one coordinate of the folds, named by its index in `FOLDS`; the other five stay.
+
+    r is in design units, the others are in degrees. A fold that is set flat stays in its mode.
+    """
+
+    index: int
+    value: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the coordinate is beyond its range.
+        """
+        index, value = self.index, self.value
+        least = -HALF_TURN if index >= FIRST_FOLD else 0.0
+        if index > 0 and not least <= value <= HALF_TURN:
+            given = format_number(value, 6, size=FULL_TURN)
+            raise InputError(f"{FOLDS[index]} must be {least:g}° to {HALF_TURN:g}°; got {given}°")
+        values = list(folds_of(state))
+        values[index] = value
+        r, beta, epsilon, phi1, phi2, phi3 = values
+        folds = (r, beta, epsilon, phi1, phi2, phi3)
+        pose = pose_of(folds)
+        mode = state.mode
+        if index >= FIRST_FOLD and abs(value) not in {0.0, HALF_TURN}:
+            bit = int(MODE_BITS[index - FIRST_FOLD])
+            mode = mode | bit if value > 0.0 else mode & ~bit
+        return replace(moved(state, pose), mode=mode, set_folds=GivenFolds(folds, pose))
+
+    def describe(self, before: State, after: State) -> str:
+        """Return which coordinate has which value."""
+        del before
+        if self.index > 0:
+            return f"{FOLDS[self.index]} = {format_number(self.value, 6, size=FULL_TURN)}°"
+        return f"{FOLDS[0]} = {format_number(self.value, 6, size=after.design.reach)}"
+
+
+def folds_of(state: State) -> Folds:
+    """Return r in design units and β, ε, φ1, φ2, φ3 in degrees, as the user set them if known.
+
+    Where an angle or r vanishes, the pose does not determine all six.
+    """
+    given = state.set_folds
+    if given is not None and given.pose == state.pose:
+        r, beta, epsilon, phi1, phi2, phi3 = given.folds
+    else:
+        r, *angles = to_folds(state.pose.position, state.pose.rotation).tolist()
+        beta, epsilon, phi1, phi2, phi3 = map(math.degrees, angles)
+    first, second, third = signs_of(state.mode)
+    phi1, phi2, phi3 = (_with_sign(phi1, first), _with_sign(phi2, second), _with_sign(phi3, third))
+    return r, beta, epsilon, phi1, phi2, phi3
+
+
+def pose_of(folds: Folds) -> Pose:
+    """Return the pose of r in design units and five angles in degrees."""
+    r, *angles = folds
+    return Pose.of(*from_folds((r, *map(math.radians, angles))))
+
+
+def _with_sign(fold: float, sign: int) -> float:
+    """Return a fold in degrees; a flat one has the sign of its margin."""
+    wall = HALF_TURN if abs(fold) > 0.5 * HALF_TURN else 0.0
+    if fold * sign > 0.0 or abs(abs(fold) - wall) > FLAT:
+        return fold
+    # Zero is not negative.
+    return sign * wall + 0.0
