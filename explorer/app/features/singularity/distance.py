@@ -1,4 +1,4 @@
-"""The three margins with their danger: value, nearest singular pose, least turn, a button to it.
+"""The three margins with their danger: fold, value, nearest singular pose, least turn, a button.
 
 While a pointer rests on a margin, the scene shows its incidence.
 """
@@ -16,19 +16,40 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.approach import HOVER, HoveredMargin
 from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.inputs.controls import Controls
+from explorer.app.state.folds import FIRST_FOLD
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import Ghost
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.colours import FAR_WARNINGS, proximity_colour
+from explorer.app.widgets.colours import (
+    FAR_WARNINGS,
+    MARGIN_COLOURS,
+    SINGULAR,
+    css,
+    proximity_colour,
+)
 from explorer.app.widgets.markup import box, fitted, format_number, margin_name, meter, swatch
-from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA
+from explorer.mechanism.folds import FOLDS
+from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, signs_of
 from explorer.numerics.number_text import format_decimals
 
 GHOSTS: tuple[Ghost, ...] = get_args(Ghost)
 GO = "singular.go"
 GO_HINT = "Move the mechanism to the nearest pose with this incidence."
+# Length of a dial's needle in pixels.
+NEEDLE = 15.0
+HINGES = ("line b2b3", "line a1b4", "guide")
+"""The lines of the folds, in the order φ1, φ2, φ3."""
+
+FLAT_WORDS = (
+    "a1 is on the platform plane",
+    "the lines a1a2 and b2b3 meet",
+    "b4 is on the base plane",
+)
+"""The incidence where each fold is flat, as a clause."""
+
 COLUMNS = (
+    ("fold", "The fold on a dial: a red end is flat, and a flat fold is a singular pose."),
     ("", ""),
     (
         "δ units",
@@ -109,11 +130,36 @@ def _margin(frame: Frame, index: int) -> str:
     distance = fitted(nearest.distance * unit_mm, reach * unit_mm, 5)
     return (
         f'<div class="ex-margin-row" data-hover="{HOVER}" data-value="{index + 1}">'
-        f"<div{' class=ex-strong' if is_least else ''}>{margin_name(index + 1)}"
+        f"{fold_dial(frame, index)}<div{' class=ex-strong' if is_least else ''}>"
+        f"{margin_name(index + 1)}"
         f"<span>{fitted(float(snapshot.margins[index]), reach, 4)}</span>"
         f"<span>{distance} mm</span><span>{format_decimals(turn, 1)}°</span>{go}</div>"
         f'<div class="ex-danger" title="{escape(hint)}">{swatch(colour)}'
         f'<span class="ex-dim ex-small ex-fill">{INCIDENCES[index]}</span>'
         f"{meter(min(100.0, 100.0 * level / FAR_WARNINGS), colour, look='ex-meter is-thin')}"
         "</div></div>"
+    )
+
+
+def fold_dial(frame: Frame, index: int) -> str:
+    """Return the fold of a margin, by the margin's index, as a needle on half a circle, as HTML.
+
+    The half is the upper one for a positive fold, the lower one for a negative fold.
+    """
+    fold = frame.folds[FIRST_FOLD + index]
+    x, y = NEEDLE * math.cos(math.radians(fold)), -NEEDLE * math.sin(math.radians(fold))
+    side = signs_of(frame.state.mode)[index] if fold == 0.0 else math.copysign(1.0, fold)
+    top, sweep = (-NEEDLE - 2.0, 0) if side > 0.0 else (-4.0, 1)
+    angle = f"{format_decimals(fold, 1)}°"
+    hint = (
+        f"Fold {FOLDS[FIRST_FOLD + index]} at the {HINGES[index]}: {angle}; flat at 0° and "
+        f"{'' if side > 0.0 else '−'}180°, where {FLAT_WORDS[index]}"
+    )
+    return (
+        f'<span class="ex-dial" title="{escape(hint)}" '
+        f'style="--colour:{css(MARGIN_COLOURS[index])};--end:{css(SINGULAR)}">'
+        f'<svg viewBox="-20 {top:g} 40 {NEEDLE + 6.0:g}" aria-hidden="true">'
+        f'<path d="M{NEEDLE:g} 0A{NEEDLE:g} {NEEDLE:g} 0 0 {sweep} -{NEEDLE:g} 0Z"/>'
+        f'<circle cx="{NEEDLE:g}" r="2.5"/><circle cx="-{NEEDLE:g}" r="2.5"/>'
+        f'<path d="M0 0L{x:.2f} {y:.2f}"/></svg>{angle}</span>'
     )
