@@ -9,9 +9,10 @@ import numpy as np
 from tab import Tab
 
 from explorer.app.features.ground.ground import ground_of, shadow_outlines
+from explorer.app.features.mechanism.leaves import fold_arcs, leaf_corners
 from explorer.app.features.mechanism.tetrahedra import EDGES, INSET
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import SetPose
+from explorer.app.state.actions import Set, SetPose
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.mechanism.design_file import PRESETS
@@ -46,6 +47,8 @@ WATCH = """() => {
             rod_end: [0, 1, 2].map((axis) => rod[12 + axis] + rod[8 + axis]),
             edges: starts("/tetrahedra/1/edges"),
             shadow: vertices("/shadow"),
+            leaf: vertices("/leaves/1"),
+            arcs: starts("/leaves/arcs"),
         });
     };
     window.explorer.stopWatching = () => {
@@ -63,6 +66,8 @@ class Drawn(TypedDict):
     rod_end: list[float]
     edges: list[float]
     shadow: list[float]
+    leaf: list[float]
+    arcs: list[float]
 
 
 def pose_at(share: float) -> Pose:
@@ -74,6 +79,7 @@ def pose_at(share: float) -> Pose:
 def test_fast_motion_is_drawn_in_one_pose_in_each_frame(tab: Tab) -> None:
     poses = [pose_at(share) for share in np.linspace(0.0, 3.0, 80).tolist()]
     tab.running.page.session.do(SetPose(poses[0]))
+    tab.running.page.session.do(Set("view.leaves", True))
     tab.picture()
     tab.page.evaluate(WATCH)
     for start in range(0, len(poses), AT_ONCE):
@@ -97,6 +103,10 @@ def test_fast_motion_is_drawn_in_one_pose_in_each_frame(tab: Tab) -> None:
         inner = corners + INSET * (corners.mean(axis=0) - corners)
         edges: FloatArray = inner[EDGES]
         np.testing.assert_allclose(frame["edges"], edges.ravel(), atol=1e-5)
+        np.testing.assert_allclose(frame["leaf"], leaf_corners(scene)[1].ravel(), atol=1e-5)
+        _, arcs = fold_arcs(scene)
+        drawn_arcs = np.reshape(frame["arcs"], (3, -1, 2, 3))[:, 1:, 0]
+        np.testing.assert_allclose(drawn_arcs, arcs, atol=1e-5)
         outlines = np.ravel(shadow_outlines(scene, ground_of(scene)))
         drawn = np.reshape(frame["shadow"], (-1, 3))[: outlines.size // 2, :2]
         np.testing.assert_allclose(drawn.ravel(), outlines, atol=1e-5)

@@ -26,6 +26,7 @@ __all__ = [
     "FAR_WARNINGS",
     "GHOST",
     "JOINT",
+    "LEAVES",
     "MARGIN_COLOURS",
     "OUTLINE",
     "PLATFORM_BODY",
@@ -50,6 +51,7 @@ PLATFORM_BODY: Rgb = (150, 160, 176)
 RAIL: Rgb = (128, 138, 152)
 CARRIAGE: Rgb = (104, 115, 132)
 GHOST: Rgb = (120, 134, 156)
+LEAVES: tuple[Rgb, Rgb] = ((176, 156, 112), (96, 140, 136))
 SWEPT: Rgb = (92, 60, 156)
 COMPARED: tuple[Rgb, ...] = ((0, 158, 115), (120, 70, 200), (225, 110, 190), (170, 150, 20))
 """Colours of the live design and of the pinned ones.

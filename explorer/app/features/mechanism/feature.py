@@ -11,6 +11,7 @@ from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.figures import limits_figure
 from explorer.app.features.mechanism.flags import Flags
 from explorer.app.features.mechanism.gaps import Gaps
+from explorer.app.features.mechanism.leaves import Leaves
 from explorer.app.features.mechanism.legs import Legs, TwinLegs
 from explorer.app.features.mechanism.marks import DragHandle, Ghosts, Labels
 from explorer.app.features.mechanism.modes import MODES
@@ -33,6 +34,7 @@ MECHANISM = Feature(
         Legs,
         TwinLegs,
         Tetrahedra,
+        Leaves,
         Gaps,
         Labels,
         Ghosts,

@@ -48,6 +48,11 @@ LAYERS = (
     ),
     ("grid", "Grid", "The ground grid; a corner of the scene tells the size of its squares."),
     (
+        "leaves",
+        "Leaves",
+        "The planes of the guide with b4 and of a1 with the line b2b3, and the three folds.",
+    ),
+    (
         "clearance",
         "Closest pair",
         "Mark the two legs that are closest to each other, and their clearance.",

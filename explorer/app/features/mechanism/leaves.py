@@ -1,0 +1,140 @@
+"""The inner leaves of the folds: the plane of the guide and b4, and that of a1 and the line b2b3.
+
+Each of the three hinges has an arc from where its fold would be 0 to where it is, with the angle
+beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import viser
+
+from explorer.app.features.feature import Services
+from explorer.app.scene.labels import add_label
+from explorer.app.scene.part import ScenePart
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import add_lines, add_translucent, of_one_colour
+from explorer.app.state.folds import FIRST_FOLD
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import LEAVES, MARGIN_COLOURS, Rgb
+from explorer.mechanism.folds import FOLDS
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_decimals
+
+OPACITY, WEDGE_OPACITY = 0.34, 0.22
+# Radius of the arcs, and distance of their labels from the hinge, as shares of the reach.
+RADIUS, LABEL_RADIUS = 0.13, 0.15
+# Segments of an arc; two more lead from the hinge to its ends.
+SEGMENTS = 24
+# Thicknesses of arcs and of the edges of leaves, in pixels.
+ARC, EDGE = 2.5, 1.5
+# Shares of a fold at the ends of its arc's segments.
+SHARES = np.linspace(0.0, 1.0, SEGMENTS + 1)
+TRIANGLE = np.array([[0, 1, 2]])
+# The triangles between the hinge, the first point, and an arc.
+FAN = np.array([[0, each, each + 1] for each in range(1, SEGMENTS + 1)])
+
+
+class Leaves(ScenePart):
+    """The two leaves, three arcs in the colours of the margins, and their angles."""
+
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
+        self._leaves = [
+            add_translucent(
+                scene, f"/leaves/{index}", (np.zeros((3, 3)), TRIANGLE), OPACITY, colour=colour
+            )
+            for index, colour in enumerate(LEAVES)
+        ]
+        self._wedges = [
+            add_translucent(
+                scene,
+                f"/leaves/wedge/{index}",
+                (np.zeros((SEGMENTS + 2, 3)), FAN),
+                WEDGE_OPACITY,
+                colour=colour,
+            )
+            for index, colour in enumerate(MARGIN_COLOURS, start=1)
+        ]
+        self._edges = _add_lines(scene, "/leaves/edges", LEAVES, 3, EDGE)
+        self._arcs = _add_lines(scene, "/leaves/arcs", MARGIN_COLOURS, SEGMENTS + 2, ARC)
+        self._labels = [
+            add_label(scene, f"/leaves/label/{index}", name, colour=colour, visible=False)
+            for index, (name, colour) in enumerate(
+                zip(FOLDS[FIRST_FOLD:], MARGIN_COLOURS, strict=True), start=1
+            )
+        ]
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw leaves and arcs of this frame."""
+        state = placed.frame.state
+        # They would stand among parts that are drawn apart.
+        shown = state.view.leaves and not placed.is_apart
+        for handle in (*self._leaves, *self._wedges, self._edges, self._arcs):
+            yield handle, "visible", shown
+        for label in self._labels:
+            yield label, "visible", shown and state.view.labels
+        if not shown:
+            return
+        hinges, arcs = fold_arcs(placed)
+        leaves, wedges = leaf_corners(placed), np.concatenate([hinges, arcs], axis=1)
+        for meshes, lines, outlines in (
+            (self._leaves, self._edges, leaves),
+            (self._wedges, self._arcs, wedges),
+        ):
+            for mesh, outline in zip(meshes, outlines, strict=True):
+                yield mesh, "vertices", outline.astype(np.float32)
+            sides = np.stack([outlines, np.roll(outlines, -1, axis=1)], axis=2)
+            yield lines, "points", sides.reshape(-1, 2, 3).astype(np.float32)
+        middles = arcs[:, SEGMENTS // 2] - hinges[:, 0]
+        places = hinges[:, 0] + LABEL_RADIUS / RADIUS * middles
+        folds = placed.frame.folds[FIRST_FOLD:]
+        for label, name, fold, place in zip(
+            self._labels, FOLDS[FIRST_FOLD:], folds, places, strict=True
+        ):
+            yield label, "text", f"{name} {format_decimals(fold, 0)}°"
+            yield label, "position", tuple(place.tolist())
+
+
+def _add_lines(
+    scene: viser.SceneApi, name: str, colours: Iterable[Rgb], count: int, thickness: float
+) -> viser.LineSegmentsHandle:
+    """Add as many line segments of each colour."""
+    each = np.concatenate([of_one_colour(colour, count) for colour in colours])
+    lines = add_lines(scene, name, len(each), None, thickness)
+    lines.colors = each
+    return lines
+
+
+def leaf_corners(placed: Placed) -> FloatArray:
+    """Return the corners of both leaves, shape (2, 3, 3): a1 a2 b4, and a1 with the line b2b3b4."""
+    points, local = placed.points, placed.platform_points
+    line = sorted(("b2", "b3", "b4"), key=lambda name: local[name][0])
+    names = (("a1", "a2", "b4"), ("a1", line[0], line[-1]))
+    return np.array([[points[name] for name in corners] for corners in names])
+
+
+def fold_arcs(placed: Placed) -> tuple[FloatArray, FloatArray]:
+    """Return the centres (3, 1, 3) of the arcs of φ1, φ2, φ3, and their points (3, n, 3).
+
+    The arc of a fold begins where the leaf beyond the hinge would lie if the fold were 0.
+    """
+    r, *degrees = placed.frame.folds
+    beta, epsilon, phi1, phi2, phi3 = map(math.radians, degrees)
+    points = placed.points
+    # Halfway to the foot of b4 on the guide, beside the carriages.
+    on_guide = np.array([0.5 * placed.scale * r * math.cos(beta), 0.0, 0.0])
+    hinges = (0.5 * (points["b2"] + points["b3"]), 0.5 * points["b4"], on_guide)
+    # Axes along the hinge, in the leaf before it and across both, from the base on; what a fold
+    # turns is turned by an angle in its leaf too.
+    x, y, z = np.eye(3)
+    arcs: list[FloatArray] = []
+    for turn, angle, hinge in ((phi3, beta, 2), (-phi2, epsilon, 1), (-phi1, 0.0, 0)):
+        along = (turn * SHARES)[:, None]
+        arcs.append(hinges[hinge] + RADIUS * placed.reach * (np.cos(along) * y + np.sin(along) * z))
+        y, z = math.cos(turn) * y + math.sin(turn) * z, math.cos(turn) * z - math.sin(turn) * y
+        x, y = math.cos(angle) * x + math.sin(angle) * y, math.cos(angle) * y - math.sin(angle) * x
+    return np.array(hinges)[:, None], np.array(arcs[::-1])
