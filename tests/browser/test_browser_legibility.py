@@ -105,12 +105,22 @@ def test_control_has_the_words_beside_it_as_its_name_whenever_it_comes(tab: Tab)
         assert ("textbox", words) in found
     # Both ends of a range have names of their own.
     tab.turn_to("Design")
+    open_folders(tab.page)
     tab.settle()
     found = controls(tab)
     for words in ("l1", "d1, d3", "b4 x"):
         for end in ("least", "most"):
             assert found.count(("textbox", f"{words} {end}")) == 1
     # What comes later has one too.
+    tab.turn_to("Pose")
+    tab.page.get_by_role("button", name="Folds", exact=True).click()
+    tab.slider("φ1 (°)").wait_for()
+    tab.settle()
+    found = controls(tab)
+    for words in ("r", "β (°)", "ε (°)", "φ1 (°)", "φ2 (°)", "φ3 (°)"):
+        assert ("slider", words) in found
+        assert ("textbox", words) in found
+    assert problems(texts_of(tab.page)) == []
     tab.page.keyboard.press("k")
     tab.page.get_by_role("dialog").wait_for()
     tab.running.page.session.do(Set("design.unit_mm", 0.0))
