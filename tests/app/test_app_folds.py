@@ -122,7 +122,10 @@ def test_fold_of_the_other_sign_goes_to_the_other_mode() -> None:
     [(0, -1.0), (0, math.inf), (1, -0.1), (2, 180.1), (3, 181.0), (5, -200.0), (4, math.nan)],
 )
 def test_coordinate_beyond_its_range_is_refused(index: int, value: float) -> None:
-    with pytest.raises(InputError, match=f"{FOLDS[index]}"):
+    range_of = "negative" if index == 0 else " (0|−180)° to 180°; got"
+    if value == math.inf:
+        range_of = "finite"
+    with pytest.raises(InputError, match=f"{FOLDS[index]}.*{range_of}"):
         SetFold(index, value).apply(HOME)
 
 
@@ -266,12 +269,12 @@ def test_dial_points_at_the_fold_in_the_half_of_its_sign(state: State) -> None:
 def test_dial_says_where_its_fold_is_and_where_it_is_flat() -> None:
     state = SetFold(3, -47.3).apply(HOME)
     assert (
-        'title="Fold φ1 at the line b2b3: −47.3°; flat at 0° and −180°, where a1 is on the '
-        'platform plane"'
+        'title="Fold φ1 at the line b2b3: −47.3°; flat at 0° and −180°, with a1 on the platform '
+        'plane"'
     ) in fold_dial(Frame(state), 0)
     assert "Fold φ2 at the line a1b4" in fold_dial(Frame(state), 1)
     assert "Fold φ3 at the guide" in fold_dial(Frame(state), 2)
-    assert "flat at 0° and 180°, where b4 is on the base plane" in fold_dial(Frame(state), 2)
+    assert "flat at 0° and 180°, with b4 on the base plane" in fold_dial(Frame(state), 2)
 
 
 # The leaves

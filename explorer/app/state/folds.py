@@ -44,8 +44,8 @@ class SetFold(Action):
         index, value = self.index, self.value
         least = -HALF_TURN if index >= FIRST_FOLD else 0.0
         if index > 0 and not least <= value <= HALF_TURN:
-            given = format_number(value, 6, size=FULL_TURN)
-            raise InputError(f"{FOLDS[index]} must be {least:g}° to {HALF_TURN:g}°; got {given}°")
+            low, high, given = (format_number(each, 6) for each in (least, HALF_TURN, value))
+            raise InputError(f"{FOLDS[index]} must be {low}° to {high}°; got {given}°")
         values = list(folds_of(state))
         values[index] = value
         r, beta, epsilon, phi1, phi2, phi3 = values

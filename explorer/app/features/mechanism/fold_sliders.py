@@ -84,15 +84,12 @@ def colour_stops(frame: Frame, index: int, span: Span) -> str:
     )
     peak = max(peak / frame.state.warn_below, LEAST_LEVEL)
     levels = [*(level for level in LEVELS if level < peak), peak]
-    stops = [
-        (css(proximity_colour(level)), level / peak if index == 0 else _rise(level / peak))
-        for level in levels
-    ]
+    shares = [level / peak for level in levels]
+    if index > 0:
+        # Along half the track a sine rises to its peak.
+        shares = [math.asin(share) / math.pi for share in shares]
+    colours = [css(proximity_colour(level)) for level in levels]
+    stops = list(zip(colours, shares, strict=True))
     if index > 0:
         stops += [(colour, 1.0 - share) for colour, share in reversed(stops[:-1])]
     return ",".join(f"{colour} {100.0 * share:.1f}%" for colour, share in stops)
-
-
-def _rise(share: float) -> float:
-    """Return the share of half a turn at which a sine first has a value."""
-    return math.asin(share) / math.pi

@@ -41,13 +41,6 @@ NEEDLE = 15.0
 HINGES = ("line b2b3", "line a1b4", "guide")
 """The lines of the folds, in the order φ1, φ2, φ3."""
 
-FLAT_WORDS = (
-    "a1 is on the platform plane",
-    "the lines a1a2 and b2b3 meet",
-    "b4 is on the base plane",
-)
-"""The incidence where each fold is flat, as a clause."""
-
 COLUMNS = (
     ("fold", "The fold on a dial: a red end is flat, and a flat fold is a singular pose."),
     ("", ""),
@@ -153,7 +146,7 @@ def fold_dial(frame: Frame, index: int) -> str:
     angle = f"{format_decimals(fold, 1)}°"
     hint = (
         f"Fold {FOLDS[FIRST_FOLD + index]} at the {HINGES[index]}: {angle}; flat at 0° and "
-        f"{'' if side > 0.0 else '−'}180°, where {FLAT_WORDS[index]}"
+        f"{'' if side > 0.0 else '−'}180°, with {INCIDENCES[index]}"
     )
     return (
         f'<span class="ex-dial" title="{escape(hint)}" '
