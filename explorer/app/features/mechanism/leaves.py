@@ -25,8 +25,8 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals
 
 OPACITY, WEDGE_OPACITY = 0.34, 0.22
-# Radius of the arcs, and distance of their labels from the hinge, as shares of the reach.
-RADIUS, LABEL_RADIUS = 0.13, 0.15
+# Radius of the arcs as a share of the reach.
+RADIUS = 0.13
 # Segments of an arc; two more lead from the hinge to its ends.
 SEGMENTS = 24
 # Thicknesses of arcs and of the edges of leaves, in pixels.
@@ -89,14 +89,10 @@ class Leaves(ScenePart):
                 yield mesh, "vertices", outline.astype(np.float32)
             sides = np.stack([outlines, np.roll(outlines, -1, axis=1)], axis=2)
             yield lines, "points", sides.reshape(-1, 2, 3).astype(np.float32)
-        middles = arcs[:, SEGMENTS // 2] - hinges[:, 0]
-        places = hinges[:, 0] + LABEL_RADIUS / RADIUS * middles
-        folds = placed.frame.folds[FIRST_FOLD:]
-        for label, name, fold, place in zip(
-            self._labels, FOLDS[FIRST_FOLD:], folds, places, strict=True
-        ):
+        for index, label in enumerate(self._labels):
+            name, fold = FOLDS[FIRST_FOLD + index], placed.frame.folds[FIRST_FOLD + index]
             yield label, "text", f"{name} {format_decimals(fold, 0)}°"
-            yield label, "position", tuple(place.tolist())
+            yield label, "position", tuple(arcs[index, SEGMENTS // 2].tolist())
 
 
 def _add_lines(
