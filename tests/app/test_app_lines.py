@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import viser
 
+from explorer.app.features.feature import Services
 from explorer.app.features.listed import FEATURES
 from explorer.app.scene.placing import Placed
-from explorer.app.server import start
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.mechanism.design_file import PRESETS
@@ -17,7 +17,9 @@ from explorer.mechanism.design_file import PRESETS
 DESIGN = PRESETS["paper-optimal"]
 
 
-def test_line_of_the_scene_has_the_kind_of_colours_that_it_gets_later() -> None:
+def test_line_of_the_scene_has_the_kind_of_colours_that_it_gets_later(
+    server: viser.ViserServer, services: Services
+) -> None:
     # A line made with one colour and then given many is white if it was drawn in between.
     shapes: dict[int, tuple[int, ...]] = {}
 
@@ -27,15 +29,10 @@ def test_line_of_the_scene_has_the_kind_of_colours_that_it_gets_later() -> None:
             shapes[id(handle)] = np.shape(handle.colors)
             return handle
 
-    running = start(DESIGN, port=0)
-    try:
-        running.viser.scene.__class__ = Recorder
-        # Parts are made anew; feeds and what else the page has stay.
-        services, placed = running.page.services, Placed(Frame(opened(DESIGN)))
-        parts = [part(services) for feature in FEATURES for part in feature.scene]
-        updates = [update for part in parts for update in part.updates(placed)]
-        given = {id(h): np.shape(np.asarray(v)) for h, name, v in updates if name == "colors"}
-        assert len(given) > 3
-        assert given == {number: shapes[number] for number in given}
-    finally:
-        running.stop()
+    server.scene.__class__ = Recorder
+    placed = Placed(Frame(opened(DESIGN)))
+    parts = [part(services) for feature in FEATURES for part in feature.scene]
+    updates = [update for part in parts for update in part.updates(placed)]
+    given = {id(h): np.shape(np.asarray(v)) for h, name, v in updates if name == "colors"}
+    assert len(given) > 3
+    assert given == {number: shapes[number] for number in given}

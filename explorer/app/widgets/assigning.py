@@ -123,7 +123,9 @@ def _same(a: object, b: object) -> bool:
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return np.array_equal(np.asarray(a), np.asarray(b))
     if is_columns(a) and is_columns(b):
-        return len(a) == len(b) and all(map(_same, a, b))
+        # Where a chart has no value it is not a number.
+        pairs = zip(a, b, strict=False)
+        return len(a) == len(b) and all(np.array_equal(*each, equal_nan=True) for each in pairs)
     return a == b
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -64,6 +65,7 @@ def time_columns(
     return tuple(column[order] for column in (x, *curves, present))
 
 
+@functools.cache
 def blank_columns(curves: int, span: tuple[float, float]) -> tuple[NDArray[Any], ...]:
     """Return the columns of a chart while there is no path: a second without values."""
     return time_columns(np.ones(1), np.full((curves, 3), np.nan), 0.0, span)
