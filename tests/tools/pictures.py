@@ -48,6 +48,7 @@ from explorer.app.state.view import (
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.folds import from_folds
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.typical import typical_machine
 from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_start
@@ -111,6 +112,12 @@ SCENES = {
     # From the side no two of the eight names lie on one another.
     "modes": Scene(
         actions=(bare(ghosts=True, flags=False, grid=False),), view="side", size=(900, 800)
+    ),
+    # All four leaves are seen from their faces, and no arc lies on another.
+    "strip": Scene(
+        pose=Pose.of(*from_folds([14.4, *np.radians([46, 88, -60, -70, 70])])),
+        actions=(bare(leaves=True, bodies=False, legs=False, grid=False),),
+        size=(960, 600),
     ),
     "unclosed": Scene(actions=(SetJoint(JOINTS.index("l1"), 20.0),), panels=True),
     # Tall, so that the whole diagram is in it.
