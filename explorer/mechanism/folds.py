@@ -2,8 +2,17 @@
 
 The mechanism is a strip of four leaves, hinged along three lines. The base plane is folded at the
 guide into the plane of the guide and b4, that one at the line a1b4 into the plane of a1 and the
-line b2b3, and that one at the line b2b3 into the platform. With rotations X(·) and Z(·) about x
-and z, a pose is
+line b2b3, and that one at the line b2b3 into the platform:
+
+    r   distance of a1 and b4
+    β   angle from the guide's direction, x̂, to that from a1 to b4
+    ε   angle from the direction from a1 to b4 to the platform's x-axis
+    φ1  fold at the line b2b3; 0 where a1 is in the platform plane, on the side of the platform's y
+    φ2  fold at the line a1b4; 0 where the three directions are in one plane, with β + ε from x̂ to
+        the platform's x-axis
+    φ3  fold at the guide; 0 where b4 is in the base plane, on the side of the base's y
+
+With rotations X(·) and Z(·) about x and z, a pose is
 
     p = X(φ3) Z(β) (r, 0, 0),    R = X(φ3) Z(β) X(−φ2) Z(ε) X(−φ1)
 
@@ -12,9 +21,9 @@ and its margins are products of sines with one fold in each:
     δ1 = r sin ε sin φ1,    δ2 = r sin β sin ε sin φ2,    δ3 = r sin β sin φ3.
 
 So each assembly mode is the open box r > 0, 0 < β, ε < π with each fold between 0 and π or between
-−π and 0, and a pose is singular exactly on a wall of it. log |δi| is concave in the coordinates, so
-that along a straight line between two poses of one mode each |δi| stays at or above the smaller of
-its two ends.
+−π and 0, and a pose is singular exactly on a wall of it. Within a mode log |δi| is concave in the
+coordinates, so that along a straight line between two poses of it each |δi| stays at or above the
+smaller of its two ends.
 """
 
 from __future__ import annotations
@@ -53,7 +62,7 @@ def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     r is a distance in design units, the others are angles in radians: β and ε from 0 to π, the
     folds above −π and up to π. On lower strata some are undefined and chosen: where b4 is on the
     guide φ3 is 0, where a1 is on the line b2b3 φ2 is 0, and where a1 and b4 coincide β is 0 too.
-    What follows takes up the rest of the rotation.
+    The other folds then are what remains of the rotation.
 
     Args:
         position: b4 in the base frame, shape (..., 3), in design units.
@@ -63,9 +72,9 @@ def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
         InputError: The position is not finite, or the rotation is not one.
     """
     p = finite_array("position", position, (3,))
-    r = checked_rotation(rotation)
-    shape = batch_shape((p, 1), (r, 2))
-    positions, rotations = rows_for_kernel(p, shape, 1), rows_for_kernel(r, shape, 2)
+    matrices = checked_rotation(rotation)
+    shape = batch_shape((p, 1), (matrices, 2))
+    positions, rotations = rows_for_kernel(p, shape, 1), rows_for_kernel(matrices, shape, 2)
     count = len(positions)
     coordinates = np.empty((count, 6))
     sines, cosines = np.empty((2, min(count, BLOCK), 5))
@@ -81,7 +90,8 @@ def from_folds(coordinates: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return position (..., 3) and rotation (..., 3, 3) of fold coordinates.
 
     Args:
-        coordinates: (r, β, ε, φ1, φ2, φ3), shape (..., 6), in design units and radians.
+        coordinates: (r, β, ε, φ1, φ2, φ3), shape (..., 6), in design units and radians. Angles may
+            have any size; beyond their ranges the pose has other coordinates as well.
 
     Raises:
         InputError: The coordinates are not six finite numbers, or r is negative.

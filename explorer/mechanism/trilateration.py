@@ -8,8 +8,8 @@ determine px, py, c, X and Y, and with them one cosine for each trilateration:
     trilateration 2 (a1 a2 b2 b3):  cos φ2 = (cos β cos ε − c) / (sin β sin ε)
     trilateration 3 (b4 a1 a2 a3):  cos φ3 = py / (r sin β)
 
-Each cosine has two folds, of opposite signs: the eight modes. The discriminants are the squared
-margins, equal in all of them.
+Each cosine has two folds, of opposite signs, or one flat fold: the eight modes. The discriminants
+are the squared margins, equal in all of them.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def solve_rows(
 ) -> None:
     """Solve the forward kinematics of each row of joints.
 
-    Joints that do not close yield the poses of the nearest folds that do: finite and rigid, but
+    Joints that do not close yield poses in which each cosine beyond ±1 is ±1: finite and rigid, but
     with other joints.
 
     Args:
@@ -48,7 +48,8 @@ def solve_rows(
         positions: Output, b4 in the base frame, shape (n, 8, 3).
         rotations: Output, platform to base, shape (n, 8, 3, 3).
         feasible: Output, whether the joints close, shape (n,).
-        discriminants: Output, δ1², δ2², δ3², negative if a trilateration fails, shape (n, 3).
+        discriminants: Output, δ1², δ2², δ3², shape (n, 3); some negative number where a
+            trilateration fails.
     """
     for row in range(joints.shape[0]):
         # Lengths are divided by the largest, so that no square over- or underflows.
@@ -87,7 +88,7 @@ def solve_rows(
         discriminants[row, 1] = square2 * scale * scale
         discriminants[row, 2] = square3 * scale * scale
 
-        # Where a cosine is beyond ±1, the nearest fold is flat. Undefined ones are 0.
+        # Where a cosine is beyond ±1, the fold is flat. Undefined ones are 0.
         c = min(1.0, max(-1.0, c))
         h = math.sqrt(max(0.0, h_square))
         r = math.sqrt(px * px + h * h)

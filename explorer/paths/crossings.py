@@ -1,4 +1,4 @@
-"""Singular poses on a path: all of them, however close together.
+"""Singular poses on a path, also those that are close together.
 
 Over a straight move one point of the platform, b4 or the tool point, goes along a line and the
 platform turns about one axis, so a margin is (a + a' t) + (b + b' t) cos ωt + (c + c' t) sin ωt.
@@ -231,7 +231,21 @@ class _MoveMargin:
                 continue
             # The left half is next, so that roots come in order.
             queue += [(middle, high), (low, middle)]
-        return _merge_roots(roots)
+        return self._merge(roots)
+
+    def _merge(self, roots: list[tuple[float, bool]]) -> list[tuple[float, bool]]:
+        """Return ascending roots, one for all that rounding or neighbouring intervals have made."""
+        merged: list[tuple[float, bool]] = []
+        for share, changes in roots:
+            if merged and share - merged[-1][0] <= NEAREST_ROOTS:
+                before, changed = merged[-1]
+                middle = self.at(0.5 * (before + share))[0]
+                # Two changes of sign are a touch if nothing but rounding is between them.
+                if not (changes and changed) or abs(middle) <= ROUNDING * self.size:
+                    merged[-1] = (share if changes and not changed else before, changes != changed)
+                    continue
+            merged.append((share, changes))
+        return merged
 
     def _isolated_root(self, low: float, high: float) -> list[tuple[float, bool]]:
         """Return the root in an interval where the margin is monotonic or zero to rounding."""
@@ -258,18 +272,6 @@ class _MoveMargin:
                 break
             t = following
         return [(t, True)]
-
-
-def _merge_roots(roots: list[tuple[float, bool]]) -> list[tuple[float, bool]]:
-    """Return ascending roots, with one for each root that two neighbouring intervals have."""
-    merged: list[tuple[float, bool]] = []
-    for share, changes in roots:
-        if merged and share - merged[-1][0] <= NEAREST_ROOTS and not (changes and merged[-1][1]):
-            if changes:
-                merged[-1] = (share, True)
-        else:
-            merged.append((share, changes))
-    return merged
 
 
 def _move_margins(

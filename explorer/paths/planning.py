@@ -3,11 +3,11 @@
 A load can be demanded too: every pose of the path then holds it within the limits of actuators,
 struts and guide.
 
-Poses without a path are refused before any search: those of different modes, and those between
-which two legs would have to pass each other on the guide. Other poses are joined by the straight
-line in the folds, which meets no singularity and keeps the margins of its ends. Only where another
-limit ends that line does `explorer.paths.tree_search` look for a way round. In both cases a proof
-covers every move as a whole.
+Two kinds of ends that no path joins are refused before any search: those of different modes, and
+those between which two legs would have to pass each other on the guide. Other ends are joined by
+the straight line in the folds, which meets no singularity and keeps the margins of its ends. Only
+where that line is not proven valid, mostly for another limit, does `explorer.paths.tree_search`
+look for a way round. In both cases a proof covers every move as a whole.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import dataclasses
 import math
 import time
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,7 +32,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.paths.loads import TOLERANCE, DemandedLoad
 from explorer.paths.move_shares import share_rows_of_moves
 from explorer.paths.proofs import Proofs, divide_line, positions_and_rotations
-from explorer.paths.smoothing import Smoother
+from explorer.paths.smoothing import Smoother, lengths_of_moves
 from explorer.paths.tree_search import TreeSearch
 from explorer.singularity.bruhat import incidences
 from explorer.statics.reactions import PART_NAMES
@@ -85,7 +85,8 @@ class PlannedPath:
     Attributes:
         poses: Corners, from the start to the goal.
         unsmoothed: Corners before smoothing.
-        length: Root-mean-square distance that b1 to b4 travel, in design units.
+        length: Sum over the moves of the root-mean-square displacement of b1 to b4, in design
+            units.
         margin: Proven lower bound of |δ1|, |δ2| and |δ3| along the path, in design units, to the
             tolerance of moves.
         clearance: Proven lower bound of the clearance of any two legs along the path, in design
@@ -119,15 +120,17 @@ def plan_path(
     """Return a path from a pose to another that keeps limits, margins and clearances.
 
     The margins keep the sign triple of the start, whatever the mode of the home pose, and the
-    carriages keep their order at the start. If possible, margins and clearances also stay
-    above a share of those at both ends.
+    carriages keep their order at the start. Four paths are tried in turn: the straight line in the
+    folds that also keeps nine tenths of the ends' margin and half of their clearance (at most 2 %
+    of the reach), the line that does not, a search for a path that does, and one for any.
 
     Args:
         design: The manipulator.
         start: Pose at the start.
         goal: Pose at the end.
         seconds: Time for the search; smoothing takes some tenths of a second more.
-        seed: Seed of the random shortcuts in smoothing.
+        seed: Seed of the random shortcuts in smoothing. What a search finds also depends on the
+            time that it has, and on earlier searches of the process.
         tool: Point that each move moves straight in the platform frame, in design units; None for
             b4. If the platform turns, b4 goes along a curve.
         load: (F; M) at the tool point of the design, shape (6,), in N and N × unit, that every
@@ -160,17 +163,18 @@ def plan_path(
         kernel.compile()
     started = time.perf_counter()
     planner = _Planner(design, start, goal, seed, tool, demanded_load)
-    demanded = Rules.of(design, ends[0].signs, _order(ends[0]))
-    margin, clearance = _preferred(*ends)
-    preferred = demanded.tighten(margin, clearance)
+    rules = Rules.of(design, ends[0].signs, _order(ends[0]))
+    margin, clearance = _preferred_bounds(*ends)
+    demanded = _Demand(rules, 0.0, 0.0)
+    preferred = _Demand(rules.tighten(margin, clearance), margin, clearance)
     path = (
-        planner.line(preferred, margin, clearance)
-        or planner.line(demanded, 0.0, 0.0)
-        or planner.search(preferred, margin, clearance, SHARE_FOR_PREFERRED * seconds)
+        planner.plan_line(preferred)
+        or planner.plan_line(demanded)
+        or planner.search(preferred, SHARE_FOR_PREFERRED * seconds)
     )
     if path is None:
         remaining = seconds - (time.perf_counter() - started)
-        path = planner.search(demanded, 0.0, 0.0, max(remaining, 0.0))
+        path = planner.search(demanded, max(remaining, 0.0))
     if path is None:
         raise NoPathError(
             "out of time",
@@ -181,8 +185,16 @@ def plan_path(
     return dataclasses.replace(path, seconds=time.perf_counter() - started, checked=planner.checked)
 
 
+class _Demand(NamedTuple):
+    """Rules, and the margin and the clearance that they demand beyond those of the design."""
+
+    rules: Rules
+    margin: float
+    clearance: float
+
+
 class _Planner:
-    """Searches for paths between two poses, under one set of rules after another.
+    """Searches for paths between two poses, under one demand after another.
 
     Attributes:
         checked: Number of lines checked so far.
@@ -208,33 +220,29 @@ class _Planner:
         least = float(np.abs(margins(*positions_and_rotations(self._ends))).min())
         self._tolerance = min(DEFAULT_TOLERANCE * design.reach, least)
 
-    def line(self, rules: Rules, margin: float, clearance: float) -> PlannedPath | None:
-        """Return the straight line in the folds if it is valid."""
+    def plan_line(self, demand: _Demand) -> PlannedPath | None:
+        """Return the straight line in the folds if it is proven valid."""
         self.checked += 1
-        proofs = self._proofs(rules)
-        corners = proofs.line(*self._folds)
+        corners = self._proofs(demand).prove_line(*self._folds)
         if corners is None:
             return None
         poses = self._poses(corners)
-        return self._path(Smoother(proofs), poses, poses, margin, clearance)
+        return self._path(demand, poses, poses)
 
-    def search(
-        self, rules: Rules, margin: float, clearance: float, seconds: float
-    ) -> PlannedPath | None:
+    def search(self, demand: _Demand, seconds: float) -> PlannedPath | None:
         """Return a smoothed path of OMPL's search, or None if the time was too short."""
-        proofs = self._proofs(rules)
+        proofs = self._proofs(demand)
         tree = TreeSearch(proofs)
         first, last = self._folds
-        corners = tree.path(first, last, seconds)
+        corners = tree.find_path(first, last, seconds)
         self.checked += tree.checked
         if corners is None:
             return None
         unsmoothed = self._poses(corners)
-        smoother = Smoother(proofs, self._seed)
-        return self._path(smoother, unsmoothed, smoother.smooth(unsmoothed), margin, clearance)
+        return self._path(demand, unsmoothed, Smoother(proofs, self._seed).smooth(unsmoothed))
 
-    def _proofs(self, rules: Rules) -> Proofs:
-        return Proofs(self._design, rules, self._tool, self._load, self._tolerance)
+    def _proofs(self, demand: _Demand) -> Proofs:
+        return Proofs(self._design, demand.rules, self._tool, self._load, self._tolerance)
 
     def _poses(self, corners: FloatArray) -> tuple[Pose, ...]:
         """Return the poses of corners, with the given ends, from which they differ by rounding."""
@@ -243,26 +251,21 @@ class _Planner:
         return (start, *(Pose.of(p, r) for p, r in between), goal)
 
     def _path(
-        self,
-        smoother: Smoother,
-        unsmoothed: tuple[Pose, ...],
-        poses: tuple[Pose, ...],
-        margin: float,
-        clearance: float,
+        self, demand: _Demand, unsmoothed: tuple[Pose, ...], poses: tuple[Pose, ...]
     ) -> PlannedPath:
         return PlannedPath(
             poses=poses,
             unsmoothed=unsmoothed,
-            length=float(smoother.lengths(poses).sum()),
-            margin=max(self._design.limits.margin or 0.0, margin),
-            clearance=clearance,
+            length=float(lengths_of_moves(self._design, poses).sum()),
+            margin=max(self._design.limits.margin or 0.0, demand.margin),
+            clearance=demand.clearance,
             seconds=0.0,
             checked=0,
             tool=self._tool,
         )
 
 
-def _preferred(start: Snapshot, goal: Snapshot) -> tuple[float, float]:
+def _preferred_bounds(start: Snapshot, goal: Snapshot) -> tuple[float, float]:
     """Return the margin and the clearance to prefer on a path; both ends have more."""
     margin = min(float(np.abs(end.margins).min()) for end in (start, goal))
     clearance = min(float(end.clearances.clearance.min()) for end in (start, goal))
@@ -282,7 +285,7 @@ def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
     if start.mode == goal.mode:
         return
     flat = [
-        f"fold φ{index + 1} at the {FOLD_LINES[index]} is flat ({INCIDENCES[index]})"
+        f"fold φ{index + 1} at the {FOLD_LINES[index]} is flat or undefined ({INCIDENCES[index]})"
         for index in range(3)
         if start.signs[index] != goal.signs[index]
     ]

@@ -2,8 +2,9 @@
 
 A straight line in fold coordinates between two poses of one mode meets no singularity, and along
 it no |δi| is below the smaller of its two ends (see `explorer.mechanism.folds`). It is cut into
-straight moves, which come the closer to it the shorter they are, until each is proven valid: only
-limits other than the margins can end that.
+straight moves, which come the closer to it the shorter they are, until each is proven valid. There
+is an end of that where another limit is exceeded, and for lines that run along a wall of the mode
+so closely, at some 10⁻⁶ of the reach or less, that they would need shorter moves than are tried.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from explorer.workspace.limits.valid_poses import Rules
 
 # The shortest move is this share of a line; a line has at most so many moves.
 SHORTEST, MOST_MOVES = 2.0**-12, 256
-# Number of poses that take as long as a line.
+# Number of poses whose check takes as long as that of a line, by which a kernel is loaded at once.
 ROWS_OF_LINE = 400
 
 
@@ -52,8 +53,8 @@ class Proofs:
     load: DemandedLoad | None = None
     tolerance: float | None = None
 
-    def hold(self, moves: Sequence[tuple[Pose, Pose]]) -> list[bool]:
-        """Return whether straight moves are valid."""
+    def are_valid(self, moves: Sequence[tuple[Pose, Pose]]) -> list[bool]:
+        """Return whether each straight move, given by its ends, is proven valid; one or more."""
         (p, r), (q, s) = (positions_and_rotations(ends) for ends in zip(*moves, strict=True))
         rules, tool, tolerance = self.rules, self.tool, self.tolerance
         valid = moves_are_valid(
@@ -63,7 +64,7 @@ class Proofs:
             valid[valid] = self.load.holds_along(p[valid], r[valid], q[valid], s[valid])
         return valid.tolist()
 
-    def line(self, first: FloatArray, last: FloatArray) -> FloatArray | None:
+    def prove_line(self, first: FloatArray, last: FloatArray) -> FloatArray | None:
         """Return the corners of a straight line in the folds, or None if it is not proven valid.
 
         The moves between the corners are straight, and as long as is proven.

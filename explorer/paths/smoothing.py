@@ -13,13 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from explorer.legs.moves import poses_between
+from explorer.mechanism.design import Design
 from explorer.mechanism.displacement import displacement
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.proofs import Proofs, positions_and_rotations
 
 # Shortcuts tried in a round, rounds without gain that end the search, and the most rounds.
-TRIES, PATIENCE, MOST_ROUNDS = 24, 4, 60
+TRIES, MOST_IDLE_ROUNDS, MOST_ROUNDS = 24, 4, 60
 # The least gain, as a share of the path's length.
 GAIN = 1e-3
 # Cuts of a corner, as shares of the two moves beside it, widest first; rounds of cutting.
@@ -42,18 +43,13 @@ class Smoother:
         """Return a path with the same ends, shorter and with its corners cut off."""
         return tuple(self._cut_corners(self._shorten(list(poses))))
 
-    def lengths(self, poses: Sequence[Pose]) -> FloatArray:
-        """Return the root-mean-square displacement over each move, shape (n,)."""
-        p, r = positions_and_rotations(poses)
-        return displacement(self.proofs.design, p[:-1], r[:-1], p[1:], r[1:])
-
     def _shorten(self, poses: list[Pose]) -> list[Pose]:
         rng = np.random.default_rng(self.seed)
         idle_rounds = 0
         for _ in range(MOST_ROUNDS):
-            if len(poses) < 3 or idle_rounds >= PATIENCE:
+            if len(poses) < 3 or idle_rounds >= MOST_IDLE_ROUNDS:
                 break
-            ends = np.concatenate([[0.0], np.cumsum(self.lengths(poses))])
+            ends = np.concatenate([[0.0], np.cumsum(self._lengths(poses))])
             pairs = np.sort(rng.uniform(0.0, ends[-1], (TRIES, 2)), axis=1)
             # Some shortcuts go from corner to corner.
             pairs[0] = ends[0], ends[-1]
@@ -63,7 +59,7 @@ class Smoother:
             shortened: list[Pose] | None = None
             if worthwhile:
                 worthwhile.sort(key=lambda cut: -cut.gain)
-                valid = self.proofs.hold([cut.piece for cut in worthwhile])
+                valid = self.proofs.are_valid([cut.piece for cut in worthwhile])
                 checked = zip(worthwhile, valid, strict=True)
                 shortened = next((cut.poses for cut, is_valid in checked if is_valid), None)
             idle_rounds = 0 if shortened else idle_rounds + 1
@@ -78,7 +74,7 @@ class Smoother:
         j, end = self._pose_after(poses, ends, last)
         if i == j:
             return _Shortcut(poses, (start, end), 0.0)
-        gain = last - first - float(self.lengths([start, end])[0])
+        gain = last - first - float(self._lengths([start, end])[0])
         path = [*poses[: i + 1], start, end, *poses[j + 1 :]]
         return _Shortcut(_without_repeats(path), (start, end), gain)
 
@@ -92,6 +88,9 @@ class Smoother:
         return index, poses[index] if share == 0.0 else self._pose_between(
             poses[index], poses[index + 1], share
         )
+
+    def _lengths(self, poses: Sequence[Pose]) -> FloatArray:
+        return lengths_of_moves(self.proofs.design, poses)
 
     def _pose_between(self, start: Pose, end: Pose, share: float) -> Pose:
         return Pose.of(*poses_between(start, end, share, self.proofs.tool))
@@ -108,7 +107,7 @@ class Smoother:
                 ]
                 for a, b, c in corners
             ]
-            valid = iter(self.proofs.hold([cut for choices in cuts for cut in choices]))
+            valid = iter(self.proofs.are_valid([cut for choices in cuts for cut in choices]))
             path: list[Pose] = [poses[0]]
             for corner, choices in zip(corners, cuts, strict=True):
                 possible = [cut for cut in choices if next(valid)]
@@ -124,6 +123,17 @@ class _Shortcut:
     poses: list[Pose]
     piece: tuple[Pose, Pose]
     gain: float
+
+
+def lengths_of_moves(design: Design, poses: Sequence[Pose]) -> FloatArray:
+    """Return the root-mean-square displacement of b1 to b4 over each move, shape (n,).
+
+    Args:
+        design: The manipulator.
+        poses: The n + 1 corners of the moves.
+    """
+    p, r = positions_and_rotations(poses)
+    return displacement(design, p[:-1], r[:-1], p[1:], r[1:])
 
 
 def _without_repeats(poses: list[Pose]) -> list[Pose]:

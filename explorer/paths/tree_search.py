@@ -79,7 +79,7 @@ class TreeSearch:
         # OMPL measures distances in all coordinates alike, hence r over the reach.
         self._units = np.array([proofs.design.reach, 1.0, 1.0, 1.0, 1.0, 1.0])
 
-    def path(self, first: FloatArray, last: FloatArray, seconds: float) -> FloatArray | None:
+    def find_path(self, first: FloatArray, last: FloatArray, seconds: float) -> FloatArray | None:
         """Return the corners of a path, or None if the time was too short.
 
         Args:
@@ -118,10 +118,13 @@ class TreeSearch:
         folds = [self._folds(state) for state in setup.getSolutionPath().getStates()]
         corners = [first[None]]
         for ends in itertools.pairwise(folds):
-            line = self._proofs.line(*ends)
-            # A line that was proven from its other end may need a step too many from this one.
+            line = self._proofs.prove_line(*ends)
             if line is None:
-                return None
+                # It was proven from its other end, and has too many steps from this one.
+                line = self._proofs.prove_line(*reversed(ends))
+                if line is None:
+                    return None
+                line = line[::-1]
             corners.append(line[1:])
         return np.concatenate(corners)
 
@@ -136,7 +139,7 @@ class TreeSearch:
 
     def _line_is_valid(self, start: Any, end: Any) -> bool:
         self.checked += 1
-        return self._proofs.line(self._folds(start), self._folds(end)) is not None
+        return self._proofs.prove_line(self._folds(start), self._folds(end)) is not None
 
 
 def _validator(base: Any, information: Any, is_valid: Callable[[Any, Any], bool]) -> Any:
@@ -150,7 +153,7 @@ def _validator(base: Any, information: Any, is_valid: Callable[[Any, Any], bool]
 
 
 def _box(design: Design, first: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return lows and highs of a box of fold coordinates that holds all poses of the mode."""
+    """Return lows and highs of a box of fold coordinates that holds the poses of the mode."""
     # A mode has one sign for each fold, and leg 4 and the box bound the distance of b4 from a1.
     farthest = design.reach + design.length_range("l4")[1]
     if design.limits.box is not None:

@@ -170,8 +170,8 @@ def _largest_difference(
 
 def _error_of_folds(given: FloatArray, found: FloatArray) -> float:
     """Return the largest error of the folds of poses by the folds of which they are made."""
-    # On the line b2b3 through a1, ε is 0 and φ1 + φ2 alone counts.
-    straight = given[:, EPSILON] == 0.0
+    # Where a1 is on the line b2b3, ε is 0 and φ1 + φ2 alone is determined.
+    straight, found = given[:, EPSILON] == 0.0, found.copy()
     found[straight, PHI1] += found[straight, PHI2]
     found[straight, PHI2] = 0.0
     apart = found - given

@@ -1,17 +1,18 @@
 """The freedoms that a singular pose leaves the platform while all actuators are locked.
 
 The mechanism folds along three lines (`explorer.mechanism.folds`). Where the fold along one is
-flat, a turn about that line changes no joint at first order, whatever the design:
+flat, and no leg has length zero, a turn about that line changes no joint at first order:
 
-- δ1 = 0: a turn about the line b2b3. Legs 2 to 4 end on it, and leg 1, which lies in the platform
-  plane with it, meets it.
+- δ1 = 0: a turn about the line b2b3. Legs 2 to 4 end on it, and leg 1 lies in the platform plane
+  with it.
 - δ2 = 0: a turn about the line a1b4. Legs 2 and 3 push within the plane of the lines a1a2 and b2b3,
   in which it lies; it meets leg 1 at a1 and leg 4 at b4.
 - δ3 = 0: a turn about the guide. Legs 1 to 3 meet it, and leg 4 lies in the base plane with it.
 
 These are pure turns: the pitch is zero. Where one incidence holds, the turn is the only freedom.
-Some deeper strata have more freedoms than these turns; all of them are turns about lines of one
-plane. A leg of length zero holds its end in every direction, so that there may be none.
+Where several hold there may be more freedoms than these turns, and combinations of two turns about
+skew lines are screws. A leg of length zero holds its end in every direction, so that there may be
+no freedom.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class FreeTurn:
     is_finite: bool
 
     @property
-    def line(self) -> str:
+    def line_name(self) -> str:
         """The name of the line."""
         return f"the {FOLD_LINES[self.incidence - 1]}"
 
@@ -69,7 +70,7 @@ class Freedoms:
     Attributes:
         count: Number of independent freedoms; 0 unless the pose is singular.
         turns: Independent turns among them, at most one for each incidence, in the order δ1, δ3,
-            δ2.
+            δ2, since the line a1b4 may be one of the others.
     """
 
     count: int
@@ -77,7 +78,15 @@ class Freedoms:
 
 
 def freedoms(design: Design, pose: Pose) -> Freedoms:
-    """Return the freedoms that a pose leaves the platform with all actuators locked."""
+    """Return the freedoms that a pose leaves the platform with all actuators locked.
+
+    Incidences hold to 1e-9 of the reach (`explorer.singularity.strata`), and rates that are below
+    1e-7, with lengths over the reach, count as zero.
+
+    Args:
+        design: The manipulator.
+        pose: The pose of the platform.
+    """
     p, r, reach = np.array(pose.position), pose.rotation, design.reach
     holding = incidences(tuple(stratum(p, r, reach).tolist()))
     if not holding:

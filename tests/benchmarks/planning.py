@@ -60,8 +60,8 @@ def lines_of_a_mode() -> Iterator[Row]:
     rules = free_rules(signs_of(MODE))
     proofs = Proofs(DESIGN, rules)
     ends = list(zip(*np.split(to_folds(p, r), 2), strict=True))
-    found = [proofs.line(*each) is not None for each in ends]
-    took = best_of(3, lambda: [proofs.line(*each) for each in ends]) / LINES
+    found = [proofs.prove_line(*each) is not None for each in ends]
+    took = best_of(3, lambda: [proofs.prove_line(*each) for each in ends]) / LINES
     straight = moves_are_valid(DESIGN, p[:LINES], r[:LINES], p[LINES:], r[LINES:], rules=rules)
     yield Row(
         f"lines in the folds between {LINES:,} pairs of one mode, no limit but the margins",
@@ -90,7 +90,7 @@ def lines_within_limits() -> Iterator[Row]:
         ends = p[same], r[same], p[same + half], r[same + half]
         straight += int(moves_are_valid(DESIGN, *ends, rules=proofs.rules).sum())
         lines = zip(to_folds(*ends[:2]), to_folds(*ends[2:]), strict=True)
-        found += sum(proofs.line(*line) is not None for line in lines)
+        found += sum(proofs.prove_line(*line) is not None for line in lines)
     yield Row(
         f"such lines between {PAIRS:,} pairs within all limits of the optimum",
         f"{100.0 * found / PAIRS:.1f} % need no search",

@@ -160,6 +160,14 @@ def test_lengths_follow_from_the_folds() -> None:
         assert_allclose(expected[index] ** 2, r**2 + b**2 + 2 * r * b * np.cos(epsilon), rtol=1e-12)
 
 
+def test_folds_are_zero_on_the_sides_that_are_named() -> None:
+    """φ3 towards the base's y, φ1 with a1 on the side of the platform's y, φ2 with β + ε."""
+    position, rotation = from_folds([5.0, 1.0, 1.2, 0.0, 0.0, 0.0])
+    assert position[1] > 0.0 == position[2]
+    assert rotation[:, 1] @ -position > 0.0
+    assert_allclose(rotation[0, 0], math.cos(1.0 + 1.2), rtol=1e-15)
+
+
 def test_unusable_folds_are_refused() -> None:
     assert "shape" in refusal(from_folds, [1.0, 2.0])
     assert "finite" in refusal(from_folds, [1.0, 1.0, 1.0, math.nan, 1.0, 1.0])

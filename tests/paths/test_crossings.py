@@ -117,6 +117,17 @@ def test_path_margins_touch_of_zero_changes_no_sign() -> None:
     assert [c.share for c in found.crossings if c.incidence == 1] == pytest.approx([0.5])
 
 
+@pytest.mark.parametrize("angle", [0.3, 0.7, 1.0, 1.2, 1.5])
+def test_path_margins_margin_that_touches_zero_changes_no_sign(angle: float) -> None:
+    # A tool at 1 above b4 and the base plane turns about x, so that δ3 = 1 − cos θ.
+    tool, place = np.array([0.0, 0.0, 1.0]), np.array([5.0, 5.0, 1.0])
+    turns = Rotation.from_rotvec([[-angle, 0.0, 0.0], [angle, 0.0, 0.0]]).as_matrix()
+    found = path_margins([Pose.of(place - turn @ tool, turn) for turn in turns], tool=tool)
+    (touch,) = [each for each in found.crossings if each.incidence == 3]
+    assert touch.share == pytest.approx(0.5, abs=1e-7)
+    assert not touch.changes_sign
+
+
 @pytest.mark.parametrize("gap", [1e-2, 1e-5])
 def test_path_margins_two_close_crossings_are_both_present(gap: float) -> None:
     # The platform turns about y by θ at b4 = (x, y, z): δ1 = −(x sin θ + z cos θ), which has

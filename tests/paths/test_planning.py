@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import sys
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -34,7 +34,7 @@ from explorer import (
 from explorer.paths.crossings import path_margins
 from explorer.paths.planning import EndError, NoPathError, PlannedPath, plan_path
 from explorer.paths.proofs import Proofs, positions_and_rotations
-from explorer.paths.smoothing import Smoother
+from explorer.paths.smoothing import Smoother, lengths_of_moves
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 DESIGN = limited(PRESETS["paper-optimal"], leg_radii=(0.2,) * 4)
@@ -65,7 +65,7 @@ def pairs(moves: int) -> tuple[tuple[Pose, Pose], ...]:
     for a, b in itertools.pairwise(valid_poses()):
         if order(a) == order(b) and len(found) < 12:
             folds = to_folds(*positions_and_rotations((a, b)))
-            corners = PROOFS.line(*folds)
+            corners = PROOFS.prove_line(*folds)
             if moves == (0 if corners is None else len(corners) - 1):
                 found.append((a, b))
     return tuple(found)
@@ -104,7 +104,7 @@ def test_plan_path_between_valid_ends_keeps_everything_and_is_shorter_when_smoot
     if tool is None:
         assert len(path.unsmoothed) > 2
         assert path.checked > 2
-        lengths = Smoother(PROOFS).lengths
+        lengths = partial(lengths_of_moves, DESIGN)
         assert path.length == pytest.approx(float(lengths(path.poses).sum()))
         assert path.length <= float(lengths(path.unsmoothed).sum()) + 1e-9
     for poses in (path.poses, path.unsmoothed):
@@ -117,7 +117,7 @@ def test_smooth_detour_in_free_space_becomes_straight() -> None:
     x, y, z = HOME.position
     corner = Pose((x, y + 2.0, z), HOME.quaternion)
     end = Pose((x + 2.0, y + 2.0, z), HOME.quaternion)
-    assert PROOFS.hold([(HOME, end)]) == [True]
+    assert PROOFS.are_valid([(HOME, end)]) == [True]
     assert Smoother(PROOFS).smooth([HOME, corner, end]) == (HOME, end)
 
 
@@ -139,7 +139,7 @@ def test_line_in_the_folds_joins_nearly_all_pairs_within_the_limits_of_the_optim
     proofs = Proofs(design, Rules.of(design))
     poses = valid_poses(design)
     lines = [
-        proofs.line(*to_folds(*positions_and_rotations(ends))) is not None
+        proofs.prove_line(*to_folds(*positions_and_rotations(ends))) is not None
         for ends in itertools.pairwise(poses)
         if order(ends[0]) == order(ends[1])
     ]
@@ -180,9 +180,9 @@ def test_plan_path_other_mode_names_the_folds_and_their_incidences(mode: int) ->
     assert caught.value.reason == "other mode"
     assert isinstance(caught.value, NoAnswerError)
     flat = [
-        "fold φ1 at the line b2b3 is flat (a1 on the platform plane)",
-        "fold φ2 at the line a1b4 is flat (lines a1a2 and b2b3 meeting)",
-        "fold φ3 at the guide is flat (b4 on the base plane)",
+        "fold φ1 at the line b2b3 is flat or undefined (a1 on the platform plane)",
+        "fold φ2 at the line a1b4 is flat or undefined (lines a1a2 and b2b3 meeting)",
+        "fold φ3 at the guide is flat or undefined (b4 on the base plane)",
     ]
     differ = [words for words, bit in zip(flat, (4, 2, 1), strict=True) if (1 ^ mode) & bit]
     poses = " and one where ".join(differ)

@@ -51,7 +51,7 @@ def test_line_between_any_two_poses_of_a_mode_is_proven_where_a_quarter_of_moves
     assert 0.7 < straight.mean() < 0.8
     for first, last, is_straight in zip(folds[:count], folds[count:], straight, strict=True):
         least = min(float(np.abs(margins(*from_folds(end))).min()) for end in (first, last))
-        corners = proofs(0.5 * least, min(1e-4 * FREE.reach, 0.1 * least)).line(first, last)
+        corners = proofs(0.5 * least, min(1e-4 * FREE.reach, 0.1 * least)).prove_line(first, last)
         assert corners is not None
         assert len(corners) > 2 or is_straight
         poses = [Pose.of(*from_folds(corner)) for corner in corners]
@@ -69,7 +69,7 @@ def test_line_along_a_wall_of_a_mode_is_proven(wall: int, flat: float) -> None:
     first[wall] = last[wall] = flat
     first, last = signs * first, signs * last
     least = min(float(np.abs(margins(*from_folds(end))).min()) for end in (first, last))
-    corners = proofs(0.0, 0.1 * least).line(first, last)
+    corners = proofs(0.0, 0.1 * least).prove_line(first, last)
     assert corners is not None
     assert_array_equal(corners[0], first)
     assert_array_equal(corners[-1], last)

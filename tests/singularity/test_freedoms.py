@@ -67,7 +67,7 @@ def test_one_incidence_leaves_one_turn_about_its_own_line_through_its_points(
         found = freedoms(DESIGN, pose)
         (turn,) = found.turns
         assert found.count == 1
-        assert turn.line.endswith(line)
+        assert turn.line_name.endswith(line)
         assert not turn.is_finite
         on_line = {
             "b2b3": np.array(pose.position) + DESIGN.b3 * pose.rotation[:, 0],

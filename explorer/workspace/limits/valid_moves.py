@@ -39,7 +39,7 @@ from explorer.workspace.limits.valid_poses import Rules, is_valid, write_ends
 DEFAULT_TOLERANCE = 1e-4
 # The largest turn of a move, in radians: of half a turn neither way is the shorter one.
 LARGEST_TURN = math.pi - 1e-9
-# A move that needs more steps than this follows a limit all the way.
+# A move that needs more steps than this is refused; most such moves follow a limit all the way.
 MOST_STEPS = 20_000
 
 Scratch = tuple[

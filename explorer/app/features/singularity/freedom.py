@@ -102,7 +102,7 @@ class FreeMotion(ScenePart):
         yield from self._ghost.draw(placed, shown.turn.move(shown.frame.state.pose, shown.angle))
         low, high = _ends_of_axis(placed, shown.turn)
         yield self._axis, "points", np.stack([low, high])[None].astype(np.float32)
-        yield self._label, "text", f"turns about {shown.turn.line}"
+        yield self._label, "text", f"turns about {shown.turn.line_name}"
         yield self._label, "position", tuple(high.tolist())
 
     def _motion(self, incidence: int) -> _Shown | None:
@@ -173,12 +173,12 @@ def _turn_words(frame: Frame, turn: FreeTurn) -> str:
         turn.incidence,
         "Show the motion",
         hint=SHOW_HINT,
-        label=f"Show the motion: turn about {turn.line}",
+        label=f"Show the motion: turn about {turn.line_name}",
         class_name="ex-link",
     )
     at_all = "; no joint changes at any angle" if turn.is_finite else ""
     return (
-        f'<div class="ex-line"><span>it turns about {turn.line}, pitch 0</span>'
+        f'<div class="ex-line"><span>it turns about {turn.line_name}, pitch 0</span>'
         f'{button}</div><div class="ex-dim ex-small" title="{hint}">'
         f"through {through}, along ({along}){at_all}</div>"
     )
