@@ -116,17 +116,20 @@ def pose_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
 def fold_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
     """Return the parser of an option with the folds of a pose, angles in degrees.
 
-    beta and epsilon must lie within 0° to 180°, phi1, phi2 and phi3 within ±180°.
+    r must not be negative, beta and epsilon must lie within 0° to 180°, phi1, phi2 and phi3 within
+    ±180°.
     """
     order = "r beta epsilon phi1 phi2 phi3"
 
     def read(words: list[str]) -> Numbers:
         values = numbers(option, order).instance_from_str(words)
+        if values[0] < 0.0:
+            raise UsageError(f"{option}: r is a distance, 0 or more; got {values[0]!r}")
         lows = 0.0, 0.0, -180.0, -180.0, -180.0
         for name, value, low in zip(order.split()[1:], values[1:], lows, strict=True):
             if not low <= value <= 180.0:
                 raise UsageError(
-                    f"{option}: {name} must lie within {low:g}° to 180°; got {value:g}°"
+                    f"{option}: {name} must lie within {low:g}° to 180°; got {value!r}°"
                 )
         return values
 

@@ -149,6 +149,14 @@ def write_poses(coordinates: FloatArray, positions: FloatArray, rotations: Float
         write_pose(coordinates[row], positions[row], rotations[row])
 
 
+@helper
+def length_of(a: float, b: float) -> float:
+    """Return √(a² + b²), also where a square is too large or too small for a number."""
+    square = a * a + b * b
+    # The function that scales takes ten times as long.
+    return math.sqrt(square) if 1e-280 < square < 1e300 else math.hypot(a, b)
+
+
 @kernel("void(f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1])")
 def write_angles(
     positions: FloatArray,
@@ -169,8 +177,8 @@ def write_angles(
     for row in range(positions.shape[0]):
         # A negative zero would turn a fold of π into −π.
         px, py, pz = positions[row, 0], positions[row, 1], positions[row, 2] + 0.0
-        h = math.sqrt(py * py + pz * pz)
-        r = math.sqrt(px * px + h * h)
+        h = length_of(py, pz)
+        r = length_of(px, h)
         c3, s3 = (py / h, pz / h) if h > 0.0 else (1.0, 0.0)
         cb, sb = (px / r, h / r) if r > 0.0 else (1.0, 0.0)
         # The platform's axes, turned back by X(φ3) Z(β): parts along a1b4, across it in the leaf
@@ -182,7 +190,7 @@ def write_angles(
         vy, vz = c3 * vy + s3 * vz, c3 * vz - s3 * vy
         ny, nz = c3 * ny + s3 * nz, c3 * nz - s3 * ny
         along, across = cb * ux + sb * uy, cb * uy - sb * ux
-        se = math.sqrt(across * across + uz * uz)
+        se = length_of(across, uz)
         c2, s2 = (across / se, (0.0 - uz) / se) if se > 0.0 else (1.0, 0.0)
         coordinates[row, 0] = r
         sines[row, 0], cosines[row, 0] = sb, cb

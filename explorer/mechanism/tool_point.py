@@ -7,9 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
 
 Point = Literal["b4", "tool"]
 """The point whose position is meant."""
@@ -56,6 +57,20 @@ def offset_of(design: Design, rotation: FloatArray, at: Point) -> FloatArray:
         at: The point.
     """
     return tool_offset(rotation, point_of(design, at))
+
+
+def one_tool(tool: ArrayLike | None) -> FloatArray:
+    """Return one tool point in the platform frame (3,) after checking it; that of b4 if None.
+
+    Raises:
+        InputError: The point is not finite, or there are several.
+    """
+    if tool is None:
+        return np.zeros(3)
+    t = finite_array("tool", tool, (3,))
+    if t.ndim != 1:
+        raise InputError(f"give one tool point, three numbers; got the shape {t.shape}")
+    return for_kernel(t)
 
 
 def tool_offset(rotation: FloatArray, tool: ArrayLike | None) -> FloatArray:

@@ -18,14 +18,20 @@ import math
 
 from explorer.mechanism.folds import write_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.numerics.compiled import kernel
+from explorer.numerics.compiled import helper, kernel
 
 # Relative rounding of one operation.
 EPSILON = 2.0**-52
-# Number of roundings, magnified by the design, within which a discriminant counts as zero.
-ROUNDINGS = 32.0
+# Number of error bounds below zero within which a discriminant counts as zero.
+ROUNDINGS = 8.0
 # Share of the largest length that is as good as zero, and whose square does not underflow.
 NEGLIGIBLE = 1e-150
+
+
+@helper
+def sine_of(cosine: float) -> float:
+    """Return the sine, 0 or more, of a cosine within ±1."""
+    return math.sqrt((1.0 - cosine) * (1.0 + cosine))
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[:,:,::1], f8[:,:,:,::1], b1[::1], f8[:,::1])")
@@ -63,27 +69,57 @@ def solve_rows(
         l1, d1, d2 = joints[row, 0] * shrink, joints[row, 1] * shrink, joints[row, 2] * shrink
         d3, d4, l4 = joints[row, 3] * shrink, joints[row, 4] * shrink, joints[row, 5] * shrink
 
-        # h and g are the distances of b4 from the guide and of a1 from the line b2b3.
+        # h and g are the distances of b4 from the guide and of a1 from the line b2b3. First-order
+        # bounds of rounding errors have a leading e.
         span = b3 - b2
+        ends = abs(b3) + abs(b2)
         c = (d3 - d1) / span
+        ec = EPSILON * (abs(d3) + abs(d1) + abs(c) * ends) / abs(span)
         sine_square = (1.0 - c) * (1.0 + c)
+        e_sine = 2.0 * abs(c) * ec + EPSILON * abs(sine_square)
         px = d1 - b2 * c
+        epx = abs(b2) * ec + EPSILON * (abs(d1) + abs(b2 * c))
         t = -b2 / span
-        h_square = (1.0 - t) * d2 * d2 + t * d4 * d4 - t * (1.0 - t) * span * span * sine_square
+        pull = t * (1.0 - t) * span * span
+        h_square = (1.0 - t) * d2 * d2 + t * d4 * d4 - pull * sine_square
+        eh = abs(pull) * e_sine + EPSILON * (
+            abs(1.0 - t) * d2 * d2 + abs(t) * d4 * d4 + abs(pull * sine_square)
+        ) * (1.0 + ends / abs(span))
         lean = (d4 * d4 - d2 * d2 - (b3 + b2) * span * sine_square) / (2.0 * span)
+        e_lean = 0.5 * abs(b3 + b2) * e_sine + EPSILON * (
+            (d4 * d4 + d2 * d2) / (2.0 * abs(span)) + abs(lean) * (1.0 + ends / abs(span))
+        )
         along = c * px + lean
+        e_along = abs(px) * ec + abs(c) * epx + e_lean
         r_square = px * px + h_square
+        er = 2.0 * abs(px) * epx + eh + EPSILON * px * px
         g_square = r_square - along * along
-        py = ((px - a3x) * (px - a3x) + h_square + a3y * a3y - l4 * l4) / (2.0 * a3y)
-        across = (l1 * l1 - r_square - b1x * b1x - b1y * b1y - 2.0 * b1x * along) / (2.0 * b1y)
+        side = px - a3x
+        py = (side * side + h_square + a3y * a3y - l4 * l4) / (2.0 * a3y)
+        epy = (
+            2.0 * abs(side) * epx
+            + eh
+            + EPSILON * (side * side + abs(h_square) + a3y * a3y + l4 * l4)
+        ) / (2.0 * abs(a3y))
+        b1_square = b1x * b1x + b1y * b1y
+        across = (l1 * l1 - r_square - b1_square - 2.0 * b1x * along) / (2.0 * b1y)
+        e_across = (
+            er + 2.0 * abs(b1x) * e_along + EPSILON * (l1 * l1 + abs(r_square) + b1_square)
+        ) / (2.0 * abs(b1y))
 
         square1 = g_square - across * across
+        e1 = er + (2.0 * abs(along) + e_along) * e_along + (2.0 * abs(across) + e_across) * e_across
         square2 = sine_square * h_square - lean * lean
+        e2 = abs(sine_square) * eh + abs(h_square) * e_sine + (2.0 * abs(lean) + e_lean) * e_lean
         if sine_square < 0.0 or h_square < 0.0:
+            # Their product may be positive.
             square2 = min(square2, sine_square, h_square)
+            e2 += e_sine + eh
         square3 = h_square - py * py
-        zero = ROUNDINGS * EPSILON / (abs(span) * min(abs(a3y), abs(b1y)))
-        feasible[row] = min(square1, square2, square3) >= -zero
+        e3 = eh + (2.0 * abs(py) + epy) * epy
+        feasible[row] = (
+            square1 >= -ROUNDINGS * e1 and square2 >= -ROUNDINGS * e2 and square3 >= -ROUNDINGS * e3
+        )
         discriminants[row, 0] = square1 * scale * scale
         discriminants[row, 1] = square2 * scale * scale
         discriminants[row, 2] = square3 * scale * scale
@@ -94,20 +130,17 @@ def solve_rows(
         r = math.sqrt(px * px + h * h)
         cos_b, sin_b = (px / r, h / r) if r > NEGLIGIBLE else (1.0, 0.0)
         cos_e = min(1.0, max(-1.0, along / r)) if r > NEGLIGIBLE else c
-        sin_e = math.sqrt((1.0 - cos_e) * (1.0 + cos_e))
+        sin_e = sine_of(cos_e)
         cos2 = (cos_b * cos_e - c) / (sin_b * sin_e) if sin_b * sin_e > 0.0 else 1.0
         if abs(cos2) >= 1.0:
             # The lines are in one plane, so that ε follows from β and the angle between them.
             cos2 = math.copysign(1.0, cos2)
-            sine = math.sqrt((1.0 - c) * (1.0 + c))
-            sine = math.copysign(sine, sin_b * cos_e + cos2 * cos_b * sin_e)
+            sine = math.copysign(sine_of(c), sin_b * cos_e + cos2 * cos_b * sin_e)
             cos_e = cos_b * c + sin_b * sine
             sin_e = cos2 * (cos_b * sine - sin_b * c)
         cos1 = min(1.0, max(-1.0, -across / (r * sin_e))) if r * sin_e > 0.0 else 1.0
         cos3 = min(1.0, max(-1.0, py / h)) if h > 0.0 else 1.0
-        sin1 = math.sqrt((1.0 - cos1) * (1.0 + cos1))
-        sin2 = math.sqrt((1.0 - cos2) * (1.0 + cos2))
-        sin3 = math.sqrt((1.0 - cos3) * (1.0 + cos3))
+        sin1, sin2, sin3 = sine_of(cos1), sine_of(cos2), sine_of(cos3)
         angles = (cos_b, sin_b), (cos_e, sin_e)
         for mode in range(8):
             folds = (

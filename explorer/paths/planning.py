@@ -28,6 +28,7 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.folds import FOLD_LINES, from_folds, to_folds, write_poses
 from explorer.mechanism.margins import INCIDENCES, margins, mode_name
 from explorer.mechanism.pose import Pose, Triple
+from explorer.mechanism.tool_point import one_tool
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.loads import TOLERANCE, DemandedLoad
 from explorer.paths.move_shares import share_rows_of_moves
@@ -141,12 +142,16 @@ def plan_path(
 
     Raises:
         EndError: the start or the goal is singular, outside the limits or does not hold the load.
-        InputError: `seconds` is not a positive number, or the load is not six finite numbers.
+        InputError: `seconds` is not a positive number, or the tool or the load is not three or six
+            finite numbers.
         NoPathError: there is no path, or the search ended without one.
         MissingExtraError: the straight line in the folds is not valid, and OMPL is not installed.
     """
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InputError(f"planning needs a time above zero, in seconds; got {seconds:g}")
+    if tool is not None:
+        x, y, z = one_tool(tool).tolist()
+        tool = (x, y, z)
     demanded_load = None if load is None else DemandedLoad.of(design, load, weights, tool)
     ends = evaluate(design, start), evaluate(design, goal)
     named_ends = {"start": ends[0], "goal": ends[1]}

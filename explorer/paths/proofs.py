@@ -22,7 +22,7 @@ from explorer.numerics.compiled import kernel
 from explorer.paths.loads import DemandedLoad
 from explorer.workspace.limits.valid_moves import (
     DEFAULT_TOLERANCE,
-    is_move_valid,
+    count_steps,
     make_scratch,
     moves_are_valid,
 )
@@ -30,6 +30,8 @@ from explorer.workspace.limits.valid_poses import Rules
 
 # The shortest move is this share of a line; a line has at most so many moves.
 SHORTEST, MOST_MOVES = 2.0**-12, 256
+# Steps along all moves that are tried on a line; a step takes half a microsecond.
+MOST_STEPS = 50_000
 # Number of poses whose check takes as long as that of a line, by which a kernel is loaded at once.
 ROWS_OF_LINE = 400
 
@@ -125,14 +127,16 @@ def divide_line(
     p, r, q, s = np.zeros(3), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
     corner = np.zeros(6)
     count[0] = 0
-    low, size, pieces = 0.0, 1.0, 0
+    low, size, pieces, left = 0.0, 1.0, 0, MOST_STEPS
     write_pose(first, p, r)
     while low < 1.0:
         high = low + size
         for i in range(6):
             corner[i] = (1.0 - high) * first[i] + high * last[i]
         write_pose(corner, q, s)
-        if is_move_valid(row, cones, p, r, q, s, tool, tolerance, scratch):
+        steps = count_steps(row, cones, p, r, q, s, tool, tolerance, left, scratch)
+        left -= abs(steps)
+        if steps > 0:
             if pieces == shares.shape[0]:
                 return
             shares[pieces] = high
@@ -144,6 +148,6 @@ def divide_line(
                 size *= 2.0
         else:
             size *= 0.5
-            if size < SHORTEST:
+            if size < SHORTEST or left <= 0:
                 return
     count[0] = pieces

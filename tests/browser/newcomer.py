@@ -27,7 +27,8 @@ FILLED = """() => [...document.querySelectorAll("button:enabled")].filter((butto
 SCROLL = """it => {
     it.scrollIntoView({ block: "nearest" });
     const { top, bottom } = it.getBoundingClientRect();
-    return it.isConnected && top >= 0 && bottom <= innerHeight;
+    // A part of a pixel may stay outside, since scrolling goes by whole ones.
+    return it.isConnected && top > -1 && bottom < innerHeight + 1;
 }"""
 PLOTS = """() => {
     const plots = [...document.querySelectorAll(".js-plotly-plot")];

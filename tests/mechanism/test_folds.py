@@ -12,11 +12,20 @@ from reference import read_reference
 from refusals import refusal
 from strategies import QUARTER_TURNS
 
-from explorer import PRESETS, from_folds, inverse, margins, rotation_from_quaternion, to_folds
+from explorer import (
+    PRESETS,
+    forward,
+    from_folds,
+    inverse,
+    margins,
+    rotation_from_quaternion,
+    to_folds,
+)
 from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
 
 CASES: list[dict[str, Any]] = read_reference("folds")["cases"]
+LENGTHS = [0, 2, 4, 5]
 TWO_PI = 2.0 * math.pi
 LONG = pytest.mark.long
 
@@ -160,12 +169,53 @@ def test_lengths_follow_from_the_folds() -> None:
         assert_allclose(expected[index] ** 2, r**2 + b**2 + 2 * r * b * np.cos(epsilon), rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "position",
+    [(1e155, -1e155, 1e155), (1.0, 1e-160, -1e-160), (1e-170, 2e-170, -3e-170), (1e-200, 0.0, 0.0)],
+)
+def test_positions_whose_squares_are_no_numbers_come_back(position: tuple[float, ...]) -> None:
+    _, rotation = random_poses(1, 5)
+    again = from_folds(to_folds(position, rotation[0]))
+    assert_allclose(again[0], position, rtol=1e-14, atol=1e-15 * max(map(abs, position)))
+    assert_allclose(again[1], rotation[0], rtol=0, atol=1e-14)
+
+
 def test_folds_are_zero_on_the_sides_that_are_named() -> None:
     """φ3 towards the base's y, φ1 with a1 on the side of the platform's y, φ2 with β + ε."""
     position, rotation = from_folds([5.0, 1.0, 1.2, 0.0, 0.0, 0.0])
     assert position[1] > 0.0 == position[2]
     assert rotation[:, 1] @ -position > 0.0
     assert_allclose(rotation[0, 0], math.cos(1.0 + 1.2), rtol=1e-15)
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+def test_joints_near_walls_that_are_told_to_close_are_those_of_the_poses(name: str) -> None:
+    """Also where d2 and d4 are short, and a difference of their squares is small as well."""
+    design, rng = PRESETS[name], np.random.default_rng(6)
+    count = 50_000
+    folds = np.abs(random_folds(count, 7))
+    near = np.where(rng.random((count, 5)) < 0.5, 10.0 ** rng.uniform(-9, -1, (count, 5)), 1.0)
+    folds[:, 1:] *= near
+    folds[:, 1:] = np.where(rng.random((count, 5)) < 0.5, math.pi - folds[:, 1:], folds[:, 1:])
+    joints = inverse(design, *from_folds(folds))
+    off = joints + 10.0 ** rng.uniform(-14, -4, (count, 1)) * rng.normal(size=(count, 6))
+    # Lengths stay positive, carriages where they are.
+    off[:, LENGTHS] = np.abs(off[:, LENGTHS])
+    found = forward(design, off)
+    closing = found.feasible
+    assert 0.3 < closing.mean() < 0.9
+    again = inverse(design, found.position[closing], found.rotation[closing])
+    # Near several walls the square root of a rounding error is lost.
+    assert_allclose(again, np.broadcast_to(off[closing, None], again.shape), atol=1e-5)
+    l1, l4 = 5.823194897943329, 20.377205114955085
+    d1, d3, d2, d4 = (
+        2.6546564093549114,
+        4.957346548482986,
+        4.0106217088879415e-4,
+        7.990750078334867e-4,
+    )
+    short = forward(PRESETS["paper-optimal"], [l1, d1, d2, d3, d4, l4])
+    assert not short.feasible
 
 
 def test_unusable_folds_are_refused() -> None:

@@ -246,6 +246,16 @@ def test_plan_path_mode_other_than_the_home_has_a_path() -> None:
     assert plan_path(free, start, goal).poses == (start, goal)
 
 
+@pytest.mark.parametrize("tool", [(math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0), (1.0, 2.0)])
+def test_plan_path_tool_that_is_no_point_is_refused(tool: tuple[float, float, float]) -> None:
+    with pytest.raises(InputError, match="tool must"):
+        plan_path(DESIGN, HOME, HOME, tool=tool)
+
+
+def test_plan_path_tool_of_whole_numbers_is_that_of_floats() -> None:
+    assert plan_path(DESIGN, HOME, HOME, tool=(1, 2, 3)).tool == (1.0, 2.0, 3.0)
+
+
 @pytest.mark.parametrize("seconds", [0.0, math.nan, math.inf])
 def test_plan_path_time_not_positive_is_refused(seconds: float) -> None:
     with pytest.raises(InputError, match="time above zero"):

@@ -201,7 +201,7 @@ def write_line(
 
 @helper
 def make_scratch() -> Scratch:
-    """Return arrays that `is_move_valid` writes into.
+    """Return arrays that `count_steps` writes into.
 
     They are the legs' base ends and platform ends, a position, a rotation, the step and the axis
     of the move, the start of the tool, and the speeds.
@@ -219,7 +219,7 @@ def make_scratch() -> Scratch:
 
 
 @helper
-def is_move_valid(
+def count_steps(
     row: FloatArray,
     cones: FloatArray,
     start: FloatArray,
@@ -228,24 +228,27 @@ def is_move_valid(
     end_rotation: FloatArray,
     tool: FloatArray,
     tolerance: float,
+    most: int,
     scratch: Scratch,
-) -> bool:
-    """Return whether a move satisfies all rules, limits to a tolerance in design units.
+) -> int:
+    """Return the number of steps that prove a move valid, or 0 or less if they do not.
 
-    Start and end are positions of b4; the tool, in platform coordinates, moves straight.
+    A move is valid if it satisfies all rules, limits to a tolerance in design units. Start and end
+    are positions of b4; the tool, in platform coordinates, moves straight. The magnitude is that of
+    the steps made, `most` at most.
     """
     base, ends, p, r, step, axis, first, speeds = scratch
     if not is_valid(row, cones, end, end_rotation, base, ends):
-        return False
+        return 0
     if not is_valid(row, cones, start, start_rotation, base, ends):
-        return False
+        return 0
     write_line(start, start_rotation, end, end_rotation, tool, first, step)
     angle = write_turn(start_rotation, end_rotation, axis)
     if angle > LARGEST_TURN:
-        return False
+        return 0
     write_speeds(row, first, start_rotation, step, axis, angle, tool, speeds)
     t, reach = 0.0, math.hypot(row[0], row[1])
-    for _ in range(MOST_STEPS):
+    for step_number in range(1, most + 1):
         write_pose_at(t, first, start_rotation, step, axis, angle, p, r)
         move_by_arm(-1.0, r, tool, p)
         write_ends(row, p, r, base, ends)
@@ -256,11 +259,11 @@ def is_move_valid(
             least = LEAST_SHARE * tolerance
             share = min(share, safe_share_of_clearances(row, base, ends, speeds, least))
         if share <= 0.0:
-            return False
+            return -step_number
         t += share
         if t >= 1.0:
-            return True
-    return False
+            return step_number
+    return -most
 
 
 @kernel(
@@ -277,8 +280,9 @@ def valid_move_rows(
     tolerance: float,
     valid: BoolArray,
 ) -> None:
-    """Write whether n moves satisfy all rules, see `is_move_valid`."""
+    """Write whether n moves are valid, see `count_steps`."""
     scratch = make_scratch()
     for index in range(start.shape[0]):
         first, last = (start[index], start_rotation[index]), (end[index], end_rotation[index])
-        valid[index] = is_move_valid(row, cones, *first, *last, tool, tolerance, scratch)
+        steps = count_steps(row, cones, *first, *last, tool, tolerance, MOST_STEPS, scratch)
+        valid[index] = steps > 0

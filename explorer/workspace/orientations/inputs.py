@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
-from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
+from explorer.numerics.arrays import FloatArray, finite_array
 
 # Largest number of azimuths or torsions.
 MOST_ANGLES = 100_000
@@ -22,20 +22,6 @@ def one_position(position: ArrayLike) -> FloatArray:
     if p.ndim != 1:
         raise InputError(f"give one position, three numbers; got the shape {p.shape}")
     return p
-
-
-def one_tool(tool: ArrayLike | None) -> FloatArray:
-    """Return one tool point in the platform frame (3,) after checking it; that of b4 if None.
-
-    Raises:
-        InputError: The point is not finite, or there are several.
-    """
-    if tool is None:
-        return np.zeros(3)
-    t = finite_array("tool", tool, (3,))
-    if t.ndim != 1:
-        raise InputError(f"give one tool point, three numbers; got the shape {t.shape}")
-    return for_kernel(t)
 
 
 def one_angle(name: str, angle: ArrayLike) -> float:

@@ -20,11 +20,11 @@ from scipy.spatial.transform import Rotation
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
-from explorer.mechanism.tool_point import tool_offset
+from explorer.mechanism.tool_point import one_tool, tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import kernel
 from explorer.workspace.limits.valid_poses import Rules, is_valid, valid_rows
-from explorer.workspace.orientations.inputs import one_position, one_tool, whole_number
+from explorer.workspace.orientations.inputs import one_position, whole_number
 from explorer.workspace.orientations.sets import MOST_ORIENTATIONS
 
 CAPABILITY_ORIENTATIONS = 100_000

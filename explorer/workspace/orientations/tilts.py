@@ -18,6 +18,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
+from explorer.mechanism.tool_point import one_tool
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
 from explorer.workspace.limits.valid_poses import Rules
 from explorer.workspace.orientations.inputs import (
@@ -25,7 +26,6 @@ from explorer.workspace.orientations.inputs import (
     even_angles,
     one_angle,
     one_position,
-    one_tool,
 )
 from explorer.workspace.orientations.least_tilts import least_tilt_rows
 from explorer.workspace.orientations.turns import NO_LIMIT, limit_names, tilt_rows

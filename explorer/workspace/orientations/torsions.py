@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
+from explorer.mechanism.tool_point import one_tool
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.valid_poses import Rules
-from explorer.workspace.orientations.inputs import even_angles, one_angle, one_position, one_tool
+from explorer.workspace.orientations.inputs import even_angles, one_angle, one_position
 from explorer.workspace.orientations.tilts import (
     AZIMUTHS_OF_ONE,
     GreatestTilt,
