@@ -54,7 +54,7 @@ BARE = View(
 @pytest.fixture
 def wide(tab: Tab) -> Tab:
     """The tab, in a window of the usual size."""
-    tab.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
+    tab.resize(SIZE)
     tab.settle()
     return tab
 

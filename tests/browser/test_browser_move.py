@@ -251,7 +251,7 @@ def test_fold_is_dragged_to_its_walls_on_a_track_coloured_by_its_margin(tab: Tab
 
 def test_arrow_of_the_gizmo_moves_the_platform_along_it(tab: Tab) -> None:
     # Large enough for the hand to be as exact as asked for below.
-    tab.page.set_viewport_size({"width": 1280, "height": 720})
+    tab.resize((1280, 720))
     tab.look_from("isometric")
     before = tab.state
     placed = Placed(Frame(before))

@@ -63,7 +63,7 @@ def test_margin_that_is_pointed_at_fills_its_tetrahedron(tab: Tab) -> None:
 
 
 def test_gizmo_that_gives_way_to_a_gap_is_dragged_on(tab: Tab) -> None:
-    tab.page.set_viewport_size({"width": 1280, "height": 720})
+    tab.resize((1280, 720))
     session, gizmo = tab.running.page.session, tab.running.page.services.get(DragHandle)
     # So high that the gap comes within the gizmo on the way down.
     session.do(SetPosition(2, 5.0))

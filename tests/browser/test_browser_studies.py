@@ -67,7 +67,7 @@ def folder(data_tab: Tab) -> Path:
 
 
 def open_studies(tab: Tab) -> None:
-    tab.page.set_viewport_size({"width": WINDOW["width"], "height": WINDOW["height"]})
+    tab.resize((WINDOW["width"], WINDOW["height"]))
     tab.turn_to("Studies")
     tab.settle()
 

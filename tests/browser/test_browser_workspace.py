@@ -48,7 +48,7 @@ TYPE_SIZES = """map => {
 @pytest.fixture
 def tab(tab: Tab) -> Tab:
     """A tab in a window of a small laptop."""
-    tab.page.set_viewport_size({"width": 1280, "height": 720})
+    tab.resize((1280, 720))
     tab.settle()
     return tab
 

@@ -371,7 +371,9 @@ class Tab:
             return self.page.locator(SCENE_CANVAS).screenshot(style=WITHOUT_TOOLTIP)
 
     def on_screen(self, point: FloatArray) -> tuple[float, float]:
-        """Return where a point of the scene (3,) is in the page."""
+        """Return where a point of the scene (3,) is in the page, once a pointer finds it there."""
+        # What a pointer meets is where the last frame had it, also on a page on hold.
+        self.page.evaluate(AWAIT_FRAMES, 2)
         camera = self.client.camera
         eye, target = np.array(camera.position), np.array(camera.look_at)
         forward = (target - eye) / np.linalg.norm(target - eye)
