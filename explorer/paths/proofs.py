@@ -4,7 +4,7 @@ A straight line in fold coordinates between two poses of one mode meets no singu
 it no |δi| is below the smaller of its two ends (see `explorer.mechanism.folds`). It is cut into
 straight moves, which come the closer to it the shorter they are, until each is proven valid. There
 is an end of that where another limit is exceeded, and for lines that run along a wall of the mode
-so closely, at some 10⁻⁶ of the reach or less, that they would need shorter moves than are tried.
+so closely, at some 10⁻⁵ of the reach or less, that they would need more moves than are tried.
 """
 
 from __future__ import annotations

@@ -241,9 +241,8 @@ def test_fold_is_dragged_to_its_walls_on_a_track_coloured_by_its_margin(tab: Tab
     assert strip["height"] == pytest.approx(end, abs=0.2)
     for share, wall in ((0.0, -180.0), (1.0, 0.0)):
         tab.drag("φ2 (°)", share)
-        tab.wait_until_shown("φ2 (°)", wall)
-        after = Frame(tab.state).folds
-        assert after == (*before[:4], wall, before[5])
+        tab.settle()
+        assert Frame(tab.state).folds == (*before[:4], wall, before[5])
     tab.type("φ2 (°)", "-47.2\n")
     tab.wait_for(lambda: Frame(tab.state).folds[4] == -47.2, "the fold that was typed")
     assert Frame(tab.state).folds == (*before[:4], -47.2, before[5])

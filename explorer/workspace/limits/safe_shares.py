@@ -39,8 +39,10 @@ from explorer.workspace.limits.valid_poses import (
 # The share of the tolerance that signs and clearances must exceed on the way, to be certain.
 LEAST_SHARE = 0.01
 # Entries of the speeds over a move: those of the platform ends of the four legs, the angle, the
-# three margins, b4 on each axis, and the distance of the carriages.
-LEG_SPEEDS, TURN_SPEED, MARGIN_SPEEDS, BOX_SPEEDS, GAP_SPEED, SPEEDS = 0, 4, 5, 8, 11, 12
+# three margins, b4 on each axis, the distance of the carriages; and the bending of the margins,
+# which is a bound of their second derivatives.
+LEG_SPEEDS, TURN_SPEED, MARGIN_SPEEDS, BOX_SPEEDS, GAP_SPEED, MARGIN_BENDS = 0, 4, 5, 8, 11, 12
+SPEEDS = 15
 
 
 @helper
@@ -59,10 +61,59 @@ def safe_share(slack: float, rate: float, tolerance: float) -> float:
 
 
 @helper
-def safe_share_of_limits(
+def rising_share(slack: float, rate: float, bend: float) -> float:
+    """Return the share over which a slack lasts, given its rate here and a bound of its bending."""
+    if rate < 0.0:
+        return 2.0 * slack / (math.sqrt(rate * rate + 2.0 * bend * slack) - rate)
+    return (rate + math.sqrt(rate * rate + 2.0 * bend * slack)) / bend if bend > 0.0 else math.inf
+
+
+@helper
+def safe_share_of_margins(
     row: FloatArray,
     p: FloatArray,
     r: FloatArray,
+    velocity: FloatArray,
+    axis: FloatArray,
+    angle: float,
+    speeds: FloatArray,
+    tolerance: float,
+) -> float:
+    """Return the share of a move from a pose on over which the demand on the margins holds.
+
+    It is −1 if the demand fails in that pose. The velocity is that of b4, per share of the move.
+    """
+    least, share = row[MARGIN], math.inf
+    if least == -math.inf:
+        return share
+    (px, py, pz), (vx, vy, vz) = (p[0], p[1], p[2]), (velocity[0], velocity[1], velocity[2])
+    (ux, uy, uz), (nx, ny, nz) = (r[0, 0], r[1, 0], r[2, 0]), (r[0, 2], r[1, 2], r[2, 2])
+    x, y, z = angle * axis[0], angle * axis[1], angle * axis[2]
+    # The rates of the normal n and of the direction u are ω × n and ω × u, with ω = (x, y, z).
+    spin1 = x * (ny * pz - nz * py) + y * (nz * px - nx * pz) + z * (nx * py - ny * px)
+    spin2 = (z * ux - x * uz) * pz - (x * uy - y * ux) * py
+    values = (-(nx * px + ny * py + nz * pz), uy * pz - uz * py, pz)
+    rates = (-spin1 - (nx * vx + ny * vy + nz * vz), spin2 + uy * vz - uz * vy, vz)
+    for i in range(3):
+        sign = row[SIGNS + i]
+        slack, rate = sign * values[i] - least, sign * rates[i]
+        if least < 2.0 * tolerance:
+            # Only the signs are demanded, and they must be certain.
+            if slack < LEAST_SHARE * tolerance:
+                return -1.0
+        elif slack < -0.5 * tolerance:
+            return -1.0
+        else:
+            slack += tolerance
+        lasting = lasting_share(slack, speeds[MARGIN_SPEEDS + i])
+        share = min(share, max(lasting, rising_share(slack, rate, speeds[MARGIN_BENDS + i])))
+    return share
+
+
+@helper
+def safe_share_of_limits(
+    row: FloatArray,
+    p: FloatArray,
     base: FloatArray,
     ends: FloatArray,
     speeds: FloatArray,
@@ -70,32 +121,13 @@ def safe_share_of_limits(
 ) -> float:
     """Return the share of a move from a pose on over which all limits hold to a tolerance.
 
-    It is −1 if a limit fails in that pose. The ends of the legs are those of the pose.
+    They are those of the box, the guide and the lengths. It is −1 if a limit fails in that pose.
+    The ends of the legs are those of the pose.
     """
     share = math.inf
     for i in range(3):
         slack = min(p[i] - row[BOX_LOWS + i], row[BOX_HIGHS + i] - p[i])
         share = min(share, safe_share(slack, speeds[BOX_SPEEDS + i], tolerance))
-    least_margin = row[MARGIN]
-    if least_margin > -math.inf:
-        delta1 = -(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
-        delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
-        slack1, slack2 = row[SIGNS] * delta1 - least_margin, row[SIGNS + 1] * delta2 - least_margin
-        slack3 = row[SIGNS + 2] * p[2] - least_margin
-        if least_margin < 2.0 * tolerance:
-            # Only the signs are demanded, and they must be certain.
-            if min(slack1, slack2, slack3) < LEAST_SHARE * tolerance:
-                return -1.0
-            share = min(share, lasting_share(slack1, speeds[MARGIN_SPEEDS]))
-            share = min(
-                share,
-                lasting_share(slack2, speeds[MARGIN_SPEEDS + 1]),
-                lasting_share(slack3, speeds[MARGIN_SPEEDS + 2]),
-            )
-        else:
-            share = min(share, safe_share(slack1, speeds[MARGIN_SPEEDS], tolerance))
-            share = min(share, safe_share(slack2, speeds[MARGIN_SPEEDS + 1], tolerance))
-            share = min(share, safe_share(slack3, speeds[MARGIN_SPEEDS + 2], tolerance))
     d1, d3 = ends[1, 0], ends[2, 0]
     slack = min(d1 - row[GUIDE_LOW], row[GUIDE_HIGH] - d1)
     share = min(share, safe_share(slack, speeds[LEG_SPEEDS + 1], tolerance))
@@ -223,6 +255,11 @@ def write_speeds(
     # With c the position of the tool, δ1 = tool z − R ẑ·c and δ2 = (x̂ × R x̂)·c − x̂·R (x̂ × tool).
     speeds[MARGIN_SPEEDS] = forward + angle * farthest
     speeds[MARGIN_SPEEDS + 1] = speeds[MARGIN_SPEEDS] + angle * math.hypot(tool[1], tool[2])
+    # c goes straight, and directions turn evenly; δ3 = ẑ·c − ẑ·R tool.
+    square = angle * angle
+    speeds[MARGIN_BENDS] = square * farthest + 2.0 * angle * forward
+    speeds[MARGIN_BENDS + 1] = speeds[MARGIN_BENDS] + square * math.hypot(tool[1], tool[2])
+    speeds[MARGIN_BENDS + 2] = square * math.sqrt(tool[0] ** 2 + tool[1] ** 2 + tool[2] ** 2)
     # b4 comes last of the ends; it swings about the tool, perpendicular to the axis of the turn.
     for i in range(3):
         share = math.sqrt(max(0.0, 1.0 - axis[i] * axis[i]))

@@ -31,6 +31,7 @@ from explorer.workspace.limits.safe_shares import (
     safe_share_of_clearances,
     safe_share_of_cones,
     safe_share_of_limits,
+    safe_share_of_margins,
     write_speeds,
 )
 from explorer.workspace.limits.valid_poses import Rules, is_valid, write_ends
@@ -43,7 +44,15 @@ LARGEST_TURN = math.pi - 1e-9
 MOST_STEPS = 20_000
 
 Scratch = tuple[
-    FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
 ]
 
 
@@ -200,17 +209,36 @@ def write_line(
 
 
 @helper
+def write_velocity(
+    t: float,
+    first: FloatArray,
+    step: FloatArray,
+    axis: FloatArray,
+    angle: float,
+    p: FloatArray,
+    velocity: FloatArray,
+) -> None:
+    """Write the velocity of b4 at p per share of a move, at a share t of it."""
+    a, b, c = (p[0] - first[0] - t * step[0], p[1] - first[1] - t * step[1],
+               p[2] - first[2] - t * step[2])  # fmt: skip
+    velocity[0] = step[0] + angle * (axis[1] * c - axis[2] * b)
+    velocity[1] = step[1] + angle * (axis[2] * a - axis[0] * c)
+    velocity[2] = step[2] + angle * (axis[0] * b - axis[1] * a)
+
+
+@helper
 def make_scratch() -> Scratch:
     """Return arrays that `count_steps` writes into.
 
-    They are the legs' base ends and platform ends, a position, a rotation, the step and the axis
-    of the move, the start of the tool, and the speeds.
+    They are the legs' base ends and platform ends, a position, a rotation, the step and the turn
+    of the move, the start of the tool, the velocity of b4, and the speeds.
     """
     return (
         np.zeros((4, 3)),
         np.zeros((4, 3)),
         np.zeros(3),
         np.zeros((3, 3)),
+        np.zeros(3),
         np.zeros(3),
         np.zeros(3),
         np.zeros(3),
@@ -237,7 +265,7 @@ def count_steps(
     are positions of b4; the tool, in platform coordinates, moves straight. The magnitude is that of
     the steps made, `most` at most.
     """
-    base, ends, p, r, step, axis, first, speeds = scratch
+    base, ends, p, r, step, axis, first, velocity, speeds = scratch
     if not is_valid(row, cones, end, end_rotation, base, ends):
         return 0
     if not is_valid(row, cones, start, start_rotation, base, ends):
@@ -252,7 +280,10 @@ def count_steps(
         write_pose_at(t, first, start_rotation, step, axis, angle, p, r)
         move_by_arm(-1.0, r, tool, p)
         write_ends(row, p, r, base, ends)
-        share = safe_share_of_limits(row, p, r, base, ends, speeds, tolerance)
+        write_velocity(t, first, step, axis, angle, p, velocity)
+        share = safe_share_of_margins(row, p, r, velocity, axis, angle, speeds, tolerance)
+        if share > 0.0:
+            share = min(share, safe_share_of_limits(row, p, base, ends, speeds, tolerance))
         if share > 0.0:
             share = min(share, safe_share_of_cones(cones, r, base, ends, speeds, tolerance / reach))
         if share > 0.0:
