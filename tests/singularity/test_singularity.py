@@ -92,8 +92,9 @@ def test_jacobian_at_the_tool_is_the_derivative_of_inverse_by_its_twists(
     at_b4 = jacobian_of(case)
     # The rows are forces at b4 and their moments about the tool; the moments alone differ.
     assert_array_equal(matrix[:, :3], at_b4[:, :3])
-    values = np.linalg.slogdet(at_b4), np.linalg.slogdet(matrix)
+    # In a singular pose there is no logarithm of the determinant.
     assume(condition_of(case) > 1e-6)
+    values = np.linalg.slogdet(at_b4), np.linalg.slogdet(matrix)
     assert values[1][0] == values[0][0]
     assert values[1][1] == pytest.approx(values[0][1], abs=1e-6)
 
