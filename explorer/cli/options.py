@@ -18,7 +18,7 @@ from explorer.cli.values import DESIGN_NAME, Flag, fold_numbers, hint, numbers
 from explorer.errors import DesignError, ExplorerError, InputError, StorageError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design
-from explorer.mechanism.folds import from_folds
+from explorer.mechanism.folds import pose_of_folds
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Quadruple, Triple
@@ -209,8 +209,7 @@ def make_pose(
             given.insert(0, "the position")
         if given:
             raise InputError(f"{option}folds is a whole pose; leave {' and '.join(given)} out")
-        r, *angles = folds
-        return Pose.of(*from_folds([r, *np.radians(angles)]))
+        return pose_of_folds(folds)
     at = default.position if position is None else position
     if tilt_torsion is not None:
         pose = pose_of_tilt_torsion(at, tilt_torsion)

@@ -29,12 +29,13 @@ smaller of its two ends.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
-from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import (
     FloatArray,
     batch_shape,
@@ -104,6 +105,16 @@ def from_folds(coordinates: ArrayLike) -> tuple[FloatArray, FloatArray]:
     write_poses(len(rows), rows, positions, rotations)
     batch = array.shape[:-1]
     return positions.reshape(*batch, 3), rotations.reshape(*batch, 3, 3)
+
+
+def pose_of_folds(folds: Sequence[float]) -> Pose:
+    """Return the pose of r in design units and β, ε, φ1, φ2, φ3 in degrees.
+
+    Raises:
+        InputError: They are not six finite numbers, r is negative, or b4 is too far away.
+    """
+    r, *angles = folds
+    return Pose.of(*from_folds([r, *np.radians(angles)]))
 
 
 @helper

@@ -172,7 +172,7 @@ class _MoveMargin:
     angle: float
     size: float
 
-    @property
+    @cached_property
     def is_zero(self) -> bool:
         """Whether the margin is zero all along the move, to rounding."""
         samples = [self.at(t)[0] for t in np.linspace(0.0, 1.0, 17).tolist()]

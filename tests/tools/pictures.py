@@ -48,7 +48,7 @@ from explorer.app.state.view import (
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.folds import from_folds
+from explorer.mechanism.folds import pose_of_folds
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.typical import typical_machine
 from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_start
@@ -115,7 +115,7 @@ SCENES = {
     ),
     # All four leaves are seen from their faces, and no arc lies on another.
     "strip": Scene(
-        pose=Pose.of(*from_folds([14.4, *np.radians([46, 88, -60, -70, 70])])),
+        pose=pose_of_folds([14.4, 46, 88, -60, -70, 70]),
         actions=(bare(leaves=True, bodies=False, legs=False, grid=False),),
         size=(960, 600),
     ),

@@ -13,9 +13,8 @@ from explorer.app.state.action import Action
 from explorer.app.state.actions import FULL_TURN, moved
 from explorer.app.state.state import Folds, GivenFolds, State
 from explorer.errors import InputError
-from explorer.mechanism.folds import FOLDS, from_folds, to_folds
+from explorer.mechanism.folds import FOLDS, pose_of_folds, to_folds
 from explorer.mechanism.margins import MODE_BITS, signs_of
-from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import format_number
 
 HALF_TURN = 180.0
@@ -50,7 +49,7 @@ class SetFold(Action):
         values[index] = value
         r, beta, epsilon, phi1, phi2, phi3 = values
         folds = (r, beta, epsilon, phi1, phi2, phi3)
-        pose = pose_of(folds)
+        pose = pose_of_folds(folds)
         mode = state.mode
         if index >= FIRST_FOLD and abs(value) not in {0.0, HALF_TURN}:
             bit = int(MODE_BITS[index - FIRST_FOLD])
@@ -79,12 +78,6 @@ def folds_of(state: State) -> Folds:
     first, second, third = signs_of(state.mode)
     phi1, phi2, phi3 = (_with_sign(phi1, first), _with_sign(phi2, second), _with_sign(phi3, third))
     return r, beta, epsilon, phi1, phi2, phi3
-
-
-def pose_of(folds: Folds) -> Pose:
-    """Return the pose of r in design units and five angles in degrees."""
-    r, *angles = folds
-    return Pose.of(*from_folds((r, *map(math.radians, angles))))
 
 
 def _with_sign(fold: float, sign: int) -> float:

@@ -219,8 +219,10 @@ def write_velocity(
     velocity: FloatArray,
 ) -> None:
     """Write the velocity of b4 at p per share of a move, at a share t of it."""
-    a, b, c = (p[0] - first[0] - t * step[0], p[1] - first[1] - t * step[1],
-               p[2] - first[2] - t * step[2])  # fmt: skip
+    # From the tool, which goes straight, to b4.
+    a = p[0] - first[0] - t * step[0]
+    b = p[1] - first[1] - t * step[1]
+    c = p[2] - first[2] - t * step[2]
     velocity[0] = step[0] + angle * (axis[1] * c - axis[2] * b)
     velocity[1] = step[1] + angle * (axis[2] * a - axis[0] * c)
     velocity[2] = step[2] + angle * (axis[0] * b - axis[1] * a)
@@ -230,7 +232,7 @@ def write_velocity(
 def make_scratch() -> Scratch:
     """Return arrays that `count_steps` writes into.
 
-    They are the legs' base ends and platform ends, a position, a rotation, the step and the turn
+    They are the legs' base ends and platform ends, a position, a rotation, the step and the axis
     of the move, the start of the tool, the velocity of b4, and the speeds.
     """
     return (

@@ -22,7 +22,7 @@ from explorer.mechanism.margins import signs_of
 HINTS = (
     "The distance of a1 and b4. All three margins grow with it.",
     "The angle at a1 between the guide and the line a1b4. At 0 and 180° δ2 and δ3 are zero.",
-    "The angle at b4 between the lines a1b4 and b2b3. At 0 and 180° δ1 and δ2 are zero.",
+    "The angle between the vector a1b4 and the platform's x. At 0 and 180° δ1 and δ2 are zero.",
     "The fold at the line b2b3. It changes δ1 alone, which is zero at both ends.",
     "The fold at the line a1b4. It changes δ2 alone, which is zero at both ends.",
     "The fold at the guide. It changes δ3 alone, which is zero at both ends.",

@@ -29,7 +29,7 @@ from explorer.app.widgets.colours import (
     proximity_colour,
 )
 from explorer.app.widgets.markup import box, fitted, format_number, margin_name, meter, swatch
-from explorer.mechanism.folds import FOLDS
+from explorer.mechanism.folds import FOLD_LINES, FOLDS
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, signs_of
 from explorer.numerics.number_text import format_decimals
 
@@ -38,9 +38,6 @@ GO = "singular.go"
 GO_HINT = "Move the mechanism to the nearest pose with this incidence."
 # Length of a dial's needle in pixels.
 NEEDLE = 15.0
-HINGES = ("line b2b3", "line a1b4", "guide")
-"""The lines of the folds, in the order φ1, φ2, φ3."""
-
 COLUMNS = (
     ("fold", "The fold on a dial: a red end is flat, and a flat fold is a singular pose."),
     ("", ""),
@@ -145,7 +142,7 @@ def fold_dial(frame: Frame, index: int) -> str:
     top, sweep = (-NEEDLE - 2.0, 0) if side > 0.0 else (-4.0, 1)
     angle = f"{format_decimals(fold, 1)}°"
     hint = (
-        f"Fold {FOLDS[FIRST_FOLD + index]} at the {HINGES[index]}: {angle}; flat at 0° and "
+        f"Fold {FOLDS[FIRST_FOLD + index]} at the {FOLD_LINES[index]}: {angle}; flat at 0° and "
         f"{'' if side > 0.0 else '−'}180°, with {INCIDENCES[index]}"
     )
     return (
