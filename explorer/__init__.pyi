@@ -33,6 +33,7 @@ from .legs.moves import (
 )
 from .legs.tetrahedra import tetrahedra_overlap as tetrahedra_overlap
 from .measures.snapshot import Snapshot as Snapshot, evaluate as evaluate
+from .mechanism.configuration import Configuration as Configuration
 from .mechanism.design import (
     JOINTS as JOINTS,
     VARIABLES as VARIABLES,
@@ -46,9 +47,7 @@ from .mechanism.design_file import (
     load_design as load_design,
 )
 from .mechanism.folds import from_folds as from_folds, to_folds as to_folds
-from .mechanism.home import home_pose as home_pose
 from .mechanism.kinematics import (
-    attachment_points as attachment_points,
     discriminants as discriminants,
     forward as forward,
     inverse as inverse,

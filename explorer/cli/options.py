@@ -19,7 +19,6 @@ from explorer.errors import DesignError, ExplorerError, InputError, StorageError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design
 from explorer.mechanism.folds import pose_of_folds
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion
@@ -251,7 +250,7 @@ class OrientationOptions:
 
     def oriented_home(self, design: Design) -> Pose:
         """Return the home pose of the design with the given orientation, as `make_pose` does."""
-        return make_pose("--", home_pose(design), None, *self._orientation)
+        return make_pose("--", design.home_pose, None, *self._orientation)
 
     @property
     def _orientation(self) -> tuple[Quadruple | None, Triple | None, Triple | None]:
@@ -274,5 +273,5 @@ class PoseOptions(OrientationOptions, PointOptions):
 
     def pose(self, design: Design) -> Pose:
         """Return the given pose completed from the home pose, as `make_pose` does."""
-        given = (home_pose(design), self.position, *self._orientation, self.folds)
+        given = (design.home_pose, self.position, *self._orientation, self.folds)
         return make_pose("--", *given, self.tool(design))

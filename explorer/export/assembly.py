@@ -21,7 +21,6 @@ from explorer.export.glb import METRES_PER_MILLIMETRE, Y_UP, Body, Material, glb
 from explorer.export.mesh import mesh_bytes
 from explorer.export.metadata import Rgb
 from explorer.export.three_mf import Model, check_size, refusals_of_lib3mf
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Places
@@ -72,7 +71,7 @@ def check_format(file_format: str) -> None:
 
 def _at_home(prototype: Prototype) -> Places:
     """Return the places of the bodies in the home pose, in the order of `BODIES`."""
-    home = home_pose(prototype.design)
+    home = prototype.design.home_pose
     return prototype.chains.places_at(home.position, home.rotation)
 
 
@@ -89,7 +88,7 @@ def _chain(leg: int) -> tuple[str, str, str]:
 
 
 def _3mf(prototype: Prototype) -> bytes:
-    design, unit, home = prototype.design, prototype.design.unit_mm, home_pose(prototype.design)
+    design, unit, home = prototype.design, prototype.design.unit_mm, prototype.design.home_pose
     check_size(np.concatenate(prototype.at(home.position, home.rotation)) * unit)
     places, kinds = _at_home(prototype), list(COLOURS)
     by_name = {part.name: part for part in prototype.parts}

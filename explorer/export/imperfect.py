@@ -16,8 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
-from explorer.mechanism.kinematics import checked_joints, inverse, platform_points
+from explorer.mechanism.kinematics import checked_joints, inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.mechanism.tool_point import tool_offset
@@ -100,7 +99,7 @@ class ImperfectMachine:
     @cached_property
     def points(self) -> FloatArray:
         """True b1, b2, b3 and b4 in the platform frame, shape (4, 3), in design units."""
-        return platform_points(self.design) + self._dimensions[B_COLUMN:].reshape(4, 3)
+        return self.design.platform_points + self._dimensions[B_COLUMN:].reshape(4, 3)
 
     @cached_property
     def shifts(self) -> FloatArray:
@@ -137,7 +136,7 @@ class ImperfectMachine:
         ends = p + self.points @ r.T
         # Seen from its base, a leg is that of the design at another position of the platform.
         seen = np.einsum("kji,kj->ki", self.turns, ends - self.shifts)
-        positions = seen - platform_points(self.design) @ r.T
+        positions = seen - self.design.platform_points @ r.T
         values = self._chains.joints(positions, r).reshape(4, 4, 3)
         return values[range(4), range(4)].ravel()
 
@@ -193,7 +192,7 @@ class ImperfectMachine:
         Raises:
             NoAnswerError: There is no such pose close to home.
         """
-        home = home_pose(self.design)
+        home = self.design.home_pose
         if not self.deviations.any():
             return home
         return self.pose(inverse(self.design, home.position, home.rotation), home)
@@ -218,7 +217,7 @@ class ImperfectMachine:
         Raises:
             NoAnswerError: The loops do not close near home.
         """
-        meant, true = home_pose(self.design), self.home
+        meant, true = self.design.home_pose, self.home
         tool = self.design.tool.position
         moved = np.array(true.position) + tool_offset(true.rotation, tool)
         moved -= np.array(meant.position) + tool_offset(meant.rotation, tool)
@@ -233,7 +232,7 @@ class ImperfectMachine:
         """
         if not self.deviations.any():
             return np.zeros(6)
-        home = home_pose(self.design)
+        home = self.design.home_pose
         tool = self.design.tool.position
         slopes = pose_error_by_source(self.design, home.position, home.rotation, tool)
         if not np.isfinite(slopes).all():

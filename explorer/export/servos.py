@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 
 from explorer.errors import NoAnswerError
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import inverse
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES, Chains
@@ -61,7 +60,7 @@ class Servos(NamedTuple):
             design: The manipulator.
             forces: Forces at the commanded joint values, shape (6,), in N.
         """
-        home = home_pose(design)
+        home = design.home_pose
         lag = (self.weights - forces) / (1e-3 * design.unit_mm * self.stiffness)
         twists = twists_of_actuators(design, home.position, home.rotation, design.tool.position)
         return twists @ -lag
@@ -107,7 +106,7 @@ def servo_stiffness(design: Design) -> FloatArray | None:
     the others.
     """
     stiffness, bending = stiffness_of(design)
-    home = home_pose(design)
+    home = design.home_pose
     softness = 1.0 / stiffness
     lengths = inverse(design, home.position, home.rotation)[[2, 4]]
     softness[[1, 3]] += lengths**3 / (3.0 * bending)
@@ -133,7 +132,7 @@ def servos_of(design: Design, masses: Mapping[str, Mass], *, elastic: bool) -> S
         NoAnswerError: The home pose is singular.
     """
     moved = np.diag(joint_inertia(design, with_payload(design, masses)))
-    home = home_pose(design)
+    home = design.home_pose
     wrench = carry(design, home.position, home.rotation, machine_weights(design, masses)).wrench
     weights = actuator_forces(design, home.position, home.rotation, wrench)
     stiffness = servo_stiffness(design) if elastic else None
@@ -163,7 +162,7 @@ def joint_inertia(design: Design, masses: Mapping[str, Mass]) -> FloatArray:
     Raises:
         NoAnswerError: The home pose is singular.
     """
-    home, metres = home_pose(design), 1e-3 * design.unit_mm
+    home, metres = design.home_pose, 1e-3 * design.unit_mm
     twists = twists_of_actuators(design, home.position, home.rotation).T
     if not np.isfinite(twists).all():
         raise NoAnswerError(

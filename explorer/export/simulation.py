@@ -34,8 +34,6 @@ from explorer.errors import InputError
 from explorer.export.imperfect import ImperfectMachine
 from explorer.export.servos import servos_of, strokes_of, with_payload
 from explorer.mechanism.design import DOWN, JOINTS, Design
-from explorer.mechanism.home import home_pose
-from explorer.mechanism.kinematics import platform_points
 from explorer.mechanism.machine import Guide
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
@@ -45,7 +43,6 @@ from explorer.prototype.sketch import BALL, ROD, leg_radii
 from explorer.prototype.weights import bar_masses
 from explorer.statics.compliance import is_elastic
 from explorer.statics.error_sources import source_errors
-from explorer.workspace.limits.constraints import demanded_order
 
 DENSITY = 1240.0
 """The default density of the bodies, in kg/m³: that of printed PLA."""
@@ -107,7 +104,7 @@ def simulation_joints(design: Design, position: FloatArray, rotation: FloatArray
     Raises:
         InputError: The position is not finite, or the rotation is not one.
     """
-    chains, home = Chains.of(design), home_pose(design)
+    chains, home = Chains.of(design), design.home_pose
     at_home = chains.joints(home.position, home.rotation)
     joints = chains.joints(position, rotation)
     is_actuated = np.isin(CHAIN_JOINTS, JOINTS)
@@ -160,7 +157,7 @@ class SimulationModel:
         self.machine = given if isinstance(given, ImperfectMachine) else None
         self.design = design = given.design if isinstance(given, ImperfectMachine) else given
         self.metres = 1e-3 * design.unit_mm
-        home, chains = home_pose(design), Chains.of(design)
+        home, chains = design.home_pose, Chains.of(design)
         joints = chains.joints(home.position, home.rotation)
         for leg in LEGS:
             if not joints[3 * leg - 1] > 0.0:
@@ -174,7 +171,7 @@ class SimulationModel:
         self.places = chains.places(joints, home.position, home.rotation)
         # Joint values at home: those of the design, and those of the machine that has them.
         self.nominal = self.joints = self.readings = joints
-        self.points = platform_points(design)
+        self.points = design.platform_points
         if self.machine is not None:
             true = self.machine.home
             self.points = self.machine.points
@@ -356,7 +353,7 @@ class SimulationModel:
         Ranges of hinges have the unit of the scene's angles, but those of tendons are in radians.
         """
         limits, tendon = self.design.limits, ET.Element("tendon")
-        if self.strokes.gap > 0.0 or demanded_order(self.design):
+        if self.strokes.gap > 0.0 or self.design.demanded_order:
             d1, d3 = (self.nominal[CHAIN_JOINTS.index(name)] for name in ("d1", "d3"))
             order = 1 if d1 > d3 else -1
             ends = _row([self.strokes.gap, 1e3 * self.design.reach * self.metres])

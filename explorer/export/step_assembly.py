@@ -10,7 +10,6 @@ from typing import Any
 
 from explorer.export.assembly import COLOURS, part_groups
 from explorer.export.opencascade import Document, ExactKernel, ExactShape, occ, transform
-from explorer.mechanism.home import home_pose
 from explorer.prototype.chains import BODIES, Chains
 from explorer.prototype.forms import forms_of
 from explorer.prototype.sizes import Sizes
@@ -34,7 +33,7 @@ def assembly_step(sizes: Sizes) -> bytes:
         ExplorerError: A boolean operation fails, or the file cannot be made.
     """
     design = sizes.design
-    home = home_pose(design)
+    home = design.home_pose
     places = Chains.of(design).places_at(home.position, home.rotation)
     parts = exact_parts(sizes)
     document = Document()

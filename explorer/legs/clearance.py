@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.legs.segments import write_closest
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DEGENERATE_RATIO, Design
-from explorer.mechanism.kinematics import attachment_points
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.compiled import kernel
 
@@ -81,7 +81,7 @@ def leg_axes(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatA
 
     Arguments and errors are those of `leg_clearances`.
     """
-    points = attachment_points(design, position, rotation)
+    points = Configuration(design, position, rotation).points
     axes = np.zeros((*points.b1.shape[:-1], 4, 2, 3))
     axes[..., 1, 0, 0], axes[..., 2, 0, 0] = points.b2[..., 0], points.b3[..., 0]
     axes[..., 3, 0, :] = points.a3

@@ -13,9 +13,10 @@ import math
 
 import numpy as np
 
-from explorer.legs.segments import Vector, closest_shares, dot3, minus, square_at
+from explorer.legs.segments import closest_shares, square_at
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector, dot3, minus
 
 # Number of intervals of a move whose ends give the first estimate of the least distance.
 SAMPLES = 8

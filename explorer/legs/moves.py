@@ -22,7 +22,6 @@ from explorer.legs.clearance import PAIRS, joined_pairs, leg_clearances, radii_o
 from explorer.legs.interference import step_overlaps
 from explorer.legs.move_bounds import least_rows
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import platform_points
 from explorer.mechanism.pose import Pose, Triple, checked_rotation
 from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array
@@ -288,7 +287,7 @@ class _Moves:
         turn = Rotation.from_matrix(last @ np.swapaxes(first, -1, -2)).as_rotvec()
         angle = np.linalg.norm(turn, axis=-1)
         axis = turn / np.where(angle > 0.0, angle, 1.0)[:, None]
-        points = platform_points(design)
+        points = design.platform_points
         if tool is not None:
             points = points - finite_array("tool", tool, (3,))
             start, end = start + tool_offset(first, tool), end + tool_offset(last, tool)

@@ -9,12 +9,10 @@ between line segments" (1985).
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
-
-Vector: TypeAlias = tuple[float, float, float]
+from explorer.numerics.vectors import Vector, cross3, dot3, minus
 
 
 @helper
@@ -25,24 +23,6 @@ def clamp_ratio(value: float, over: float) -> float:
     if value >= over:
         return 1.0
     return value / over
-
-
-@helper
-def minus(a: Vector, b: Vector) -> Vector:
-    """Return a − b."""
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-@helper
-def dot3(a: Vector, b: Vector) -> float:
-    """Return a · b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@helper
-def cross3(a: Vector, b: Vector) -> Vector:
-    """Return a × b."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @helper

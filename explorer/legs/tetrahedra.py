@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.legs.segments import Vector, closest_shares, dot3, minus
+from explorer.legs.segments import closest_shares
 from explorer.numerics.arrays import (
     BoolArray,
     FloatArray,
@@ -21,6 +21,7 @@ from explorer.numerics.arrays import (
     rows_for_kernel,
 )
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector, dot3, minus
 
 # Share of the largest coordinate up to which a gap is rounding, so that two bodies touch.
 TOUCHING = 2.0**-46

@@ -12,7 +12,6 @@ import numpy as np
 from explorer.measures.clearance import clearance_beyond, clearance_margin_of
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import inverse_condition, jacobian
@@ -59,7 +58,7 @@ class Case:
     @property
     def at(self) -> Pose:
         """The pose of the case: the given one, or else the home pose."""
-        return home_pose(self.design) if self.pose is None else self.pose
+        return self.design.home_pose if self.pose is None else self.pose
 
     @property
     def rotation(self) -> FloatArray:

@@ -7,7 +7,6 @@ import numpy as np
 
 from explorer.legs.clearance import PAIRS
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.slices.volume import workspace_volume
@@ -38,7 +37,7 @@ def clearance_beyond(
         margin: The least |δ|, in design units.
         rotation: Platform to base, shape (3, 3); that of the home pose if None.
     """
-    r = home_pose(design).rotation if rotation is None else rotation
+    r = design.home_pose.rotation if rotation is None else rotation
     if workspace_volume(design, r, explain=False).volume <= 0.0:
         return None, None
     own_margin = design.limits.margin or 0.0

@@ -5,21 +5,17 @@ The page, the command line and reports all read these values.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from explorer.legs.clearance import LegClearances, leg_clearances
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.feasible_intervals import Interval, feasible_intervals
-from explorer.mechanism.home import home_signs
 from explorer.mechanism.kinematics import (
-    AttachmentPoints,
     ForwardKinematics,
-    attachment_points,
     forward,
-    inverse,
 )
 from explorer.mechanism.margins import describe_modes, margins, mode_name, mode_of, signs_of
 from explorer.mechanism.pose import Pose
@@ -45,42 +41,22 @@ from explorer.singularity.turning import least_turns
 from explorer.workspace.limits.broken import Violation, violations
 
 
-@dataclass(frozen=True)
-class Snapshot:
-    """A design in a pose, and the values that follow from both; lengths in design units.
+class Snapshot(Configuration):
+    """A design in one pose, and the values that follow from both; lengths in design units.
 
-    Attributes:
+    Args:
         design: The manipulator.
         pose: The pose of the platform.
     """
 
-    design: Design
-    pose: Pose
-
-    @cached_property
-    def rotation(self) -> FloatArray:
-        """The rotation from platform to base, shape (3, 3)."""
-        return self.pose.rotation
-
-    @cached_property
-    def points(self) -> AttachmentPoints:
-        """The attachment points in the base frame, each (3,)."""
-        return attachment_points(self.design, self.pose.position, self.rotation)
-
-    @cached_property
-    def joints(self) -> FloatArray:
-        """The joint values (l1, d1, d2, d3, d4, l4), shape (6,)."""
-        return inverse(self.design, self.pose.position, self.rotation)
-
-    @cached_property
-    def margins(self) -> FloatArray:
-        """The margins (δ1, δ2, δ3), shape (3,)."""
-        return margins(self.pose.position, self.rotation)
+    def __init__(self, design: Design, pose: Pose) -> None:
+        super().__init__(design, pose.position, pose.rotation)
+        self.pose = pose
 
     @cached_property
     def gaps(self) -> FlagGaps:
         """The gaps that are left to each incidence."""
-        return flag_gaps(np.array(self.pose.position), self.rotation)
+        return flag_gaps(self.position, self.rotation)
 
     @cached_property
     def volumes(self) -> FloatArray:
@@ -106,7 +82,7 @@ class Snapshot:
 
     @cached_property
     def _singular_values(self) -> FloatArray:
-        matrix = jacobian(self.design, self.pose.position, self.rotation)
+        matrix = jacobian(self.design, self.position, self.rotation)
         return singular_values(matrix, self.design.reach)
 
     @property
@@ -125,7 +101,7 @@ class Snapshot:
     @cached_property
     def least_turns(self) -> tuple[float, float, float]:
         """The least turns that lead to each incidence, in radians, in the order δ1, δ2, δ3."""
-        first, second, third = least_turns(self.pose.position, self.rotation).tolist()
+        first, second, third = least_turns(self.position, self.rotation).tolist()
         return first, second, third
 
     @property
@@ -136,7 +112,7 @@ class Snapshot:
     @cached_property
     def stratum(self) -> tuple[int, ...]:
         """The stratum: the permutation of the relative position of the two flags."""
-        permutation = stratum(self.pose.position, self.rotation, self.design.reach)
+        permutation = stratum(self.position, self.rotation, self.design.reach)
         return tuple(permutation.tolist())
 
     @property
@@ -193,7 +169,7 @@ class Snapshot:
     @cached_property
     def violations(self) -> tuple[Violation, ...]:
         """The limits that the pose breaks."""
-        return self._violations(np.array(self.pose.position), self.rotation, self.margins)
+        return self._violations(self.position, self.rotation, self.margins)
 
     @cached_property
     def mode_violations(self) -> tuple[tuple[Violation, ...], ...]:
@@ -208,13 +184,13 @@ class Snapshot:
         self, position: FloatArray, rotation: FloatArray, margin: FloatArray
     ) -> tuple[Violation, ...]:
         """Return the limits that the joints break in a pose in which they are assembled."""
-        signs = home_signs(self.design)
+        signs = self.design.home_signs
         return violations(self.design, position, rotation, self.joints, margin, signs)
 
     @cached_property
     def clearances(self) -> LegClearances:
         """The clearances of the six pairs of legs."""
-        return leg_clearances(self.design, np.array(self.pose.position), self.rotation)
+        return leg_clearances(self.design, self.position, self.rotation)
 
     @cached_property
     def nearest_distances(self) -> tuple[float, float, float]:
@@ -229,7 +205,7 @@ class Snapshot:
 
     @cached_property
     def _nearest_poses(self) -> NearestPoses:
-        return nearest_singular_poses(self.design, self.pose.position, self.rotation)
+        return nearest_singular_poses(self.design, self.position, self.rotation)
 
     @cached_property
     def modes(self) -> ForwardKinematics:

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Literal, cast, get_args
 
 import msgspec
 
 from explorer.errors import DesignError
+from explorer.mechanism.home import best_home
 from explorer.mechanism.machine import (
     Actuators,
     Guide,
@@ -23,7 +25,10 @@ from explorer.mechanism.machine import (
     check_near,
     checked_gravity,
 )
+from explorer.mechanism.margins import margins, mode_of, signs_of
+from explorer.mechanism.points import Variables, platform_points
 from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import (
     instance,
     not_negative,
@@ -192,7 +197,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         b2, b3: x of b2 and b3 in the platform frame, in design units.
         limits: Limits of the mechanism.
         home: Home pose, whose orientation and sign triple are those of the workspace; None
-            for the one that `explorer.mechanism.home` chooses.
+            for the one that `explorer.mechanism.home` chooses; see `home_pose`.
         tool: Frame of the tool on the platform.
         payload: Mass that the platform carries.
         gravity: Direction of gravity in the base frame, normalised.
@@ -279,7 +284,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
                 check_near(name, point, self.reach)
 
     @property
-    def variables(self) -> tuple[float, float, float, float, float, float]:
+    def variables(self) -> Variables:
         """The design variables X = (a3x, a3y, b1x, b1y, b2, b3), in design units."""
         return (*self.a3, *self.b1, self.b2, self.b3)
 
@@ -299,10 +304,43 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         ends = self.limits.guide or (0.0, self.reach)
         return ends[1] or ends[0] or self.reach
 
+    @property
+    def platform_points(self) -> FloatArray:
+        """The points b1, b2, b3 and b4 in the platform frame, shape (4, 3), in design units."""
+        return platform_points(self.variables)
+
     def length_range(self, name: str) -> tuple[float, float]:
         """Return (minimum, maximum) of l1, d2, d4 or l4; a maximum of None becomes the reach."""
         low, high = cast("Range", getattr(self.limits, name))
         return low, self.reach if high is None else high
+
+    @property
+    def home_pose(self) -> Pose:
+        """The home pose, of the file or chosen: the orientation and the mode of the workspace."""
+        if self.home is not None:
+            return self.home
+        guide = self.limits.guide or (-math.inf, math.inf)
+        ranges = (self.length_range(name) if name in LENGTHS else guide for name in JOINTS)
+        return best_home(self.variables, tuple(ranges), self.limits.box)
+
+    @property
+    def home_signs(self) -> tuple[int, int, int]:
+        """The sign triple of the home pose, in its own orientation."""
+        return _signs_at(self.home_pose)
+
+    @property
+    def demanded_order(self) -> int:
+        """The sign of d3 − d1 that the limits demand, which is that of the home pose.
+
+        The sign is 0, for either order, if the limits allow any order or if the carriages
+        coincide in the home pose to the tolerance.
+        """
+        if self.limits.carriage_order == "any":
+            return 0
+        difference = (self.b3 - self.b2) * float(self.home_pose.rotation[0, 0])
+        if abs(difference) <= self.tolerance:
+            return 0
+        return 1 if difference > 0.0 else -1
 
     def with_variables(self, values: Sequence[float]) -> Design:
         """Return this design with other values of X.
@@ -324,3 +362,8 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         values = list(self.variables)
         values[VARIABLES.index(name)] = value
         return self.with_variables(values)
+
+
+@lru_cache(64)
+def _signs_at(pose: Pose) -> tuple[int, int, int]:
+    return signs_of(int(mode_of(margins(pose.position, pose.rotation))))

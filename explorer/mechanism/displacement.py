@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import platform_points
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, batch_shape, dot, finite_array
 
@@ -40,7 +39,7 @@ class PlatformPoints:
     @staticmethod
     def of(design: Design) -> PlatformPoints:
         """Return the points of a design's platform."""
-        points = platform_points(design)
+        points = design.platform_points
         centroid = points.mean(axis=0)
         off = points - centroid
         scatter = off.T @ off / len(points)
@@ -71,5 +70,5 @@ def displacement(
     r, s = checked_rotation(rotation), checked_rotation(other_rotation)
     batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
     # For close poses the formula with the scatter would cancel; these squares do not.
-    moves = (q - p)[..., None, :] + platform_points(design) @ np.swapaxes(s - r, -1, -2)
+    moves = (q - p)[..., None, :] + design.platform_points @ np.swapaxes(s - r, -1, -2)
     return np.sqrt(dot(moves, moves).mean(axis=-1))

@@ -1,6 +1,6 @@
 """Inverse and forward kinematics in closed form, over any batch, in the order of `JOINTS`.
 
-The inverse kinematics is four distances and two projections. The forward kinematics finds the
+The inverse kinematics is that of `explorer.mechanism.points`. The forward kinematics finds the
 folds of `explorer.mechanism.folds` by the three trilaterations, each the cosine of one fold, and
 has eight assembly modes.
 """
@@ -13,32 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, LENGTHS, Design
-from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.trilateration import solve_rows
 from explorer.numerics.arrays import (
     BoolArray,
     FloatArray,
-    batch_shape,
     finite_array,
     for_kernel,
-    lengths_of,
 )
 
 # Largest joint over the design's size; beyond it double precision cannot tell its points apart.
 LARGEST_RATIO = 1e15
-
-
-class AttachmentPoints(NamedTuple):
-    """The attachment points in the base frame, each of shape (..., 3), in design units."""
-
-    a1: FloatArray
-    a2: FloatArray
-    a3: FloatArray
-    b1: FloatArray
-    b2: FloatArray
-    b3: FloatArray
-    b4: FloatArray
 
 
 class ForwardKinematics(NamedTuple):
@@ -58,63 +44,9 @@ class ForwardKinematics(NamedTuple):
     feasible: BoolArray
 
 
-def platform_points(design: Design) -> FloatArray:
-    """Return b1, b2, b3 and b4 in the platform frame, shape (4, 3), in design units."""
-    return np.array(
-        [(*design.b1, 0.0), (design.b2, 0.0, 0.0), (design.b3, 0.0, 0.0), (0.0, 0.0, 0.0)]
-    )
-
-
-def attachment_points(design: Design, position: ArrayLike, rotation: ArrayLike) -> AttachmentPoints:
-    """Return the seven attachment points of a pose.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-
-    Raises:
-        InputError: The position is not finite, or the rotation is not one.
-    """
-    p = finite_array("position", position, (3,))
-    r = checked_rotation(rotation)
-    shape = (*batch_shape((p, 1), (r, 2)), 3)
-    x = r[..., 0]
-    b1x, b1y = design.b1
-    return AttachmentPoints(
-        a1=np.zeros(shape),
-        a2=np.broadcast_to(np.array([design.a2x, 0.0, 0.0]), shape),
-        a3=np.broadcast_to(np.array([*design.a3, 0.0]), shape),
-        b1=p + b1x * x + b1y * r[..., 1],
-        b2=p + design.b2 * x,
-        b3=p + design.b3 * x,
-        b4=np.broadcast_to(p, shape),
-    )
-
-
 def inverse(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
-    """Return the joints (l1, d1, d2, d3, d4, l4) of a pose, shape (..., 6).
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-
-    Raises:
-        InputError: The position is not finite, or the rotation is not one.
-    """
-    points = attachment_points(design, position, rotation)
-    return np.stack(
-        [
-            lengths_of(points.b1),
-            points.b2[..., 0],
-            np.hypot(points.b2[..., 1], points.b2[..., 2]),
-            points.b3[..., 0],
-            np.hypot(points.b3[..., 1], points.b3[..., 2]),
-            lengths_of(points.b4 - points.a3),
-        ],
-        axis=-1,
-    )
+    """Return the joints of `Configuration(design, position, rotation)`, shape (..., 6)."""
+    return Configuration(design, position, rotation).joints
 
 
 def forward(design: Design, joints: ArrayLike) -> ForwardKinematics:

@@ -15,7 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import FloatArray, IntArray, batch_shape, dot, finite_array
+from explorer.numerics.arrays import (
+    FloatArray,
+    IntArray,
+    batch_shape,
+    finite_array,
+    rows_for_kernel,
+)
+from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector, column, dot3
 
 INCIDENCES = (
     "a1 on the platform plane",
@@ -50,11 +58,34 @@ def margins(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """
     p = finite_array("position", position, (3,))
     r = checked_rotation(rotation)
-    shape = batch_shape((p, 1), (r, 2))
-    delta1 = -dot(r[..., 2], p)
-    delta2 = r[..., 1, 0] * p[..., 2] - r[..., 2, 0] * p[..., 1]
-    delta3 = np.broadcast_to(p[..., 2], shape)
-    return np.stack([delta1, delta2, delta3], axis=-1)
+    batch = batch_shape((p, 1), (r, 2))
+    p_rows, r_rows = rows_for_kernel(p, batch, 1), rows_for_kernel(r, batch, 2)
+    out = np.empty((len(p_rows), 3))
+    margin_rows(len(p_rows), p_rows, r_rows, out)
+    return out.reshape(*batch, 3)
+
+
+@helper
+def margins_of(p: Vector, u: Vector, n: Vector) -> Vector:
+    """Return the margins (δ1, δ2, δ3) of a position and the directions of the platform's x and z.
+
+    The first two are linear in the position and in the directions, so that rates follow from
+    rates of these.
+    """
+    return (-dot3(n, p), u[1] * p[2] - u[2] * p[1], p[2])
+
+
+@helper
+def margins_at(p: FloatArray, r: FloatArray) -> Vector:
+    """Return the margins (δ1, δ2, δ3) of a position (3,) and a rotation (3, 3)."""
+    return margins_of((p[0], p[1], p[2]), column(r, 0), column(r, 2))
+
+
+@kernel("void(f8[:,::1], f8[:,:,::1], f8[:,::1])")
+def margin_rows(position: FloatArray, rotation: FloatArray, out: FloatArray) -> None:
+    """Write the margins of n poses, shape (n, 3)."""
+    for k in range(position.shape[0]):
+        out[k, 0], out[k, 1], out[k, 2] = margins_at(position[k], rotation[k])
 
 
 def mode_of(margin: FloatArray) -> IntArray:

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import msgspec
 
 from explorer.mechanism.design import Design, Pair
-from explorer.mechanism.home import home_pose
 
 
 class PossibleRanges(NamedTuple):
@@ -102,7 +101,7 @@ def _side(design: Design) -> Pair:
     margin = design.limits.margin
     if margin is None:
         return -math.inf, math.inf
-    return (margin, math.inf) if home_pose(design).position[2] > 0.0 else (-math.inf, -margin)
+    return (margin, math.inf) if design.home_pose.position[2] > 0.0 else (-math.inf, -margin)
 
 
 def _to_b1(design: Design, b: float) -> float:

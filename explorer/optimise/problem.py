@@ -15,7 +15,6 @@ import numpy as np
 from explorer.errors import InputError
 from explorer.measures.size import longest_leg
 from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Limits, Swing
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
 from explorer.numerics.checks import number
 from explorer.optimise.demands import MOST_TILT, Box, Demands
@@ -99,7 +98,7 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     def __post_init__(self) -> None:
         if self.start.home is None:
-            home = home_pose(self.start)
+            home = self.start.home_pose
             with_home = msgspec.structs.replace(self.start, home=home)
             msgspec.structs.force_setattr(self, "start", with_home)
         if self.objective not in OBJECTIVES:
@@ -177,7 +176,7 @@ def varied(design: Design, values: Mapping[str, float]) -> Design:
     own = zip(VARIABLES, design.variables, strict=True)
     changed = design.with_variables([values.get(name, value) for name, value in own])
     if YAW in values:
-        home = home_pose(design)
+        home = design.home_pose
         _, pitch, roll = yaw_pitch_roll_from_rotation(home.rotation).tolist()
         home = Pose.of_yaw_pitch_roll(home.position, (values[YAW], pitch, roll))
         changed = msgspec.structs.replace(changed, home=home)
@@ -225,7 +224,7 @@ def start_value(start: Design, name: str) -> float:
     if name in VARIABLES:
         return start.variables[VARIABLES.index(name)]
     if name == YAW:
-        return float(yaw_pitch_roll_from_rotation(home_pose(start).rotation)[0])
+        return float(yaw_pitch_roll_from_rotation(start.home_pose.rotation)[0])
     if name == REACH:
         return longest_leg(start)
     if name in SHIFTS:

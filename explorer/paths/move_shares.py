@@ -13,9 +13,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from explorer.legs.segments import Vector
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector
 from explorer.paths.taylor_models import (
     Model,
     Models,

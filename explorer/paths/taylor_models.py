@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-from explorer.legs.segments import Vector
 from explorer.numerics.compiled import helper
+from explorer.numerics.vectors import Vector
 
 Model: TypeAlias = tuple[float, float, float]
 """The value, the rate, and the most by which the rate differs within the interval."""

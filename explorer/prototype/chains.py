@@ -17,9 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
-from explorer.mechanism.kinematics import attachment_points
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
 
@@ -95,8 +94,8 @@ class Chains:
 
         The first axis of a universal joint is perpendicular to the leg at home.
         """
-        home = home_pose(design)
-        points = attachment_points(design, home.position, home.rotation)
+        home = design.home_pose
+        points = Configuration(design, home.position, home.rotation).points
         side = -1 if home.position[2] < 0.0 else 1
         above = -1 if float(home.rotation[:, 2] @ points.b4) > 0.0 else 1
         along = np.diag([1.0, side, side])
@@ -122,7 +121,7 @@ class Chains:
         Raises:
             InputError: a pose that is not finite or not a rotation.
         """
-        b = attachment_points(self.design, position, rotation)
+        b = Configuration(self.design, position, rotation).points
         ends = np.stack([b.b1, b.b2, b.b3, b.b4 - b.a3], axis=-2)
         legs = np.where(_GUIDE[:, None], ends * [0.0, 1.0, 1.0], ends)
         x, y, z = np.moveaxis(np.einsum("kji,...kj->...ki", self.mounts, legs), -1, 0)

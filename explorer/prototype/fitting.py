@@ -13,7 +13,6 @@ import numpy as np
 
 from explorer.errors import InputError, TooTightError
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import LEGS
 from explorer.prototype.joint_limits import broken_joint_limits
@@ -36,7 +35,7 @@ def sizes_of(design: Design) -> Sizes:
             distance and what would fit.
         InputError: the home pose breaks the limits of a leg.
     """
-    design = msgspec.structs.replace(design, home=home_pose(design))
+    design = msgspec.structs.replace(design, home=design.home_pose)
     share = 1.0 if all(design.limits.leg_radii) else _fitting_factors(design, 1.0)[0]
     sizes = _sizes(design, 1.0, share or 1.0)
     if sizes.worst is not None:
@@ -49,7 +48,7 @@ def sizes_of(design: Design) -> Sizes:
                 f"leg {leg} is {sizes.home_length(leg):.4g} mm long at home, but its limits are "
                 f"{low:.4g} to {high:.4g} mm; choose another home"
             )
-    home = home_pose(design)
+    home = design.home_pose
     for problem in broken_joint_limits(sizes, home.position, home.rotation):
         raise InputError(f"at home {problem}; choose another home")
     return sizes

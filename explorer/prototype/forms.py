@@ -9,7 +9,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from explorer.mechanism.kinematics import platform_points
 from explorer.prototype.chains import LEGS, ON_GUIDE
 from explorer.prototype.dimensions import CLEARANCE, LegSizes
 from explorer.prototype.kernel import Circle, Kernel, Shape
@@ -140,7 +139,7 @@ def _rod(k: Kernel, sizes: Sizes, leg: int) -> Shape:
 
 def _platform(k: Kernel, sizes: Sizes) -> Shape:
     """Return the platform plate, beyond the platform plane, with a hole for each ball's neck."""
-    points = platform_points(sizes.design) * sizes.design.unit_mm
+    points = sizes.design.platform_points * sizes.design.unit_mm
     low, high = sizes.standoff, sizes.standoff + sizes.platform_plate
     pads: list[Circle] = []
     holes: list[Shape] = []
@@ -153,7 +152,7 @@ def _platform(k: Kernel, sizes: Sizes) -> Shape:
 def _ball(k: Kernel, sizes: Sizes, leg: int) -> Shape:
     """Return a ball on its neck, which reaches through the platform plate."""
     dims = sizes.legs[leg - 1]
-    x, y, _ = (platform_points(sizes.design)[leg - 1] * sizes.design.unit_mm).tolist()
+    x, y, _ = (sizes.design.platform_points[leg - 1] * sizes.design.unit_mm).tolist()
     neck = k.disc(Circle(dims.neck), 0.0, sizes.standoff + sizes.platform_plate)
     return _facing((k.ball(dims.ball) + neck).translate((x, y, 0.0)), sizes)
 

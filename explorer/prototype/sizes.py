@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike
 
 from explorer.legs.clearance import PAIRS, leg_axes, pair_rows
 from explorer.mechanism.design import LENGTHS, Design
-from explorer.mechanism.home import home_pose
-from explorer.mechanism.kinematics import platform_points
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
 from explorer.prototype.dimensions import CLEARANCE, THINNEST, GuideSizes, LegSizes, Stroke
@@ -62,7 +60,7 @@ class Sizes:
     @cached_property
     def home_joints(self) -> FloatArray:
         """The joint values of the chains at home, in design units and radians, shape (12,)."""
-        home = home_pose(self.design)
+        home = self.design.home_pose
         return self.chains.joints(home.position, home.rotation)
 
     def home_length(self, leg: int) -> float:
@@ -134,7 +132,7 @@ class Sizes:
         return Stroke(low, min(high, max(-nearest, home)))
 
     def _required_guide_range(self, leg: int) -> Stroke:
-        design, home = self.design, home_pose(self.design)
+        design, home = self.design, self.design.home_pose
         if design.limits.guide is not None:
             low, high = design.limits.guide
             return Stroke(low * design.unit_mm, high * design.unit_mm)
@@ -216,7 +214,7 @@ class Sizes:
         a3y = abs(self.design.a3[1]) * self.design.unit_mm
         needed = self.legs[3].sweep(self.guide.eye) + CLEARANCE + self.guide.eye
         yield "the guide and the universal joint at a3", a3y, needed
-        points = platform_points(self.design) * self.design.unit_mm
+        points = self.design.platform_points * self.design.unit_mm
         for i, j in itertools.combinations(range(4), 2):
             distance = float(np.linalg.norm(points[i] - points[j]))
             needed = self.legs[i].cup + self.legs[j].cup + CLEARANCE
@@ -224,7 +222,7 @@ class Sizes:
         for leg, leg_sizes in zip(LEGS, self.legs, strict=True):
             # The stroke needs room on both sides of the home length.
             yield f"the ends of leg {leg} at home", self.home_length(leg), 1.1 * leg_sizes.dead
-        home = home_pose(self.design)
+        home = self.design.home_pose
         for axes, distance, needed in self.leg_distances(home.position, home.rotation):
             yield f"{axes} at home", distance, needed
 

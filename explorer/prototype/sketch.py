@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import platform_points
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ON_GUIDE, Chains, joints_of_leg
 from explorer.prototype.mass import Mass, ball, bar, total_mass
@@ -40,7 +39,7 @@ def sketch_masses(chains: Chains, home_joints: FloatArray, density: float) -> Ma
         masses[f"{joint} {leg}"] = ball(JOINT * radius, np.zeros(3), density)
         masses[f"cylinder {leg}"] = bar(radius, np.zeros(3), along, density)
         masses[f"rod {leg}"] = bar(ROD * radius, -along, np.zeros(3), density)
-    points = platform_points(chains.design)
+    points = chains.design.platform_points
     hub = points.mean(axis=0)
     balls = (ball(BALL * r, point, density) for r, point in zip(radii, points, strict=True))
     bars = (bar(r, hub, point, density) for r, point in zip(radii, points, strict=True))

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.machine import Payload
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains
 from explorer.prototype.mass import Mass
@@ -55,7 +54,7 @@ def bar_masses(design: Design, density: float) -> Mapping[str, Mass]:
         design: The manipulator.
         density: Density of the bars, in kg/m³.
     """
-    chains, home, metres = Chains.of(design), home_pose(design), 1e-3 * design.unit_mm
+    chains, home, metres = Chains.of(design), design.home_pose, 1e-3 * design.unit_mm
     joints = chains.joints(np.array(home.position), home.rotation)
     masses = sketch_masses(chains, joints, 1.0)
     return {name: each.scaled(metres, density * metres**3) for name, each in masses.items()}

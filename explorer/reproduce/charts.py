@@ -13,7 +13,6 @@ import numpy as np
 
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.folds import from_folds, to_folds
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
@@ -93,7 +92,7 @@ class ChartErrors:
 
 def chart() -> Measurement:
     """Try the folds as coordinates of all poses, of each stratum, and of the home pose."""
-    random, home = np.random.default_rng(9), home_pose(OPTIMAL)
+    random, home = np.random.default_rng(9), OPTIMAL.home_pose
     p, r = random_poses(random, POSES, 1.0)
     p[0], r[0] = np.array(home.position) / OPTIMAL.reach, home.rotation
     folds = to_folds(p, r)

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.numerics.arrays import BoolArray, FloatArray
@@ -24,7 +23,7 @@ OPTIMAL = PRESETS["paper-optimal"]
 # The optimum with no limit but its mode, the order of its carriages, and a stroke of one reach for
 # each actuator, as the legs of the others have: the guide goes from a1 to a2.
 STROKES = msgspec.structs.replace(OPTIMAL.limits, box=None, guide=(0.0, OPTIMAL.reach))
-FREE = msgspec.structs.replace(OPTIMAL, limits=STROKES, home=home_pose(OPTIMAL))
+FREE = msgspec.structs.replace(OPTIMAL, limits=STROKES, home=OPTIMAL.home_pose)
 A2X = (10.0, OPTIMAL.reach)
 """Positions of a2 at which the twin is measured, in design units."""
 SIZES = (0.75, 1.0, 1.5)
@@ -117,7 +116,7 @@ def judge_workspace(
 def orientations() -> Measurement:
     """Compare the orientations of the 4-4 with those of six-legged mechanisms."""
     points = qmc.scale(_points(0), *_four_box())
-    rotation = home_pose(OPTIMAL).rotation
+    rotation = OPTIMAL.home_pose.rotation
     ours = _abilities("4-4", four_four, points, rotation)
     crossed = _abilities("4-4, any order", in_any_order, points, rotation)
     others = [
@@ -168,7 +167,7 @@ def four_four(position: FloatArray, rotation: FloatArray) -> BoolArray:
 
 def in_any_order(position: FloatArray, rotation: FloatArray) -> BoolArray:
     """Return whether poses keep the strokes and the mode of home."""
-    joints, home = inverse(OPTIMAL, position, rotation), home_pose(OPTIMAL)
+    joints, home = inverse(OPTIMAL, position, rotation), OPTIMAL.home_pose
     within = (joints >= 0.0) & (joints <= OPTIMAL.reach)
     mode = mode_of(margins(home.position, home.rotation))
     return within.all(axis=-1) & (mode_of(margins(position, rotation)) == mode)

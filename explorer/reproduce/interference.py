@@ -11,14 +11,13 @@ import numpy as np
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.interference import step_is_free
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.reproduce.claim import Measurement
 from explorer.reproduce.six_legs import six_four_twin
 from explorer.workspace.limits.constraints import constraints, satisfies
 
 OPTIMAL = PRESETS["paper-optimal"]
-ROTATION = home_pose(OPTIMAL).rotation
+ROTATION = OPTIMAL.home_pose.rotation
 A2X = (5.0, 10.0, 15.0, OPTIMAL.reach)
 """Positions of a2 within the reach at which the twin is measured, in design units; the 4-4 does
 not depend on it."""

@@ -6,8 +6,9 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import attachment_points, inverse
+from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.reproduce.claim import Measurement, below
@@ -85,7 +86,7 @@ def judge_flat(errors: Errors) -> Measurement:
 
 def _volumes(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
     """Return the volumes of the three tetrahedra from their points, shape (n, 3)."""
-    points = attachment_points(design, position, rotation)
+    points = Configuration(design, position, rotation).points
     a1, a3 = np.zeros(3), np.array([*design.a3, 0.0])
     a2 = np.array([design.a2x, 0.0, 0.0])
     b1, b2, b3, b4 = points.b1, points.b2, points.b3, points.b4

@@ -12,7 +12,6 @@ import numpy as np
 from explorer.legs.segments import write_closest
 from explorer.legs.tetrahedra import tetrahedra_overlap
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import kernel
@@ -135,7 +134,7 @@ def six_four_twin(design: Design, a2x: float) -> SixLegs:
         "b3": np.array([design.b3, 0.0, 0.0]),
         "b4": np.zeros(3),
     }
-    home = home_pose(design)
+    home = design.home_pose
     return SixLegs(
         f"6-4, a2x = {a2x:.4g}",
         np.array([points[base] for base, _ in TWIN]),

@@ -12,7 +12,6 @@ import numpy as np
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
 from explorer.reproduce.claim import Measurement
 from explorer.workspace.slices.volume import (
@@ -85,7 +84,7 @@ def extents() -> Measurement:
         yaw: (workspace_nodes(_turned(optimal, yaw)).count, _initial_off(initial, yaw))
         for yaw in YAWS
     }
-    as_scanned = msgspec.structs.replace(initial, b3=15.0, home=home_pose(initial))
+    as_scanned = msgspec.structs.replace(initial, b3=15.0, home=initial.home_pose)
     off = min(_initial_off(as_scanned, yaw) for yaw in range(-180, 180))
     return judge_table(rows, by_yaw, off, _beyond_box(optimal))
 
@@ -191,7 +190,7 @@ def _lines(row: Row) -> list[str]:
 
 
 def _turned(design: Design, yaw: float) -> Design:
-    home = home_pose(design)
+    home = design.home_pose
     return msgspec.structs.replace(
         design, home=Pose.of_yaw_pitch_roll(home.position, (yaw, 0.0, 0.0))
     )

@@ -22,9 +22,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.folds import FOLD_LINES
-from explorer.mechanism.kinematics import attachment_points, inverse
+from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.bruhat import incidences
@@ -125,7 +126,7 @@ def _locked_rates(design: Design, pose: Pose) -> FloatArray:
     end, shape (6 or more, 6).
     """
     p, r, reach = np.array(pose.position), pose.rotation, design.reach
-    points = attachment_points(design, p, r)
+    points = Configuration(design, p, r).points
     rows = [jacobian(design, p, r)]
     lengths = inverse(design, p, r)[[0, 2, 4, 5]]
     for end, length in zip((points.b1, points.b2, points.b3, points.b4), lengths, strict=True):

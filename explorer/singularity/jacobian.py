@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import attachment_points
 from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray, dot
@@ -48,7 +48,7 @@ def jacobian(
         InputError: The position or the tool is not finite, or the rotation is not one.
     """
     r = checked_rotation(rotation)
-    points = attachment_points(design, position, r)
+    points = Configuration(design, position, r).points
     p = points.b4
     c = p + tool_offset(r, tool)
     radial = np.array([0.0, 1.0, 1.0])

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.displacement import PlatformPoints
-from explorer.mechanism.margins import INCIDENCES
+from explorer.mechanism.margins import INCIDENCES, margins_at
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import FloatArray, batch_shape, finite_array, rows_for_kernel
 from explorer.numerics.compiled import helper, kernel
@@ -313,17 +313,17 @@ def nearest_rows(
             g[i] = p[i] + r[i, 0] * c[0] + r[i, 1] * c[1]
             distance[row, i] = bound[row, i] = 0.0
             copy_pose(p, r, q[i], s[i])
+        delta1, delta2, delta3 = margins_at(p, r)
         for i in (0, 2):
             n = (0.0, 0.0, 1.0) if i == 2 else (r[0, 2], r[1, 2], r[2, 2])
-            off = n[0] * p[0] + n[1] * p[1] + n[2] * p[2]
+            off = delta3 if i == 2 else -delta1
             if abs(off) > ROUNDING * size:
                 square = write_point_on_plane(i == 0, g, r, c, forms, q[i], s[i])
                 way = rms_displacement(points, p, r, q[i], s[i])
                 way = shorten(way, off, n, p, r, q[i], s[i])
                 distance[row, i], bound[row, i] = way, min(way, math.sqrt(max(0.0, square)))
         across = math.hypot(r[1, 0], r[2, 0])
-        off = r[1, 0] * p[2] - r[2, 0] * p[1]
-        if across > ROUNDING and abs(off) > ROUNDING * across * size:
+        if across > ROUNDING and abs(delta2) > ROUNDING * across * size:
             k = constants_at(r, g, scatter, c)
             phi, sigma, square = minimise_on_torus(k, boxes)
             write_on_plane(phi, sigma, k, c, g, s[1], q[1])
@@ -337,5 +337,5 @@ def nearest_rows(
                 copy_pose(near_q, near_s, q[1], s[1])
                 way = near_way
             n = (0.0, -r[2, 0] / across, r[1, 0] / across)
-            way = shorten(way, off / across, n, p, r, q[1], s[1])
+            way = shorten(way, delta2 / across, n, p, r, q[1], s[1])
             distance[row, 1], bound[row, 1] = way, min(way, math.sqrt(max(0.0, square)))

@@ -16,11 +16,12 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.legs.segments import Vector, cross3, dot3
 from explorer.mechanism.design import Design
+from explorer.mechanism.margins import margins_at, margins_of
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, batch_shape, finite_array, for_kernel
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector, along, column, cross3, dot3
 
 # Share of |p| up to which a margin is zero but for rounding.
 SINGULAR = 1e-13
@@ -34,27 +35,14 @@ NO_TOOL = np.zeros((1, 3))
 
 
 @helper
-def column(r: FloatArray, axis: int) -> Vector:
-    """Return a column of a rotation."""
-    return (r[0, axis], r[1, axis], r[2, axis])
-
-
-@helper
-def along(a: Vector, share: float, b: Vector) -> Vector:
-    """Return a + share · b."""
-    return (a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2])
-
-
-@helper
 def is_singular(x: FloatArray, p: FloatArray, r: FloatArray) -> bool:
     """Return whether a margin of the pose vanishes to rounding."""
     square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2]
     least = SINGULAR * math.sqrt(square)
-    delta1 = r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2]
-    delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
+    delta1, delta2, delta3 = margins_at(p, r)
     if square <= AT_A1 * AT_A1 * (x[A3X] * x[A3X] + x[A3Y] * x[A3Y]):
         return True
-    return abs(delta1) <= least or abs(delta2) <= least or abs(p[2]) <= least
+    return abs(delta1) <= least or abs(delta2) <= least or abs(delta3) <= least
 
 
 @helper
@@ -81,15 +69,14 @@ def holding_forces(
     """
     u, v, b4 = column(r, 0), column(r, 1), (p[0], p[1], p[2])
     zero = (0.0, 0.0, 0.0)
-    delta1 = -dot3(column(r, 2), b4)
-    delta2 = u[1] * p[2] - u[2] * p[1]
+    delta1, delta2, delta3 = margins_of(b4, u, column(r, 2))
     arm1 = along(along(zero, x[B1X], u), x[B1Y], v)
     leg1 = along(b4, 1.0, arm1)
     leg4 = (p[0] - x[A3X], p[1] - x[A3Y], p[2])
     l1, l4 = math.sqrt(dot3(leg1, leg1)), math.sqrt(dot3(leg4, leg4))
     # Forces over lengths.
     f1 = dot3(moment, u) / (x[B1Y] * delta1)
-    f4 = -(moment[0] + p[1] * force[2] - p[2] * force[1]) / (x[A3Y] * p[2])
+    f4 = -(moment[0] + p[1] * force[2] - p[2] * force[1]) / (x[A3Y] * delta3)
     rest = along(along(force, f1, leg1), f4, leg4)
     turning = along(moment, f1, cross3(arm1, leg1))
     lever = cross3(u, rest)

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
-from explorer.legs.segments import Vector, cross3, dot3
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import DIMENSIONS
 from explorer.numerics.arrays import FloatArray, for_kernel, lengths_of
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector, along, cross3, dot3, vector
 from explorer.statics.accuracy import (
     UNIFORM,
     Precision,
@@ -25,7 +25,6 @@ from explorer.statics.accuracy import (
     actuator_errors,
     pose_precision,
 )
-from explorer.statics.equilibrium import along
 
 SOURCES = (*JOINTS, *DIMENSIONS)
 """The 29 sources of errors, in the order of every array axis of 29."""
@@ -62,12 +61,6 @@ class LargestError(NamedTuple):
 
 
 @helper
-def row(rows: FloatArray, index: int) -> Vector:
-    """Return a row of three numbers."""
-    return (rows[index, 0], rows[index, 1], rows[index, 2])
-
-
-@helper
 def toward(total: Vector, side: float, w: Vector) -> Vector:
     """Return the total plus w where `side` is positive, and minus w elsewhere."""
     return along(total, 1.0 if side > 0.0 else -1.0, w)
@@ -92,7 +85,7 @@ def merge_parallel(columns: FloatArray, scale: float, w: FloatArray, u: FloatArr
         unit = (v[0] / length, v[1] / length, v[2] / length)
         i = 0
         while i < count:
-            across = cross3(unit, row(u, i))
+            across = cross3(unit, vector(u, i))
             if dot3(across, across) <= FLAT * FLAT:
                 break
             i += 1
@@ -101,7 +94,7 @@ def merge_parallel(columns: FloatArray, scale: float, w: FloatArray, u: FloatArr
             u[i, 0], u[i, 1], u[i, 2] = unit
             w[i, 0], w[i, 1], w[i, 2] = v
         else:
-            w[i, 0], w[i, 1], w[i, 2] = toward(row(w, i), dot3(unit, row(u, i)), v)
+            w[i, 0], w[i, 1], w[i, 2] = toward(vector(w, i), dot3(unit, vector(u, i)), v)
     return count
 
 
@@ -115,23 +108,23 @@ def longest_sum(w: FloatArray, u: FloatArray, count: int) -> Vector:
     has both. The vectors of a plane span a polygon with i along one of its edges; every corner of
     it ends an edge of another vector too, so that pairs with i < j suffice.
     """
-    longest, most = row(w, 0), 0.0
+    longest, most = vector(w, 0), 0.0
     for i in range(count):
         for j in range(i + 1, count):
-            normal = cross3(row(u, i), row(u, j))
+            normal = cross3(vector(u, i), vector(u, j))
             flat = FLAT * math.sqrt(dot3(normal, normal))
-            inner = cross3(normal, row(u, i))
+            inner = cross3(normal, vector(u, i))
             out, within = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
             for k in range(count):
                 if k != i:
-                    side = dot3(normal, row(u, k))
+                    side = dot3(normal, vector(u, k))
                     if abs(side) > flat:
-                        out = toward(out, side, row(w, k))
+                        out = toward(out, side, vector(w, k))
                     else:
-                        within = toward(within, dot3(inner, row(u, k)), row(w, k))
+                        within = toward(within, dot3(inner, vector(u, k)), vector(w, k))
             for corner in range(4):
                 total = toward(out, 0.5 - (corner & 1), within)
-                total = toward(total, 1.0 - (corner & 2), row(w, i))
+                total = toward(total, 1.0 - (corner & 2), vector(w, i))
                 square = dot3(total, total)
                 if square > most:
                     longest, most = total, square

@@ -15,7 +15,6 @@ import math
 import numpy as np
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_signs
 from explorer.numerics.arrays import FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import helper, kernel
 from explorer.singularity.ellipsoids import planes_of_singularity
@@ -62,7 +61,7 @@ def load_case(
     planes = planes_of_singularity(rotation)
     lengths = np.linalg.norm(planes, axis=1)
     # Of parallel lines every position is singular, and δ2 has no plane.
-    scale = np.array(home_signs(design)) / np.where(lengths > 0.0, lengths, 1.0)
+    scale = np.array(design.home_signs) / np.where(lengths > 0.0, lengths, 1.0)
     inward = scale[:, None] * planes
     bounds = part_limits(design) if limits is None else limits
     parts = (design.variables, tool, wrench, design.payload.force_n, bounds, inward)

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.kinematics import attachment_points, inverse
+from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.machine import Payload
 from explorer.numerics.arrays import BoolArray, FloatArray, dot
 from explorer.statics.equilibrium import twists_of_actuators
@@ -210,7 +211,7 @@ def _signed(
     It is the actuator forces, the moments at the carriages along the guide, and the (y, z)
     components of the forces of both carriages on the guide.
     """
-    points = attachment_points(design, position, rotation)
+    points = Configuration(design, position, rotation).points
     joints = inverse(design, position, rotation)
     lengths, along = joints[..., STRUT_ROWS], forces[..., GUIDE_ROWS]
     regular = np.isfinite(along)
@@ -253,7 +254,7 @@ def _spread(
 def _joint_forces(
     design: Design, position: ArrayLike, rotation: ArrayLike, forces: FloatArray, carried: Carried
 ) -> FloatArray:
-    points = attachment_points(design, position, rotation)
+    points = Configuration(design, position, rotation).points
     across = np.array([0.0, 1.0, 1.0])
     legs = [points.b1, points.b2 * across, points.b3 * across, points.b4 - points.a3]
     axes = np.stack(legs, axis=-2)

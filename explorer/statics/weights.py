@@ -15,9 +15,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import AttachmentPoints, attachment_points
 from explorer.mechanism.machine import STANDARD_GRAVITY, Payload
+from explorer.mechanism.points import AttachmentPoints
 from explorer.mechanism.pose import Quadruple
 from explorer.numerics.arrays import FloatArray, dot, finite_array, rotate
 from explorer.numerics.checks import numbers
@@ -117,7 +118,7 @@ def carry(
     Raises:
         InputError: The position or the tool is not finite, or the rotation is not one.
     """
-    points = attachment_points(design, position, rotation)
+    points = Configuration(design, position, rotation).points
     r = np.asarray(rotation, dtype=np.float64)
     shift = np.zeros(3) if tool is None else rotate(r, finite_array("tool", tool, (3,)))
     g = STANDARD_GRAVITY * np.array(design.gravity)

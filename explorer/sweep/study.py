@@ -22,7 +22,6 @@ from explorer.files.writing import read_at_most
 from explorer.measures.catalogue import FORMER_NAMES, measures_in
 from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.numerics.checks import instance, number, one_of, positive, two, whole
 from explorer.optimise.demands import Demands
 from explorer.optimise.problem import (
@@ -351,7 +350,7 @@ def _complete(design: Any) -> Design:
             )
         design = PRESETS[design]
     instance("design", design, Design)
-    return msgspec.structs.replace(design, home=home_pose(design))
+    return msgspec.structs.replace(design, home=design.home_pose)
 
 
 def _ranges(

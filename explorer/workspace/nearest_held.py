@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from explorer.mechanism.home import home_signs
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
@@ -77,7 +76,7 @@ def _signs_of(loaded: LoadedPose) -> tuple[int, int, int]:
     pose = loaded.pose
     own = np.sign(margins(pose.position, pose.rotation)).astype(np.int64).tolist()
     first, second, third = (
-        sign or home for sign, home in zip(own, home_signs(loaded.design), strict=True)
+        sign or home for sign, home in zip(own, loaded.design.home_signs, strict=True)
     )
     return first, second, third
 

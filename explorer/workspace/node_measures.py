@@ -15,14 +15,16 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, joined_pairs, radii_of_pairs
-from explorer.legs.segments import closest_shares, minus, square_at
+from explorer.legs.segments import closest_shares, square_at
 from explorer.mechanism.design import Design
+from explorer.mechanism.margins import margins_at
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import kernel
+from explorer.numerics.vectors import minus, vector
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.limits.valid_poses import LENGTH_LOWS, vector, write_ends
+from explorer.workspace.limits.valid_poses import LENGTH_LOWS, write_ends
 from explorer.workspace.slices.nodes import is_within
 from explorer.workspace.slices.volume import bounds, home_rotation
 
@@ -159,13 +161,10 @@ def measure_nodes(  # noqa: PLR0917 - a compiled loop takes plain values
                     index = float(i if axis == 0 else (j if axis == 1 else k))
                     results[LOWS + axis] = min(results[LOWS + axis], index)
                     results[HIGHS + axis] = max(results[HIGHS + axis], index)
-                delta1 = abs(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
-                delta2 = abs(r[1, 0] * p[2] - r[2, 0] * p[1])
-                delta3 = abs(p[2])
-                results[LEAST] = min(results[LEAST], delta1)
-                results[LEAST + 1] = min(results[LEAST + 1], delta2)
-                results[LEAST + 2] = min(results[LEAST + 2], delta3)
-                smallest = min(delta1, delta2, delta3)
+                smallest = math.inf
+                for index, delta in enumerate(margins_at(p, r)):
+                    results[LEAST + index] = min(results[LEAST + index], abs(delta))
+                    smallest = min(smallest, abs(delta))
                 results[MEAN] += smallest
                 is_off_planes = smallest >= margin
                 if is_off_planes:

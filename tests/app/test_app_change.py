@@ -24,7 +24,6 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import Buttons
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -64,7 +63,7 @@ def test_change_shows_the_differences_of_volume_reach_and_clearance(watcher: Wat
     card = watcher.card(watcher.do(SetVariable("a3x", 20.0)))
     cells = re.sub(r"<[^>]+>", " ", card)
     before, after = (
-        workspace_volume(design, home_pose(OPTIMAL).rotation).volume for design in (OPTIMAL, WIDER)
+        workspace_volume(design, OPTIMAL.home_pose.rotation).volume for design in (OPTIMAL, WIDER)
     )
     for value in (before, after):
         assert f"{value:,.0f}" in cells
@@ -80,7 +79,7 @@ def test_page_that_never_showed_the_design_before_measures_it_too(
     desk.session.do(SetVariable("a3x", 20.0))
     watcher = Watcher(server, buttons, desk)
     card = watcher.card(watcher.follow())
-    assert f"{workspace_volume(OPTIMAL, home_pose(OPTIMAL).rotation).volume:,.0f}" in card
+    assert f"{workspace_volume(OPTIMAL, OPTIMAL.home_pose.rotation).volume:,.0f}" in card
     assert "…" not in card
 
 

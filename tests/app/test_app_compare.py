@@ -46,7 +46,6 @@ from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.machine import Actuators, Guide, Payload
 from explorer.mechanism.pose import Pose
 from explorer.statics.loaded import LoadedPose
@@ -238,7 +237,7 @@ HEAVY = msgspec.structs.replace(LIGHT, name="heavy", payload=Payload(2.0, force_
 
 
 def test_table_of_a_singular_home_shows_infinite_loads_and_errors() -> None:
-    home = Pose((10.0, 5.0, 0.0), home_pose(OPTIMAL).quaternion)
+    home = Pose((10.0, 5.0, 0.0), OPTIMAL.home_pose.quaternion)
     singular = msgspec.structs.replace(HEAVY, home=home)
     rows = cells(table(columns(singular, live=LIGHT), millimetres=True))
     for name in ("load share at home %", "worst error at home mm", "worst turn at home °"):
@@ -254,7 +253,7 @@ def test_table_compares_loads_of_the_designs_that_have_them() -> None:
     assert "inf" not in re.sub("<.*?>", "", html)
     rows = cells(html)
     for design, place in ((LIGHT, 0), (HEAVY, 1)):
-        pose = LoadedPose(design, home_pose(design))
+        pose = LoadedPose(design, design.home_pose)
         moments = pose.held.bending + pose.held.spread[6:8]
         for name, expected in (
             ("load share at home %", 100.0 * pose.share),
@@ -279,7 +278,7 @@ def test_drawing_has_the_workspace_at_home_and_the_points_of_the_design() -> Non
         abs=0.01 * INITIAL.reach,
     )
     ends = drawing.outline.reshape(-1, 3)
-    for point in ((0.0, 0.0, 0.0), (*INITIAL.a3, 0.0), home_pose(INITIAL).position):
+    for point in ((0.0, 0.0, 0.0), (*INITIAL.a3, 0.0), INITIAL.home_pose.position):
         assert np.abs(ends - np.array(point)).max(axis=1).min() < 1e-9
     assert compared_drawing(ComparedRequest(INITIAL)).shell is None
 

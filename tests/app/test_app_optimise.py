@@ -72,7 +72,6 @@ from explorer.errors import InputError
 from explorer.measures.size import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.paper import paper_problem, paper_start
 from explorer.optimise.problem import OBJECTIVES, YAW
@@ -245,7 +244,7 @@ def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
     assert len(places) >= min(len({*steps}), optimiser.STEPS)
     assert state.design.variables == best.design.variables
     assert state.design.name == "paper-initial-optimised"
-    assert state.pose.quaternion == home_pose(paper_start()).quaternion
+    assert state.pose.quaternion == paper_start().home_pose.quaternion
     assert state.view.workspace.solid
     assert filled_buttons(state) == [ACCEPT]
     assert {buttons_of(state)[name] for name in (REVERT, START, HULL)} == {"enabled"}
@@ -392,8 +391,8 @@ def test_platform_moves_freely_during_a_run_and_iterates_keep_its_position() -> 
     last = iterates_of(state, 3)[-1]
     after = Advance(run.number, (last,)).apply(moved)
     assert after.pose.position[0] == 6.0
-    assert after.pose.quaternion == home_pose(last.design).quaternion
-    assert after.pose.quaternion != home_pose(run.own.design).quaternion
+    assert after.pose.quaternion == last.design.home_pose.quaternion
+    assert after.pose.quaternion != run.own.design.home_pose.quaternion
     assert after.joints == opened(last.design, after.pose).joints
     # Iterates of another run change nothing.
     assert Advance(run.number + 1, (last,)).apply(moved) == moved
@@ -434,7 +433,7 @@ def test_only_free_variables_change_and_those_of_margins_influence_them() -> Non
 @pytest.mark.parametrize("name", PRESETS)
 def test_suggested_values_suit_the_design(name: str) -> None:
     state = opened(PRESETS[name])
-    design, home = state.design, home_pose(state.design)
+    design, home = state.design, state.design.home_pose
     volume = workspace_volume(design).volume
     assert 1.05 * volume < requested_volume(state) < 2.3 * volume
     same = ask(OptimisationRequest(objective="smallest-reach"), state)
@@ -484,7 +483,7 @@ def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
     assert LiftLimit(limit).title == title
     after = LiftLimit(limit).apply(before)
     assert limit not in {refusal.limit for refusal in refuted(after)}
-    assert home_pose(after.design) == home_pose(design)
+    assert after.design.home_pose == design.home_pose
 
 
 def test_paper_box_allows_the_search_and_keeps_the_home() -> None:
@@ -492,7 +491,7 @@ def test_paper_box_allows_the_search_and_keeps_the_home() -> None:
     after = TakePaperBox().apply(before)
     assert refuted(before) != ()
     assert refuted(after) == ()
-    assert home_pose(after.design) == home_pose(INITIAL)
+    assert after.design.home_pose == INITIAL.home_pose
 
 
 def test_tilt_is_demanded_over_the_required_box() -> None:

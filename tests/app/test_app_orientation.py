@@ -46,7 +46,6 @@ from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.colours import css
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_from_rotation, tilt_torsion_of
 from explorer.workspace.orientations.sets import cone_of_directions
 from explorer.workspace.orientations.share import orientation_share
@@ -57,7 +56,7 @@ from explorer.workspace.solids.solids import inclusive_solid, total_solid
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
-HOME = tilt_torsion_of(home_pose(OPTIMAL).rotation)
+HOME = tilt_torsion_of(OPTIMAL.home_pose.rotation)
 
 
 def show(state: State, **changes: Any) -> State:
@@ -99,7 +98,7 @@ def test_angles_that_are_set_are_those_of_the_pose() -> None:
         state = SetTiltTorsion(axis, value).apply(state)
         assert tilt_torsion_of(state.pose.rotation)[axis] == pytest.approx(value, abs=1e-9)
     assert tilt_torsion_of(state.pose.rotation) == pytest.approx((-140.0, 25.0, -50.0), abs=1e-9)
-    assert state.pose.position == home_pose(OPTIMAL).position
+    assert state.pose.position == OPTIMAL.home_pose.position
     there = GoToTilt(30.0, 20.0).apply(state)
     assert tilt_torsion_of(there.pose.rotation) == pytest.approx((30.0, 20.0, -50.0), abs=1e-9)
     assert SetTiltTorsion(1, 25.0).words() == "tilt = 25°"
@@ -167,7 +166,7 @@ def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(tasks, "ORIENTATIONS", 8)
-    rotations = cone_of_directions(home_pose(OPTIMAL).rotation, 15.0, 8)
+    rotations = cone_of_directions(OPTIMAL.home_pose.rotation, 15.0, 8)
     volumes: dict[str, float] = {}
     for over, make, bound in (
         ("total", total_solid, "at most "),
@@ -185,7 +184,7 @@ def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
 
 
 def test_range_turns_the_tilted_orientations_either_way() -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     tilted = orientations_over(RangeRequest(OPTIMAL, home, 15.0, 0.0, "total"))
     np.testing.assert_array_equal(tilted, cone_of_directions(home.rotation, 15.0, ORIENTATIONS))
     turned = orientations_over(RangeRequest(OPTIMAL, home, 15.0, 10.0, "total"))

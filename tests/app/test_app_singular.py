@@ -43,9 +43,9 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import SingularView
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.displacement import displacement
-from explorer.mechanism.kinematics import attachment_points
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
 from explorer.singularity.bruhat import OF_INCIDENCES, incidences
@@ -166,9 +166,9 @@ def test_distances_and_their_ghosts_are_those_of_the_nearest_poses(
         lengths = np.linalg.norm(ways[:, 1] - ways[:, 0], axis=1) / placed.scale
         assert float(np.sqrt((lengths**2).mean())) == pytest.approx(distances[index], rel=1e-4)
         assert f"δ{index + 1} = 0" in drawn["/nearest/label"]["text"]
-        there = attachment_points(
+        there = Configuration(
             OPTIMAL, nearest[index].pose.position, nearest[index].pose.rotation
-        )
+        ).points
         ends = placed.scale * np.array([there.b1, there.b2, there.b3, there.b4])
         np.testing.assert_allclose(ways[:, 1], ends, rtol=1e-4, atol=1e-4)
 
@@ -410,7 +410,7 @@ def test_pointer_on_a_row_shows_one_ghost_with_its_number_and_leaves_no_step(
     scene = drawn()
     assert scene["/ghosts/name/0"]["text"] == MODES[6]
     there = SetMode(6).apply(before).pose
-    points = attachment_points(OPTIMAL, there.position, there.rotation)
+    points = Configuration(OPTIMAL, there.position, there.rotation).points
     placed = Placed(Frame(desk.state))
     expected = placed.scale * np.array([points.b1, points.b2, points.b3, points.b4])
     np.testing.assert_allclose(ghost_points(placed, [6])[0], expected, atol=1e-9)

@@ -54,7 +54,6 @@ from explorer.errors import InputError
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.parts import part_paths, write_part
@@ -268,7 +267,7 @@ def test_plan_offers_what_the_machine_of_the_design_has_and_refuses_the_rest() -
     ):
         with pytest.raises(InputError, match=words):
             study_around(OPTIMAL, plan, "s")
-        expected = msgspec.structs.replace(LOADED, home=home_pose(LOADED))
+        expected = msgspec.structs.replace(LOADED, home=LOADED.home_pose)
         assert study_around(LOADED, plan, "s").base == expected
 
 

@@ -59,7 +59,6 @@ from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.pieces import widgets
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.machine import Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
@@ -563,7 +562,7 @@ def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) 
         nodes = by_name(scene.updates(placed))
         boxes = scene.corners(placed).reshape(-1, 8, 3)
         for design, name, box in zip((state.design, other), ("live", "A"), boxes, strict=True):
-            home = home_pose(design)
+            home = design.home_pose
             unit = scene_scale(state) * design.unit_mm / state.design.unit_mm
             node = nodes[f"/compared/{name}/workspace"]
             points = (np.asarray(node["vertices"]) + node["position"]) / unit

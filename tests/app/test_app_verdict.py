@@ -28,7 +28,6 @@ from explorer.measures.snapshot import evaluate
 from explorer.measures.verdict import DISTANCE_SHARE, TITLES, verdict, warnings
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import describe_modes
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.singularity.bruhat import COVERED, OF_INCIDENCES, incidences
@@ -41,7 +40,7 @@ OPTIMAL = PRESETS["paper-optimal"]
 
 def test_verdict_seven_degrees_from_an_incidence_is_near_and_so_is_its_margin() -> None:
     # Where the lines nearly meet every margin is long.
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     turn = rotation_from_yaw_pitch_roll((66.0, 0.0, 0.0))
     frame = Frame(opened(OPTIMAL, Pose.of(home.position, home.rotation @ turn)))
     assert np.abs(frame.snapshot.margins).min() > frame.state.warn_below
@@ -111,7 +110,7 @@ def test_verdict_where_the_map_warns_is_never_clear(
     measure: Literal["margin", "condition"], share: float | None
 ) -> None:
     for design in PRESETS.values():
-        rng, reach, place = np.random.default_rng(7), design.reach, home_pose(design)
+        rng, reach, place = np.random.default_rng(7), design.reach, design.home_pose
         warn_below = WARN_SHARE * reach if share is None else share * reach
         bands = position_bands(design, place.rotation, measure, warn_below=warn_below)
         points = rng.uniform([-reach, -reach, 0.0], reach, (500, 3))

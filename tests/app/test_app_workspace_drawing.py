@@ -37,7 +37,6 @@ from explorer.app.state.state import State, opened
 from explorer.app.state.view import WorkspaceView
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
@@ -47,7 +46,7 @@ from explorer.workspace.slices.volume import workspace_nodes
 from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = PRESETS["paper-optimal"]
-HOME_ROWS = tuple(tuple(row) for row in home_pose(OPTIMAL).rotation.tolist())
+HOME_ROWS = tuple(tuple(row) for row in OPTIMAL.home_pose.rotation.tolist())
 PATIENCE = 120.0
 
 
@@ -143,7 +142,7 @@ def test_workspace_large_beside_the_reach_has_a_bounded_number_of_facets() -> No
 
 
 ORIENTATIONS = (
-    home_pose(OPTIMAL).rotation,
+    OPTIMAL.home_pose.rotation,
     # Singular everywhere, and almost so.
     np.eye(3),
     rotation_from_yaw_pitch_roll((1e-7, 0.0, 0.0)),

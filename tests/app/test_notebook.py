@@ -71,7 +71,7 @@ def test_notebook_gets_the_page_in_a_frame_and_a_shell_its_address(
 
 
 def test_design_and_pose_are_read_and_set_live(shown: explorer.Shown) -> None:
-    home = explorer.home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     assert (shown.design, shown.pose) == (OPTIMAL, home)
     pose = Pose.of_yaw_pitch_roll((9.0, 4.0, 8.0), (-60.0, 10.0, 5.0))
     shown.pose = pose
@@ -79,7 +79,7 @@ def test_design_and_pose_are_read_and_set_live(shown: explorer.Shown) -> None:
     other = OPTIMAL.with_variable("b2", 2.0)
     shown.design = other
     assert shown.design == other
-    assert shown.pose == explorer.home_pose(other)
+    assert shown.pose == other.home_pose
     shown.design = "paper-initial"
     assert shown.design == explorer.PRESETS["paper-initial"]
 
@@ -94,7 +94,7 @@ def test_value_that_cannot_be_set_is_refused_in_one_line_and_changes_nothing(
         shown.pose = untyped
     with pytest.raises(explorer.DesignError, match=r"^[^\n]*no-such-design[^\n]*$"):
         shown.design = "no-such-design"
-    assert (shown.design, shown.pose) == (OPTIMAL, explorer.home_pose(OPTIMAL))
+    assert (shown.design, shown.pose) == (OPTIMAL, OPTIMAL.home_pose)
     with pytest.raises(InputError, match=r"^the height must be 100 pixels at least; got 5$"):
         explorer.show(height=5)
     port = int(shown.url.rpartition(":")[2])
@@ -108,7 +108,7 @@ def test_explorers_shown_at_once_have_a_state_each(shown: explorer.Shown) -> Non
         assert answers(other.url)
         other.pose = Pose((4.0, 3.0, 4.0), other.pose.quaternion)
         assert shown.design == OPTIMAL
-        assert shown.pose == explorer.home_pose(OPTIMAL)
+        assert shown.pose == OPTIMAL.home_pose
         assert 'height="300"' in displayed(other)["text/html"]
     assert answers(shown.url)
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
-from explorer import greatest_tilts, home_pose, inverse, margins, orientation_share, tilt_map
+from explorer import greatest_tilts, inverse, margins, orientation_share, tilt_map
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 
@@ -21,7 +21,7 @@ TILTS = 1_801
 
 def allowed(position: FloatArray, rotations: FloatArray) -> FloatArray:
     """Return which orientations are within lengths, box, sign triple and order of the preset."""
-    home = home_pose(DESIGN)
+    home = DESIGN.home_pose
     q, here = inverse(DESIGN, position, rotations), inverse(DESIGN, home.position, home.rotation)
     signs = np.sign(margins(home.position, home.rotation))
     lengths = (q[:, [0, 2, 4, 5]] <= DESIGN.reach).all(axis=1)
@@ -32,7 +32,7 @@ def allowed(position: FloatArray, rotations: FloatArray) -> FloatArray:
 def run() -> Iterator[Row]:
     """Yield the rows."""
     warm()
-    position = np.array(home_pose(DESIGN).position)
+    position = np.array(DESIGN.home_pose.position)
     rng = np.random.default_rng(1)
 
     def sample() -> None:

@@ -20,7 +20,6 @@ from benchmarks.timing import ROOT, best_of, elapsed
 from explorer import (
     Design,
     LocalWorkers,
-    home_pose,
     leg_clearances,
     margins,
     poses_are_valid,
@@ -93,7 +92,7 @@ def _one_core() -> Row:
 
 def _measure_by_hand(design: Design) -> tuple[Any, ...]:
     """Measure a design with what is public, all nodes at once."""
-    rotation = home_pose(design).rotation
+    rotation = design.home_pose.rotation
     lows, highs = design.limits.box or ((0.0,) * 3, (0.0,) * 3)
     axes = [
         low + (high - low) * (np.arange(NODES) + 0.5) / NODES

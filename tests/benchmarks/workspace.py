@@ -19,7 +19,6 @@ from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
 from explorer import Actuators, Payload, Struts
-from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.statics.held import largest_shares, load_case
@@ -168,7 +167,7 @@ def _held_region() -> Row:
 def _marching_cubes(true: float) -> tuple[int, float, float]:
     """Return the nodes an axis of a grid of the allowed error, its time, and its error."""
     measure: Any = importlib.import_module("skimage.measure")
-    rotation = home_pose(LOADED).rotation
+    rotation = LOADED.home_pose.rotation
     limits = constraints(LOADED, rotation)
     case = load_case(LOADED, rotation, np.zeros(6))
     box = LOADED.limits.box or ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

@@ -19,7 +19,6 @@ from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, joints_of
 from explorer.mechanism.design import JOINTS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import forward
 from explorer.numerics.arrays import FloatArray
 
@@ -82,7 +81,7 @@ def test_mechanism_follows_fields_sliders_and_the_home_button(tab: Tab) -> None:
     tab.wait_for(lambda: tab.state.yaw_pitch_roll[2] == 12.0, "the roll that was typed")
     assert_page_shows_state(tab)
     tab.push("Home pose")
-    home = home_pose(tab.state.design)
+    home = tab.state.design.home_pose
     tab.wait_for(lambda: tab.state.pose == home, "the home pose")
     assert_page_shows_state(tab)
 

@@ -9,7 +9,6 @@ from playwright.sync_api import Locator, expect
 from tab import Tab
 
 from explorer.app.features.orientation.polar_map import RADIUS, WIDTH, edge_of
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.workspace.orientations.tilts import tilt_map
 
@@ -36,7 +35,7 @@ def test_platform_is_tilted_and_turned_by_clicks_on_the_charts_and_by_typed_angl
     edge = edge_of(
         tilt_map(tab.state.design, tab.state.pose.position, torsion),
         angles(tab),
-        tilt_torsion_of(home_pose(tab.state.design).rotation),
+        tilt_torsion_of(tab.state.design.home_pose.rotation),
     )
     x, y, width = middle_of(tab, chart)
     off = 20.0 / edge * RADIUS * width / WIDTH

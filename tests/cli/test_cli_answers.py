@@ -200,7 +200,7 @@ def test_forward_infeasible_joints_have_status_1_and_name_the_tetrahedron(cli: C
 
 
 def test_pose_options_are_completed_from_the_home_pose(cli: CommandLine) -> None:
-    home = explorer.home_pose(PRESET)
+    home = PRESET.home_pose
     rotation = explorer.rotation_from_yaw_pitch_roll(ANGLES)
     # Of any length, and -q is the same rotation as q.
     quaternion = (-3.0 * explorer.quaternion_from_rotation(rotation)).tolist()

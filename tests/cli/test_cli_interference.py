@@ -15,7 +15,7 @@ from explorer.legs.clearance import leg_axes
 
 COMMAND = ("interference",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]
-HOME = explorer.home_pose(OPTIMAL)
+HOME = OPTIMAL.home_pose
 POSITION = (8.0, -2.5, 11.0)
 ANGLES = (-60.0, 12.5, -7.0)
 POSE = ["--position", "8", "-2.5", "1.1e1", "--yaw-pitch-roll", "-60", "12.5", "-7"]

@@ -18,7 +18,7 @@ from explorer.statics.reactions import LIMITED
 
 COMMAND = ("path",)
 PRESET = explorer.PRESETS["paper-optimal"]
-HOME = explorer.home_pose(PRESET)
+HOME = PRESET.home_pose
 SIX = ("14", "45", "98", "-140", "-120", "60")
 
 

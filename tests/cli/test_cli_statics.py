@@ -206,7 +206,7 @@ def test_statics_unusable_options_are_refused(
     assert words in cli.refusal(*argv)
 
 
-HOME = explorer.home_pose(OPTIMAL)
+HOME = OPTIMAL.home_pose
 BOX = (8.0, 3.0, 7.0, 12.0, 7.0, 11.0)
 OVER_BOX = ("--required-box", *BOX)
 POSITIONS = positions_over(OPTIMAL, "box", HOME, (BOX[:3], BOX[3:]))

@@ -58,7 +58,7 @@ def test_folds_are_those_of_b4(cli: CommandLine, tooled: list[str]) -> None:
 
 
 def test_poses_are_completed_from_the_tool_at_home(cli: CommandLine, tooled: list[str]) -> None:
-    home = explorer.home_pose(TOOLED)
+    home = TOOLED.home_pose
     at_home = np.array(home.position) + home.rotation @ TOOL
     assert cli.answer("inverse", *tooled)["position"] == list(home.position)
     turned = cli.answer("inverse", "--yaw-pitch-roll", *ANGLES, *tooled)
@@ -257,7 +257,7 @@ def test_capability_and_orientations_are_those_of_the_tool(
     assert "position" not in found
     assert found["greatest_tilt"] == explorer.greatest_tilt(TOOLED, PLACE, tool=TOOL).tilt
     assert found["tilts"] == explorer.tilt_map(TOOLED, PLACE, tool=TOOL).tilts.tolist()
-    home = explorer.home_pose(TOOLED)
+    home = TOOLED.home_pose
     default = cli.answer("orientation", "--samples", "10", *tooled)
     assert_allclose(default["tool_position"], position_of(TOOLED, home, "tool"))
     assert default["home_connected"]

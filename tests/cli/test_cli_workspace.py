@@ -94,7 +94,7 @@ def test_workspace_ranges_and_tilts_add_two_volumes(cli: CommandLine) -> None:
     found = cli.answer(
         "--yaw-range", "-80", "-65", "--roll-range", "0", "6", "--samples", "3", *COARSE
     )
-    home = explorer.yaw_pitch_roll_from_rotation(explorer.home_pose(OPTIMAL).rotation)
+    home = explorer.yaw_pitch_roll_from_rotation(OPTIMAL.home_pose.rotation)
     pitch = float(home[1])
     rotations = yaw_pitch_roll_range([-80.0, pitch, 0.0], [-65.0, pitch, 6.0], [3, 1, 3])
     assert found["orientations"] == 9
@@ -104,7 +104,7 @@ def test_workspace_ranges_and_tilts_add_two_volumes(cli: CommandLine) -> None:
     assert found["total_mesh"]["volume"] < found["mesh"]["volume"]
     assert found["mesh"]["volume"] < found["inclusive_mesh"]["volume"]
     tilted = cli.answer("--tilt", "8", "--samples", "5", *COARSE)
-    rotations = cone_of_directions(explorer.home_pose(OPTIMAL).rotation, 8.0, 5)
+    rotations = cone_of_directions(OPTIMAL.home_pose.rotation, 8.0, 5)
     assert tilted["orientations"] == 5
     volume = inclusive_solid(OPTIMAL, rotations, 0.4).volume
     assert tilted["inclusive_mesh"]["volume"] == pytest.approx(volume, rel=1e-6)

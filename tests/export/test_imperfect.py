@@ -28,7 +28,6 @@ from explorer import (
     compliance,
     deflection,
     draw_deviations,
-    home_pose,
     inverse,
     pose_error_by_source,
     pose_precision,
@@ -106,7 +105,7 @@ def joints_read(machine: ImperfectMachine, pose: Pose) -> FloatArray:
 @pytest.mark.parametrize("seed", range(5))
 def test_machine_reads_the_joints_of_the_design_and_errs_by_the_second_order(seed: int) -> None:
     machine = random_machine(seed)
-    design, home = machine.design, home_pose(machine.design)
+    design, home = machine.design, machine.design.home_pose
     expected = inverse(design, home.position, home.rotation)
     assert_allclose(joints_read(machine, machine.home), expected, atol=3e-12 * design.reach)
     off = np.linalg.norm(np.array(machine.home.position) - home.position)
@@ -138,7 +137,7 @@ def test_deviations_are_drawn_within_the_errors_of_the_design() -> None:
 
 @pytest.mark.parametrize("design", [OFF, typical_machine(IDEAL)[0]])
 def test_rms_errors_are_those_of_drawn_machines(design: Design) -> None:
-    home = home_pose(design)
+    home = design.home_pose
     precision = ToolPrecision(LoadedPose(design, home, (0, 0, 0, 0, 0, 0), point=TOOL))
     costs = source_costs(design, home.position, home.rotation, TOOL)
     drawn = np.array([draw_deviations(design, seed) for seed in range(4000)])
@@ -185,7 +184,7 @@ def error_of(found: tuple[FloatArray, FloatArray], pose: Pose, tool: FloatArray)
 @pytest.mark.parametrize(("seed", "share"), [(0, 1e-4), (1, 1e-6), (2, 1e-8), (3, 1e-8)])
 def test_model_of_machine_starts_closed_with_the_readings_of_home(seed: int, share: float) -> None:
     machine = random_machine(seed, share)
-    design, home = machine.design, home_pose(machine.design)
+    design, home = machine.design, machine.design.home_pose
     model = model_of(machine)
     data = at_home(model)
     metres = 1e-3 * design.unit_mm
@@ -216,7 +215,7 @@ def test_model_of_machine_at_rest_has_the_tool_of_the_solved_pose() -> None:
         OFF, actuators=Actuators(error_mm=ERRORS, stiffness_n_mm=(5.0, 6.0, 5.0, 4.0, 5.0, 7.0))
     )
     machine = ImperfectMachine.draw(design, 5)
-    home = home_pose(design)
+    home = design.home_pose
     meant = Pose.of_yaw_pitch_roll(np.array(home.position) + [0.8, -0.5, 0.6], (-68.0, 4.0, -3.0))
     joints = inverse(design, meant.position, meant.rotation)
     true = machine.pose(joints, meant)
@@ -322,7 +321,7 @@ def test_deflection_at_home_is_that_of_a_model_whose_struts_bend(actuators: Actu
         IDEAL, actuators=actuators, struts=Struts(outer_mm=6.0, inner_mm=4.0)
     )
     model, data = springs_of(design)
-    home = home_pose(design)
+    home = design.home_pose
     stiffness, bending = stiffness_of(design)
     if actuators.stiffness_n_mm is None:
         # Actuators that are rigid have ten times the stiffness of the stiffest strut.
@@ -408,7 +407,7 @@ def test_machines_that_cannot_be_made_are_refused() -> None:
     huge = ImperfectMachine(OFF, np.full(29, 30.0))
     with pytest.raises(NoAnswerError, match="do not close near the pose of the design"):
         simulation_mjcf(huge)
-    singular = Pose(home_pose(OFF).position, (1.0, 0.0, 0.0, 0.0))
+    singular = Pose(OFF.home_pose.position, (1.0, 0.0, 0.0, 0.0))
     machine = ImperfectMachine.draw(msgspec.structs.replace(OFF, home=singular), 0)
     with pytest.raises(NoAnswerError, match="singular"):
         machine.linear_tool_error()

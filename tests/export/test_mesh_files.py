@@ -23,7 +23,6 @@ from explorer import (
     InputError,
     NoAnswerError,
     decode_design,
-    home_pose,
 )
 from explorer.export.assembly import COLOURS, FORMATS as ASSEMBLY_FORMATS, assembly_bytes
 from explorer.export.mesh import FORMATS, colour_of, mesh_bytes
@@ -263,7 +262,7 @@ transformations: Any = trimesh.transformations
 
 ASSEMBLED = msgspec.structs.replace(PRESETS["paper-optimal"], unit_mm=12.5)
 PROTOTYPE = make_prototype(ASSEMBLED)
-HOME = home_pose(ASSEMBLED)
+HOME = ASSEMBLED.home_pose
 PARTS = [part.name for part in PROTOTYPE.parts]
 AT_HOME = dict(zip(PARTS, PROTOTYPE.at(HOME.position, HOME.rotation), strict=True))
 DATA = {file_format: assembly_bytes(PROTOTYPE, file_format) for file_format in ASSEMBLY_FORMATS}

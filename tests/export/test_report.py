@@ -122,7 +122,7 @@ def test_report_equal_input_differs_in_date_only() -> None:
 def test_report_mechanism_tables_hold_design_and_joints(seed: int) -> None:
     design, _ = ordinary_case(seed)
     page, unit = ordinary_page(seed), design.unit_mm
-    home = explorer.home_pose(design)
+    home = design.home_pose
     variables = table_of(page, "Design variables")
     for row, name, value in zip(variables.values(), VARIABLES, design.variables, strict=False):
         assert row.text.startswith(name)
@@ -144,7 +144,7 @@ def test_report_mechanism_tables_hold_design_and_joints(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(2))
 def test_report_workspace_tables_hold_public_measures(seed: int) -> None:
     design, _ = ordinary_case(seed)
-    rotation = explorer.home_pose(design).rotation
+    rotation = design.home_pose.rotation
     page, cubic = ordinary_page(seed), (0.1 * design.unit_mm) ** 3
     volume = explorer.workspace_volume(design, rotation)
     nodes = explorer.workspace_nodes(design, rotation)
@@ -169,7 +169,7 @@ def test_report_workspace_tables_hold_public_measures(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(2))
 def test_report_singularity_and_leg_tables_hold_snapshot(seed: int) -> None:
     design, _ = ordinary_case(seed)
-    home = explorer.home_pose(design)
+    home = design.home_pose
     page, unit, snapshot = ordinary_page(seed), design.unit_mm, explorer.evaluate(design, home)
     margins = table_of(page, "Margins in")
     for k in range(3):
@@ -233,7 +233,7 @@ def test_report_bill_is_that_of_the_prototype() -> None:
 
 
 def test_report_slice_areas_are_exact() -> None:
-    rotation = explorer.home_pose(OPTIMAL).rotation
+    rotation = OPTIMAL.home_pose.rotation
     tables = [each for each in paper_page().all("table") if "slice at" in each.text]
     (areas,) = (row.values for row in tables[0].all("tr") if "units²" in row.text)
     solid = workspace_solid(OPTIMAL, rotation)
@@ -396,7 +396,7 @@ def test_fit_view_random_points_lie_in_the_frame_upright(name: ViewName) -> None
 
 def test_slice_bands_hold_the_positions_of_their_margins() -> None:
     """Each polygon of a band holds the positions with such margins, and no others."""
-    home = explorer.home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     solid = workspace_solid(OPTIMAL, home.rotation)
     extent = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     slices = Slices.of(OPTIMAL, home.rotation, extent)

@@ -75,7 +75,7 @@ def loaded_page(seed: int) -> Node:
 
 
 def reactions_at_home(design: Design) -> explorer.Reactions:
-    home = explorer.home_pose(design)
+    home = design.home_pose
     weights = design_weights(design)
     tool = design.tool.position
     return explorer.reactions(design, home.position, home.rotation, ZERO, tool, weights)
@@ -144,7 +144,7 @@ def test_report_loads_largest_payload_and_force_are_those_of_statics(seed: int) 
 
 def test_report_loads_volume_is_that_of_held_workspace_beside_the_whole() -> None:
     design = loaded_case(1)
-    page, rotation = loaded_page(1), explorer.home_pose(design).rotation
+    page, rotation = loaded_page(1), design.home_pose.rotation
     held = held_workspace(design, rotation)
     whole = explorer.workspace_volume(design, rotation).volume
     cubic = (0.1 * design.unit_mm) ** 3
@@ -163,7 +163,7 @@ def test_report_loads_volume_is_that_of_held_workspace_beside_the_whole() -> Non
 def test_report_of_limits_or_a_payload_alone_tells_what_follows_from_it() -> None:
     limits = Actuators((100.0, 100.0, 100.0, 100.0, 100.0, 100.0))
     design = msgspec.structs.replace(OPTIMAL, actuators=limits)
-    page, home = page_of(design), explorer.home_pose(design)
+    page, home = page_of(design), design.home_pose
     assert table_of(page, "Forces of the actuators")["d1"].values == [100.0, 100.0]
     payload = float(explorer.largest_payload(design, home.position, home.rotation))
     assert table_of(page, "Most that is held")["payload"].values == [payload]
@@ -206,7 +206,7 @@ def test_report_of_too_large_a_load_names_the_best_position() -> None:
     payload = msgspec.structs.replace(design.payload, mass_kg=1e4)
     design = msgspec.structs.replace(design, payload=payload)
     page = page_of(design)
-    held = held_workspace(design, explorer.home_pose(design).rotation)
+    held = held_workspace(design, design.home_pose.rotation)
     assert held.best is not None
     assert held.factor is not None
     assert "The payload is not held in its" in page.text

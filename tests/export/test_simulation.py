@@ -21,7 +21,6 @@ from explorer import (
     Pose,
     evaluate,
     forward,
-    home_pose,
     inverse,
     margins,
 )
@@ -100,7 +99,7 @@ def test_model_has_every_joint_and_six_servos() -> None:
 @pytest.mark.parametrize("design", DESIGNS)
 def test_model_starts_at_home_and_its_loops_close_at_our_joint_values(design: Design) -> None:
     model = model_of(design)
-    home, metres = home_pose(design), design.unit_mm * 1e-3
+    home, metres = design.home_pose, design.unit_mm * 1e-3
     expected = simulation_joints(design, np.array(home.position), home.rotation)
     assert (model.key_qpos[0] == model.qpos0).all()
     np.testing.assert_allclose(model.key_qpos[0], expected, rtol=1e-12, atol=1e-12)
@@ -192,7 +191,7 @@ def test_model_servos_reach_the_pose_of_forward_kinematics() -> None:
     design = OPTIMAL
     model = model_of(design)
     data = at_home(model)
-    home = home_pose(design)
+    home = design.home_pose
     mode = int(mode_of(margins(home.position, home.rotation)))
     metres = design.unit_mm * 1e-3
     turn = Rotation.from_euler("ZYX", [8.0, -5.0, 6.0], degrees=True).as_matrix()
@@ -248,14 +247,14 @@ def test_model_limits_become_ranges_in_metres() -> None:
     data = engine.MjData(model)
     engine.mj_forward(model, data)
     assert model.tendon_range[0, 0] == pytest.approx(0.0025)
-    home = home_pose(design)
+    home = design.home_pose
     q = inverse(design, home.position, home.rotation)
     assert data.ten_length.tolist() == pytest.approx([0.01 * abs(q[1] - q[3]), 0.0, 0.0])
 
 
 @pytest.mark.parametrize("yaw", [-73.1, -106.9])
 def test_model_carriages_keep_the_demanded_order(yaw: float) -> None:
-    home = Pose.of_yaw_pitch_roll(home_pose(OPTIMAL).position, (yaw, 0.0, 0.0))
+    home = Pose.of_yaw_pitch_roll(OPTIMAL.home_pose.position, (yaw, 0.0, 0.0))
     design = msgspec.structs.replace(OPTIMAL, home=home)
     model = model_of(design)
     data = engine.MjData(model)
@@ -270,7 +269,7 @@ def test_model_ranges_of_hinges_hold_the_swing_cone(half_angle: float) -> None:
     design = limited(OPTIMAL, margin=None, swing=Swing(a1=half_angle, a3=half_angle))
     model = model_of(design)
     rng = np.random.default_rng(2)
-    home = home_pose(design)
+    home = design.home_pose
     shifts = rng.uniform(-1.0, 1.0, (400, 3)) * rng.uniform(0.0, design.reach, (400, 1))
     positions = np.array(home.position) + shifts
     rotations = np.broadcast_to(home.rotation, (400, 3, 3))

@@ -26,7 +26,6 @@ from explorer import (
     Pose,
     Tool,
     actuator_forces,
-    home_pose,
     tool_position,
 )
 from explorer.export.simulation import DENSITY, SimulationModel, simulation_mjcf
@@ -213,7 +212,7 @@ def test_model_attached_anywhere_starts_closed_with_its_tool_in_place(seed: int,
     data = at_home(model, "m-home")
     size = float(np.linalg.norm(position)) + 1e-3 * design.unit_mm * design.reach
     assert np.abs(loops_of(model, data)[0]).max() < min(1e-9, 1e-14 * size)
-    pose = given.home if isinstance(given, ImperfectMachine) else home_pose(design)
+    pose = given.home if isinstance(given, ImperfectMachine) else design.home_pose
     tool = 1e-3 * design.unit_mm * np.array(tool_position(pose, design.tool.position))
     site = data.site("m-tool")
     base = data.body("m-base")
@@ -238,7 +237,7 @@ def test_servos_at_rest_give_the_forces_of_statics_at_home(design: Design, masse
     model = model_of(simulation_mjcf(design, masses=found))
     data = at_home(model)
     start = data.site("tool").xpos.copy(), data.site("tool").xmat.reshape(3, 3).copy()
-    home = home_pose(design)
+    home = design.home_pose
     given = design, home.position, home.rotation
     forces = actuator_forces(*given, carry(*given, machine_weights(design, found)).wrench)
     rest(model, data)
@@ -359,7 +358,7 @@ def test_limits_that_home_exceeds_end_at_home() -> None:
         low, high = model.joint(name).range
         assert low <= data.joint(name).qpos[0] <= high
     rest(model, data)
-    tool = 1e-3 * design.unit_mm * np.array(tool_position(home_pose(design), design.tool.position))
+    tool = 1e-3 * design.unit_mm * np.array(tool_position(design.home_pose, design.tool.position))
     assert_allclose(data.site("tool").xpos, tool, atol=1e-5)
 
 
@@ -405,6 +404,6 @@ def test_model_has_no_setting_of_the_whole_scene() -> None:
 
 
 def test_model_of_a_singular_home_is_refused() -> None:
-    singular = Pose(home_pose(OPTIMAL).position, (1.0, 0.0, 0.0, 0.0))
+    singular = Pose(OPTIMAL.home_pose.position, (1.0, 0.0, 0.0, 0.0))
     with pytest.raises(NoAnswerError, match="home pose is singular, so that no servos hold it"):
         simulation_mjcf(msgspec.structs.replace(OPTIMAL, home=singular))

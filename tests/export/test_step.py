@@ -18,7 +18,6 @@ from explorer import (
     InputError,
     NoAnswerError,
     Pose,
-    home_pose,
     make_prototype,
     workspace_volume,
 )
@@ -193,7 +192,7 @@ def test_step_empty_or_oversized_workspace_is_refused() -> None:
 def test_exact_parts_volumes_match_the_meshes(below: bool) -> None:
     design = OPTIMAL
     if below:
-        home = home_pose(OPTIMAL)
+        home = OPTIMAL.home_pose
         x, y, z = home.position
         pose = Pose.of((x, -y, -z), np.diag([1.0, -1.0, -1.0]) @ home.rotation)
         a3 = (OPTIMAL.a3[0], -OPTIMAL.a3[1])
@@ -223,7 +222,7 @@ def test_step_assembly_reads_back_the_places_of_parts(tmp_path: Path) -> None:
     assert data.count(b"NEXT_ASSEMBLY_USAGE_OCCURRENCE(") == len(prototype.parts) + 6
     assert data.count(b"COLOUR_RGB") >= 7
     shape = read(path)
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     points = np.concatenate(prototype.at(home.position, home.rotation)) * OPTIMAL.unit_mm
     box = occ("Bnd_Box")()
     occ("BRepBndLib").AddOptimal_s(shape, box, False, False)

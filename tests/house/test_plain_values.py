@@ -21,7 +21,6 @@ from explorer import (
     Study,
     Variable,
     Weights,
-    home_pose,
 )
 from explorer.mechanism.design import Swing
 from explorer.mechanism.design_file import decode_design, encode_design
@@ -99,7 +98,7 @@ def test_design_of_numpy_numbers_is_that_of_plain_ones(design: Design) -> None:
     check_plain(design)
     made = of_numpy(design, arrays=True)
     assert decode_design(encode_design(made), "file") == design
-    assert home_pose(made) == home_pose(design)
+    assert made.home_pose == design.home_pose
 
 
 @given(poses, st.sampled_from([np.float32, np.float64]))

@@ -13,7 +13,6 @@ from strategies import Case, ordinary_cases, uniform_rotations
 
 from explorer import PAIRS, Design, leg_clearances
 from explorer.legs.clearance import joined_pairs, leg_axes, pair_rows
-from explorer.mechanism.kinematics import platform_points
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 
@@ -94,7 +93,7 @@ def test_closest_points_few_and_many_pairs_agree() -> None:
 @given(ordinary_cases())
 def test_leg_axes_any_pose_run_from_base_ends_to_platform_ends(case: Case) -> None:
     axes = leg_axes(case.design, case.position, case.rotation)
-    ends = case.position + platform_points(case.design) @ case.rotation.T
+    ends = case.position + case.design.platform_points @ case.rotation.T
     np.testing.assert_allclose(axes[:, 1], ends, atol=1e-12 * case.size)
     a3 = [*case.design.a3, 0.0]
     base = [[0.0, 0.0, 0.0], [ends[1, 0], 0.0, 0.0], [ends[2, 0], 0.0, 0.0], a3]

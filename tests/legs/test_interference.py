@@ -21,7 +21,6 @@ from explorer import (
     PRESETS,
     Design,
     Pose,
-    home_pose,
     leg_clearances,
     move_clearance,
     move_clearances,
@@ -38,7 +37,7 @@ from explorer.legs.clearance import joined_pairs, leg_axes
 from explorer.numerics.arrays import FloatArray
 
 OPTIMAL = PRESETS["paper-optimal"]
-HOME = home_pose(OPTIMAL)
+HOME = OPTIMAL.home_pose
 JOINED = Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0)
 
 

@@ -18,7 +18,6 @@ from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.optimise.curves import GOALS
@@ -44,7 +43,7 @@ def compared(design: Design) -> Measurements:
 
 @each_case
 def test_measures_of_compare_equal_their_functions(design: Design) -> None:
-    found, home = compared(design), home_pose(design)
+    found, home = compared(design), design.home_pose
     snapshot, nodes = evaluate(design, home), workspace_nodes(design)
     assert found["volume"] == workspace_volume(design).volume
     assert (found["node_count"], found["node_volume"]) == (nodes.count, nodes.volume)
@@ -58,7 +57,7 @@ def test_measures_of_compare_equal_their_functions(design: Design) -> None:
 
 @each_case
 def test_extremes_hold_for_samples_and_are_reached(design: Design) -> None:
-    r, reach = home_pose(design).rotation, design.reach
+    r, reach = design.home_pose.rotation, design.reach
     fine = workspace_solid(design, r, 0.0005 * reach).vertices
     ends, least = extent_of(design, r), least_margins(design, r)
     assert ends is not None
@@ -82,7 +81,7 @@ def test_measures_at_a_pose_are_of_its_orientation() -> None:
     pose = Pose.of_yaw_pitch_roll((9.0, 4.0, 8.0), (-60.0, 5.0, 2.0))
     names = [*measures_in("compare"), "worst_margin", "accessible_volume"]
     turned = msgspec.structs.replace(OPTIMAL, home=pose)
-    assert home_pose(turned) == pose
+    assert turned.home_pose == pose
     at_pose = measure_design(Case(OPTIMAL, pose=pose), names)
     assert at_pose["volume"] == workspace_volume(OPTIMAL, pose.rotation).volume
     own = measure_design(Case(turned), [name for name in names if name != "accessible_volume"])
@@ -91,7 +90,7 @@ def test_measures_at_a_pose_are_of_its_orientation() -> None:
 
 def test_extremes_of_separate_parts_are_those_of_each_part() -> None:
     design = limited(OPTIMAL, margin=None, box=((0.0, -12.0, -3.0), (20.0, 22.0, 18.0)))
-    r = home_pose(design).rotation
+    r = design.home_pose.rotation
     assert np.array(extent_of(design, r)) == pytest.approx(np.array(design.limits.box), abs=1e-9)
     least = least_margins(design, r)
     assert least is not None
@@ -116,7 +115,7 @@ def test_least_clearance_alone_equals_that_of_all_pairs(seed: int) -> None:
     assert other == pytest.approx(one, abs=1.001 * tolerance)
     assert (least.bound <= full.clearance + 1e-12 * design.reach).all()
     pair = int(least.clearance.argmin())
-    r = home_pose(design).rotation if rotation is None else rotation
+    r = design.home_pose.rotation if rotation is None else rotation
     own = leg_clearances(design, least.position[pair], r)
     assert own.clearance[pair] == pytest.approx(other, abs=2e-9 * design.reach)
 
@@ -161,7 +160,7 @@ def test_measures_of_empty_workspace_are_none_with_reasons() -> None:
 
 
 def test_margins_of_parallel_lines_at_home_are_zero() -> None:
-    home = Pose(home_pose(OPTIMAL).position, (1.0, 0.0, 0.0, 0.0))
+    home = Pose(OPTIMAL.home_pose.position, (1.0, 0.0, 0.0, 0.0))
     found = compared(msgspec.structs.replace(limited(OPTIMAL, margin=None), home=home))
     assert found["home_margin"] == found["least_margin"] == found["mean_margin"] == 0.0
     assert found["inverse_condition"] == pytest.approx(0.0, abs=1e-12)
@@ -184,7 +183,7 @@ def test_gradients_of_measures_equal_finite_differences(design: Design) -> None:
         if measure.gradient is None or measure.needs:
             continue
         held = design if measure.name == "longest_leg" else limited(design, **limits)
-        held = msgspec.structs.replace(held, home=home_pose(held))
+        held = msgspec.structs.replace(held, home=held.home_pose)
         gradient = measure.gradient(Case(held))
         for name, value in zip(VARIABLES, held.variables, strict=True):
             step = 1e-5 * design.reach
@@ -224,7 +223,7 @@ def test_objective_of_a_search_is_the_measure_that_it_is_named_after(
             ),
             struts=Struts(outer_mm=12.0),
         )
-    middle = np.array(home_pose(design).position)
+    middle = np.array(design.home_pose.position)
     box = (tuple((middle - 1e-3).tolist()), tuple((middle + 1e-3).tolist()))
     problem = make_problem(design, objective, volume=5.0, required_box=box, free=(YAW,))
     model = Model(problem, problem.start_values)

@@ -19,7 +19,6 @@ from explorer import (
     Struts,
     Tool,
     deflection,
-    home_pose,
     limit_shares,
     pose_precision,
     reactions,
@@ -62,7 +61,7 @@ def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
     assert tuple(found) == NAMES
     units = [CATALOGUE[name].unit_in("mm") for name in NAMES]
     assert units == ["", "", "kg", "N m", "mm", "°", "mm/N", "mm"]
-    rotation = home_pose(MACHINE).rotation
+    rotation = MACHINE.home_pose.rotation
     positions = np.random.default_rng(1).uniform(*BOX, (1000, 3))
     given = MACHINE, positions, rotation
     held = reactions(*given, np.zeros(6), None, design_weights(MACHINE))

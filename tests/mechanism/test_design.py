@@ -21,7 +21,6 @@ from explorer import (
     DesignError,
     Limits,
     evaluate,
-    home_pose,
     load_design,
     margins,
 )
@@ -110,7 +109,7 @@ def test_preset_is_a_row_of_table_1_with_its_home_within_all_limits(
     assert (design.limits.box, design.limits.guide) == (box, None)
     assert all(design.length_range(leg) == (0.0, design.reach) for leg in LENGTHS)
     assert design.home is not None
-    assert home_pose(design) == design.home
+    assert design.home_pose == design.home
     snapshot = evaluate(design, design.home)
     assert snapshot.violations == ()
     assert snapshot.proximity > 0.05
@@ -121,7 +120,7 @@ def test_preset_is_a_row_of_table_1_with_its_home_within_all_limits(
 @given(designs())
 def test_home_of_a_design_without_one_is_regular(design: Design) -> None:
     assert design.home is None
-    pose = home_pose(design)
+    pose = design.home_pose
     assert np.abs(margins(pose.position, pose.rotation)).min() > 1e-3 * design.reach
     snapshot = evaluate(design, pose)
     assert snapshot.stratum == (4, 3, 2, 1)
@@ -140,6 +139,6 @@ def test_design_without_limits_equals_that_of_arrays_and_has_its_reach_for_lengt
 
 @given(designs(), limits())
 def test_home_of_any_limits_is_finite(design: Design, within: Limits) -> None:
-    pose = home_pose(msgspec.structs.replace(design, limits=within))
+    pose = msgspec.structs.replace(design, limits=within).home_pose
     assert np.isfinite(pose.position).all()
     assert max(map(abs, pose.position)) <= LARGEST_NUMBER

@@ -31,7 +31,6 @@ from explorer import (
     Design,
     discriminants,
     forward,
-    home_pose,
     inverse,
     margins,
     rotation_from_quaternion,
@@ -344,7 +343,7 @@ def test_positions_that_underflow_give_rigid_poses(compiled: None, turn: int) ->
 
 def test_read_only_joints_in_a_large_batch_are_accepted() -> None:
     design = PRESETS["paper-optimal"]
-    home = home_pose(design)
+    home = design.home_pose
     joints = np.broadcast_to(inverse(design, home.position, home.rotation), (300, 6))
     assert not joints.flags.writeable
     assert forward(design, joints).feasible.all()

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from explorer import PRESETS, Actuators, Payload, Struts
-from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import all_kernels, warm
 from explorer.statics.forces import actuator_forces
@@ -20,7 +19,7 @@ from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map
 from explorer.workspace.orientations.torsions import torsion_range
 
 OPTIMAL = PRESETS["paper-optimal"]
-ROTATION = home_pose(OPTIMAL).rotation
+ROTATION = OPTIMAL.home_pose.rotation
 POSITION = (10.0, 5.0, 9.0)
 LOADED = msgspec.structs.replace(
     OPTIMAL,

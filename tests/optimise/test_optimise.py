@@ -25,7 +25,6 @@ from explorer import (
     Problem,
     Struts,
     Variable,
-    home_pose,
     leg_clearances,
     make_problem,
     margins,
@@ -69,7 +68,7 @@ def same_for_all(value: float) -> Six:
 def least_clearance_by_sampling(design: Design, margin: float, count: int) -> float:
     """Return the least clearance over random positions, those at the lowest height among them."""
     random = np.random.default_rng(0)
-    rotation = home_pose(design).rotation
+    rotation = design.home_pose.rotation
     lows, highs = np.array(design.limits.box)
     p = lows + (highs - lows) * random.random((count, 3))
     p[: count // 2, 2] = margin * (1.0 + 0.05 * random.random(count // 2))
@@ -107,7 +106,7 @@ def test_search_for_paper_volume_matches_it_to_rounding(clearance: float | None)
     assert outcome.iterations <= 15
     assert abs(1.0 - workspace_volume(outcome.design).volume / 8000.0) <= 1e-9
     assert outcome.design.limits == OPTIMAL.limits
-    assert home_pose(outcome.design).quaternion == home_pose(OPTIMAL).quaternion
+    assert outcome.design.home_pose.quaternion == OPTIMAL.home_pose.quaternion
 
 
 def test_optimum_keeps_clearance_between_the_positions_of_the_solver() -> None:
@@ -197,7 +196,7 @@ def test_optimum_in_a_kink_of_the_volume_converges() -> None:
     outcome = optimise_design(make_problem(OPTIMAL, "smallest-reach"))
     assert outcome.converged
     design = outcome.design
-    arm = home_pose(design).rotation @ np.array([*design.b1, 0.0])
+    arm = design.home_pose.rotation @ np.array([*design.b1, 0.0])
     assert -arm[:2] == pytest.approx(design.a3, abs=1e-3)
     assert design.reach < 17.1
 
@@ -256,7 +255,7 @@ def test_largest_margin_with_free_yaw_and_shifts_is_the_height() -> None:
     # The box of the design ends at a height of 18, that of the required one is 4.
     assert raised.best.value == pytest.approx(14.0, abs=1e-7)
     moved = raised.problem.required_box_at(raised.best.values)
-    rotation = home_pose(raised.design).rotation
+    rotation = raised.design.home_pose.rotation
     corners = corners_of(moved)
     assert slacks(constraints(raised.design, rotation), corners).min() >= -1e-6
     assert np.abs(margins(corners, rotation)).min() == pytest.approx(14.0, abs=1e-6)
@@ -473,7 +472,7 @@ def test_search_with_bad_settings_is_refused(option: str, value: int) -> None:
         optimise_design(paper_problem(), **options)
 
 
-ROTATION = home_pose(OPTIMAL).rotation
+ROTATION = OPTIMAL.home_pose.rotation
 SMALL_BOX = ((8.0, 3.0, 7.0), (12.0, 7.0, 11.0))
 LARGE_BOX = ((6.0, 1.0, 1.0), (14.0, 9.0, 11.0))
 
@@ -545,7 +544,7 @@ def test_demand_of_a_tilt_is_kept_in_its_azimuths() -> None:
     outcome = optimise_design(problem)
     assert outcome.converged
     found = outcome.design
-    yaw = float(yaw_pitch_roll_from_rotation(home_pose(found).rotation)[0])
+    yaw = float(yaw_pitch_roll_from_rotation(found.home_pose.rotation)[0])
     azimuths = yaw + np.linspace(0.0, 360.0, AZIMUTHS, endpoint=False)
     for corner in corners_of(SMALL_BOX):
         assert tilt_map(found, corner, yaw, azimuths).tilts.min() >= 25.0 - 1e-3

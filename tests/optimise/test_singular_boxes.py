@@ -18,7 +18,6 @@ from explorer.measures.case import Case
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Triple
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.machine import Six
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
@@ -82,7 +81,7 @@ def least_over(box: Box, rotation: FloatArray) -> FloatArray:
 
 def boxes_at(design: Design, index: int, place: float) -> Box:
     """Return a box whose worst corner has a margin, on the home's side of a plane or beyond."""
-    rotation = home_pose(design).rotation
+    rotation = design.home_pose.rotation
     normal = planes(rotation)[index]
     # Far along the plane of each margin, so that the box touches no other.
     middle = np.array([10.0, 5.0, 9.0])
@@ -150,7 +149,7 @@ def test_box_on_or_across_a_plane_is_refuted_where_forces_or_errors_count(index:
     design = machine(TURNS[index], (None, 0.0, None)[index])
     for place in BESIDE:
         box = boxes_at(design, index, place)
-        is_singular = bool((least_over(box, home_pose(design).rotation) <= 1e-12).any())
+        is_singular = bool((least_over(box, design.home_pose.rotation) <= 1e-12).any())
         assert is_singular or place > 0.0
         for problem in counting(design, box):
             found = [each for each in refutations(problem) if each.limit == "singular plane"]
@@ -214,7 +213,7 @@ def test_search_moves_a_box_off_a_singular_plane_where_it_may(
     assert best.objective is not None
     assert math.isfinite(best.objective)
     box = problem.required_box_at(best.values)
-    assert least_over(box, home_pose(best.design).rotation).min() > 0.0
+    assert least_over(box, best.design.home_pose.rotation).min() > 0.0
     assert best.spare >= 0.0
 
 

@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 from strategies import WAYS, Case, cases, singular_cases
 from tool_moves import tool_move
 
-from explorer import PRESETS, InputError, Pose, forward, home_pose, inverse, margins, poses_between
+from explorer import PRESETS, InputError, Pose, forward, inverse, margins, poses_between
 from explorer.mechanism.margins import mode_of
 from explorer.paths.crossings import path_margins
 
 OPTIMAL = PRESETS["paper-optimal"]
-HOME = home_pose(OPTIMAL)
+HOME = OPTIMAL.home_pose
 
 
 def random_pose(rng: np.random.Generator, size: float = 5.0) -> Pose:

@@ -15,7 +15,7 @@ from long_cases import long_after
 from scipy.spatial.transform import Rotation
 from tool_moves import tool_move
 
-from explorer import PRESETS, Actuators, Design, InputError, Pose, home_pose, inverse
+from explorer import PRESETS, Actuators, Design, InputError, Pose, inverse
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
@@ -91,7 +91,7 @@ def test_plan_path_with_load_holds_it_all_along_by_a_detour(index: int) -> None:
 
 def test_plan_path_with_load_that_the_straight_move_holds_is_straight() -> None:
     design = random_machine(OPTIMAL, 0, strength=50.0)
-    home = home_pose(design)
+    home = design.home_pose
     x, y, z = home.position
     goal = Pose((x + 1.0, y, z - 1.0), home.quaternion)
     load = [5.0, 0.0, -5.0, 0.0, 0.0, 0.0]
@@ -159,6 +159,6 @@ def test_plan_path_end_on_the_limit_is_held() -> None:
 
 @pytest.mark.parametrize("load", [[1.0] * 5, [np.nan] * 6])
 def test_plan_path_bad_load_is_refused(load: list[float]) -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     with pytest.raises(InputError, match="load"):
         plan_path(OPTIMAL, home, home, load=load)

@@ -12,7 +12,7 @@ from loaded_designs import random_machine, random_move, random_weights
 from long_cases import long_after
 from tool_moves import tool_move
 
-from explorer import PRESETS, Design, InputError, Pose, home_pose, margins
+from explorer import PRESETS, Design, InputError, Pose, margins
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
 from explorer.paths.loads import TOLERANCE, DemandedLoad, path_loads
@@ -44,9 +44,9 @@ def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
     tool = rng.normal(size=3) if seed % 3 else np.zeros(3)
     # Moves without a turn, without a way, and both.
     size, angle = ((1.5, 0.3), (1.5, 0.0), (0.0, 0.3), (0.05, 0.01))[seed % 4]
-    move = random_move(home_pose(design), seed, size, angle)
+    move = random_move(design.home_pose, seed, size, angle)
     if path_margins(move, tool=tool).crossings:
-        move = random_move(home_pose(design), seed, 0.5, 0.1)
+        move = random_move(design.home_pose, seed, 0.5, 0.1)
     load = rng.normal(size=6) * np.array([20.0, 20.0, 20.0, 50.0, 50.0, 50.0])
     x, y, z = tool.tolist()
     along = path_loads(design, move, load, tool=(x, y, z), weights=weights)
@@ -68,7 +68,7 @@ def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
 def test_path_loads_of_moves_near_singular_poses_bound_dense_samples(seed: int) -> None:
     rng = np.random.default_rng([4, seed])
     design = random_machine(OPTIMAL, seed)
-    home = home_pose(design)
+    home = design.home_pose
     x, y, _ = home.position
     # b4 dips towards the base plane, δ3 = 0, without touching it.
     low = 10.0 ** -float(rng.uniform(1.0, 4.0))
@@ -85,8 +85,8 @@ def test_path_loads_of_moves_near_singular_poses_bound_dense_samples(seed: int) 
 
 def test_path_loads_samples_have_the_shares_of_their_poses() -> None:
     design = random_machine(OPTIMAL, 5)
-    first, second = random_move(home_pose(design), 5, 1.0, 0.1)
-    poses = (first, second, home_pose(design))
+    first, second = random_move(design.home_pose, 5, 1.0, 0.1)
+    poses = (first, second, design.home_pose)
     load = np.array([3.0, -4.0, 5.0, 0.0, 1.0, 2.0])
     along = path_loads(design, poses, load, samples=11)
     assert along.poses == poses
@@ -103,7 +103,7 @@ def test_path_loads_samples_have_the_shares_of_their_poses() -> None:
 
 def test_path_loads_of_singular_path_is_infinite_at_its_first_crossing() -> None:
     design = random_machine(OPTIMAL, 1)
-    home = home_pose(design)
+    home = design.home_pose
     x, y, z = home.position
     below = Pose((x + 1.0, y, -2.0 * z), home.quaternion)
     along = path_loads(design, (home, below, home), [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -120,8 +120,8 @@ def test_path_loads_of_singular_path_is_infinite_at_its_first_crossing() -> None
 
 
 def test_path_loads_without_limit_or_load_has_no_part() -> None:
-    x, y, z = home_pose(OPTIMAL).position
-    poses = home_pose(OPTIMAL), Pose((x + 1.0, y, z), home_pose(OPTIMAL).quaternion)
+    x, y, z = OPTIMAL.home_pose.position
+    poses = OPTIMAL.home_pose, Pose((x + 1.0, y, z), OPTIMAL.home_pose.quaternion)
     along = path_loads(OPTIMAL, poses, [100.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert (along.largest.share, along.largest.bound, along.largest.part) == (0.0, 0.0, None)
     empty = msgspec.structs.replace(random_machine(OPTIMAL, 2), payload=OPTIMAL.payload)
@@ -131,7 +131,7 @@ def test_path_loads_without_limit_or_load_has_no_part() -> None:
 
 @pytest.mark.parametrize("load", [[1.0, 2.0], [math.nan] * 6, [math.inf] * 6])
 def test_path_loads_bad_load_is_refused(load: list[float]) -> None:
-    pose = home_pose(OPTIMAL)
+    pose = OPTIMAL.home_pose
     with pytest.raises(InputError, match="load"):
         path_loads(OPTIMAL, (pose, pose), load)
     with pytest.raises(InputError, match="at least two poses"):
@@ -142,7 +142,7 @@ def test_path_loads_bad_load_is_refused(load: list[float]) -> None:
 def test_holds_along_agrees_with_the_largest_share(seed: int) -> None:
     rng = np.random.default_rng([5, seed])
     design = random_machine(OPTIMAL, seed)
-    moves = [random_move(home_pose(design), 100 * seed + k, 1.0, 0.2) for k in range(30)]
+    moves = [random_move(design.home_pose, 100 * seed + k, 1.0, 0.2) for k in range(30)]
     demanded = DemandedLoad.of(design, rng.normal(size=6) * 10.0)
     ends = [np.array([move[k].position for move in moves]) for k in (0, 1)]
     turns = [np.array([move[k].rotation for move in moves]) for k in (0, 1)]

@@ -25,7 +25,6 @@ from explorer import (
     Pose,
     evaluate,
     forward,
-    home_pose,
     inverse,
     move_clearances,
     moves_are_clear,
@@ -40,7 +39,7 @@ from explorer.paths.smoothing import Smoother, lengths_of_moves
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 DESIGN = limited(PRESETS["paper-optimal"], leg_radii=(0.2,) * 4)
-HOME = home_pose(DESIGN)
+HOME = DESIGN.home_pose
 PROOFS = Proofs(DESIGN, Rules.of(DESIGN))
 needs_ompl = pytest.mark.skipif(find_spec("ompl") is None, reason="OMPL is not installed")
 

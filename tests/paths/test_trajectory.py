@@ -18,7 +18,6 @@ from explorer import (
     PRESETS,
     InputError,
     Pose,
-    home_pose,
     inverse,
     rotation_from_quaternion as rotation_of,
 )
@@ -26,7 +25,7 @@ from explorer.export.trajectory import trajectory_csv
 from explorer.paths.trajectory import trajectory
 
 DESIGN = PRESETS["paper-optimal"]
-HOME = home_pose(DESIGN)
+HOME = DESIGN.home_pose
 
 
 def random_path(seed: int, corners: int) -> list[Pose]:

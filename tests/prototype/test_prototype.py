@@ -18,7 +18,7 @@ from part_gaps import least_gap, overlaps, placed, touching
 from reference import read_reference
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, Design, InputError, Pose, home_pose, leg_clearances
+from explorer import PRESETS, Design, InputError, Pose, leg_clearances
 from explorer.errors import TooTightError
 from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
@@ -34,7 +34,7 @@ HALF_TURN_X, HALF_TURN_Z = np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, -1.0, 1.0]
 
 def turned(design: Design, base: FloatArray, platform: FloatArray, name: str) -> Design:
     """Return the same mechanism with frames of base and platform that are turned in place."""
-    home = home_pose(design)
+    home = design.home_pose
     a3, b1, b2, b3 = (
         turn @ [*point, 0.0]
         for turn, point in (
@@ -75,7 +75,7 @@ def parts_named(prototype: Prototype, *names: str) -> list[Part]:
 
 
 def pose_of(prototype: Prototype) -> tuple[FloatArray, FloatArray]:
-    home = home_pose(prototype.design)
+    home = prototype.design.home_pose
     return np.array(home.position), home.rotation
 
 
@@ -408,7 +408,7 @@ def test_homes_beyond_joint_limits_are_refused() -> None:
     with pytest.raises(InputError, match=r"leg 1 is 117\.4 mm long at home, but its limits"):
         make_prototype(limited(OPTIMAL, l1=(0.0, 11.0)))
     leaning = msgspec.structs.replace(
-        OPTIMAL, home=Pose((12.0, 5.0, 4.0), home_pose(OPTIMAL).quaternion)
+        OPTIMAL, home=Pose((12.0, 5.0, 4.0), OPTIMAL.home_pose.quaternion)
     )
     leans = r"at home the universal joint at a\d leans .* choose another"
     with pytest.raises(InputError, match=leans):

@@ -18,9 +18,9 @@ from explorer import PRESETS, InputError, from_folds, to_folds
 from explorer.files.manual import read_page
 from explorer.files.packaged import packaged_file
 from explorer.legs.segments import write_closest
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.folds import FOLDS
-from explorer.mechanism.home import home_pose
-from explorer.mechanism.kinematics import attachment_points, forward, inverse
+from explorer.mechanism.kinematics import forward, inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
@@ -100,7 +100,7 @@ def test_single_actuators_of_uncoupled_motions_are_l1_and_l4(results: dict[str, 
 DEPENDENT = Pose((3.36818, 9.35633, 4.83913), (0.835148, -0.486356, -0.178114, -0.185095))
 
 
-@pytest.mark.parametrize(("pose", "least"), [(home_pose(OPTIMAL), 1e-9), (DEPENDENT, 1e-4)])
+@pytest.mark.parametrize(("pose", "least"), [(OPTIMAL.home_pose, 1e-9), (DEPENDENT, 1e-4)])
 def test_folds_are_regular_where_the_six_motions_made_once_are_no_chart(
     pose: Pose, least: float
 ) -> None:
@@ -174,9 +174,9 @@ def test_clearances_of_the_twin_are_distances_of_its_legs_from_point_to_point(se
     work = np.empty((2, 3))
     expected = [write_closest(axes[i], axes[j], work) for i, j in twin.pairs.tolist()]
     np.testing.assert_allclose(found, expected, atol=1e-12)
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     twin = six_four_twin(OPTIMAL, 12.0)
-    points = attachment_points(OPTIMAL, home.position, home.rotation)
+    points = Configuration(OPTIMAL, home.position, home.rotation).points
     axes = twin.axes(np.array(home.position)[None], home.rotation)[0]
     for leg, tip in zip(axes, ("b1", "b2", "b3", "b2", "b3", "b4"), strict=True):
         np.testing.assert_allclose(leg[1], getattr(points, tip), atol=1e-12)
@@ -204,7 +204,7 @@ def test_compared_mechanisms_have_actuators_of_one_stroke() -> None:
     reach, random = OPTIMAL.reach, np.random.default_rng(3)
     position = random.uniform(-2.0 * reach, 2.0 * reach, (100_000, 3))
     for rotation in (
-        home_pose(OPTIMAL).rotation,
+        OPTIMAL.home_pose.rotation,
         np.asarray(Rotation.random(rng=random).as_matrix()),
     ):
         turned = np.broadcast_to(rotation, (len(position), 3, 3))
@@ -248,7 +248,7 @@ def test_volume_of_the_twin_is_that_of_a_plain_count(results: dict[str, Result])
 
 def test_legs_2_and_3_are_as_far_apart_as_their_carriages(results: dict[str, Result]) -> None:
     values: Any = results["interference"].measurement.values
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     joints = inverse(OPTIMAL, home.position, home.rotation)
     assert values["legs_2_and_3_apart"] == pytest.approx(abs(joints[3] - joints[1]), rel=1e-12)
     four = values["mechanisms"][0]
@@ -264,7 +264,7 @@ def test_share_of_free_nodes_is_that_of_legs_as_capsules(results: dict[str, Resu
     axes = [np.arange(low, high + 0.5) for low, high in zip(lows, highs, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     grid = grid[grid[:, 2] >= interference.FROM]
-    rotation = home_pose(OPTIMAL).rotation
+    rotation = OPTIMAL.home_pose.rotation
     inside = grid[poses_are_valid(OPTIMAL, grid, rotation)]
     assert poses_are_valid(design, inside, rotation).mean() == pytest.approx(told, abs=1e-12)
 
@@ -368,7 +368,7 @@ def test_paths_join_two_modes_of_the_same_joints() -> None:
 
 
 def test_path_that_stays_in_a_mode_has_no_singular_pose() -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     way, detour = np.zeros((2, 1, 6))
     way[0, 0], detour[0, :3] = 1.0, 0.5
     path = Paths(np.array([home.position]), home.rotation[None], way, detour)

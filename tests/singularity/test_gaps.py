@@ -11,7 +11,8 @@ from incidence import distance_of_lines, distance_to_plane
 from numpy.testing import assert_allclose
 from strategies import EPSILON, Case, all_cases, cases
 
-from explorer import PRESETS, attachment_points
+from explorer import PRESETS
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.gaps import FlagGaps, flag_gaps
 
@@ -82,6 +83,6 @@ def test_parallel_lines_have_the_gap_through_b4(angle: float) -> None:
     assert gaps.lengths[1] == 5.0
     assert gaps.base[1].tolist() == [7.0, 0.0, 0.0]
     assert gaps.platform[1].tolist() == position.tolist()
-    points = attachment_points(PRESETS["paper-optimal"], position, rotation)
+    points = Configuration(PRESETS["paper-optimal"], position, rotation).points
     lines = (points.a1, points.a2), (points.b2, points.b3)
     assert distance_of_lines(*lines) == pytest.approx(5.0)

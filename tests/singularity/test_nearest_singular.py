@@ -28,7 +28,6 @@ from explorer import (
     Design,
     InputError,
     Pose,
-    home_pose,
     margins,
     nearest_singular_poses,
     nearest_singularities,
@@ -133,7 +132,7 @@ def test_nearest_pose_of_a_singular_pose_is_itself(case: Case) -> None:
 
 
 def test_nearest_singularity_at_a_distance_of_zero_is_the_pose_itself() -> None:
-    pose = Pose((3.0, 4.0, 0.0), home_pose(OPTIMAL).quaternion)
+    pose = Pose((3.0, 4.0, 0.0), OPTIMAL.home_pose.quaternion)
     nearest = nearest_singularities(OPTIMAL, pose)
     # Level and at the height of the base: a1 is on the platform plane, b4 on the base's.
     assert [each.distance == 0.0 for each in nearest] == [True, True, True]
@@ -324,7 +323,7 @@ def test_nearest_pose_of_a_pose_in_the_closure_is_itself_and_of_one_outside_is_n
 
 
 def test_nearest_poses_of_home_are_the_nearest_singular_ones_or_have_closed_forms() -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     for w, nearest in zip(OF_INCIDENCES, nearest_singularities(OPTIMAL, home), strict=True):
         found = nearest_in_stratum(OPTIMAL, home, w)
         assert (found.pose, found.distance) == (nearest.pose, nearest.distance)
@@ -339,4 +338,4 @@ def test_nearest_poses_of_home_are_the_nearest_singular_ones_or_have_closed_form
 @pytest.mark.parametrize("w", [(1, 2, 3), (1, 1, 2, 3), (5, 4, 3, 2)])
 def test_permutation_that_is_no_stratum_is_refused(w: Stratum) -> None:
     with pytest.raises(InputError, match="permutation"):
-        nearest_in_stratum(OPTIMAL, home_pose(OPTIMAL), w)
+        nearest_in_stratum(OPTIMAL, OPTIMAL.home_pose, w)

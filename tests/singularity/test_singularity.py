@@ -24,13 +24,13 @@ from strategies import (
 from explorer import (
     PRESETS,
     InputError,
-    attachment_points,
     evaluate,
     inverse,
     jacobian,
     margins,
     rotation_from_quaternion,
 )
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import TETRAHEDRA, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
@@ -55,7 +55,7 @@ def determinant_of(case: Case) -> float:
 
 def incidence_distances(case: Case) -> FloatArray:
     """Return |δ1|, |δ2| and |δ3| from the pose's points alone."""
-    points = attachment_points(case.design, case.position, case.rotation)
+    points = Configuration(case.design, case.position, case.rotation).points
     sine = math.hypot(case.rotation[1, 0], case.rotation[2, 0])
     return np.array(
         [
@@ -176,7 +176,7 @@ def test_determinant_where_a_margin_is_zero_is_exactly_zero() -> None:
 
 @given(all_cases())
 def test_volumes_are_those_of_the_four_points(case: Case) -> None:
-    points = attachment_points(case.design, case.position, case.rotation)._asdict()
+    points = Configuration(case.design, case.position, case.rotation).points._asdict()
     size = max(case.size, case.design.a2x)
     volumes = tetrahedron_volumes(case.design, case.margins).tolist()
     for names, volume in zip(TETRAHEDRA, volumes, strict=True):

@@ -12,14 +12,14 @@ from refusals import refusal
 from scipy.spatial.transform import Rotation
 from strategies import Case, all_cases, ordinary_cases
 
-from explorer import PRESETS, UNCOUPLED, Pose, home_pose, inverse, margins
+from explorer import PRESETS, UNCOUPLED, Pose, inverse, margins
 from explorer.errors import InputError
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import jacobian, scaled_margins
 from explorer.singularity.turning import least_turns
 
 DESIGN = PRESETS["paper-optimal"]
-HOME = home_pose(DESIGN)
+HOME = DESIGN.home_pose
 GENERIC = Pose((3.0, 4.0, 5.0), (0.8, 0.3, -0.4, 0.2))
 
 

@@ -23,7 +23,6 @@ from explorer import (
     error_by_actuator,
     errors_alone,
     forward,
-    home_pose,
     inverse,
     largest_error,
     margins,
@@ -143,7 +142,7 @@ def test_errors_of_singular_pose_are_infinite(count: int) -> None:
 
 
 def test_errors_of_unusable_arguments_are_refused() -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     given = OPTIMAL, home.position, home.rotation
     for errors in ([-1.0] * 6, [1.0] * 5, [np.nan] * 6, [np.inf] * 6):
         assert "six finite" in refusal(worst_error, *given, errors, kind=InputError)
@@ -255,7 +254,7 @@ def test_largest_error_of_singular_or_overflowing_pose_is_infinite(count: int) -
 
 
 def test_largest_error_without_errors_is_zero_and_of_unusable_bounds_refused() -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     sources = pose_error_by_source(OPTIMAL, home.position, home.rotation)
     found = largest_error(sources, source_errors(OPTIMAL))
     assert (float(found.displacement), float(found.turn)) == (0.0, 0.0)

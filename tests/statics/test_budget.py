@@ -23,7 +23,6 @@ from explorer import (
     Tolerances,
     decode_design,
     encode_design,
-    home_pose,
     largest_error,
     make_prototype,
     pose_error_by_source,
@@ -45,7 +44,7 @@ from explorer.statics.budget.costs import (
 )
 
 OPTIMAL = PRESETS["paper-optimal"]
-HOME = home_pose(OPTIMAL)
+HOME = OPTIMAL.home_pose
 TOOL = (0.5, -0.3, 1.5)
 BOX: tuple[Triple, Triple] = (8.0, 3.0, 7.0), (12.0, 7.0, 11.0)
 EACH: Triple = (0.1, 0.2, 0.15)

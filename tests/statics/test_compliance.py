@@ -22,11 +22,10 @@ from explorer import (
     compliance,
     compliance_shares,
     deflection,
-    home_pose,
     inverse,
     principal_compliances,
 )
-from explorer.mechanism.kinematics import attachment_points
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.compliance import largest_deflection, stiffness_of
 
@@ -132,7 +131,7 @@ def test_stiffness_of_a_design_is_in_its_units() -> None:
     stiffness, bending = stiffness_of(design)
     assert_allclose(stiffness, 10.0 * np.array(six))
     assert_allclose(bending, 70e3 * np.pi * 10.0**4 / 64.0 / 100.0)
-    home = home_pose(design)
+    home = design.home_pose
     found = compliance(design, home.position, home.rotation, stiffness, bending)
     assert np.isfinite(found).all()
 
@@ -151,7 +150,7 @@ def test_compliance_of_singular_pose_is_infinite(count: int) -> None:
 
 
 def test_compliance_of_unusable_arguments_is_refused() -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     given = OPTIMAL, home.position, home.rotation
     for stiffness in ([0.0] * 6, [-1.0] * 6, [1.0] * 5, [np.nan] * 6):
         message = refusal(compliance, *given, stiffness, kind=InputError)
@@ -214,7 +213,7 @@ def frame_compliance(
 
     Members of the platform have EA = EI = `platform`.
     """
-    frame, points = Frame(), attachment_points(design, position, rotation)
+    frame, points = Frame(), Configuration(design, position, rotation).points
     l1, d1, d2, d3, d4, l4 = inverse(design, position, rotation).tolist()
     frame.add_node("b4", points.b4)
     ends = {"b1": points.b1, "b2": points.b2, "b3": points.b3, "tool": position + rotation @ tool}

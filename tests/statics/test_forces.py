@@ -24,7 +24,6 @@ from explorer import (
     Tool,
     Weights,
     actuator_forces,
-    home_pose,
     inverse,
     jacobian,
     largest_force,
@@ -34,7 +33,7 @@ from explorer import (
     strut_bending,
     worst_direction,
 )
-from explorer.mechanism.kinematics import attachment_points
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
@@ -84,7 +83,7 @@ def test_forces_of_reference_are_those_of_the_reference() -> None:
 
 
 def test_forces_at_the_papers_home_are_the_published_ones() -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     down = [0.0, 0.0, -10.0, 0.0, 0.0, 0.0]
     forces = actuator_forces(OPTIMAL, home.position, home.rotation, down)
     assert_allclose(forces, [0.0, 16.04, 6.34, -8.76, -3.24, 10.32], atol=0.02)
@@ -116,7 +115,7 @@ def test_twists_of_actuators_invert_the_jacobian() -> None:
 
 def centres(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
     """Return the centres of all masses, in the order of `MASSES`, from the geometry of the legs."""
-    at = attachment_points(design, position, rotation)
+    at = Configuration(design, position, rotation).points
     points = [position + rotation @ np.array(body.centre) for body in WEIGHTS.on_platform]
     foot2, foot3 = at.b2 * [1.0, 0.0, 0.0], at.b3 * [1.0, 0.0, 0.0]
     legs = [(at.a1, at.b1), (foot2, at.b2), (foot3, at.b3), (at.a3, at.b4)]
@@ -153,7 +152,7 @@ def test_joint_forces_balance_the_platform_and_each_leg(gravity: Triple) -> None
     held = reactions(design, positions, rotations, load, None, WEIGHTS)
     scale = np.abs(held.joints).max()
     for k, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
-        at = attachment_points(design, position, rotation)
+        at = Configuration(design, position, rotation).points
         ends = [at.b1, at.b2, at.b3, at.b4]
         body = WEIGHTS.on_platform[0]
         centre, weight = rotation @ np.array(body.centre), body.mass_kg * g
@@ -230,7 +229,7 @@ def test_largest_payload_uses_a_limit_up_and_keeps_all() -> None:
 
 
 def test_mass_may_hold_a_load_that_exceeds_a_limit_alone() -> None:
-    home = home_pose(LIMITED)
+    home = LIMITED.home_pose
     given = LIMITED, home.position, home.rotation
     alone = limit_shares(LIMITED, reactions(*given, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])).max()
     load = [0.0, 0.0, 1.2 / float(alone), 0.0, 0.0, 0.0]
@@ -281,7 +280,7 @@ def test_forces_of_singular_pose_are_infinite(
 
 
 def test_forces_of_unusable_arguments_are_refused() -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     given = OPTIMAL, home.position, home.rotation
     assert "load (FX FY FZ MX MY MZ)" in refusal(actuator_forces, *given, [1, 2], kind=InputError)
     refusal(actuator_forces, *given, [np.nan] * 6, kind=InputError)

@@ -21,7 +21,6 @@ from explorer import (
     rotation_from_yaw_pitch_roll,
 )
 from explorer.mechanism.design import Limits
-from explorer.mechanism.home import home_pose, home_signs
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
@@ -34,7 +33,7 @@ from explorer.statics.tool_precision import ToolPrecision
 from explorer.statics.weights import design_weights
 
 OPTIMAL = PRESETS["paper-optimal"]
-HOME = home_pose(OPTIMAL)
+HOME = OPTIMAL.home_pose
 OWN = Weights(cylinders=(0.1, 0.2, 0.15, 0.1), cylinder_centres=(1.0, 1.0, 2.0, 3.0))
 
 
@@ -160,7 +159,7 @@ def test_parts_with_a_limit_are_those_whose_share_a_load_changes() -> None:
         assert loaded.limited.any()
 
 
-ROTATION = home_pose(OPTIMAL).rotation
+ROTATION = OPTIMAL.home_pose.rotation
 
 
 def with_force(force: float) -> Design:
@@ -222,10 +221,10 @@ def test_functions_of_limits_cross_a_singular_plane_without_fold_or_jump() -> No
 
     def across(plane: int) -> FloatArray:
         """Return the functions along a line across a face of the home mode."""
-        inward = planes_of_singularity(rotation)[plane] * home_signs(design)[plane]
+        inward = planes_of_singularity(rotation)[plane] * design.home_signs[plane]
         at = np.random.default_rng(2).uniform(-20.0, 20.0, (500, 3))
         at -= (at @ inward)[:, None] * inward
-        depths = margins(at, rotation) * home_signs(design)
+        depths = margins(at, rotation) * design.home_signs
         depths[:, plane] = np.inf
         inner = at[depths.min(axis=1).argmax()]
         return limit_values(case, rotation, np.arange(20), inner + heights * inward)

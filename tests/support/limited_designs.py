@@ -11,7 +11,7 @@ import numpy as np
 from reference import read_reference
 from scipy.spatial.transform import Rotation
 
-from explorer import Design, Limits, Pose, home_pose, inverse
+from explorer import Design, Limits, Pose, inverse
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
@@ -40,7 +40,7 @@ def scaled_design(design: Design, factor: float) -> Design:
         return value * factor if isinstance(value, float) else value
 
     names = [name for name in Limits.__struct_fields__ if name != "swing"]
-    home = home_pose(design)
+    home = design.home_pose
     return msgspec.structs.replace(
         limited(design, **{name: times(getattr(design.limits, name)) for name in names}),
         **{name: times(getattr(design, name)) for name in ("a3", "b1", "b2", "b3", "node_step")},

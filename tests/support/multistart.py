@@ -11,7 +11,6 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from explorer import Design
-from explorer.mechanism.kinematics import platform_points
 from explorer.numerics.arrays import FloatArray
 
 
@@ -46,7 +45,7 @@ def searched_least(
         seed: Seed of the starts.
     """
     rng = np.random.default_rng(seed)
-    points = platform_points(design)
+    points = design.platform_points
     size = float(np.sqrt((points**2).sum() / 4.0))
 
     def pose(x: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -18,7 +18,6 @@ from explorer import (
     InputError,
     Limits,
     accessible_workspace,
-    home_pose,
     inverse,
     leg_clearances,
     margins,
@@ -27,7 +26,6 @@ from explorer import (
 from explorer.files.json_text import LONGEST_LINE
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES
-from explorer.mechanism.home import home_signs
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.pose import Pose
 from explorer.singularity.jacobian import inverse_condition, jacobian
@@ -81,7 +79,7 @@ def test_study_encoded_and_decoded_is_unchanged() -> None:
     again = decode_study(encode_study(study), "again")
     assert again == study
     assert study_hash(again) == study_hash(study)
-    assert study.base.home == home_pose(OPTIMAL)
+    assert study.base.home == OPTIMAL.home_pose
     assert study.varied == ("a3y", "yaw", "radius")
     # So it is of one that is made in Python, whose design is checked too.
     made = Study(
@@ -281,8 +279,8 @@ def test_design_of_values_has_these_values() -> None:
         "a3x": 17.0,
         "b2": 2.0,
     }
-    home = home_pose(design)
-    assert home.position == home_pose(OPTIMAL).position
+    home = design.home_pose
+    assert home.position == OPTIMAL.home_pose.position
     assert math.degrees(math.atan2(home.rotation[1, 0], home.rotation[0, 0])) == pytest.approx(-65)
     assert design.limits.leg_radii == (0.2,) * 4
     assert all(design.length_range(name)[1] == 15.0 for name in ("l1", "d2", "d4", "l4"))
@@ -310,7 +308,7 @@ def test_node_measures_match_each_position(seed: int) -> None:
     )
     margin = 0.5
     found = node_measures(design, rotation, nodes=9, clearance_margin=margin)
-    signs = home_signs(design)
+    signs = design.home_signs
     kept = np.array(
         [
             p
@@ -341,7 +339,7 @@ def test_measures_of_a_row_match_the_public_functions() -> None:
     values = {name: rows[name][0] for name in study.variables}
     design = design_of(study, values)  # pyright: ignore[reportArgumentType]
     found = {name: rows[name][0] for name in MEASURES}
-    home = home_pose(design)
+    home = design.home_pose
     assert rows["status"][0] == "done"
     assert found["volume"] == workspace_volume(design).volume
     assert found["reach"] == design.reach
@@ -396,7 +394,7 @@ def test_study_over_machine_and_geometry_measures_loads_as_statics_does() -> Non
             guide=Guide(values["guide_force"], values["guide_moment"]),
         )
         assert design == design_of(study, values)
-        home = home_pose(design)
+        home = design.home_pose
         loaded = LoadedPose(design, home)
         assert rows["home_load_share"][k] == pytest.approx(loaded.share, rel=1e-9)
         assert rows["home_worst_actuator"][k] == 1 + loaded.shares[:6].argmax()
@@ -474,7 +472,7 @@ def test_polish_for_the_smallest_load_takes_the_payload_of_its_sample() -> None:
         values = {name: float(rows[name][k] or 0.0) for name in study.varied}
         design = design_of(study, values)
         assert design.payload.mass_kg == mass
-        share = LoadedPose(design, home_pose(design)).share
+        share = LoadedPose(design, design.home_pose).share
         assert rows["home_load_share"][k] == pytest.approx(share, rel=1e-9)
 
 
@@ -560,7 +558,7 @@ def test_polished_yaw_of_any_turn_stays_in_its_range(
     ends: tuple[float, float], is_sampled: bool
 ) -> None:
     middle = (ends[0] + ends[1]) / 2.0
-    home = Pose.of_yaw_pitch_roll(home_pose(OPTIMAL).position, (middle, 0.0, 0.0))
+    home = Pose.of_yaw_pitch_roll(OPTIMAL.home_pose.position, (middle, 0.0, 0.0))
     study = sampled(
         "grid",
         {"b2": 1, "yaw": 5} if is_sampled else 2,

@@ -20,7 +20,6 @@ from explorer import (
     InputError,
     Pose,
     accessible_workspace,
-    home_pose,
     leg_clearances,
     moves_are_clear,
     radius_curve,
@@ -52,7 +51,7 @@ def random_designs(count: int) -> list[Design]:
     found: list[Design] = []
     for seed in itertools.count():
         design = thick(ordinary_case(seed)[0], (0.0, 0.005, 0.02)[seed % 3])
-        home = home_pose(design)
+        home = design.home_pose
         if (leg_clearances(design, home.position, home.rotation).clearance > 0.0).all():
             found.append(design)
         if len(found) == count:
@@ -99,7 +98,7 @@ def test_accessible_solid_of_random_designs_holds_the_ends_of_clear_moves_alone(
     assert (slack[inside] > -2.0 * solid.tolerance).all()
     # A rim of a wall thinner than the grid's step may be missed.
     assert (clearance[inside] < -0.25 * step).sum() <= 0.02 * len(points)
-    home = np.array(home_pose(design).position)
+    home = np.array(design.home_pose.position)
     way = home + np.linspace(0.0, 1.0, 30)[:, None, None] * (points - home)
     led_to = (slacks(limits, way) >= solid.tolerance).all(axis=(0, 2)) & moves_are_clear(
         design, home, r, points, r, clearance=0.2 * step
@@ -214,7 +213,7 @@ def test_accessible_workspace_with_a_grid_out_of_range_is_refused(nodes: int) ->
 
 def test_accessible_nodes_are_a_component_of_clear_steps() -> None:
     design, r = thick(INITIAL, 0.02), home_rotation(INITIAL)
-    home = np.array(home_pose(design).position)
+    home = np.array(design.home_pose.position)
     grid = Grid(home - 4.5, np.full(3, 1.5), (7, 7, 7))
     found = survey(design, r, grid)
     reached = found.accessible_from(home)

@@ -22,14 +22,13 @@ from explorer import (
     decode_design,
     encode_design,
     evaluate,
-    home_pose,
     inverse,
     poses_are_valid,
     workspace_nodes,
     workspace_volume,
 )
 from explorer.mechanism.design import LENGTHS
-from explorer.workspace.limits.constraints import CARRIAGE_ORDER, Never, constraints, demanded_order
+from explorer.workspace.limits.constraints import CARRIAGE_ORDER, Never, constraints
 from explorer.workspace.orientations.share import orientations_within
 from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid
 
@@ -37,7 +36,7 @@ pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
 # Half a turn of the platform about the base's z-axis reverses the order of the carriages.
-MIRRORED = np.diag([-1.0, -1.0, 1.0]) @ home_pose(OPTIMAL).rotation
+MIRRORED = np.diag([-1.0, -1.0, 1.0]) @ OPTIMAL.home_pose.rotation
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -45,7 +44,7 @@ def test_order_with_d3_less_d1_of_the_other_sign_than_at_home_is_a_violation(
     seed: int,
 ) -> None:
     design, _ = ordinary_case(seed)
-    home = home_pose(design)
+    home = design.home_pose
     rotations = Rotation.random(20, random_state=np.random.default_rng(seed)).as_matrix()
     joints = inverse(design, home.position, rotations)
     at_home = evaluate(design, home).joints
@@ -86,7 +85,7 @@ def test_workspace_with_the_carriages_in_the_other_order_is_empty() -> None:
 
 def test_inclusive_and_total_solids_respect_the_order() -> None:
     design = limited(OPTIMAL, margin=None)
-    both = np.stack([home_pose(design).rotation, MIRRORED])
+    both = np.stack([design.home_pose.rotation, MIRRORED])
     alone = workspace_solid(design).volume
     assert inclusive_solid(design, both).volume == pytest.approx(alone, rel=1e-3)
     assert total_solid(design, both).empty_because == (CARRIAGE_ORDER,)
@@ -96,7 +95,7 @@ def test_inclusive_and_total_solids_respect_the_order() -> None:
 
 
 def yawed(yaw: float) -> Pose:
-    return Pose.of_yaw_pitch_roll(home_pose(OPTIMAL).position, (yaw, 0.0, 0.0))
+    return Pose.of_yaw_pitch_roll(OPTIMAL.home_pose.position, (yaw, 0.0, 0.0))
 
 
 def with_home_at(yaw: float) -> Design:
@@ -105,11 +104,11 @@ def with_home_at(yaw: float) -> Design:
 
 def test_home_with_coincident_carriages_demands_no_order() -> None:
     design = with_home_at(-90.0)
-    assert demanded_order(design) == 0
+    assert design.demanded_order == 0
     for yaw in (-60.0, -90.0, -120.0):
         assert not evaluate(design, yawed(yaw)).violations
-    assert demanded_order(with_home_at(-89.0)) == 1
-    assert demanded_order(with_home_at(-91.0)) == -1
+    assert with_home_at(-89.0).demanded_order == 1
+    assert with_home_at(-91.0).demanded_order == -1
 
 
 @pytest.mark.parametrize(("beyond", "kept"), [(0.0, True), (1e-12, True), (1e-7, False)])

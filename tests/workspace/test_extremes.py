@@ -24,7 +24,7 @@ from long_cases import long_after
 from reference import read_reference
 from scipy.spatial.transform import Rotation
 
-from explorer import Design, Limits, Pose, home_pose
+from explorer import Design, Limits, Pose
 from explorer.measures.case import Case
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.design_file import decode_design
@@ -53,8 +53,8 @@ NO_NORMALS = np.zeros((0, 3))
 def at_home(design: Design, rotation: FloatArray | None) -> tuple[Design, FloatArray]:
     """Return a design whose home has a rotation, if there is one, and the home's rotation."""
     if rotation is None:
-        return design, home_pose(design).rotation
-    home = Pose.of(home_pose(design).position, rotation)
+        return design, design.home_pose.rotation
+    home = Pose.of(design.home_pose.position, rotation)
     return msgspec.structs.replace(design, home=home), home.rotation
 
 
@@ -224,7 +224,7 @@ def test_extents_and_least_margins_of_scaled_designs_are_exact(
 ) -> None:
     """On the meshes of these designs a descent stalls before it is at the lowest position."""
     case = Case(scaled_design(design, factor))
-    lows, highs = np.array(extent_of(design, home_pose(design).rotation))
+    lows, highs = np.array(extent_of(design, design.home_pose.rotation))
     assert lows[2] == pytest.approx(lowest, abs=2e-8 * design.reach)
     near = 1e-9 * design.reach
     np.testing.assert_allclose(case.extent / factor, highs - lows, atol=near)

@@ -11,7 +11,6 @@ from limited_designs import ordinary_case, thin_case
 
 from explorer import PRESETS
 from explorer.mechanism.design import Design, Swing
-from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray, dot
 from explorer.workspace.faces.faces import Faces, workspace_faces
 from explorer.workspace.limits.constraints import (
@@ -35,7 +34,7 @@ def coned() -> Design:
 
 
 def at_home(design: Design) -> tuple[Design, FloatArray]:
-    return design, home_pose(design).rotation
+    return design, design.home_pose.rotation
 
 
 PRESET_CASES = tuple(at_home(design) for design in PRESETS.values())

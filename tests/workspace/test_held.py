@@ -31,7 +31,6 @@ from explorer import (
     workspace_solid,
 )
 from explorer.mechanism.design_file import decode_design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.held import largest_shares as shares_of_case, load_case
@@ -65,7 +64,7 @@ def largest_shares(
     design: Design, at: FloatArray, load: Iterable[float], rotation: FloatArray | None = None
 ) -> FloatArray:
     """Return the largest share of a limit at positions (n, 3), in home's orientation if none."""
-    r = home_pose(design).rotation if rotation is None else rotation
+    r = design.home_pose.rotation if rotation is None else rotation
     weights = design_weights(design)
     held = reactions(design, at, r, np.array(load), design.tool.position, weights)
     return np.asarray(limit_shares(design, held).max(axis=1))
@@ -95,10 +94,10 @@ def test_volume_at_any_orientation_is_that_of_positions_in_the_mode_of_home(seed
     design = msgspec.structs.replace(
         design, limits=msgspec.structs.replace(design.limits, margin=0.0)
     )
-    home, rotation, whole = home_pose(OPTIMAL), np.eye(3), None
+    home, rotation, whole = OPTIMAL.home_pose, np.eye(3), None
     while whole is None or whole.volume < 100.0:
         turn = Rotation.from_rotvec(rng.normal(size=3) * 0.4).as_matrix()
-        rotation = turn @ home_pose(OPTIMAL).rotation
+        rotation = turn @ OPTIMAL.home_pose.rotation
         if seed % 3 == 0:
             home = Pose.of(home.position, rotation)
         design = msgspec.structs.replace(design, home=home)
@@ -156,7 +155,7 @@ def test_thin_and_long_parts_are_found_whole(force: float, error: float) -> None
     load = np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0])
     part = held_workspace(UNBOUNDED, load=load)
     signed = msgspec.structs.replace(UNBOUNDED, limits=Limits(margin=0.0))
-    rotation = home_pose(UNBOUNDED).rotation
+    rotation = UNBOUNDED.home_pose.rotation
     limits = constraints(signed, rotation)
     whole = workspace_solid(signed, rotation)
     lows, highs = whole.vertices.min(axis=0), whole.vertices.max(axis=0)

@@ -13,7 +13,6 @@ from reference import read_reference
 
 from explorer import PRESETS, Actuators, Limits, Payload, Struts, Tool
 from explorer.mechanism.design_file import decode_design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
@@ -23,7 +22,7 @@ from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 from explorer.workspace.nearest_held import nearest_held
 
 OPTIMAL = PRESETS["paper-optimal"]
-HOME = home_pose(OPTIMAL)
+HOME = OPTIMAL.home_pose
 LIMITED = msgspec.structs.replace(
     OPTIMAL,
     tool=Tool((1.0, -1.0, 2.0)),

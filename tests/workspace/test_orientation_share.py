@@ -16,7 +16,7 @@ from long_cases import long_after
 from reference import read_reference
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, Design, InputError, Limits, evaluate, home_pose, margins
+from explorer import PRESETS, Design, InputError, Limits, evaluate, margins
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.pose import Pose
 from explorer.workspace.orientations.share import orientation_capability, orientation_share
@@ -63,7 +63,7 @@ def test_share_is_that_of_an_independent_count(index: int) -> None:
 
 def test_standard_error_is_the_spread_over_seeds() -> None:
     design = limited(OPTIMAL, l1=(5.0, 15.0), swing=Swing(b1=70.0))
-    p = home_pose(OPTIMAL).position
+    p = OPTIMAL.home_pose.position
     found = [orientation_share(design, p, 2000, seed) for seed in range(60)]
     spread = float(np.std([each.share for each in found]))
     told = math.sqrt(float(np.mean([each.standard_error**2 for each in found])))
@@ -77,7 +77,7 @@ def test_standard_error_is_the_spread_over_seeds() -> None:
 @pytest.mark.parametrize("seed", range(2))
 def test_share_agrees_with_single_poses(seed: int) -> None:
     design, _ = ordinary_case(seed)
-    position = home_pose(design).position
+    position = design.home_pose.position
     rotations = Rotation.random(400, random_state=np.random.default_rng(seed)).as_matrix()
     allowed = [not evaluate(design, Pose.of(position, r)).violations for r in rotations]
     found = orientation_share(design, position)
@@ -87,7 +87,7 @@ def test_share_agrees_with_single_poses(seed: int) -> None:
 
 
 def test_share_is_the_same_for_a_seed_and_none_outside_the_box() -> None:
-    p = home_pose(OPTIMAL).position
+    p = OPTIMAL.home_pose.position
     assert orientation_share(OPTIMAL, p, 500, 7) == orientation_share(OPTIMAL, p, 500, 7)
     outside = orientation_share(OPTIMAL, [30.0, 5.0, 9.0], 100)
     assert (outside.share, outside.standard_error) == (0.0, 0.0)
@@ -97,11 +97,11 @@ def test_share_is_the_same_for_a_seed_and_none_outside_the_box() -> None:
 def test_any_number_of_orientations_is_counted_in_full(n: int) -> None:
     free = limited(OPTIMAL, margin=None, carriage_order="any", box=None)
     assert orientation_share(free, [1.0, 1.0, 1.0], n).share == 1.0
-    assert 0.0 <= orientation_share(OPTIMAL, home_pose(OPTIMAL).position, n).share <= 1.0
+    assert 0.0 <= orientation_share(OPTIMAL, OPTIMAL.home_pose.position, n).share <= 1.0
 
 
 def test_unusable_positions_numbers_and_seeds_are_refused() -> None:
-    p = home_pose(OPTIMAL).position
+    p = OPTIMAL.home_pose.position
     refused: list[tuple[str, dict[str, Any]]] = [
         *(("number of orientations", {"n": n}) for n in (1, -5, 10**9)),
         ("number of orientations must be a whole number", {"n": 2.5}),

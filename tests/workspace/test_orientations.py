@@ -10,7 +10,7 @@ import pytest
 from limited_designs import limited
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, InputError, Pose, evaluate, home_pose
+from explorer import PRESETS, InputError, Pose, evaluate
 from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import checked_rotation, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
@@ -21,7 +21,7 @@ from explorer.workspace.orientations.share import orientation_capability, orient
 from explorer.workspace.slices.volume import volume_within
 
 OPTIMAL = PRESETS["paper-optimal"]
-HOME = home_pose(OPTIMAL)
+HOME = OPTIMAL.home_pose
 EVERY_LIMIT: dict[str, Any] = {
     "gap": 0.5,
     "guide": (-5.0, 20.0),

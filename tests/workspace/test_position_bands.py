@@ -23,7 +23,6 @@ from explorer import (
 )
 from explorer.export.report.drawings.slices import Slices
 from explorer.mechanism.design import Limits
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import planes_of_singularity
@@ -53,7 +52,7 @@ LOADED = msgspec.structs.replace(
 )
 LOAD = np.array([4.0, -3.0, -6.0, 5.0, 10.0, -5.0])
 ORIENTATIONS = [
-    home_pose(OPTIMAL).rotation,
+    OPTIMAL.home_pose.rotation,
     *(rotation_from_yaw_pitch_roll(angles) for angles in ((-40, 25, 10), (-120, -35, 60))),
 ]
 
@@ -216,7 +215,7 @@ def test_levels_of_forces_are_round_numbers_that_suit_the_load(factor: float) ->
 
 
 def asked_force(factor: float, rotation: FloatArray) -> float:
-    held = reactions(OPTIMAL, home_pose(OPTIMAL).position, rotation, factor * LOAD)
+    held = reactions(OPTIMAL, OPTIMAL.home_pose.position, rotation, factor * LOAD)
     return float(np.abs(held.actuators).max())
 
 

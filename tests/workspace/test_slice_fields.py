@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, InputError, Pose, evaluate, home_pose, nearest_singularities
+from explorer import PRESETS, InputError, Pose, evaluate, nearest_singularities
 from explorer.singularity.ellipsoids import singular_plane_distances
 from explorer.workspace.slices.fields import FIELDS, Field, field_at, slice_field
 
 OPTIMAL = PRESETS["paper-optimal"]
-HOME = home_pose(OPTIMAL)
+HOME = OPTIMAL.home_pose
 
 
 @pytest.mark.parametrize("field", FIELDS)

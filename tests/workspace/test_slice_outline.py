@@ -97,7 +97,7 @@ def test_outline_edges_have_the_slice_on_their_left(seed: int) -> None:
 
 @pytest.mark.parametrize("size", [1e-6, 1e6])
 def test_outline_of_a_scaled_design_scales(size: float) -> None:
-    rotation = explorer.home_pose(OPTIMAL).rotation
+    rotation = OPTIMAL.home_pose.rotation
     plain = limited(OPTIMAL, box=None)
     scaled = limited(plain.with_variables([size * x for x in plain.variables]))
     one = slice_outline(plain, rotation, "y", 3.0)
@@ -109,7 +109,7 @@ def test_outline_of_a_scaled_design_scales(size: float) -> None:
 
 
 def test_outline_outside_a_workspace_has_no_loops() -> None:
-    rotation = explorer.home_pose(OPTIMAL).rotation
+    rotation = OPTIMAL.home_pose.rotation
     for r, level in ((rotation, 30.0), (rotation, -0.1), (np.eye(3), 9.0)):
         outline = slice_outline(OPTIMAL, r, "z", level)
         assert outline is not None
@@ -118,7 +118,7 @@ def test_outline_outside_a_workspace_has_no_loops() -> None:
 
 def test_outline_with_cones_is_none_and_unknown_axes_are_refused() -> None:
     swung = limited(OPTIMAL, swing=Swing(a1=60.0))
-    rotation = explorer.home_pose(OPTIMAL).rotation
+    rotation = OPTIMAL.home_pose.rotation
     assert slice_outline(swung, rotation, "z", 9.0) is None
     for axis in ("w", "", "xy"):
         with pytest.raises(explorer.InputError, match="x, y or z"):

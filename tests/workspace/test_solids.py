@@ -26,7 +26,7 @@ from long_cases import long_after
 from meshes import assert_lies_on_its_limits, edges_are_paired, euler_characteristic
 from scipy.spatial.transform import Rotation
 
-from explorer import JOINTS, PRESETS, Design, InputError, Limits, Pose, home_pose, inverse
+from explorer import JOINTS, PRESETS, Design, InputError, Limits, Pose, inverse
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints
@@ -247,7 +247,7 @@ def test_solid_of_coincident_limits_is_closed() -> None:
     assert workspace_solid(OPTIMAL).volume == pytest.approx(workspace_solid(lower).volume, rel=1e-4)
     rotation = home_rotation(OPTIMAL)
     b1x, b1y = (-(rotation.T @ [*OPTIMAL.a3, 0.0]))[:2].tolist()
-    equal = msgspec.structs.replace(OPTIMAL, b1=(b1x, b1y), home=home_pose(OPTIMAL))
+    equal = msgspec.structs.replace(OPTIMAL, b1=(b1x, b1y), home=OPTIMAL.home_pose)
     solid = workspace_solid(equal)
     assert solid.is_watertight
     assert solid.volume == pytest.approx(workspace_volume(equal).volume, rel=1e-4)
@@ -304,7 +304,7 @@ def test_solid_with_an_unusable_tolerance_is_refused() -> None:
     ("joint", "half"), [("l1", 1e-9), ("d2", 1e-12), ("d4", 1e-14), ("l4", 1e-15)]
 )
 def test_solid_of_a_box_of_the_size_of_rounding_is_within_it(joint: str, half: float) -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     middle = np.array(home.position)
     length = float(inverse(OPTIMAL, middle, home.rotation)[JOINTS.index(joint)])
     box = (tuple((middle - half).tolist()), tuple((middle + half).tolist()))

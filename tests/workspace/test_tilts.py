@@ -12,7 +12,7 @@ from limited_designs import limited, ordinary_case, troubled_case
 from long_cases import long_after
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, Design, InputError, evaluate, home_pose, inverse
+from explorer import PRESETS, Design, InputError, evaluate, inverse
 from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
@@ -57,7 +57,7 @@ def case_of(seed: int) -> tuple[Design, FloatArray, float]:
         design = PRESETS[("paper-initial", "paper-optimal")[seed // 4 % 2]]
     else:
         design = (ordinary_case if seed % 4 < 3 else troubled_case)(seed)[0]
-    home = home_pose(design)
+    home = design.home_pose
     if seed % 2:
         names = rng.choice(["a1", "a3", "b1", "b2", "b3", "b4"], 3, replace=False).tolist()
         design = limited(design, swing=Swing(**{n: float(rng.uniform(10, 170)) for n in names}))
@@ -72,7 +72,7 @@ def tool_case_of(seed: int, share: float) -> tuple[Design, FloatArray, float, Fl
     design, position, torsion = case_of(seed)
     direction = np.random.default_rng([4, seed]).normal(size=3)
     tool = share * design.reach * direction / np.linalg.norm(direction)
-    return design, position + home_pose(design).rotation @ tool, torsion, tool
+    return design, position + design.home_pose.rotation @ tool, torsion, tool
 
 
 @pytest.mark.parametrize("seed", range(0, 12, 4))
@@ -80,7 +80,7 @@ def test_orientations_of_the_tool_are_those_of_its_poses(seed: int) -> None:
     design, position, _, tool = tool_case_of(seed, 0.3)
     rng = np.random.default_rng(seed)
     turns = Rotation.from_rotvec(rng.normal(scale=0.3, size=(60, 3))).as_matrix()
-    rotations = turns @ home_pose(design).rotation
+    rotations = turns @ design.home_pose.rotation
     poses = [Pose.of(position - r @ tool, r) for r in rotations]
     expected = [not evaluate(design, pose).violations for pose in poses]
     assert orientations_within(design, position, rotations, tool).tolist() == expected
@@ -113,7 +113,7 @@ def test_tilt_map_agrees_with_dense_turns_and_names_the_limit(seed: int) -> None
 
 def test_tilt_map_of_the_paper_ends_at_margins_and_the_carriage_order() -> None:
     design = PRESETS["paper-optimal"]
-    found = tilt_map(design, home_pose(design).position)
+    found = tilt_map(design, design.home_pose.position)
     assert len(found.tilts) == 72
     assert {"margin δ1", "margin δ2", CARRIAGE_ORDER} == set(found.limits)
     # Towards the azimuth zero the carriages meet where b3 - b2 is upright.
@@ -236,7 +236,7 @@ def test_tilts_with_unusable_input_are_refused(
 ) -> None:
     design = PRESETS["paper-optimal"]
     with pytest.raises(InputError, match=words):
-        measure(design, **({"position": home_pose(design).position} | arguments))
+        measure(design, **({"position": design.home_pose.position} | arguments))
 
 
 def test_tilt_zero_that_violates_a_limit_has_no_tilt() -> None:
@@ -254,7 +254,7 @@ def tool_dips() -> list[tuple[Design, FloatArray, FloatArray]]:
     design = PRESETS["paper-optimal"]
     wide: dict[str, Any] = dict.fromkeys(("l1", "d2", "d4", "l4"), (0.0, 500.0))
     free = limited(design, margin=None, carriage_order="any", box=None, **wide)
-    c, small = np.array(home_pose(design).position), 1.0 - 3e-4
+    c, small = np.array(design.home_pose.position), 1.0 - 3e-4
     cases: list[tuple[Design, FloatArray, FloatArray]] = []
     for tool in ((0.0, 0.3, 3.0), (1.5, -1.0, 2.0)):
         t = np.array(tool)
@@ -296,7 +296,7 @@ def test_greatest_tilt_finds_a_dip_between_azimuths(index: int) -> None:
 
 def test_orientations_of_two_torsions_are_connected_within_the_range_of_torsions() -> None:
     design = PRESETS["paper-optimal"]
-    p = home_pose(design).position
+    p = design.home_pose.position
     span = torsion_range(design, p)
     assert span.high - span.low < 359.0
 
@@ -321,7 +321,7 @@ def test_orientations_of_two_torsions_are_connected_within_the_range_of_torsions
 def test_torsion_range_whose_half_turn_ends_on_a_limit_has_both_ends() -> None:
     design = PRESETS["paper-optimal"]
     free = limited(design, margin=None, carriage_order="any", box=None)
-    p = home_pose(design).position
+    p = design.home_pose.position
     rng = np.random.default_rng(0)
     for torsion in rng.uniform(-180.0, 180.0, 12).tolist():
         longest = float(inverse(free, p, tilted(0.0, np.zeros(1), torsion + 180.0)[0])[0])

@@ -27,7 +27,6 @@ from explorer import (
     decode_design,
     encode_design,
     evaluate,
-    home_pose,
     inverse,
     make_problem,
     margins,
@@ -104,7 +103,7 @@ def touching(design: Design, pose: Pose, little: float) -> Iterator[tuple[str, D
         yield "box of a point", boxed(design, place, place)
     least = float(np.abs(margins(pose.position, pose.rotation)).min())
     yield "margin", limited(design, margin=least + little)
-    home = home_pose(design)
+    home = design.home_pose
     at_home, here = (legs(design, np.array(each.position), each.rotation) for each in (home, pose))
     for leg in range(4):
         names = [f"b{leg + 1}", *({0: ["a1"], 3: ["a3"]}.get(leg, []))]
@@ -174,7 +173,7 @@ def assert_file_meets_demands(outcome: Outcome) -> None:
         values = dict(zip(problem.names, outcome.best.values, strict=True))
         shift = np.array([values.get(name, 0.0) for name in SHIFTS])
         for corner in corners_of(demands.required_box) + shift:
-            pose = Pose.of(corner, home_pose(design).rotation)
+            pose = Pose.of(corner, design.home_pose.rotation)
             assert not evaluate(design, pose).violations
 
 
@@ -195,13 +194,13 @@ def test_optimum_on_limits_read_from_its_file_satisfies_them(seed: int) -> None:
     rng = np.random.default_rng(seed)
     design = decode_design(json.dumps(DEFECTS[0]["design"]).encode(), "the start")
     x = np.array(design.variables) * rng.uniform(0.7, 1.4, 6)
-    apart = abs((x[5] - x[4]) * home_pose(design).rotation[0, 0])
+    apart = abs((x[5] - x[4]) * design.home_pose.rotation[0, 0])
     design = limited(
         design.with_variables(x.tolist()),
         gap=float(apart * rng.uniform(0.5, 2.0)),
         margin=float(rng.choice([0.0, 0.3])),
     )
-    middle, half = np.array(home_pose(design).position), rng.uniform(0.2, 1.0, 3)
+    middle, half = np.array(design.home_pose.position), rng.uniform(0.2, 1.0, 3)
     problem = make_problem(
         design,
         "largest-margin",

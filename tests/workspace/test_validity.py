@@ -19,7 +19,6 @@ from explorer import (
     InputError,
     Pose,
     evaluate,
-    home_pose,
     moves_are_clear,
     poses_between,
 )
@@ -44,7 +43,7 @@ def verdict_of(design: Design, pose: Pose) -> tuple[bool, float]:
 def poses_about(design: Design, seed: int, count: int) -> list[Pose]:
     """Return random poses at distances from near the home to far from it."""
     rng = np.random.default_rng(seed)
-    home, size = home_pose(design), design.reach
+    home, size = design.home_pose, design.reach
     spread = rng.choice([1e-3, 0.1, 0.5], (count, 1))
     places = np.array(home.position) + size * spread * rng.uniform(-1.0, 1.0, (count, 3))
     turns = Rotation.from_rotvec(spread * rng.normal(size=(count, 3))).as_matrix()
@@ -77,7 +76,7 @@ def test_pose_without_violations_or_collisions_is_valid(seed: int) -> None:
 
 @pytest.mark.parametrize("bound", ["l1", "d2", "d4", "l4"])
 def test_pose_on_a_limit_is_valid(bound: str) -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     length = float(evaluate(OPTIMAL, home).joints[JOINTS.index(bound)])
     for low, high, expected in (
         (0.0, length, True),
@@ -90,10 +89,10 @@ def test_pose_on_a_limit_is_valid(bound: str) -> None:
 
 
 def test_leg_without_a_direction_at_home_violates_its_cone() -> None:
-    home = Pose((*OPTIMAL.a3, 0.0), home_pose(OPTIMAL).quaternion)
+    home = Pose((*OPTIMAL.a3, 0.0), OPTIMAL.home_pose.quaternion)
     free = limited(OPTIMAL, box=None, margin=None)
     design = msgspec.structs.replace(limited(free, swing=Swing(a3=90.0)), home=home)
-    pose = home_pose(OPTIMAL)
+    pose = OPTIMAL.home_pose
     assert poses_are_valid(free, pose.position, pose.rotation)
     assert not poses_are_valid(design, pose.position, pose.rotation)
     assert not verdict_of(design, pose)[0]
@@ -143,7 +142,7 @@ def test_move_valid_has_valid_poses_all_along(
 
 
 def test_move_along_a_limit_is_valid_to_the_tolerance() -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     top = limited(OPTIMAL, box=((0, -12, 0), (20, 22, home.position[2])))
     x, y, z = home.position
     # On the face of the box all the way.
@@ -169,7 +168,7 @@ def test_move_along_a_limit_is_valid_to_the_tolerance() -> None:
 
 
 def test_move_to_another_mode_is_invalid() -> None:
-    home = home_pose(OPTIMAL)
+    home = OPTIMAL.home_pose
     free = limited(OPTIMAL, box=None)
     x, y, z = home.position
     assert not moves_are_valid(free, (x, y, z), home.rotation, (x, y, -z), home.rotation)

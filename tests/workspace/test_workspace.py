@@ -23,7 +23,7 @@ from limited_designs import (
 from long_cases import long_after
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, Design, InputError, home_pose
+from explorer import PRESETS, Design, InputError
 from explorer.mechanism.design import LENGTHS, VARIABLES, Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import YAW, constraints
@@ -171,7 +171,7 @@ def test_balls_that_are_equal_count_once() -> None:
     rotation = home_rotation(OPTIMAL)
     # The centre of l1 is -R b1: put a3 there, and the balls of l1 and l4 are one.
     b1x, b1y = (-(rotation.T @ [*OPTIMAL.a3, 0.0]))[:2].tolist()
-    design = msgspec.structs.replace(OPTIMAL, b1=(b1x, b1y), home=home_pose(OPTIMAL))
+    design = msgspec.structs.replace(OPTIMAL, b1=(b1x, b1y), home=OPTIMAL.home_pose)
     without = workspace_volume(limited(design, l4=(0.0, 1e3))).volume
     assert workspace_volume(design).volume == pytest.approx(without, rel=1e-12)
 

@@ -22,7 +22,6 @@ from explorer.app.state.studies import Studies
 from explorer.app.state.view import View
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_of
 from explorer.mechanism.pose import (
@@ -349,7 +348,7 @@ class State:
 
 def opened(design: Design, pose: Pose | None = None, view: View | None = None) -> State:
     """Return the state in which a design opens: in its home pose unless another is given."""
-    at = home_pose(design) if pose is None else pose
+    at = design.home_pose if pose is None else pose
     return State(
         design=design,
         base=design,

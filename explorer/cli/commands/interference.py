@@ -20,7 +20,6 @@ from explorer.cli.values import OPTIONAL, fold_numbers, hint, numbers, whole_num
 from explorer.errors import InputError
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import platform_points
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.mechanism.tool_point import tool_position
@@ -111,7 +110,7 @@ def _steps_of(design: Design, start: Pose, end: Pose, tool: Triple | None) -> in
         min(1.0, max(-1.0, 0.5 * (float(np.trace(end.rotation @ start.rotation.T)) - 1.0)))
     )
     point = tool or (0.0, 0.0, 0.0)
-    arm = max(math.dist(end, point) for end in platform_points(design).tolist())
+    arm = max(math.dist(end, point) for end in design.platform_points.tolist())
     way = math.dist(tool_position(start, point), tool_position(end, point))
     count = math.ceil((way + turn * arm) / step * (1.0 - 1e-9))
     if count > MOST_STEPS:

@@ -11,7 +11,6 @@ from explorer.cli.options import DesignOptions, JsonOptions, PointOptions
 from explorer.cli.output import degrees, figure, figures, finite, heading, table
 from explorer.cli.values import finite_number, hint, numbers, whole_number
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import Point, position_of
 
@@ -53,7 +52,7 @@ class Orientation(JsonOptions, PointOptions, DesignOptions):
         from explorer.workspace.orientations.torsions import tilt_by_torsion, torsion_range
 
         design = self.read_design()
-        home, tool = home_pose(design), self.tool(design)
+        home, tool = design.home_pose, self.tool(design)
         position = position_of(design, home, self.at) if self.position is None else self.position
         found = _Orientations(
             design=design,

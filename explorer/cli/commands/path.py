@@ -42,7 +42,6 @@ from explorer.cli.values import (
 )
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.statics.reactions import LIMITED, PART_NAMES
@@ -171,7 +170,7 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
             self.to_tilt_torsion,
             self.to_folds,
         )
-        start = _pose("--from", home_pose(design), *starts, tool)
+        start = _pose("--from", design.home_pose, *starts, tool)
         if ends == (None,) * 5:
             raise InputError(
                 "say where the path ends with --to, --to-quaternion, --to-yaw-pitch-roll, "

@@ -18,7 +18,6 @@ from explorer.measures.catalogue import measures_in
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
 from explorer.optimise.record import Record
 from explorer.prototype.assembly import make_prototype
@@ -142,7 +141,7 @@ def gather_report_data(
         case=case,
         measured=measure_design(case, measures_in("report")),
         snapshot=evaluate(design, at),
-        is_home=at == home_pose(design),
+        is_home=at == design.home_pose,
         nodes=_compute(lambda: case.paper_nodes),
         solid=solid,
         hull_volume=solid if isinstance(solid, Missing) else _compute(lambda: _hull(solid)),

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import msgspec
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.optimise.refutation.lifting import without_one
 from explorer.workspace.slices.volume import workspace_volume
 
@@ -36,7 +35,7 @@ def find_binding_limit(design: Design, volume: float) -> BindingLimit | None:
         design: The manipulator, of a smaller volume.
         volume: The volume, in cubed design units.
     """
-    start = msgspec.structs.replace(design, home=home_pose(design))
+    start = msgspec.structs.replace(design, home=design.home_pose)
     lifted: list[BindingLimit] = []
     for name, limits in without_one(design.limits, UNBOUNDED * design.reach).items():
         freed = msgspec.structs.replace(start, limits=limits)

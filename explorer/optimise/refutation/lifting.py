@@ -5,7 +5,6 @@ from __future__ import annotations
 import msgspec
 
 from explorer.mechanism.design import LENGTHS, Design, Limits, Swing
-from explorer.mechanism.home import home_pose
 from explorer.workspace.limits.constraints import GAP
 
 BOX_LIMIT = "box"
@@ -60,4 +59,4 @@ def lift(design: Design, limit: str) -> Design | None:
         lifted = without_one(limits).get(limit, limits)
     if lifted == limits:
         return None
-    return msgspec.structs.replace(design, limits=lifted, home=home_pose(design))
+    return msgspec.structs.replace(design, limits=lifted, home=design.home_pose)

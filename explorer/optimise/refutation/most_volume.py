@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from explorer.mechanism.design import LENGTHS, Pair
-from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.optimise.demands import Box
@@ -63,7 +62,7 @@ def margin_planes(ranges: Ranges, least: float | None) -> list[tuple[FloatArray,
     """
     if least is None:
         return []
-    normals = planes_of_singularity(home_pose(ranges.problem.start).rotation)
+    normals = planes_of_singularity(ranges.problem.start.home_pose.rotation)
     return [
         (sign * normal, least)
         for index, (normal, sign) in enumerate(zip(normals, ranges.signs, strict=True))

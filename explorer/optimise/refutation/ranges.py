@@ -10,7 +10,6 @@ import math
 from functools import cached_property
 
 from explorer.mechanism.design import LENGTHS, VARIABLES, Pair
-from explorer.mechanism.home import home_pose, home_signs
 from explorer.optimise.demands import Box
 from explorer.optimise.problem import REACH, SHIFTS, YAW, Problem
 
@@ -75,7 +74,7 @@ class Ranges:
 
     def _axis(self, column: int, pieces: int) -> list[tuple[Pair, Pair, Pair]]:
         """Return the intervals of an axis of the platform in the base frame, by pieces of yaw."""
-        x, y, z = home_pose(self.problem.start).rotation[:, column].tolist()
+        x, y, z = self.problem.start.home_pose.rotation[:, column].tolist()
         if not self.is_turning:
             return [((x, x), (y, y), (z, z))]
         low, high = (math.radians(end) for end in self._bounds[YAW])
@@ -124,7 +123,7 @@ class Ranges:
     @cached_property
     def arm_height(self) -> Pair:
         """The interval of the height of b1 over b4, which no turn about z changes."""
-        rotation = home_pose(self.problem.start).rotation
+        rotation = self.problem.start.home_pose.rotation
         u, v = float(rotation[2, 0]), float(rotation[2, 1])
         return total(product(self.of("b1x"), (u, u)), product(self.of("b1y"), (v, v)))
 
@@ -183,7 +182,7 @@ class Ranges:
     @cached_property
     def signs(self) -> tuple[int, int, int]:
         """The sign triple of home."""
-        return home_signs(self.problem.start)
+        return self.problem.start.home_signs
 
 
 def _cosines(low: float, high: float) -> Pair:

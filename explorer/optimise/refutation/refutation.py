@@ -15,7 +15,6 @@ import msgspec
 from explorer.legs.clearance import PAIRS
 from explorer.mechanism.design import Design, Pair
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.home import home_pose
 from explorer.numerics.number_text import format_number
 from explorer.optimise.demands import Box
 from explorer.optimise.problem import SHIFTS, Problem
@@ -81,7 +80,7 @@ def words_of(reasons: Iterable[Refutation]) -> str:
 def with_box(design: Design, box: Box | None) -> Design:
     """Return a design with another box, or none; its home stays where it was."""
     limits = msgspec.structs.replace(design.limits, box=box)
-    return msgspec.structs.replace(design, limits=limits, home=home_pose(design))
+    return msgspec.structs.replace(design, limits=limits, home=design.home_pose)
 
 
 def paper_box(problem: Problem) -> Box | None:

@@ -9,7 +9,6 @@ import numpy as np
 from explorer.errors import DesignError, InputError
 from explorer.measures.size import longest_leg
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import DISTANCES, Problem, distance_of
@@ -76,7 +75,7 @@ def first_positions(problem: Problem, design: Design) -> FloatArray:
         start, end = np.array(lows)[: len(counts)], np.array(highs)[: len(counts)]
         return start + (end - start) * shares
 
-    rotation, least = home_pose(design).rotation, problem.demands.clearance_margin
+    rotation, least = design.home_pose.rotation, problem.demands.clearance_margin
     columns = grid(IN_SURFACE, IN_SURFACE)
     foot = np.column_stack([columns, np.zeros(len(columns))])
     # Margins are linear in z: δ = δ at the foot + rise · z.

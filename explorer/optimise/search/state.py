@@ -15,7 +15,6 @@ import numpy as np
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import decode_design, encode_design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import (
     rotation_from_yaw_pitch_roll,
     yaw_pitch_roll_from_rotation,
@@ -68,7 +67,7 @@ class State:
     @cached_property
     def rotation(self) -> FloatArray:
         """The orientation of the workspace, shape (3, 3)."""
-        return home_pose(self.design).rotation
+        return self.design.home_pose.rotation
 
     def turned(self, turn: FloatArray) -> State:
         """Return the same place at another orientation: that of home, turned by a rotation.

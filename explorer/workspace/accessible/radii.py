@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.moves import move_clearances
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.stages import Stages, Watch, unwatched
@@ -104,7 +103,7 @@ def radius_curve(
         InputError: not a rotation, the start breaks a limit, or legs cross there.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
-    p = np.array(home_pose(design).position) if start is None else np.array(start, dtype=float)
+    p = np.array(design.home_pose.position) if start is None else np.array(start, dtype=float)
     thin = with_radius(design, 0.0)
     stages = Stages(watch, STAGES)
     stages.begin("solid of the limits")

@@ -7,7 +7,6 @@ import numpy as np
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_signs
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
@@ -59,7 +58,7 @@ def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> N
 def start_faults(design: Design, rotation: FloatArray, position: FloatArray) -> list[str]:
     """Return the limits that a position breaks and the pairs of legs that touch there."""
     joints, delta = inverse(design, position, rotation), margins(position, rotation)
-    broken = violations(design, position, rotation, joints, delta, home_signs(design))
+    broken = violations(design, position, rotation, joints, delta, design.home_signs)
     clearance = leg_clearances(design, position, rotation).clearance
     faults = [str(violation) for violation in broken]
     for (i, j), depth in zip(PAIRS, (-clearance).tolist(), strict=True):

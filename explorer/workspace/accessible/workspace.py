@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, radii_of_pairs
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.stages import Stages, Watch, unwatched
@@ -140,7 +139,7 @@ def accessible_workspace(
             of range. An empty workspace has no start to check.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
-    p = np.array(home_pose(design).position) if start is None else np.array(start, dtype=float)
+    p = np.array(design.home_pose.position) if start is None else np.array(start, dtype=float)
     if not FEWEST_NODES <= nodes <= MOST_NODES:
         raise InputError(
             f"the nodes on an axis must be from {FEWEST_NODES} to {MOST_NODES}; got {nodes}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from explorer.mechanism.design import JOINTS, LENGTHS, TOLERANCE, Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.workspace.limits.constraints import CARRIAGE_ORDER, GAP, demanded_order
+from explorer.workspace.limits.constraints import CARRIAGE_ORDER, GAP
 from explorer.workspace.limits.joint_cones import angle_between, joint_cones, legs
 
 
@@ -78,7 +78,7 @@ def violations(
         check("d1", q["d1"], *limits.guide)
         check("d3", q["d3"], *limits.guide)
     check(GAP, abs(q["d1"] - q["d3"]), limits.gap, None)
-    demanded = demanded_order(design) if order is None else order
+    demanded = design.demanded_order if order is None else order
     if demanded:
         low, high = (0.0, None) if demanded > 0 else (None, 0.0)
         check(CARRIAGE_ORDER, q["d3"] - q["d1"], low, high)

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.design import TOLERANCE, Design
-from explorer.mechanism.home import home_pose, home_signs
 from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, finite_array
@@ -290,7 +289,7 @@ def _guide(design: Design, r: FloatArray) -> Iterator[Constraint]:
     difference = (design.b3 - design.b2) * float(u[0])
     if abs(difference) < design.limits.gap - design.tolerance:
         yield Never(GAP)
-    if demanded_order(design) * difference < -design.tolerance:
+    if design.demanded_order * difference < -design.tolerance:
         yield Never(CARRIAGE_ORDER)
 
 
@@ -317,7 +316,7 @@ def _margins(
         ("margin δ2", np.cross(X, u), np.cross(X, _turning(u))),
         ("margin δ3", Z, np.zeros(3)),
     )
-    for (name, k, turning), sign in zip(gradients, signs or home_signs(design), strict=True):
+    for (name, k, turning), sign in zip(gradients, signs or design.home_signs, strict=True):
         # The lines are parallel, and the margin is zero at every position.
         if float(np.linalg.norm(k)) <= PARALLEL:
             yield Never(name)
@@ -342,17 +341,3 @@ def _swings(design: Design, r: FloatArray) -> Iterator[Constraint]:
             continue
         axis = r @ cone.axis if cone.in_platform else cone.axis
         yield Cone(name, apexes[cone.leg - 1], axis, cone.half_angle, cone.leg in (2, 3))
-
-
-def demanded_order(design: Design) -> int:
-    """Return the sign of d3 − d1 that a design demands, which is that of its home pose.
-
-    The sign is 0, for either order, if the limits allow any order or if the carriages coincide in
-    the home pose to the tolerance.
-    """
-    if design.limits.carriage_order == "any":
-        return 0
-    difference = (design.b3 - design.b2) * float(home_pose(design).rotation[0, 0])
-    if abs(difference) <= design.tolerance:
-        return 0
-    return 1 if difference > 0.0 else -1

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design, Swing
-from explorer.mechanism.home import home_pose
-from explorer.mechanism.kinematics import attachment_points
 from explorer.numerics.arrays import FloatArray
 
 
@@ -39,7 +38,7 @@ def joint_cones(design: Design) -> tuple[JointCone, ...]:
     swing = design.limits.swing
     if swing == Swing():
         return ()
-    home = home_pose(design)
+    home = design.home_pose
     home_legs = legs(design, np.array(home.position), home.rotation)
     cones: list[JointCone] = []
     for joint in swing.__struct_fields__:
@@ -62,7 +61,7 @@ def legs(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArr
 
     Legs 2 and 3 start at their carriages, so they are perpendicular to the guide.
     """
-    points = attachment_points(design, position, rotation)
+    points = Configuration(design, position, rotation).points
     across = np.array([0.0, 1.0, 1.0])
     return np.array([points.b1, points.b2 * across, points.b3 * across, points.b4 - points.a3])
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 
-from explorer.legs.segments import closest_shares, minus, square_at
+from explorer.legs.segments import closest_shares, square_at
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
+from explorer.numerics.vectors import minus, vector
 from explorer.workspace.limits.valid_poses import (
     AXIS_X,
     AXIS_Y,
@@ -33,7 +34,6 @@ from explorer.workspace.limits.valid_poses import (
     SINE,
     TURNS,
     carriages_apart,
-    vector,
 )
 
 # The share of the tolerance that signs and clearances must exceed on the way, to be certain.

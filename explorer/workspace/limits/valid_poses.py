@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.legs.clearance import joined_pairs, radii_of_pairs
-from explorer.legs.segments import Vector, closest_shares, minus, square_at
+from explorer.legs.segments import closest_shares, square_at
 from explorer.mechanism.design import LENGTHS, TOLERANCE, Design
-from explorer.mechanism.home import home_signs
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import (
     BoolArray,
@@ -26,7 +25,7 @@ from explorer.numerics.arrays import (
     rows_for_kernel,
 )
 from explorer.numerics.compiled import helper, kernel
-from explorer.workspace.limits.constraints import demanded_order
+from explorer.numerics.vectors import minus, vector
 from explorer.workspace.limits.joint_cones import joint_cones
 
 # Columns of the row of rules; see `Rules.of`.
@@ -83,8 +82,8 @@ class Rules:
         row[MARGIN] = -math.inf if limits.margin is None else limits.margin - tolerance
         if signs is not None:
             row[MARGIN] = (limits.margin or 0.0) - tolerance
-        row[SIGNS:ORDER] = signs or home_signs(design)
-        row[ORDER] = demanded_order(design) if order is None else order
+        row[SIGNS:ORDER] = signs or design.home_signs
+        row[ORDER] = design.demanded_order if order is None else order
         # No clearance is demanded of a pair that shares a joint.
         row[RADII:] = np.where(joined_pairs(design), -1.0, radii_of_pairs(design))
         cones = np.zeros((len(joint_cones(design)), CONE_COLUMNS))
@@ -232,12 +231,6 @@ def satisfies_cones(cones: FloatArray, r: FloatArray, base: FloatArray, ends: Fl
         if cones[index, SINE] * along < cones[index, COSINE] * across:
             return False
     return True
-
-
-@helper
-def vector(points: FloatArray, index: int) -> Vector:
-    """Return a row of an array as three numbers."""
-    return (points[index, 0], points[index, 1], points[index, 2])
 
 
 @helper

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from explorer.legs.segments import Vector
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector
 from explorer.workspace.limits.valid_poses import (
     A3,
     BOX_HIGHS,

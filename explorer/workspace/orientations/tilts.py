@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.mechanism.tool_point import one_tool
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
@@ -204,7 +203,7 @@ def checked_torsion(design: Design, torsion: float | None) -> float:
         InputError: The torsion is not finite, or there are several.
     """
     if torsion is None:
-        return tilt_torsion_of(home_pose(design).rotation).torsion
+        return tilt_torsion_of(design.home_pose.rotation).torsion
     return one_angle("torsion", torsion)
 
 

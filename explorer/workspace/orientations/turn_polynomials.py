@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 
-from explorer.legs.segments import Vector
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.bernstein import (
     NOWHERE,
@@ -20,6 +19,7 @@ from explorer.numerics.bernstein import (
     keep_left,
 )
 from explorer.numerics.compiled import helper
+from explorer.numerics.vectors import Vector
 from explorer.workspace.limits.valid_poses import A3, B1, B2, B3
 
 START_IS_INVALID = -1.0

@@ -12,10 +12,10 @@ import math
 
 import numpy as np
 
-from explorer.legs.segments import Vector
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector
 from explorer.workspace.limits.constraints import CARRIAGE_ORDER, GAP as GAP_NAME
 from explorer.workspace.limits.joint_cones import joint_cones
 from explorer.workspace.limits.valid_poses import (

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.columns import OFFSET, X, Y, Z
@@ -95,7 +94,7 @@ class NodeCount:
 
 def home_rotation(design: Design) -> FloatArray:
     """Return the orientation of a design's constant-orientation workspace, shape (3, 3)."""
-    return home_pose(design).rotation
+    return design.home_pose.rotation
 
 
 def workspace_volume(

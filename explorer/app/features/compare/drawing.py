@@ -16,7 +16,6 @@ from explorer.measures.catalogue import measures_in
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.tool_point import Point, offset_of
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import Rgb
@@ -68,7 +67,7 @@ class ComparedDrawing:
     def offset(self, at: Point) -> FloatArray:
         """Return the vector from b4 to a point in the orientation of the drawing, shape (3,)."""
         design, rows = self.request.design, self.request.rotation
-        rotation = home_pose(design).rotation if rows is None else np.array(rows)
+        rotation = design.home_pose.rotation if rows is None else np.array(rows)
         return offset_of(design, rotation, at)
 
     @cached_property
@@ -94,7 +93,7 @@ def compared_drawing(request: ComparedRequest) -> ComparedDrawing:
     except ExplorerError as error:
         problem = str(error)
     return ComparedDrawing(
-        request, measurements, shell, outline(evaluate(design, home_pose(design))), problem
+        request, measurements, shell, outline(evaluate(design, design.home_pose)), problem
     )
 
 
@@ -105,5 +104,5 @@ def _measure(design: Design) -> Measurements:
 
 @lru_cache(maxsize=CACHED)
 def _solid(design: Design, rotation: Rows | None, tolerance: float | None) -> Solid:
-    r = home_pose(design).rotation if rotation is None else np.array(rotation)
+    r = design.home_pose.rotation if rotation is None else np.array(rotation)
     return workspace_solid(design, r, tolerance or MESH_TOLERANCE * design.reach)

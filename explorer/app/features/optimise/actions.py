@@ -22,7 +22,6 @@ from explorer.app.state.values import with_value
 from explorer.app.storage.library import LONGEST_NAME
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_start
@@ -282,7 +281,7 @@ def _restore_own(state: State, own: State) -> State:
 
 def _with_design(state: State, design: Design) -> State:
     """Return the state with a design of a run, in the orientation of its home pose."""
-    pose = Pose(state.pose.position, home_pose(design).quaternion)
+    pose = Pose(state.pose.position, design.home_pose.quaternion)
     return moved(replace(state, design=design), pose)
 
 

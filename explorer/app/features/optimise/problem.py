@@ -14,7 +14,6 @@ from explorer.errors import ExplorerError
 from explorer.measures.case import Case
 from explorer.measures.size import longest_leg
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Swing
-from explorer.mechanism.home import home_pose
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.demands import Box
 from explorer.optimise.problem import (
@@ -181,7 +180,7 @@ def _problem_or_none(design: Design, base: Design, request: OptimisationRequest)
 @lru_cache(maxsize=8)
 def box_within(design: Design) -> Box:
     """Return a box in the workspace about the home position; a small one if home is outside."""
-    home = home_pose(design)
+    home = design.home_pose
     limits = constraints(design, home.rotation)
     middle = np.array(home.position)
     grid = np.indices((TRIED,) * 3).reshape(3, -1).T / (TRIED - 1.0) - 0.5

@@ -16,7 +16,6 @@ from explorer.app.features.orientation.tasks import (
 )
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
-from explorer.mechanism.home import home_pose
 
 # Digits of a torsion in degrees beyond which tilts are not computed again.
 DIGITS = 3
@@ -63,5 +62,5 @@ def _range_of(frame: Frame) -> RangeRequest | None:
     view, design = frame.state.view.orientation, frame.state.design
     if view.over == "none":
         return None
-    home, tool = home_pose(design), frame.state.tool
+    home, tool = design.home_pose, frame.state.tool
     return RangeRequest(design, home, view.range, view.turn, view.over, tool)

@@ -34,7 +34,6 @@ from explorer.app.widgets.markup import (
     table,
 )
 from explorer.app.widgets.under_way import UnderWay, problem, progress
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.number_text import format_decimals
 from explorer.workspace.orientations.share import OrientationShare
@@ -143,7 +142,7 @@ class OrientationPanel:
         tilts = tilt_map(design, *place, tool=state.tool)
         least = greatest_tilt(design, *place, tool=state.tool)
         yield self._top, "content", box(*summary(frame, here, least, self._here))
-        home = tilt_torsion_of(home_pose(design).rotation)
+        home = tilt_torsion_of(design.home_pose.rotation)
         yield self._map, "content", box(polar_map(tilts, least, here, home))
         title = caption("What ends the tilts, by share of azimuths")
         yield self._legend, "content", box(title, legend(tilts))

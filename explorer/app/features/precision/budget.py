@@ -29,7 +29,6 @@ from explorer.app.widgets.markup import box, dim, meter, note, row, swatch, tabl
 from explorer.app.widgets.under_way import problem
 from explorer.measures.positions import PositionSet
 from explorer.mechanism.design import JOINTS
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import format_number
 from explorer.statics.budget.costs import PARTS, SourceCosts
@@ -62,7 +61,7 @@ def _shown_budget(frame: Frame) -> BudgetRequest | None:
 def budget_request(state: State) -> BudgetRequest:
     """Return the request for the budget of a state."""
     view, design = state.view.precision, state.design
-    pose: Pose = state.pose if view.over == "pose" else home_pose(design)
+    pose: Pose = state.pose if view.over == "pose" else design.home_pose
     return BudgetRequest(
         design,
         view.over,

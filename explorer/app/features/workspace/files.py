@@ -19,7 +19,6 @@ from explorer.app.features.workspace.tasks import (
 from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Triple
 
 FORMATS = ("3mf", "stl", "glb", "obj", "ply", STEP)
@@ -45,7 +44,7 @@ class WorkspaceFiles:
     def send_hull_at_home(self, file_format: str, who: Who) -> None:
         """Send the hull of the workspace within the limits, at the orientation of home."""
         state = self._session.settled()
-        rows = rows_of(home_pose(state.design).rotation)
+        rows = rows_of(state.design.home_pose.rotation)
         self._send(who, state, "limits", "hull", file_format, rows, None)
 
     def _send(

@@ -10,7 +10,6 @@ import numpy as np
 from explorer.app.features.workspace.regions import Rows, rows_of
 from explorer.app.state.frame import Frame
 from explorer.mechanism.design import Design
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 
@@ -22,7 +21,7 @@ def workspace_pose(frame: Frame) -> Pose:
     """Return the pose whose orientation the workspace has: the present one, or that of home."""
     state = frame.state
     is_home = state.view.workspace.orientation == "home"
-    return home_pose(state.design) if is_home else state.pose
+    return state.design.home_pose if is_home else state.pose
 
 
 def orientation_word(frame: Frame) -> str:
@@ -32,7 +31,7 @@ def orientation_word(frame: Frame) -> str:
 
 def turned_suffix(design: Design, rotation: Rows) -> str:
     """Return what follows the names of a workspace's measures; "" in the orientation of home."""
-    is_home = np.allclose(rotation, home_pose(design).rotation, atol=SAME)
+    is_home = np.allclose(rotation, design.home_pose.rotation, atol=SAME)
     return "" if is_home else ", turned"
 
 

@@ -25,7 +25,6 @@ from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Constraint,
     HalfSpace,
-    home_signs,
 )
 
 # Tolerance of a demand that is no limit, dimensionless.
@@ -268,7 +267,7 @@ class MarginDemand:
         self._signs: FloatArray | None = None
         if start.design.limits.margin is None:
             middle = planes_of_singularity(start.rotation) @ np.mean(start.box, axis=0)
-            self._signs = np.where(middle == 0.0, home_signs(start.design), np.sign(middle))
+            self._signs = np.where(middle == 0.0, start.design.home_signs, np.sign(middle))
 
     def measure(self, state: State) -> Measured:
         """Return sign · δ at the corner that is worst for each δ, over the size of the start."""
@@ -294,4 +293,4 @@ class MarginDemand:
         return np.asarray((signed > least[:, None]).all(axis=1))
 
     def _signs_at(self, state: State) -> FloatArray:
-        return np.array(home_signs(state.design)) if self._signs is None else self._signs
+        return np.array(state.design.home_signs) if self._signs is None else self._signs

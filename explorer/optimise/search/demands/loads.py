@@ -18,7 +18,6 @@ import numpy as np
 
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import JOINTS, VARIABLES
-from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.optimise.problem import SHIFTS, ObjectiveName
@@ -203,7 +202,7 @@ def _scale_of(start: State, values: Callable[[BoxStatics], FloatArray]) -> float
     """
     box = start.statics
     if not box.is_regular:
-        places = np.vstack([box.positions, home_pose(start.design).position])
+        places = np.vstack([box.positions, start.design.home_pose.position])
         least = np.abs(margins(places, start.rotation)).min(axis=1)
         x, y, z = places[least.argmax()].tolist()
         box = BoxStatics(start.design, ((x, y, z), (x, y, z)), start.rotation)

@@ -1,0 +1,167 @@
+"""The configuration: a design in one pose or a batch of poses, with a point of the platform.
+
+Most functions of this package take one. What follows from it is computed on first use and kept,
+so that no two of them compute it twice.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.margins import margin_rows
+from explorer.mechanism.points import AttachmentPoints, points_of
+from explorer.mechanism.pose import Pose, checked_rotation
+from explorer.numerics.arrays import (
+    FloatArray,
+    batch_shape,
+    finite_array,
+    for_kernel,
+    rotate,
+    rows_for_kernel,
+)
+
+Value = TypeVar("Value")
+
+
+class Configuration:
+    """A design in one pose or in a batch of poses, with a tool point.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Attributes:
+        design: The manipulator.
+        position: b4, shape (..., 3).
+        rotation: Platform to base, shape (..., 3, 3).
+        tool: Tool point in the platform frame, shape (..., 3).
+
+    Raises:
+        InputError: The position or the tool is not finite, the rotation is not one, or their
+            batch axes do not broadcast.
+    """
+
+    def __init__(
+        self,
+        design: Design,
+        position: ArrayLike,
+        rotation: ArrayLike,
+        tool: ArrayLike | None = None,
+    ) -> None:
+        self.design = design
+        self.position = finite_array("position", position, (3,))
+        self.rotation = checked_rotation(rotation)
+        self.tool = np.zeros(3) if tool is None else finite_array("tool", tool, (3,))
+        self.batch = self.batch_with()
+
+    @classmethod
+    def at(cls, design: Design, pose: Pose, tool: ArrayLike | None = None) -> Configuration:
+        """Return the configuration of a design in one pose."""
+        return cls(design, pose.position, pose.rotation, tool)
+
+    def batch_with(self, *values: FloatArray) -> tuple[int, ...]:
+        """Return the batch axes of the poses and of other vectors, shape (..., k) each.
+
+        Raises:
+            InputError: The batch axes do not broadcast.
+        """
+        own = (self.position, 1), (self.rotation, 2), (self.tool, 1)
+        return batch_shape(*own, *((value, 1) for value in values))
+
+    def spread(self, *values: FloatArray) -> Configuration:
+        """Return the configuration with the batch axes that it has together with other vectors.
+
+        Args:
+            values: Vectors of each pose, such as loads, shape (..., k) each.
+
+        Raises:
+            InputError: The batch axes do not broadcast.
+        """
+        batch = self.batch_with(*values)
+        if batch == self.batch:
+            return self
+        spread = object.__new__(Configuration)
+        spread.design, spread.tool, spread.batch = self.design, self.tool, batch
+        spread.position = np.broadcast_to(self.position, (*batch, 3))
+        spread.rotation = np.broadcast_to(self.rotation, (*batch, 3, 3))
+        return spread
+
+    @cached_property
+    def points(self) -> AttachmentPoints:
+        """The attachment points in the base frame, each of shape (..., 3), in design units."""
+        return points_of(self.design.variables, self.design.a2x, self.position, self.rotation)
+
+    @cached_property
+    def legs(self) -> FloatArray:
+        """The legs as vectors from base to platform, shape (..., 4, 3), in design units."""
+        return self.points.legs()
+
+    @cached_property
+    def joints(self) -> FloatArray:
+        """The joints (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units."""
+        return self.points.joints()
+
+    @cached_property
+    def margins(self) -> FloatArray:
+        """The margins (δ1, δ2, δ3), shape (..., 3), in design units."""
+        out = np.empty((len(self.positions), 3))
+        margin_rows(len(out), self.positions, self.rotations, out)
+        return out.reshape(*self.batch, 3)
+
+    @cached_property
+    def arm(self) -> FloatArray:
+        """The vector from b4 to the tool point along the axes of the base, shape (..., 3)."""
+        return rotate(self.rotation, self.tool)
+
+    @cached_property
+    def variables(self) -> FloatArray:
+        """The design variables as kernels take them, shape (6,)."""
+        return np.array(self.design.variables)
+
+    @cached_property
+    def positions(self) -> FloatArray:
+        """The positions as rows for kernels, shape (n, 3)."""
+        return self.rows(self.position)
+
+    @cached_property
+    def rotations(self) -> FloatArray:
+        """The rotations as rows for kernels, shape (n, 3, 3)."""
+        return rows_for_kernel(self.rotation, self.batch, 2)
+
+    @cached_property
+    def tools(self) -> FloatArray:
+        """The tool points as rows for kernels, shape (n, 3), or (1, 3) if all poses have one."""
+        return self.rows_or_one(self.tool)
+
+    def rows(self, vectors: FloatArray) -> FloatArray:
+        """Return vectors (..., k) as one row for each pose."""
+        return rows_for_kernel(vectors, self.batch, 1)
+
+    def rows_or_one(self, vectors: FloatArray) -> FloatArray:
+        """Return vectors (..., k) as one row for each pose, or as one row for all."""
+        return for_kernel(vectors[None]) if vectors.ndim == 1 else self.rows(vectors)
+
+
+def computed_once(
+    function: Callable[[Configuration], Value],
+) -> Callable[[Configuration], Value]:
+    """Return a function of a configuration whose value is kept in the configuration."""
+    key = f"{function.__module__}.{function.__qualname__}"
+
+    @functools.wraps(function)
+    def value_of(configuration: Configuration) -> Value:
+        kept = configuration.__dict__
+        if key not in kept:
+            kept[key] = function(configuration)
+        return kept[key]
+
+    return value_of

@@ -1,0 +1,72 @@
+"""The attachment points of a pose, and the joints that follow from them: the inverse kinematics.
+
+It is four distances and two projections.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from explorer.numerics.arrays import FloatArray, lengths_of
+
+Variables = tuple[float, float, float, float, float, float]
+"""The design variables X = (a3x, a3y, b1x, b1y, b2, b3), in design units."""
+
+ACROSS = np.array([0.0, 1.0, 1.0])
+"""The part of a vector across the guide, as a factor of its components."""
+
+
+class AttachmentPoints(NamedTuple):
+    """The attachment points in the base frame, each of shape (..., 3), in design units."""
+
+    a1: FloatArray
+    a2: FloatArray
+    a3: FloatArray
+    b1: FloatArray
+    b2: FloatArray
+    b3: FloatArray
+    b4: FloatArray
+
+    def legs(self) -> FloatArray:
+        """Return the legs as vectors from base to platform, shape (..., 4, 3).
+
+        Legs 2 and 3 start at their carriages, so they are perpendicular to the guide.
+        """
+        legs = (self.b1, self.b2 * ACROSS, self.b3 * ACROSS, self.b4 - self.a3)
+        return np.stack(legs, axis=-2)
+
+    def joints(self) -> FloatArray:
+        """Return the joints (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units."""
+        l1, d2, d4, l4 = np.moveaxis(lengths_of(self.legs()), -1, 0)
+        return np.stack([l1, self.b2[..., 0], d2, self.b3[..., 0], d4, l4], axis=-1)
+
+
+def platform_points(variables: Variables) -> FloatArray:
+    """Return b1, b2, b3 and b4 in the platform frame, shape (4, 3), in design units."""
+    _, _, b1x, b1y, b2, b3 = variables
+    return np.array([(b1x, b1y, 0.0), (b2, 0.0, 0.0), (b3, 0.0, 0.0), (0.0, 0.0, 0.0)])
+
+
+def points_of(variables: Variables, a2x: float, p: FloatArray, r: FloatArray) -> AttachmentPoints:
+    """Return the attachment points of poses.
+
+    Args:
+        variables: The design variables.
+        a2x: The x of a2, which no joint depends on.
+        p: b4 in the base frame, shape (..., 3), in design units.
+        r: Platform to base, shape (..., 3, 3).
+    """
+    a3x, a3y, b1x, b1y, b2, b3 = variables
+    x = r[..., 0]
+    shape = np.broadcast_shapes(p.shape, x.shape)
+    return AttachmentPoints(
+        a1=np.zeros(shape),
+        a2=np.broadcast_to(np.array([a2x, 0.0, 0.0]), shape),
+        a3=np.broadcast_to(np.array([a3x, a3y, 0.0]), shape),
+        b1=p + b1x * x + b1y * r[..., 1],
+        b2=p + b2 * x,
+        b3=p + b3 * x,
+        b4=np.broadcast_to(p, shape),
+    )

@@ -1,0 +1,46 @@
+"""Vectors of three numbers, as functions that kernels call."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import helper
+
+Vector: TypeAlias = tuple[float, float, float]
+
+
+@helper
+def vector(points: FloatArray, index: int) -> Vector:
+    """Return a row of an array (n, 3)."""
+    return (points[index, 0], points[index, 1], points[index, 2])
+
+
+@helper
+def column(matrix: FloatArray, index: int) -> Vector:
+    """Return a column of an array (3, n)."""
+    return (matrix[0, index], matrix[1, index], matrix[2, index])
+
+
+@helper
+def minus(a: Vector, b: Vector) -> Vector:
+    """Return a − b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@helper
+def along(a: Vector, share: float, b: Vector) -> Vector:
+    """Return a + share · b."""
+    return (a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2])
+
+
+@helper
+def dot3(a: Vector, b: Vector) -> float:
+    """Return a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@helper
+def cross3(a: Vector, b: Vector) -> Vector:
+    """Return a × b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
