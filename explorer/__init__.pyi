@@ -102,12 +102,8 @@ from .singularity.nearest_stratum import nearest_in_stratum as nearest_in_stratu
 from .singularity.strata import stratum as stratum
 from .singularity.uncoupled import UNCOUPLED as UNCOUPLED
 from .statics.accuracy import (
-    Precision as Precision,
     ToolError as ToolError,
-    error_by_actuator as error_by_actuator,
     pose_error_by_geometry as pose_error_by_geometry,
-    pose_precision as pose_precision,
-    rms_error as rms_error,
     worst_error as worst_error,
 )
 from .statics.budget.allocation import (
@@ -130,7 +126,6 @@ from .statics.error_sources import (
     LargestError as LargestError,
     errors_alone as errors_alone,
     largest_error as largest_error,
-    pose_error_by_source as pose_error_by_source,
     rms_of_sources as rms_of_sources,
     source_errors as source_errors,
 )

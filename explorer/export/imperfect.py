@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError, NoAnswerError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import checked_joints, inverse
 from explorer.mechanism.margins import margins, mode_of
@@ -28,7 +29,7 @@ from explorer.statics.error_sources import (
     SOURCES,
     UNITS,
     drawing_values,
-    pose_error_by_source,
+    error_by_source,
     source_errors,
 )
 
@@ -234,7 +235,7 @@ class ImperfectMachine:
             return np.zeros(6)
         home = self.design.home_pose
         tool = self.design.tool.position
-        slopes = pose_error_by_source(self.design, home.position, home.rotation, tool)
+        slopes = error_by_source(Configuration.at(self.design, home, tool))
         if not np.isfinite(slopes).all():
             raise NoAnswerError(
                 "the home pose is singular, so that errors have no bound there; choose another home"

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import NoAnswerError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.kinematics import inverse
 from explorer.numerics.arrays import FloatArray
@@ -62,7 +63,7 @@ class Servos(NamedTuple):
         """
         home = design.home_pose
         lag = (self.weights - forces) / (1e-3 * design.unit_mm * self.stiffness)
-        twists = twists_of_actuators(design, home.position, home.rotation, design.tool.position)
+        twists = twists_of_actuators(Configuration.at(design, home, design.tool.position))
         return twists @ -lag
 
 
@@ -133,7 +134,7 @@ def servos_of(design: Design, masses: Mapping[str, Mass], *, elastic: bool) -> S
     """
     moved = np.diag(joint_inertia(design, with_payload(design, masses)))
     home = design.home_pose
-    wrench = carry(design, home.position, home.rotation, machine_weights(design, masses)).wrench
+    wrench = carry(Configuration.at(design, home), machine_weights(design, masses)).wrench
     weights = actuator_forces(design, home.position, home.rotation, wrench)
     stiffness = servo_stiffness(design) if elastic else None
     forces = weights if stiffness is None else np.zeros(6)
@@ -163,7 +164,7 @@ def joint_inertia(design: Design, masses: Mapping[str, Mass]) -> FloatArray:
         NoAnswerError: The home pose is singular.
     """
     home, metres = design.home_pose, 1e-3 * design.unit_mm
-    twists = twists_of_actuators(design, home.position, home.rotation).T
+    twists = twists_of_actuators(Configuration.at(design, home)).T
     if not np.isfinite(twists).all():
         raise NoAnswerError(
             "the home pose is singular, so that no servos hold it; choose another home"

@@ -12,10 +12,9 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from explorer.legs.segments import write_closest
-from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import DEGENERATE_RATIO, Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.compiled import kernel
@@ -76,13 +75,11 @@ def radii_of_pairs(design: Design) -> FloatArray:
     return np.array([radii[first - 1] + radii[second - 1] for first, second in PAIRS])
 
 
-def leg_axes(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
-    """Return the axes of the four legs, base end and platform end, shape (..., 4, 2, 3).
-
-    Arguments and errors are those of `leg_clearances`.
-    """
-    points = Configuration(design, position, rotation).points
-    axes = np.zeros((*points.b1.shape[:-1], 4, 2, 3))
+@computed_once
+def leg_axes(configuration: Configuration) -> FloatArray:
+    """Return the axes of the four legs, base end and platform end, shape (..., 4, 2, 3)."""
+    points = configuration.points
+    axes = np.zeros((*configuration.batch, 4, 2, 3))
     axes[..., 1, 0, 0], axes[..., 2, 0, 0] = points.b2[..., 0], points.b3[..., 0]
     axes[..., 3, 0, :] = points.a3
     for leg, end in enumerate((points.b1, points.b2, points.b3, points.b4)):
@@ -90,18 +87,10 @@ def leg_axes(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatA
     return axes
 
 
-def leg_clearances(design: Design, position: ArrayLike, rotation: ArrayLike) -> LegClearances:
-    """Return the clearances of all six pairs of legs.
-
-    Args:
-        design: The manipulator; its limits hold the radii.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-
-    Raises:
-        InputError: The position is not finite, or the rotation is not one.
-    """
-    axes = leg_axes(design, position, rotation)
+@computed_once
+def leg_clearances(configuration: Configuration) -> LegClearances:
+    """Return the clearances of all six pairs of legs; the limits of the design hold the radii."""
+    design, axes = configuration.design, leg_axes(configuration)
     batch = axes.shape[:-3]
     rows = axes.reshape(-1, 4, 2, 3)
     distance, points = np.empty((len(rows), 6)), np.empty((len(rows), 6, 2, 3))
@@ -116,19 +105,17 @@ def leg_clearances(design: Design, position: ArrayLike, rotation: ArrayLike) -> 
     )
 
 
-def distance_gradients(
-    design: Design, position: ArrayLike, rotation: ArrayLike, clearances: LegClearances
-) -> FloatArray:
+def distance_gradients(configuration: Configuration) -> FloatArray:
     """Return the gradients of all pairs' distances by the position, shape (..., 6, 3).
 
     The gradient is zero for a pair that shares a joint. It is also set to zero where the axes of a
-    pair cross, since the distance is not differentiable there. The clearances are those of the
-    same poses.
+    pair cross, since the distance is not differentiable there.
     """
+    clearances = leg_clearances(configuration)
     offset = clearances.points[..., 0, :] - clearances.points[..., 1, :]
     length = np.linalg.norm(offset, axis=-1, keepdims=True)
     normal = offset / np.where(length > 0.0, length, 1.0)
-    return normal * point_rates(leg_axes(design, position, rotation), clearances.points)
+    return normal * point_rates(leg_axes(configuration), clearances.points)
 
 
 def point_rates(axes: FloatArray, points: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes
 from explorer.legs.tetrahedra import tetrahedra_overlap
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray
 
@@ -38,8 +39,8 @@ def swept_tetrahedra(
     Raises:
         InputError: A position is not finite, or a rotation is not one.
     """
-    start = leg_axes(design, start_position, start_rotation)
-    end = leg_axes(design, end_position, end_rotation)
+    start = leg_axes(Configuration(design, start_position, start_rotation))
+    end = leg_axes(Configuration(design, end_position, end_rotation))
     start, end = np.broadcast_arrays(start, end)
     # From (base, platform) of both poses to (base, base, platform, platform).
     both = np.stack([start, end], axis=-2)

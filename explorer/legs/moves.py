@@ -21,6 +21,7 @@ from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, joined_pairs, leg_clearances, radii_of_pairs
 from explorer.legs.interference import step_overlaps
 from explorer.legs.move_bounds import least_rows
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple, checked_rotation
 from explorer.mechanism.tool_point import tool_offset
@@ -234,7 +235,7 @@ def move_clearance(
     least = move_clearances(design, *arrays, tolerance=float(tolerances[0]), tool=tool)
     positions, rotations = poses_between(start, end, np.linspace(0.0, 1.0, steps + 1), tool)
     overlaps = step_overlaps(design, positions[:-1], rotations[:-1], positions[1:], rotations[1:])
-    closest = leg_clearances(design, *poses_between(start, end, least.share, tool))
+    closest = leg_clearances(Configuration(design, *poses_between(start, end, least.share, tool)))
     pairs = np.arange(len(PAIRS))
     return MoveClearance(
         start=start,

@@ -15,18 +15,18 @@ from functools import cached_property
 import numpy as np
 
 from explorer.measures.size import box_margins, box_nodes
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.accuracy import ToolError, actuator_errors, worst_error
+from explorer.statics.accuracy import ToolError, actuator_errors, tool_errors
 from explorer.statics.compliance import (
-    compliance,
+    compliance_of,
     largest_deflection,
     principal_compliances,
     stiffness_of,
 )
-from explorer.statics.forces import STRUT_ROWS
+from explorer.statics.equilibrium import STRUT_ROWS
 from explorer.statics.load_slopes import (
     BENDING,
     TURN,
@@ -73,27 +73,29 @@ class BoxStatics:
         return box_nodes(self.box)
 
     @cached_property
+    def configuration(self) -> Configuration:
+        """The design at the nodes of the grid, with its tool point."""
+        return Configuration(self.design, self.positions, self.rotation, self.design.tool.position)
+
+    @cached_property
     def held(self) -> Reactions:
         """The reactions to the weight of the payload."""
-        design, weights = self.design, design_weights(self.design)
-        return reactions(design, self.positions, self.rotation, np.zeros(6), weights=weights)
+        return reactions(self.configuration, np.zeros(6), design_weights(self.design))
 
     @cached_property
     def strut_lengths(self) -> FloatArray:
         """The lengths d2 and d4 at the nodes, shape (n, 2), in design units."""
-        return inverse(self.design, self.positions, self.rotation)[:, STRUT_ROWS]
+        return self.configuration.joints[:, STRUT_ROWS]
 
     @cached_property
     def errors(self) -> ToolError:
         """The worst errors of the tool at the nodes, each of shape (n,)."""
-        errors, tool = actuator_errors(self.design), self.design.tool.position
-        return worst_error(self.design, self.positions, self.rotation, errors, tool)
+        return tool_errors(self.configuration, actuator_errors(self.design)).worst
 
     @cached_property
     def compliances(self) -> FloatArray:
         """The compliance at the nodes, shape (n, 6, 6)."""
-        stiffness, tool = stiffness_of(self.design), self.design.tool.position
-        return compliance(self.design, self.positions, self.rotation, *stiffness, tool)
+        return compliance_of(self.configuration, *stiffness_of(self.design))
 
     @cached_property
     def softest(self) -> FloatArray:
@@ -133,7 +135,7 @@ class BoxStatics:
         """The largest mass in place of the payload that keeps all limits everywhere, in kg."""
         if not self.is_regular:
             return 0.0
-        return float(largest_payload(self.design, self.positions, self.rotation).min())
+        return float(largest_payload(self.configuration).min())
 
     @property
     def worst_error(self) -> float:

@@ -16,13 +16,14 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margin_rows
-from explorer.mechanism.points import AttachmentPoints, points_of
+from explorer.mechanism.points import AttachmentPoints, joints_of, points_of
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import (
     FloatArray,
     batch_shape,
     finite_array,
     for_kernel,
+    lengths_of,
     rotate,
     rows_for_kernel,
 )
@@ -95,6 +96,19 @@ class Configuration:
         spread.rotation = np.broadcast_to(self.rotation, (*batch, 3, 3))
         return spread
 
+    def with_tool(self, tool: ArrayLike) -> Configuration:
+        """Return the configuration with another tool point.
+
+        Args:
+            tool: Tool point in the platform frame, shape (..., 3), in design units.
+
+        Raises:
+            InputError: The tool is not finite, or batch axes do not broadcast.
+        """
+        if np.array_equal(self.tool, tool):
+            return self
+        return Configuration(self.design, self.position, self.rotation, tool)
+
     @cached_property
     def points(self) -> AttachmentPoints:
         """The attachment points in the base frame, each of shape (..., 3), in design units."""
@@ -106,9 +120,20 @@ class Configuration:
         return self.points.legs()
 
     @cached_property
+    def leg_lengths(self) -> FloatArray:
+        """The lengths l1, d2, d4 and l4 of the legs, shape (..., 4), in design units."""
+        return lengths_of(self.legs)
+
+    @cached_property
+    def leg_directions(self) -> FloatArray:
+        """The unit vectors of the legs, shape (..., 4, 3); zero for a leg without a length."""
+        lengths = self.leg_lengths[..., None]
+        return np.divide(self.legs, lengths, out=np.zeros_like(self.legs), where=lengths > 0.0)
+
+    @cached_property
     def joints(self) -> FloatArray:
         """The joints (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units."""
-        return self.points.joints()
+        return joints_of(self.points, self.leg_lengths)
 
     @cached_property
     def margins(self) -> FloatArray:

@@ -14,9 +14,9 @@ from functools import lru_cache
 import numpy as np
 
 from explorer.mechanism.margins import margins
-from explorer.mechanism.points import Variables, points_of
+from explorer.mechanism.points import Variables, joints_of, points_of
 from explorer.mechanism.pose import Pose, Triple, rotation_from_yaw_pitch_roll
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, lengths_of
 
 Ranges = tuple[tuple[float, float], ...]
 """(Lowest, highest) value of each joint, infinite for no limit."""
@@ -45,7 +45,8 @@ def best_home(variables: Variables, ranges: Ranges, box: tuple[Triple, Triple] |
     positions = _candidates(reach, box)
     p, r = positions[None, :, :], rotations[:, None, :, :]
     least_margin = np.abs(margins(p, r)).min(axis=-1)
-    joints = points_of(variables, reach, p, r).joints()
+    points = points_of(variables, reach, p, r)
+    joints = joints_of(points, lengths_of(points.legs()))
     lows, highs = np.array(ranges).T
     excess = (np.maximum(0.0, lows - joints) + np.maximum(0.0, joints - highs)).sum(axis=-1)
     excess = np.asarray(np.round(excess / reach, 12), dtype=np.float64)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from explorer.numerics.arrays import FloatArray, lengths_of
+from explorer.numerics.arrays import FloatArray
 
 Variables = tuple[float, float, float, float, float, float]
 """The design variables X = (a3x, a3y, b1x, b1y, b2, b3), in design units."""
@@ -36,11 +36,6 @@ class AttachmentPoints(NamedTuple):
         """
         legs = (self.b1, self.b2 * ACROSS, self.b3 * ACROSS, self.b4 - self.a3)
         return np.stack(legs, axis=-2)
-
-    def joints(self) -> FloatArray:
-        """Return the joints (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units."""
-        l1, d2, d4, l4 = np.moveaxis(lengths_of(self.legs()), -1, 0)
-        return np.stack([l1, self.b2[..., 0], d2, self.b3[..., 0], d4, l4], axis=-1)
 
 
 def platform_points(variables: Variables) -> FloatArray:
@@ -70,3 +65,10 @@ def points_of(variables: Variables, a2x: float, p: FloatArray, r: FloatArray) ->
         b3=p + b3 * x,
         b4=np.broadcast_to(p, shape),
     )
+
+
+def joints_of(points: AttachmentPoints, leg_lengths: FloatArray) -> FloatArray:
+    """Return the joints (l1, d1, d2, d3, d4, l4), shape (..., 6), of legs of some lengths."""
+    d1, d3 = points.b2[..., 0], points.b3[..., 0]
+    l1, d2, d4, l4 = (leg_lengths[..., leg] for leg in range(4))
+    return np.stack([l1, d1, d2, d3, d4, l4], axis=-1)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.legs.moves import poses_between
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Pose, Triple
@@ -130,8 +131,8 @@ class DemandedLoad:
             position: b4 in the base frame, shape (..., 3), in design units.
             rotation: Platform to base, shape (..., 3, 3).
         """
-        given = self.design, position, rotation, self.load, self.design.tool.position
-        return limit_shares(self.design, reactions(*given, self.weights))
+        poses = Configuration(self.design, position, rotation, self.design.tool.position)
+        return limit_shares(self.design, reactions(poses, self.load, self.weights))
 
     def holds_along(
         self,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.legs.clearance import PAIRS, leg_axes, pair_rows
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
@@ -172,7 +173,7 @@ class Sizes:
         and must be the sum of their radii and the clearance of parts. For the arguments see
         `leg_axes`.
         """
-        axes = leg_axes(self.design, position, rotation) * self.design.unit_mm
+        axes = leg_axes(Configuration(self.design, position, rotation)) * self.design.unit_mm
         capsules, radii = np.repeat(axes[:, None], 3, axis=1), np.empty((4, 3))
         for index, (axis, own) in enumerate(zip(axes, self.legs, strict=True)):
             length = float(np.linalg.norm(axis[1] - axis[0]))

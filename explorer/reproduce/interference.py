@@ -10,6 +10,7 @@ import numpy as np
 
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.interference import step_is_free
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.reproduce.claim import Measurement
@@ -86,7 +87,7 @@ class Touching:
 def lower_risk() -> Measurement:
     """Compare clearances and swept steps of the 4-4 and of its 6-4 twin over a workspace."""
     nodes = _nodes(NODE_STEP, LOWEST[0])
-    pairs = leg_clearances(OPTIMAL, nodes, ROTATION).clearance
+    pairs = leg_clearances(Configuration(OPTIMAL, nodes, ROTATION)).clearance
     four = pairs.min(axis=1)
     ours = _interference("4-4", nodes, four, four, _four_collides)
     twins: list[Interference] = []
@@ -153,9 +154,13 @@ def judge_risk(
 def clear_optimum() -> Measurement:
     """Test steps of the paper's optimum by swept tetrahedra, and its nodes by clearances."""
     nodes = _nodes(NODE_STEP, LOWEST[0])
-    apart = float(leg_clearances(OPTIMAL, nodes, ROTATION).clearance[:, PAIRS.index((2, 3))].min())
+    apart = float(
+        leg_clearances(Configuration(OPTIMAL, nodes, ROTATION))
+        .clearance[:, PAIRS.index((2, 3))]
+        .min()
+    )
     of_table = _nodes(STEPS[-1], 0.0)
-    clearance = leg_clearances(OPTIMAL, of_table, ROTATION).clearance.min(axis=1)
+    clearance = leg_clearances(Configuration(OPTIMAL, of_table, ROTATION)).clearance.min(axis=1)
     touching = of_table[clearance < TOUCHING]
     return judge_optimum(
         _shares_of_steps(nodes, _four_collides),

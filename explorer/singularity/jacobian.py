@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
-from explorer.mechanism.tool_point import tool_offset
-from explorer.numerics.arrays import FloatArray, dot
+from explorer.numerics.arrays import FloatArray
 
 
 def tetrahedron_volumes(design: Design, margin: FloatArray) -> FloatArray:
@@ -26,38 +24,29 @@ def tetrahedron_volumes(design: Design, margin: FloatArray) -> FloatArray:
 def jacobian(
     design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
 ) -> FloatArray:
+    """Return `jacobian_of` of `Configuration(design, position, rotation, tool)`."""
+    return jacobian_of(Configuration(design, position, rotation, tool))
+
+
+@computed_once
+def jacobian_of(configuration: Configuration) -> FloatArray:
     """Return the actuator Jacobian J, shape (..., 6, 6): joint rates = J @ twist.
 
     J maps the platform's twist to the joint rates; Merlet ("Parallel Robots", 2006) calls this
-    matrix the inverse Jacobian. The twist is (v; ω): the velocity v of b4 or of the tool point, in
-    design units per unit of time, and the angular velocity ω, in radians per unit of time, both
-    along the axes of the base frame. The rows are the rates of (l1, d1, d2, d3, d4, l4), the order
-    of `JOINTS`, in design units per unit of time; so columns 1 to 3 are dimensionless and columns
+    matrix the inverse Jacobian. The twist is (v; ω): the velocity v of the tool point, in design
+    units per unit of time, and the angular velocity ω, in radians per unit of time, both along
+    the axes of the base frame. The rows are the rates of (l1, d1, d2, d3, d4, l4), the order of
+    `JOINTS`, in design units per unit of time; so columns 1 to 3 are dimensionless and columns
     4 to 6 are lengths in design units. The determinant does not depend on the tool point.
 
     A joint of length zero has no direction, and its row is zero: such a pose is singular.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units, also if a tool is given.
-        rotation: Platform to base, shape (..., 3, 3).
-        tool: Point of the velocity v in the platform frame, shape (..., 3), in design units; None
-            for b4.
-
-    Raises:
-        InputError: The position or the tool is not finite, or the rotation is not one.
     """
-    r = checked_rotation(rotation)
-    points = Configuration(design, position, r).points
-    p = points.b4
-    c = p + tool_offset(r, tool)
-    radial = np.array([0.0, 1.0, 1.0])
-    actuators = [points.b1, points.b2 * radial, points.b3 * radial, p - points.a3]
-    out = np.zeros((*c.shape[:-1], 6, 6))
-    out[..., [0, 2, 4, 5], :3] = _unit(np.stack(actuators, axis=-2))
+    points, c = configuration.points, configuration.position + configuration.arm
+    out = np.zeros((*configuration.batch, 6, 6))
+    out[..., [0, 2, 4, 5], :3] = configuration.leg_directions
     out[..., [1, 3], 0] = 1.0
-    b1, b2, b3, b4 = points.b1 - c, points.b2 - c, points.b3 - c, p - c
-    arms = np.stack([b1, b2, b2, b3, b3, b4], axis=-2)
+    b1, b2, b3, b4 = points.b1 - c, points.b2 - c, points.b3 - c, points.b4 - c
+    arms = np.stack(np.broadcast_arrays(b1, b2, b2, b3, b3, b4), axis=-2)
     # The moment arm × direction of every row; np.cross takes three times as long.
     dx, dy, dz = (out[..., i] for i in range(3))
     ax, ay, az = (arms[..., i] for i in range(3))
@@ -130,8 +119,3 @@ def inverse_condition(jacobian: FloatArray, length: float) -> FloatArray:
     """
     values = singular_values(jacobian, length)
     return np.asarray(values[..., -1] / values[..., 0])
-
-
-def _unit(vector: FloatArray) -> FloatArray:
-    length = np.sqrt(dot(vector, vector))[..., None]
-    return np.divide(vector, length, out=np.zeros_like(vector), where=length > 0.0)

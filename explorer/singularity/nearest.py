@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import Design
 from explorer.mechanism.displacement import PlatformPoints
 from explorer.mechanism.margins import INCIDENCES, margins_at
-from explorer.mechanism.pose import Pose, checked_rotation
-from explorer.numerics.arrays import FloatArray, batch_shape, finite_array, rows_for_kernel
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.singularity.nearest_lines import (
     ROOM,
@@ -86,7 +86,7 @@ def nearest_singularities(
         design: The manipulator, which gives the unit of all lengths.
         pose: Pose of its platform, which may be singular itself.
     """
-    return singularities_of(nearest_singular_poses(design, pose.position, pose.rotation), pose)
+    return singularities_of(nearest_singular_poses(Configuration.at(design, pose)), pose)
 
 
 def singularities_of(
@@ -104,25 +104,13 @@ def singularities_of(
     return of_margin(0), of_margin(1), of_margin(2)
 
 
-def nearest_singular_poses(
-    design: Design, position: ArrayLike, rotation: ArrayLike
-) -> NearestPoses:
-    """Return the nearest singular poses of a batch of poses.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-
-    Raises:
-        InputError: A position is not finite, or a rotation is not one.
-    """
-    p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
-    batch = batch_shape((p, 1), (r, 2))
-    platform = PlatformPoints.of(design)
+@computed_once
+def nearest_singular_poses(configuration: Configuration) -> NearestPoses:
+    """Return the nearest singular poses of a batch of poses."""
+    platform, batch = PlatformPoints.of(configuration.design), configuration.batch
     # In units of the platform's own length no product of lengths can over- or underflow.
     unit = platform.length
-    p_rows, r_rows = rows_for_kernel(p / unit, batch, 1), rows_for_kernel(r, batch, 2)
+    p_rows, r_rows = configuration.positions / unit, configuration.rotations
     count = len(p_rows)
     distance, bound = np.empty((count, 3)), np.empty((count, 3))
     near_p, near_r = np.empty((count, 3, 3)), np.empty((count, 3, 3, 3))

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import DIMENSIONS
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.statics.compliance import compliance_of, stiffness_of
-from explorer.statics.equilibrium import A3X, A3Y, B1X, B1Y, B2, B3, Poses
+from explorer.statics.equilibrium import A3X, A3Y, B1X, B1Y, B2, B3, twists_of_actuators
 
 # First columns of the dimensions, in the order of `DIMENSIONS`.
 A1_COLUMN, A3_COLUMN, GUIDE_COLUMN, TILT_COLUMN, B_COLUMN = 0, 3, 6, 9, 11
@@ -48,24 +48,20 @@ class ToolError(NamedTuple):
     turn: FloatArray
 
 
-class Precision(NamedTuple):
-    """Compliance and errors of the tool in poses, by one inversion of J; infinite in singular ones.
+class ToolErrors(NamedTuple):
+    """Errors of the tool for errors of the actuators within their bounds.
 
     Attributes:
-        compliance: C at the tool, shape (..., 6, 6), see `explorer.compliance`.
-        worst: Largest errors for actuator errors within their bounds.
-        rms: Root-mean-square errors for errors that are uniform within their bounds.
-        by_actuator: Errors of each actuator alone, with axes of six in the order of `JOINTS`.
-        by_geometry: Error of the tool per error of each dimension, shape (..., 6, 23).
-        by_joint: Error of the tool per error of each actuator, J⁻¹, shape (..., 6, 6).
+        worst: Largest displacement and turn over the 64 corners of the cube of errors, exact for
+            the linear model.
+        rms: Root-mean-square errors for independent errors that are uniform within the bounds.
+        by_actuator: Errors that each actuator alone causes, with axes of six in the order of
+            `JOINTS`.
     """
 
-    compliance: FloatArray
     worst: ToolError
     rms: ToolError
     by_actuator: ToolError
-    by_geometry: FloatArray
-    by_joint: FloatArray
 
 
 @helper
@@ -180,76 +176,48 @@ def worst_error(
     errors: ArrayLike,
     tool: ArrayLike | None = None,
 ) -> ToolError:
-    """Return the largest displacement and the largest turn for actuator errors within ±errors.
-
-    They are the largest over the 64 corners of the cube of errors, exact for the linear model.
-    Both are infinite in a singular pose.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        errors: Bounds of the errors, shape (..., 6), in design units, not negative.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: An error is negative, a value is not finite, the rotation is not one, or batch
-            axes do not broadcast.
-    """
-    return _errors(design, position, rotation, errors, tool)[0]
-
-
-def rms_error(
-    design: Design,
-    position: ArrayLike,
-    rotation: ArrayLike,
-    errors: ArrayLike,
-    tool: ArrayLike | None = None,
-) -> ToolError:
-    """Return the root-mean-square errors for actuator errors that are uniform within ±errors.
-
-    The errors are independent. Both are infinite in a singular pose.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        errors: Bounds of the errors, shape (..., 6), in design units, not negative.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: An error is negative, a value is not finite, the rotation is not one, or batch
-            axes do not broadcast.
-    """
-    return _errors(design, position, rotation, errors, tool)[1]
-
-
-def error_by_actuator(
-    design: Design,
-    position: ArrayLike,
-    rotation: ArrayLike,
-    errors: ArrayLike,
-    tool: ArrayLike | None = None,
-) -> ToolError:
-    """Return the errors that each actuator's error alone causes, each of shape (..., 6).
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        errors: Errors of the actuators, shape (..., 6), in design units, not negative.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: An error is negative, a value is not finite, the rotation is not one, or batch
-            axes do not broadcast.
-    """
-    return _errors(design, position, rotation, errors, tool)[2]
+    """Return the `worst` of `tool_errors` of `Configuration(design, position, rotation, tool)`."""
+    return tool_errors(Configuration(design, position, rotation, tool), errors).worst
 
 
 def pose_error_by_geometry(
     design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
 ) -> FloatArray:
+    """Return `error_by_geometry` of `Configuration(design, position, rotation, tool)`."""
+    return error_by_geometry(Configuration(design, position, rotation, tool))
+
+
+def tool_errors(configuration: Configuration, errors: ArrayLike) -> ToolErrors:
+    """Return the errors of the tool for actuator errors within ±errors.
+
+    Args:
+        configuration: Design and poses, with the tool point.
+        errors: Bounds of the errors, shape (..., 6), in design units, not negative.
+
+    Raises:
+        InputError: An error is negative or not finite, or batch axes do not broadcast.
+    """
+    e = np.asarray(errors, dtype=np.float64)
+    if e.shape[-1:] != (6,) or not (np.isfinite(e) & (e >= 0.0)).all():
+        text = np.array2string(e, threshold=12).replace("\n", "")
+        raise InputError(
+            f"the errors of the actuators must be six finite numbers, none negative; got {text}"
+        )
+    c = configuration.spread(e)
+    out = np.empty((len(c.positions), 2, 8))
+    twists = twists_of_actuators(c).reshape(-1, 6, 6)
+    error_rows(len(out), twists, c.rows_or_one(e), out)
+    halves = out.reshape(*c.batch, 2, 8)
+    # The root mean squares of the rows are those of errors as standard deviations.
+    return ToolErrors(
+        ToolError(halves[..., 0, 0], halves[..., 1, 0]),
+        ToolError(UNIFORM * halves[..., 0, 1], UNIFORM * halves[..., 1, 1]),
+        ToolError(halves[..., 0, 2:], halves[..., 1, 2:]),
+    )
+
+
+@computed_once
+def error_by_geometry(configuration: Configuration) -> FloatArray:
     """Return the tool's error per error of each dimension, −J⁻¹ ∂q/∂g, shape (..., 6, 23).
 
     Rows are the displacement and the turn of the tool, base axes, while the actuators hold their
@@ -257,90 +225,14 @@ def pose_error_by_geometry(
     guide's offset along base axes, the guide's tilt about y and z through a1, and b1 to b4 along
     platform axes. Offsets are in design units, tilts in radians. All entries are infinite in a
     singular pose.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: The position or the tool is not finite, or the rotation is not one.
     """
-    poses = Poses(design, position, rotation, tool)
-    out = _by_geometry(poses, poses.inverse_jacobians())
-    return out.reshape(*poses.batch, 6, len(DIMENSIONS))
-
-
-def pose_precision(
-    design: Design,
-    position: ArrayLike,
-    rotation: ArrayLike,
-    tool: ArrayLike | None = None,
-) -> Precision:
-    """Return all of the precision of poses, with the design's own stiffness and errors.
-
-    Args:
-        design: The manipulator, with its actuators and struts.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: The position or the tool is not finite, or the rotation is not one.
-    """
-    poses = Poses(design, position, rotation, tool)
-    twists = poses.inverse_jacobians()
-    stiffness, bending = stiffness_of(design)
-    softness = compliance_of(poses, twists, 1.0 / stiffness, 1.0 / (3.0 * bending))
-    worst, rms, single = _errors_of(poses, twists, actuator_errors(design))
-    return Precision(
-        softness.reshape(*poses.batch, 6, 6),
-        worst,
-        rms,
-        single,
-        _by_geometry(poses, twists).reshape(*poses.batch, 6, len(DIMENSIONS)),
-        twists.reshape(*poses.batch, 6, 6),
-    )
+    c = configuration
+    out = np.empty((len(c.positions), 6, len(DIMENSIONS)))
+    twists = twists_of_actuators(c).reshape(-1, 6, 6)
+    geometry_rows(len(out), c.variables, c.positions, c.rotations, twists, out)
+    return out.reshape(*c.batch, 6, len(DIMENSIONS))
 
 
 def actuator_errors(design: Design) -> FloatArray:
     """Return the largest errors of a design's actuators, shape (6,), in design units."""
     return np.array(design.actuators.error_mm) / design.unit_mm
-
-
-def _by_geometry(poses: Poses, twists: FloatArray) -> FloatArray:
-    out = np.empty((poses.count, 6, len(DIMENSIONS)))
-    geometry_rows(poses.count, poses.variables, poses.positions, poses.rotations, twists, out)
-    return out
-
-
-def _errors(
-    design: Design,
-    position: ArrayLike,
-    rotation: ArrayLike,
-    errors: ArrayLike,
-    tool: ArrayLike | None,
-) -> tuple[ToolError, ToolError, ToolError]:
-    e = np.asarray(errors, dtype=np.float64)
-    if e.shape[-1:] != (6,) or not (np.isfinite(e) & (e >= 0.0)).all():
-        text = np.array2string(e, threshold=12).replace("\n", "")
-        raise InputError(
-            f"the errors of the actuators must be six finite numbers, none negative; got {text}"
-        )
-    poses = Poses(design, position, rotation, tool, (e, 1))
-    return _errors_of(poses, poses.inverse_jacobians(), e)
-
-
-def _errors_of(
-    poses: Poses, twists: FloatArray, errors: FloatArray
-) -> tuple[ToolError, ToolError, ToolError]:
-    out = np.empty((poses.count, 2, 8))
-    error_rows(poses.count, twists, poses.rows_or_one(errors), out)
-    halves = out.reshape(*poses.batch, 2, 8)
-    # The root mean squares of the rows are those of errors as standard deviations.
-    return (
-        ToolError(halves[..., 0, 0], halves[..., 1, 0]),
-        ToolError(UNIFORM * halves[..., 0, 1], UNIFORM * halves[..., 1, 1]),
-        ToolError(halves[..., 0, 2:], halves[..., 1, 2:]),
-    )

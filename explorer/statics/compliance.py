@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, finite_array, lengths_of
 from explorer.numerics.compiled import helper, kernel
-from explorer.statics.equilibrium import B2, B3, Poses
+from explorer.statics.equilibrium import B2, B3, STRUT_ROWS, twists_of_actuators
 
 # Number of halvings, of the logarithm where it can be, that find the worst force to rounding.
 HALVINGS = 70
@@ -102,46 +103,43 @@ def compliance(
     bending_stiffness: ArrayLike | None = None,
     tool: ArrayLike | None = None,
 ) -> FloatArray:
+    """Return `compliance_of` of `Configuration(design, position, rotation, tool)`."""
+    configuration = Configuration(design, position, rotation, tool)
+    return compliance_of(configuration, stiffness, bending_stiffness)
+
+
+def compliance_of(
+    configuration: Configuration, stiffness: ArrayLike, bending_stiffness: ArrayLike | None = None
+) -> FloatArray:
     """Return the compliance C at the tool, shape (..., 6, 6): (displacement; turn) = C (F; M).
 
     Axes are those of the base. The blocks are in units/N, 1/N and rad/(N × unit). All entries are
     infinite in a singular pose.
 
     Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
+        configuration: Design and poses, with the tool point.
         stiffness: Stiffness of the actuators, shape (..., 6), in N/unit, positive; infinite for
             rigid ones.
         bending_stiffness: EI of struts 2 and 3, shape (..., 2), in N × unit², positive; None for
             rigid struts.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
 
     Raises:
-        InputError: A stiffness is not positive, a value is not finite, the rotation is not one, or
-            batch axes do not broadcast.
+        InputError: A stiffness is not positive, or batch axes do not broadcast.
     """
-    c, b = _softness(stiffness, bending_stiffness)
-    poses = Poses(design, position, rotation, tool, (c, 1), (b, 1))
-    return compliance_of(poses, poses.inverse_jacobians(), c, b).reshape(*poses.batch, 6, 6)
-
-
-def compliance_of(
-    poses: Poses, twists: FloatArray, softness: FloatArray, bending: FloatArray
-) -> FloatArray:
-    """Return the compliance of poses whose J⁻¹ is known, shape (n, 6, 6)."""
-    out = np.empty((poses.count, 6, 6))
+    soft, bending = _softness(stiffness, bending_stiffness)
+    c = configuration.spread(soft, bending)
+    out = np.empty((len(c.positions), 6, 6))
     compliance_rows(
-        poses.count,
-        poses.variables,
-        poses.positions,
-        poses.rotations,
-        twists,
-        poses.rows_or_one(softness),
-        poses.rows_or_one(bending),
+        len(out),
+        c.variables,
+        c.positions,
+        c.rotations,
+        twists_of_actuators(c).reshape(-1, 6, 6),
+        c.rows_or_one(soft),
+        c.rows_or_one(bending),
         out,
     )
-    return out
+    return out.reshape(*c.batch, 6, 6)
 
 
 def stiffness_of(design: Design) -> tuple[FloatArray, FloatArray]:
@@ -276,13 +274,10 @@ def _principal(block: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def compliance_shares(
-    design: Design,
-    position: ArrayLike,
-    rotation: ArrayLike,
+    configuration: Configuration,
     load: ArrayLike,
     stiffness: ArrayLike,
     bending_stiffness: ArrayLike | None = None,
-    tool: ArrayLike | None = None,
 ) -> ComplianceShares:
     """Return which parts of the deflection's work guide, struts and actuators take.
 
@@ -290,33 +285,28 @@ def compliance_shares(
     struts are so soft that the compliance overflows.
 
     Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
+        configuration: Design and poses, with the tool point.
         load: (F; M) at the tool, shape (..., 6), in N and N × unit.
         stiffness: Stiffness of the actuators, shape (..., 6), in N/unit.
         bending_stiffness: EI of struts 2 and 3, shape (..., 2), in N × unit²; None for rigid ones.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
 
     Raises:
-        InputError: A stiffness is not positive, a value is not finite, the rotation is not one, or
-            batch axes do not broadcast.
+        InputError: A stiffness is not positive, the load is not finite, or batch axes do not
+            broadcast.
     """
     w = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
-    c, b = _softness(stiffness, bending_stiffness)
-    poses = Poses(design, position, rotation, tool, (w, 1), (c, 1), (b, 1))
-    twists = poses.inverse_jacobians()
+    soft, bending = _softness(stiffness, bending_stiffness)
+    poses = configuration.spread(w, soft, bending)
+    twists = twists_of_actuators(poses).reshape(-1, 6, 6)
     regular = np.isfinite(twists[:, 0, 0])
-    forces = np.einsum(
-        "nji,nj->ni", np.where(regular[:, None, None], twists, 0.0), poses.rows(w, 1)
-    )
+    forces = np.einsum("nji,nj->ni", np.where(regular[:, None, None], twists, 0.0), poses.rows(w))
     # Shares do not change with the size of the load; squares of large forces would overflow.
     largest = np.abs(forces).max(axis=1, keepdims=True)
     forces = np.divide(forces, largest, out=np.zeros_like(forces), where=largest > 0.0)
-    lengths = _strut_lengths(poses)
-    work = forces**2 * poses.rows(c, 1)
+    lengths = poses.joints[..., STRUT_ROWS].reshape(-1, 2)
+    work = forces**2 * poses.rows(soft)
     with np.errstate(over="ignore", invalid="ignore"):
-        bent = (forces[:, [1, 3]] ** 2 * poses.rows(b, 1) * lengths**3).sum(axis=1)
+        bent = (forces[:, [1, 3]] ** 2 * poses.rows(bending) * lengths**3).sum(axis=1)
     guide, actuators = work[:, [1, 3]].sum(axis=1), work[:, [0, 2, 4, 5]].sum(axis=1)
     total: FloatArray = guide + actuators + bent
     parts = [
@@ -326,12 +316,6 @@ def compliance_shares(
         for part in (guide, bent, actuators)
     ]
     return ComplianceShares(*(part.reshape(poses.batch) for part in parts))
-
-
-def _strut_lengths(poses: Poses) -> FloatArray:
-    across = poses.rotations[:, 1:, 0, None] * poses.variables[[B2, B3]]
-    points = poses.positions[:, 1:, None] + across
-    return np.sqrt((points**2).sum(axis=1))
 
 
 def _softness(

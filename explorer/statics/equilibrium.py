@@ -16,10 +16,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.design import Design
+from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.margins import margins_at, margins_of
-from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import FloatArray, batch_shape, finite_array, for_kernel
+from explorer.numerics.arrays import FloatArray, finite_array
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, along, column, cross3, dot3
 
@@ -31,7 +30,10 @@ AT_A1 = 1e-26
 # Columns of the row of design variables, `Design.variables`.
 A3X, A3Y, B1X, B1Y, B2, B3 = range(6)
 
-NO_TOOL = np.zeros((1, 3))
+GUIDE_ROWS = (1, 3)
+"""Indices of d1 and d3, whose forces bend the struts."""
+STRUT_ROWS = (2, 4)
+"""Indices of d2 and d4, the lengths of the struts of legs 2 and 3."""
 
 
 @helper
@@ -167,72 +169,33 @@ def inverse_rows(
                 out[k, 3 + axis, i] = -by_moment[i]
 
 
-class Poses:
-    """Checked poses with a tool, as rows for kernels.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-        more: Batch axes of other arguments, such as loads.
-
-    Raises:
-        InputError: The position or the tool is not finite, or the rotation is not one.
-    """
-
-    def __init__(
-        self,
-        design: Design,
-        position: ArrayLike,
-        rotation: ArrayLike,
-        tool: ArrayLike | None = None,
-        *more: tuple[FloatArray, int],
-    ) -> None:
-        p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
-        t = NO_TOOL[0] if tool is None else finite_array("tool", tool, (3,))
-        self.batch = batch_shape((p, 1), (r, 2), (t, 1), *more)
-        self.variables = np.array(design.variables)
-        self.positions, self.rotations = self.rows(p, 1), self.rows(r, 2)
-        self.tools = self.rows_or_one(t)
-
-    @property
-    def count(self) -> int:
-        """Number of poses."""
-        return len(self.positions)
-
-    def rows(self, array: FloatArray, trailing: int) -> FloatArray:
-        """Return an array as one row for each pose."""
-        own = array.shape[array.ndim - trailing :]
-        return for_kernel(np.broadcast_to(array, (*self.batch, *own)).reshape(-1, *own))
-
-    def rows_or_one(self, array: FloatArray) -> FloatArray:
-        """Return vectors as one row for each pose, or one for all."""
-        return for_kernel(array[None]) if array.ndim == 1 else self.rows(array, 1)
-
-    def inverse_jacobians(self) -> FloatArray:
-        """Return J⁻¹ at the tool, shape (n, 6, 6); infinite in singular poses."""
-        out = np.empty((self.count, 6, 6))
-        inverse_rows(self.count, self.variables, self.tools, self.positions, self.rotations, out)
-        return out
-
-
-def twists_of_actuators(
-    design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
-) -> FloatArray:
+@computed_once
+def twists_of_actuators(configuration: Configuration) -> FloatArray:
     """Return J⁻¹ at the tool, shape (..., 6, 6): twist of the tool = J⁻¹ @ joint rates.
 
     Column i is the twist (v; ω) of the tool point for a unit rate of joint i, in the order of
     `JOINTS`, along the axes of the base. All entries are infinite in a singular pose.
+    """
+    c = configuration
+    out = np.empty((len(c.positions), 6, 6))
+    inverse_rows(len(out), c.variables, c.tools, c.positions, c.rotations, out)
+    return out.reshape(*c.batch, 6, 6)
+
+
+def forces_of(configuration: Configuration, load: ArrayLike) -> FloatArray:
+    """Return the actuator forces f = −J⁻ᵀ (F; M) that hold a load, shape (..., 6), in newtons.
+
+    Their order is that of `JOINTS`. All six are infinite in a singular pose.
 
     Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+        configuration: Design and poses, with the tool point at which the load acts.
+        load: (F; M) on the platform, base axes, shape (..., 6), in N and N × unit.
 
     Raises:
-        InputError: The position or the tool is not finite, or the rotation is not one.
+        InputError: The load is not finite, or batch axes do not broadcast.
     """
-    poses = Poses(design, position, rotation, tool)
-    return poses.inverse_jacobians().reshape(*poses.batch, 6, 6)
+    w = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
+    c = configuration.spread(w)
+    out = np.empty((len(c.positions), 6))
+    force_rows(len(out), c.variables, c.tools, c.positions, c.rotations, c.rows_or_one(w), out)
+    return out.reshape(*c.batch, 6)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import DIMENSIONS
 from explorer.numerics.arrays import FloatArray, for_kernel, lengths_of
@@ -20,11 +21,11 @@ from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, along, cross3, dot3, vector
 from explorer.statics.accuracy import (
     UNIFORM,
-    Precision,
     ToolError,
     actuator_errors,
-    pose_precision,
+    error_by_geometry,
 )
+from explorer.statics.equilibrium import twists_of_actuators
 
 SOURCES = (*JOINTS, *DIMENSIONS)
 """The 29 sources of errors, in the order of every array axis of 29."""
@@ -179,29 +180,15 @@ def drawing_values(design: Design, errors: FloatArray) -> FloatArray:
     return np.where(IS_TILT, np.degrees(errors), errors * design.unit_mm)
 
 
-def pose_error_by_source(
-    design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
-) -> FloatArray:
+@computed_once
+def error_by_source(configuration: Configuration) -> FloatArray:
     """Return the tool's error per error of each source, J⁻¹ and −J⁻¹ ∂q/∂g, shape (..., 6, 29).
 
     Rows are the displacement and the turn of the tool, base axes; columns have the order of
     `SOURCES`. All entries are infinite in a singular pose.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: The position or the tool is not finite, or the rotation is not one.
     """
-    return by_source(pose_precision(design, position, rotation, tool))
-
-
-def by_source(precision: Precision) -> FloatArray:
-    """Return the tool's error per error of each source, as `pose_error_by_source` does."""
-    return np.concatenate([precision.by_joint, precision.by_geometry], axis=-1)
+    by_joint, by_geometry = twists_of_actuators(configuration), error_by_geometry(configuration)
+    return np.concatenate([by_joint, by_geometry], axis=-1)
 
 
 def largest_error(by_source: FloatArray, bounds: ArrayLike) -> LargestError:

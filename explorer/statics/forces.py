@@ -14,15 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import inverse
-from explorer.numerics.arrays import FloatArray, IntArray, finite_array
-from explorer.statics.equilibrium import Poses, force_rows, twists_of_actuators
-
-GUIDE_ROWS = (1, 3)
-"""Indices of d1 and d3, whose forces bend the struts."""
-STRUT_ROWS = (2, 4)
-"""Indices of d2 and d4, the lengths of the struts of legs 2 and 3."""
+from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.statics.equilibrium import GUIDE_ROWS, STRUT_ROWS, forces_of, twists_of_actuators
 
 
 class WorstDirection(NamedTuple):
@@ -46,34 +41,8 @@ def actuator_forces(
     load: ArrayLike,
     tool: ArrayLike | None = None,
 ) -> FloatArray:
-    """Return the actuator forces f = −J⁻ᵀ (F; M) that hold a load, shape (..., 6), in newtons.
-
-    Their order is that of `JOINTS`. All six are infinite in a singular pose.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        load: (F; M) on the platform at the tool point, base axes, shape (..., 6), in N and
-            N × unit.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: A value is not finite, the rotation is not one, or batch axes do not broadcast.
-    """
-    w = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
-    poses = Poses(design, position, rotation, tool, (w, 1))
-    out = np.empty((poses.count, 6))
-    force_rows(
-        poses.count,
-        poses.variables,
-        poses.tools,
-        poses.positions,
-        poses.rotations,
-        poses.rows_or_one(w),
-        out,
-    )
-    return out.reshape(*poses.batch, 6)
+    """Return `forces_of` of `Configuration(design, position, rotation, tool)` under a load."""
+    return forces_of(Configuration(design, position, rotation, tool), load)
 
 
 def strut_bending(
@@ -86,21 +55,10 @@ def strut_bending(
     """Return the bending moments of struts 2 and 3 at their carriages, shape (..., 2), N × unit.
 
     They are |f(d1)| d2 and |f(d3)| d4; the guide takes the same moments. Both are infinite in a
-    singular pose.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        load: (F; M) on the platform at the tool point, base axes, shape (..., 6), in N and
-            N × unit.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: A value is not finite, the rotation is not one, or batch axes do not broadcast.
+    singular pose. The arguments are those of `Configuration` and the load of `forces_of`.
     """
-    forces = actuator_forces(design, position, rotation, load, tool)
-    return bending_of(forces, inverse(design, position, rotation))
+    configuration = Configuration(design, position, rotation, tool)
+    return bending_of(forces_of(configuration, load), configuration.joints)
 
 
 def bending_of(forces: FloatArray, joints: FloatArray) -> FloatArray:
@@ -126,49 +84,28 @@ def largest_force(
 
     It acts at the tool point, without a moment. It is the least over the actuators of the limit
     over the length of the actuator's row of J⁻ᵀ, its first three entries; 0 in a singular pose.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        most: Largest force of each actuator to either side, shape (..., 6), in N, positive; may
-            be infinite.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: A limit is not positive, a value is not finite, the rotation is not one, or
-            batch axes do not broadcast.
+    The arguments are those of `Configuration` and of `worst_direction`.
     """
-    shares = worst_direction(design, position, rotation, most, tool).share
+    shares = worst_direction(Configuration(design, position, rotation, tool), most).share
     return np.divide(1.0, shares, out=np.full(shares.shape, np.inf), where=shares > 0.0)
 
 
-def worst_direction(
-    design: Design,
-    position: ArrayLike,
-    rotation: ArrayLike,
-    most: ArrayLike,
-    tool: ArrayLike | None = None,
-) -> WorstDirection:
+def worst_direction(configuration: Configuration, most: ArrayLike) -> WorstDirection:
     """Return the direction in which a force at the tool loads an actuator most.
 
     The opposite direction is as bad, with a pull for a push. The share is infinite in a singular
     pose, and zero if no actuator has a limit.
 
     Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
+        configuration: Design and poses, with the tool point.
         most: Largest force of each actuator to either side, shape (..., 6), in N, positive; may
             be infinite.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
 
     Raises:
-        InputError: A limit is not positive, a value is not finite, the rotation is not one, or
-            batch axes do not broadcast.
+        InputError: A limit is not positive, or batch axes do not broadcast.
     """
     limits = checked_limits(most)
-    twists = twists_of_actuators(design, position, rotation, tool)
+    twists = twists_of_actuators(configuration)
     # Row i: the force of actuator i is the product with the load's force.
     rows = -np.swapaxes(twists[..., :3, :], -1, -2)
     sizes = np.sqrt(np.einsum("...ij,...ij->...i", rows, rows))

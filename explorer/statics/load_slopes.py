@@ -12,7 +12,7 @@ from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.statics.accuracy import actuator_errors
 from explorer.statics.compliance import largest_deflection, stiffness_of
-from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS
+from explorer.statics.equilibrium import GUIDE_ROWS, STRUT_ROWS
 from explorer.statics.slopes import PARAMETERS, TwistSlopes
 from explorer.statics.weights import payload_wrench
 

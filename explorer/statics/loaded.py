@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Payload, Six
 from explorer.mechanism.pose import Pose, Triple
@@ -70,6 +71,11 @@ class LoadedPose:
         return self.design.tool.position if self.point is None else self.point
 
     @cached_property
+    def configuration(self) -> Configuration:
+        """The design in the pose, with the point at which the load acts."""
+        return Configuration.at(self.design, self.pose, self.tool)
+
+    @cached_property
     def weights(self) -> Weights:
         """All masses."""
         own = self.own or Weights()
@@ -109,8 +115,7 @@ class LoadedPose:
     @cached_property
     def largest_payload(self) -> float:
         """The largest mass in place of the payload that keeps all limits, in kg."""
-        given = self.design, self.pose.position, self.pose.rotation, self.load
-        return float(largest_payload(*given, self.tool, self.own))
+        return float(largest_payload(self.configuration, self.load, self.own))
 
     @cached_property
     def newton(self) -> WorstForce:
@@ -132,24 +137,21 @@ class LoadedPose:
         Args:
             force: Size of the force, in N.
         """
-        design, pose = self.design, self.pose
-        twists = twists_of_actuators(design, pose.position, pose.rotation, self.tool)
-        rows = twists[:3].T
+        rows = twists_of_actuators(self.configuration)[:3].T
         if not np.isfinite(rows).all():
             return WorstForce(np.full(3, np.nan), self.worst, np.inf)
-        if not has_limits(design):
+        if not has_limits(self.design):
             return WorstForce(np.full(3, np.nan), 0, 0.0)
         sizes = np.linalg.norm(rows, axis=1)
         units = rows[sizes > 0.0] / sizes[sizes > 0.0, None]
         directions = np.concatenate([units, -units])
         loads = np.tile(self.load, (len(directions), 1))
         loads[:, :3] += force * directions
-        shares = limit_shares(design, self._held(loads))
+        shares = limit_shares(self.design, self._held(loads))
         row, part = (int(i) for i in np.unravel_index(shares.argmax(), shares.shape))
         share = float(shares[row, part])
         direction = directions[row] if share > 0.0 else np.full(3, np.nan)
         return WorstForce(direction, part, share)
 
     def _held(self, load: ArrayLike) -> Reactions:
-        given = self.design, self.pose.position, self.pose.rotation, load
-        return reactions(*given, self.tool, self.weights)
+        return reactions(self.configuration, load, self.weights)

@@ -9,11 +9,14 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.machine import Payload
 from explorer.numerics.arrays import BoolArray, FloatArray, dot
-from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, actuator_forces
+from explorer.statics.equilibrium import (
+    GUIDE_ROWS,
+    STRUT_ROWS,
+    forces_of,
+    twists_of_actuators,
+)
 from explorer.statics.weights import Carried, Weights, carry
 
 LIMITED = (
@@ -57,12 +60,7 @@ class Reactions(NamedTuple):
 
 
 def reactions(
-    design: Design,
-    position: ArrayLike,
-    rotation: ArrayLike,
-    load: ArrayLike,
-    tool: ArrayLike | None = None,
-    weights: Weights | None = None,
+    configuration: Configuration, load: ArrayLike, weights: Weights | None = None
 ) -> Reactions:
     """Return all that holds a load and weights.
 
@@ -73,30 +71,25 @@ def reactions(
     about the guide, so that this moment vanishes at the carriage.
 
     Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        load: (F; M) on the platform at the tool point, base axes, shape (..., 6), in N and
-            N × unit.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+        configuration: Design and poses, with the tool point at which the load acts.
+        load: (F; M) on the platform, base axes, shape (..., 6), in N and N × unit.
         weights: Masses of the moving bodies; None for none.
 
     Raises:
-        InputError: A value is not finite, the rotation is not one, or batch axes do not broadcast.
+        InputError: The load is not finite, or batch axes do not broadcast.
     """
-    carried = carry(design, position, rotation, weights or Weights(), tool)
-    total = carried.wrench + np.asarray(load, dtype=np.float64)
-    forces = actuator_forces(design, position, rotation, total, tool)
-    signed = _signed(design, position, rotation, forces, carried)
+    carried = carry(configuration, weights or Weights())
+    forces = forces_of(configuration, carried.wrench + np.asarray(load, dtype=np.float64))
+    signed = _signed(configuration, forces, carried)
     moments = np.abs(signed[..., _MOMENTS])
     across = signed[..., 8:].reshape(*signed.shape[:-1], 2, 2)
     return Reactions(
         actuators=forces,
-        joints=_joint_forces(design, position, rotation, forces, carried),
+        joints=_joint_forces(configuration, forces, carried),
         bending=moments,
         guide_force=np.sqrt(dot(across, across)),
         guide_moment=moments,
-        spread=_spread(design, position, rotation, forces.shape[:-1]),
+        spread=_spread(configuration, forces.shape[:-1]),
     )
 
 
@@ -145,11 +138,8 @@ def has_limits(design: Design) -> bool:
 
 
 def largest_payload(
-    design: Design,
-    position: ArrayLike,
-    rotation: ArrayLike,
+    configuration: Configuration,
     load: ArrayLike = (0.0,) * 6,
-    tool: ArrayLike | None = None,
     weights: Weights | None = None,
 ) -> FloatArray:
     """Return the largest mass at the payload's centre that keeps all limits, shape (...), in kg.
@@ -159,29 +149,27 @@ def largest_payload(
     infinite if there is no limit.
 
     Args:
-        design: The manipulator, with its limits and the centre of its payload.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        load: (F; M) at the tool point besides the payload, shape (..., 6), in N and N × unit.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+        configuration: Design, with its limits and the centre of its payload, and poses, with the
+            tool point at which the load acts.
+        load: (F; M) besides the payload, shape (..., 6), in N and N × unit.
         weights: Masses besides the payload; None for none.
 
     Raises:
-        InputError: A value is not finite, the rotation is not one, or batch axes do not broadcast.
+        InputError: The load is not finite, or batch axes do not broadcast.
     """
-    base = carry(design, position, rotation, weights or Weights(), tool)
+    design = configuration.design
+    base = carry(configuration, weights or Weights())
     one = Weights(on_platform=(Payload(1.0, design.payload.centre),))
-    kilogram = carry(design, position, rotation, one, tool)
-    total = base.wrench + np.asarray(load, dtype=np.float64)
-    at_zero = actuator_forces(design, position, rotation, total, tool)
-    by_one = actuator_forces(design, position, rotation, kilogram.wrench, tool)
+    kilogram = carry(configuration, one)
+    at_zero = forces_of(configuration, base.wrench + np.asarray(load, dtype=np.float64))
+    by_one = forces_of(configuration, kilogram.wrench)
     regular = np.isfinite(at_zero[..., 0])
     at_zero, by_one = np.nan_to_num(at_zero, posinf=0.0), np.nan_to_num(by_one, posinf=0.0)
-    start = _signed(design, position, rotation, at_zero, base)
-    slope = _signed(design, position, rotation, by_one, kilogram)
+    start = _signed(configuration, at_zero, base)
+    slope = _signed(configuration, by_one, kilogram)
     start, slope = np.broadcast_arrays(start, slope)
     highs, lows = part_limits(design)
-    spread = _spread(design, position, rotation, regular.shape)[..., :10]
+    spread = _spread(configuration, regular.shape)[..., :10]
     highs, lows = highs - spread, lows - spread
     smallest, largest = np.zeros(regular.shape), np.full(regular.shape, np.inf)
     for least, most in (
@@ -203,68 +191,50 @@ def _limits(design: Design) -> FloatArray:
     return np.array([bending, bending, force, force, moment, moment])
 
 
-def _signed(
-    design: Design, position: ArrayLike, rotation: ArrayLike, forces: FloatArray, carried: Carried
-) -> FloatArray:
+def _signed(c: Configuration, forces: FloatArray, carried: Carried) -> FloatArray:
     """Return what limits bound, linear in the load, shape (..., 12).
 
     It is the actuator forces, the moments at the carriages along the guide, and the (y, z)
     components of the forces of both carriages on the guide.
     """
-    points = Configuration(design, position, rotation).points
-    joints = inverse(design, position, rotation)
-    lengths, along = joints[..., STRUT_ROWS], forces[..., GUIDE_ROWS]
+    lengths, along = c.joints[..., STRUT_ROWS], forces[..., GUIDE_ROWS]
     regular = np.isfinite(along)
     finite = np.where(regular, along, 0.0)
     moments = np.where(regular, finite * lengths + carried.along_guide, np.inf)
     across: list[FloatArray] = []
-    for leg, point in ((1, points.b2), (2, points.b3)):
-        radial = forces[..., STRUT_ROWS[leg - 1], None]
-        length = lengths[..., leg - 1, None]
-        axis = np.divide(
-            point[..., 1:], length, out=np.zeros_like(point[..., 1:]), where=length > 0.0
-        )
+    for leg, row in zip((1, 2), STRUT_ROWS, strict=True):
+        radial = forces[..., row, None]
         # The weight of the leg acts on the guide, less what the platform carries of it.
         own = carried.legs[leg, 1:] - carried.at_joints[..., leg, 1:]
-        ok = np.isfinite(radial)
+        ok, axis = np.isfinite(radial), c.leg_directions[..., leg, 1:]
         across.append(np.where(ok, own - np.where(ok, radial, 0.0) * axis, np.inf))
-    parts = [forces, moments, *across]
-    batch = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
-    return np.concatenate([np.broadcast_to(e, (*batch, e.shape[-1])) for e in parts], axis=-1)
+    return _join(forces.shape[:-1], forces, moments, *across)
 
 
-def _spread(
-    design: Design, position: ArrayLike, rotation: ArrayLike, batch: tuple[int, ...]
-) -> FloatArray:
+def _spread(c: Configuration, batch: tuple[int, ...]) -> FloatArray:
     """Return the effect of the payload's force of any direction, see `Reactions`."""
-    if not design.payload.force_n:
+    if not c.design.payload.force_n:
         return np.zeros((*batch, 12))
     # By the principle of virtual work, a force F at the tool asks F · v of an actuator whose
     # unit rate moves the tool by v.
-    twists = twists_of_actuators(design, position, rotation, design.tool.position)
-    velocities = twists[..., :3, :]
+    tool = c.design.tool.position
+    velocities = twists_of_actuators(c.with_tool(tool))[..., :3, :]
     speeds = np.sqrt((velocities * velocities).sum(axis=-2))
-    forces = design.payload.force_n * np.where(np.isfinite(speeds), speeds, 0.0)
-    lengths = inverse(design, position, rotation)[..., STRUT_ROWS]
-    bending = forces[..., GUIDE_ROWS] * lengths
-    parts = [forces, bending, forces[..., STRUT_ROWS], bending]
-    return np.concatenate([np.broadcast_to(e, (*batch, e.shape[-1])) for e in parts], axis=-1)
+    forces = c.design.payload.force_n * np.where(np.isfinite(speeds), speeds, 0.0)
+    bending = forces[..., GUIDE_ROWS] * c.joints[..., STRUT_ROWS]
+    return _join(batch, forces, bending, forces[..., STRUT_ROWS], bending)
 
 
-def _joint_forces(
-    design: Design, position: ArrayLike, rotation: ArrayLike, forces: FloatArray, carried: Carried
-) -> FloatArray:
-    points = Configuration(design, position, rotation).points
-    across = np.array([0.0, 1.0, 1.0])
-    legs = [points.b1, points.b2 * across, points.b3 * across, points.b4 - points.a3]
-    axes = np.stack(legs, axis=-2)
-    lengths = np.sqrt(dot(axes, axes))[..., None]
-    units = np.divide(axes, lengths, out=np.zeros_like(axes), where=lengths > 0.0)
+def _joint_forces(c: Configuration, forces: FloatArray, carried: Carried) -> FloatArray:
     finite = np.where(np.isfinite(forces), forces, 0.0)
-    out = finite[..., [0, 2, 4, 5], None] * units + carried.at_joints
+    out = finite[..., [0, 2, 4, 5], None] * c.leg_directions + carried.at_joints
     out[..., 1, 0] += finite[..., 1]
     out[..., 2, 0] += finite[..., 3]
     return np.where(np.isfinite(forces[..., 0, None, None]), out, np.inf)
+
+
+def _join(batch: tuple[int, ...], *parts: FloatArray) -> FloatArray:
+    return np.concatenate([np.broadcast_to(e, (*batch, e.shape[-1])) for e in parts], axis=-1)
 
 
 def _linear_range(

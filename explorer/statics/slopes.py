@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import FloatArray, dot
 from explorer.statics.equilibrium import twists_of_actuators
@@ -49,7 +50,7 @@ def twist_slopes(design: Design, positions: FloatArray, rotation: FloatArray) ->
         InputError: A position is not finite.
     """
     tool = np.array(design.tool.position)
-    twists = twists_of_actuators(design, positions, rotation, tool)
+    twists = twists_of_actuators(Configuration(design, positions, rotation, tool))
     # Joints' points on the platform and the tool, from b4 along the axes of the base.
     u, v = rotation[:, 0], rotation[:, 1]
     b1, b2, b3 = rotation[:, :2] @ np.array(design.b1), design.b2 * u, design.b3 * u

@@ -8,27 +8,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.accuracy import UNIFORM, Precision, ToolError, pose_precision
+from explorer.statics.accuracy import UNIFORM, ToolError
 from explorer.statics.compliance import (
     ComplianceShares,
     PrincipalCompliances,
+    compliance_of,
     compliance_shares,
     deflection,
     largest_deflection,
     principal_compliances,
     stiffness_of,
 )
+from explorer.statics.equilibrium import GUIDE_ROWS, twists_of_actuators
 from explorer.statics.error_sources import (
     LargestError,
-    by_source,
+    error_by_source,
     errors_alone,
     largest_error,
     rms_of_sources,
     source_errors,
 )
-from explorer.statics.forces import GUIDE_ROWS
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.weights import carry
 
@@ -64,14 +64,15 @@ class ToolPrecision:
     loaded: LoadedPose
 
     @cached_property
-    def precision(self) -> Precision:
-        """The compliance and the errors per error of each source."""
-        return pose_precision(*self._given, self.loaded.tool)
+    def compliance(self) -> FloatArray:
+        """The compliance at the tool, shape (6, 6)."""
+        stiffness = stiffness_of(self.loaded.design)
+        return compliance_of(self.loaded.configuration, *stiffness)
 
     @property
     def is_regular(self) -> bool:
         """Whether the pose is not singular."""
-        return bool(np.isfinite(self.precision.compliance).all())
+        return bool(np.isfinite(self.compliance).all())
 
     @property
     def has_errors(self) -> bool:
@@ -86,7 +87,7 @@ class ToolPrecision:
     @cached_property
     def by_source(self) -> FloatArray:
         """The tool's error per error of each source, shape (6, 29)."""
-        return by_source(self.precision)
+        return error_by_source(self.loaded.configuration)
 
     def worst(self, sources: slice = BY_ALL) -> LargestError:
         """Return the largest errors by some of the sources."""
@@ -115,39 +116,34 @@ class ToolPrecision:
     @cached_property
     def wrench(self) -> FloatArray:
         """The load and the weights as (F; M) at the tool, shape (6,), in N and N × unit."""
-        carried = carry(*self._given, self.loaded.weights, self.loaded.tool)
+        carried = carry(self.loaded.configuration, self.loaded.weights)
         return self.loaded.load + carried.wrench
 
     @cached_property
     def deflection(self) -> FloatArray:
         """Displacement and turn of the tool under the wrench, shape (6,)."""
-        return deflection(self.precision.compliance, self.wrench)
+        return deflection(self.compliance, self.wrench)
 
     @cached_property
     def principal(self) -> PrincipalCompliances:
         """The six principal directions of the compliance."""
-        return principal_compliances(self.precision.compliance)
+        return principal_compliances(self.compliance)
 
     @cached_property
     def shares(self) -> ComplianceShares:
         """Shares of guide, struts and actuators in the deflection's work."""
         stiffness = stiffness_of(self.loaded.design)
-        return compliance_shares(*self._given, self.wrench, *stiffness, self.loaded.tool)
+        return compliance_shares(self.loaded.configuration, self.wrench, *stiffness)
 
     @cached_property
     def largest_displacement(self) -> float:
         """Largest displacement of the tool with the payload's force besides, in design units."""
         force = self.loaded.design.payload.force_n
-        return float(largest_deflection(self.precision.compliance, self.wrench, force)[0])
+        return float(largest_deflection(self.compliance, self.wrench, force)[0])
 
     @cached_property
     def carriages(self) -> FloatArray:
         """Displacements of the carriages along the guide, shape (2,), in a regular pose."""
         guide = list(GUIDE_ROWS)
-        forces = -self.precision.by_joint[:, guide].T @ self.wrench
+        forces = -twists_of_actuators(self.loaded.configuration)[:, guide].T @ self.wrench
         return -forces / stiffness_of(self.loaded.design)[0][guide]
-
-    @property
-    def _given(self) -> tuple[Design, tuple[float, ...], FloatArray]:
-        pose = self.loaded.pose
-        return self.loaded.design, pose.position, pose.rotation

@@ -13,14 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import STANDARD_GRAVITY, Payload
-from explorer.mechanism.points import AttachmentPoints
 from explorer.mechanism.pose import Quadruple
-from explorer.numerics.arrays import FloatArray, dot, finite_array, rotate
+from explorer.numerics.arrays import FloatArray, dot, rotate
 from explorer.numerics.checks import numbers
 
 NOTHING: Quadruple = (0.0, 0.0, 0.0, 0.0)
@@ -99,52 +97,31 @@ def payload_wrench(design: Design, rotation: FloatArray) -> FloatArray:
     return np.concatenate([weight, np.cross(arm, weight)])
 
 
-def carry(
-    design: Design,
-    position: ArrayLike,
-    rotation: ArrayLike,
-    weights: Weights,
-    tool: ArrayLike | None = None,
-) -> Carried:
+def carry(configuration: Configuration, weights: Weights) -> Carried:
     """Return what weights do in poses, in the design's direction of gravity.
 
     Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
+        configuration: Design and poses, with the tool point at which the wrench acts.
         weights: Masses of the moving bodies.
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: The position or the tool is not finite, or the rotation is not one.
     """
-    points = Configuration(design, position, rotation).points
-    r = np.asarray(rotation, dtype=np.float64)
-    shift = np.zeros(3) if tool is None else rotate(r, finite_array("tool", tool, (3,)))
-    g = STANDARD_GRAVITY * np.array(design.gravity)
+    c = configuration
+    points, shift = c.points, c.arm
+    g = STANDARD_GRAVITY * np.array(c.design.gravity)
+    force, moment = _of_bodies(c.rotation, shift, weights, g)
     if not weights.has_legs:
-        return _carry_on_platform(points, r, shift, weights, g)
-    at_joints = _legs_at_joints(points, weights, g)
+        wrench = np.broadcast_to(np.concatenate([force, moment], axis=-1), (*c.batch, 6))
+        return Carried(
+            wrench, np.zeros((*c.batch, 4, 3)), np.zeros((*c.batch, 2)), np.zeros((4, 3))
+        )
+    at_joints = _legs_at_joints(c, weights, g)
     ends = np.stack([points.b1, points.b2, points.b3, points.b4], axis=-2)
     arms = ends - points.b4[..., None, :] - shift[..., None, :]
-    moment = np.cross(arms, at_joints).sum(axis=-2)
-    force = at_joints.sum(axis=-2)
-    own, turning = _of_bodies(r, shift, weights, g)
-    force, moment = force + own, moment + turning
+    moment = moment + np.cross(arms, at_joints).sum(axis=-2)
+    force = force + at_joints.sum(axis=-2)
     wrench = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
     legs = np.outer(np.add(weights.cylinders, weights.rods), g)
     legs += np.outer(np.where(ON_GUIDE, weights.carriages, 0.0), g)
-    return Carried(wrench, at_joints, _moments_along_guide(points, weights, g), legs)
-
-
-def _carry_on_platform(
-    points: AttachmentPoints, r: FloatArray, shift: FloatArray, weights: Weights, g: FloatArray
-) -> Carried:
-    """Return what the weights on the platform do, without those of the legs."""
-    batch = points.b4.shape[:-1]
-    wrench = np.concatenate(_of_bodies(r, shift, weights, g), axis=-1)
-    wrench = np.broadcast_to(wrench, np.broadcast_shapes(wrench.shape, (*batch, 6)))
-    return Carried(wrench, np.zeros((*batch, 4, 3)), np.zeros((*batch, 2)), np.zeros((4, 3)))
+    return Carried(wrench, at_joints, _moments_along_guide(c, weights, g), legs)
 
 
 def _of_bodies(
@@ -160,8 +137,8 @@ def _of_bodies(
     return np.broadcast_to(force, moment.shape), moment
 
 
-def _legs_at_joints(points: AttachmentPoints, weights: Weights, g: FloatArray) -> FloatArray:
-    axes, lengths = _legs(points)
+def _legs_at_joints(c: Configuration, weights: Weights, g: FloatArray) -> FloatArray:
+    axes, lengths = c.leg_directions, c.leg_lengths
     cylinders, rods = np.array(weights.cylinders), np.array(weights.rods)
     moments = cylinders * np.array(weights.cylinder_centres) - rods * np.array(weights.rod_centres)
     along = dot(axes, np.broadcast_to(g, axes.shape))[..., None] * axes
@@ -173,23 +150,10 @@ def _legs_at_joints(points: AttachmentPoints, weights: Weights, g: FloatArray) -
     )
 
 
-def _moments_along_guide(points: AttachmentPoints, weights: Weights, g: FloatArray) -> FloatArray:
+def _moments_along_guide(c: Configuration, weights: Weights, g: FloatArray) -> FloatArray:
     """Return g_x (m_carriage d + m_rod r + m_cylinder (d − s)) of legs 2 and 3."""
-    lengths = _legs(points)[1][..., 1:3]
+    lengths = c.leg_lengths[..., 1:3]
     carriages, cylinders = np.array(weights.carriages)[1:3], np.array(weights.cylinders)[1:3]
     of_rods = np.array(weights.rods)[1:3] * np.array(weights.rod_centres)[1:3]
     of_cylinders = cylinders * (lengths - np.array(weights.cylinder_centres)[1:3])
     return g[0] * (carriages * lengths + of_rods + of_cylinders)
-
-
-def _legs(points: AttachmentPoints) -> tuple[FloatArray, FloatArray]:
-    """Return the directions (..., 4, 3) and the lengths (..., 4) of the legs."""
-    across = np.array([0.0, 1.0, 1.0])
-    legs = np.stack(
-        [points.b1, points.b2 * across, points.b3 * across, points.b4 - points.a3], axis=-2
-    )
-    lengths = np.sqrt(dot(legs, legs))
-    axes = np.divide(
-        legs, lengths[..., None], out=np.zeros_like(legs), where=lengths[..., None] > 0
-    )
-    return axes, lengths

@@ -24,6 +24,7 @@ from explorer.legs.clearance import (
     leg_clearances,
     radii_of_pairs,
 )
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import checked_rotation
@@ -120,7 +121,9 @@ def least_clearances(
         distance = np.zeros((0, len(PAIRS)))
         for part in np.array_split(middles, 1 + len(middles) // BATCH):
             before_each()
-            distance = np.vstack([distance, leg_clearances(design, part, r).distance])
+            distance = np.vstack(
+                [distance, leg_clearances(Configuration(design, part, r)).distance]
+            )
         inside = np.flatnonzero(slack >= 0.0)
         if len(inside):
             least = inside[distance[inside].argmin(axis=0)]
@@ -181,9 +184,8 @@ class _Domain:
         design, reach = self.design, self.design.reach
 
         def distance(p: FloatArray) -> tuple[float, FloatArray]:
-            clearances = leg_clearances(design, p * reach, self.rotation)
-            gradient = distance_gradients(design, p * reach, self.rotation, clearances)
-            return float(clearances.distance[pair]) / reach, gradient[pair]
+            at = Configuration(design, p * reach, self.rotation)
+            return float(leg_clearances(at).distance[pair]) / reach, distance_gradients(at)[pair]
 
         def slacks(p: FloatArray) -> FloatArray:
             of_limits = [float(limit.slack(p * reach)) for limit in self.limits]

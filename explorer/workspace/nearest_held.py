@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
@@ -152,11 +153,8 @@ class _Search:
         """Return the shares of the limits at positions (..., 3), shape (..., 12)."""
         loaded = self.loaded
         held = reactions(
-            loaded.design,
-            positions,
-            loaded.pose.rotation,
+            Configuration(loaded.design, positions, loaded.pose.rotation, loaded.tool),
             loaded.load,
-            loaded.tool,
             loaded.weights,
         )
         return limit_shares(loaded.design, held)

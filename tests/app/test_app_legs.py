@@ -50,6 +50,7 @@ from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, leg_axes, leg_clearances
 from explorer.legs.interference import step_overlaps, swept_tetrahedra
 from explorer.legs.moves import move_clearance
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
@@ -122,7 +123,9 @@ def drawing_of(state: State) -> WorkspaceDrawing:
 
 def clearance_at(state: State, points: FloatArray) -> FloatArray:
     """Return the least clearance of any two legs at positions (n, 3)."""
-    return leg_clearances(state.design, points, state.pose.rotation).clearance.min(axis=-1)
+    return leg_clearances(Configuration(state.design, points, state.pose.rotation)).clearance.min(
+        axis=-1
+    )
 
 
 untyped_trimesh: Any = trimesh
@@ -487,7 +490,7 @@ STATES = [
 
 
 def clearances(state: State) -> np.ndarray[Any, np.dtype[np.float64]]:
-    return leg_clearances(state.design, state.pose.position, state.pose.rotation).clearance
+    return leg_clearances(Configuration.at(state.design, state.pose)).clearance
 
 
 # Clearances in the panel
@@ -567,7 +570,7 @@ def test_closest_pair_is_marked_wherever_the_platform_goes(services: Services) -
     for state in STATES:
         placed = Placed(Frame(viewed(state, clearance=True)))
         drawn = by_name(scene.updates(placed))
-        found = leg_clearances(state.design, state.pose.position, state.pose.rotation)
+        found = leg_clearances(Configuration.at(state.design, state.pose))
         pair = int(found.clearance.argmin())
         first, second = PAIRS[pair]
         marked.add(PAIRS[pair])
@@ -577,7 +580,7 @@ def test_closest_pair_is_marked_wherever_the_platform_goes(services: Services) -
         length = float(np.linalg.norm(ends[1] - ends[0]))
         assert length == pytest.approx(placed.scale * found.distance[pair], rel=1e-4)
         # Each end lies on the axis of its leg.
-        axes = placed.scale * leg_axes(state.design, state.pose.position, state.pose.rotation)
+        axes = placed.scale * leg_axes(Configuration.at(state.design, state.pose))
         for end, leg in zip(ends, (first, second), strict=True):
             base, tip = axes[leg - 1]
             along = np.linalg.norm(end - base) + np.linalg.norm(tip - end)
@@ -593,7 +596,7 @@ def test_legs_with_radii_are_drawn_as_capsules(services: Services) -> None:
     placed = Placed(Frame(state))
     drawn = by_name(ClearanceScene(services).updates(placed))
     rods, ends = drawn["/clearance/rods"], drawn["/clearance/ends"]
-    axes = placed.scale * leg_axes(OPTIMAL, state.pose.position, state.pose.rotation)
+    axes = placed.scale * leg_axes(Configuration.at(OPTIMAL, state.pose))
     radii = placed.scale * np.array(state.design.limits.leg_radii)
     assert rods["visible"] is ends["visible"] is True
     np.testing.assert_allclose(rods["batched_positions"], axes[:, 0], rtol=1e-5, atol=1e-5)

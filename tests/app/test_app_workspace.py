@@ -38,6 +38,7 @@ from explorer.app.state.view import ForcesView
 from explorer.errors import InputError
 from explorer.export.report.drawings.slices import Slices
 from explorer.measures.verdict import warnings
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
@@ -393,7 +394,7 @@ def load_state(design: Design = LOADED, forces: ForcesView = FORCES, **changes: 
 def shares_at(design: Design, points: FloatArray, rotation: FloatArray) -> FloatArray:
     """Return the largest shares of a limit at positions (n, 3), by reactions."""
     tool, weights = design.tool.position, design_weights(design)
-    held = reactions(design, points, rotation, np.array(LOAD), tool, weights)
+    held = reactions(Configuration(design, points, rotation, tool), np.array(LOAD), weights)
     return np.asarray(limit_shares(design, held).max(axis=-1))
 
 
@@ -468,7 +469,7 @@ def test_surface_lies_in_the_bands_of_its_measure(colour: Any, cut: Any) -> None
             wrench = LOAD + payload_wrench(design, rotation)
             soft = compliance(design, points, rotation, *stiffness_of(design), tool)
             return design.unit_mm * np.linalg.norm(deflection(soft, wrench)[:, :3], axis=-1)
-        found = reactions(design, points, rotation, np.array(LOAD))
+        found = reactions(Configuration(design, points, rotation), np.array(LOAD))
         if colour == "force":
             return np.asarray(np.abs(found.actuators).max(axis=-1))
         return np.asarray(0.01 * found.bending.max(axis=-1))

@@ -12,6 +12,7 @@ from benchmarks.samples import DESIGN, SIZE, around_home
 from benchmarks.table import Row, per_second, seconds, times
 from benchmarks.timing import best_of
 from explorer import accessible_workspace, leg_clearances, moves_are_clear, tetrahedra_overlap
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import warm
 from explorer.workspace.accessible.radii import with_radius
@@ -51,7 +52,9 @@ def run() -> Iterator[Row]:
     )
     yield Row(
         f"clearances of all six pairs of legs in {POSES:,} poses, with the points",
-        seconds(best_of(ROUNDS, lambda: leg_clearances(DESIGN, positions, rotations))),
+        seconds(
+            best_of(ROUNDS, lambda: leg_clearances(Configuration(DESIGN, positions, rotations)))
+        ),
         "100 ms",
     )
     start, end = positions[:MOVES], positions[:MOVES] + 0.02 * SIZE

@@ -12,6 +12,7 @@ from benchmarks.samples import DESIGN, SIZE, around_home
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
 from explorer import Pose, nearest_singular_poses, nearest_singularities
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.compiled import warm
 from explorer.paths.crossings import path_margins
 from explorer.singularity.nearest_stratum import nearest_in_strata
@@ -32,7 +33,9 @@ def run() -> Iterator[Row]:
             nearest_singularities(DESIGN, pose)
 
     duration = best_of(5, calls) / CALLS
-    exact = nearest_singular_poses(DESIGN, positions[:SEARCHES], rotations[:SEARCHES]).distance
+    exact = nearest_singular_poses(
+        Configuration(DESIGN, positions[:SEARCHES], rotations[:SEARCHES])
+    ).distance
     searched = np.empty((SEARCHES, 3))
 
     def search() -> None:
@@ -51,7 +54,10 @@ def run() -> Iterator[Row]:
         f"apart by {np.abs(searched - exact).max():.1g} at the most; "
         f"{times(search_time / duration)}",
     )
-    batch = best_of(3, lambda: nearest_singular_poses(DESIGN, positions, rotations)) / POSES
+    batch = (
+        best_of(3, lambda: nearest_singular_poses(Configuration(DESIGN, positions, rotations)))
+        / POSES
+    )
     yield Row(f"the same in a batch of {POSES:,}, each, one core", seconds(batch))
     strata = best_of(3, lambda: nearest_in_strata(DESIGN, poses[0]))
     yield Row("nearest pose in each of the 24 strata", seconds(strata))

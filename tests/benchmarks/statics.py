@@ -21,16 +21,17 @@ from explorer import (
     jacobian,
     largest_error,
     largest_force,
-    pose_precision,
     principal_compliances,
     source_errors,
     strut_bending,
 )
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
-from explorer.statics.accuracy import actuator_errors
-from explorer.statics.compliance import stiffness_of
-from explorer.statics.error_sources import by_source
+from explorer.statics.accuracy import actuator_errors, tool_errors
+from explorer.statics.compliance import compliance_of, stiffness_of
+from explorer.statics.equilibrium import twists_of_actuators
+from explorer.statics.error_sources import error_by_source
 from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS
 
 FORCE_POSES, POSES, ROUNDS = 100_000, 10_000, 10
@@ -86,14 +87,15 @@ def _precision() -> Iterator[Row]:
     errors, (stiffness, bending) = actuator_errors(MACHINE), stiffness_of(MACHINE)
 
     def all_of_it() -> object:
-        given = MACHINE, positions, rotations
-        precision = pose_precision(*given)
+        poses = Configuration(MACHINE, positions, rotations)
+        soft = compliance_of(poses, stiffness, bending)
         return (
-            precision,
-            _ellipsoids(precision.by_joint[:, :3] * errors),
-            principal_compliances(precision.compliance),
-            deflection(precision.compliance, LOAD),
-            compliance_shares(*given, LOAD, stiffness, bending),
+            error_by_source(poses),
+            tool_errors(poses, errors),
+            _ellipsoids(twists_of_actuators(poses)[:, :3] * errors),
+            principal_compliances(soft),
+            deflection(soft, LOAD),
+            compliance_shares(poses, LOAD, stiffness, bending),
         )
 
     def plain() -> object:
@@ -116,12 +118,15 @@ def _precision() -> Iterator[Row]:
         "60 ms",
         f"NumPy, RMS errors and compliance alone: {seconds(theirs)}; {times(theirs / ours)}",
     )
-    alone = best_of(100, lambda: pose_precision(MACHINE, positions[0], rotations[0]))
+
+    def of_one() -> object:
+        pose = Configuration(MACHINE, positions[0], rotations[0])
+        return error_by_source(pose), tool_errors(pose, errors), compliance_of(pose, stiffness)
+
+    alone = best_of(100, of_one)
     yield Row("errors and compliance of one pose", seconds(alone))
-    sources, bounds = (
-        by_source(pose_precision(MACHINE, positions, rotations)),
-        source_errors(MACHINE),
-    )
+    sources = error_by_source(Configuration(MACHINE, positions, rotations))
+    bounds = source_errors(MACHINE)
     worst = best_of(3, lambda: largest_error(sources, bounds))
     yield Row(f"the exact largest errors by all 29 sources in {POSES:,} poses", seconds(worst))
 

@@ -26,6 +26,7 @@ from explorer import (
     run_study,
     workspace_volume,
 )
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.compiled import warm
 from explorer.sweep import rows, run as runs
 from explorer.sweep.sampling import samples
@@ -102,7 +103,7 @@ def _measure_by_hand(design: Design) -> tuple[Any, ...]:
     nodes = nodes[poses_are_valid(design, nodes, rotation)]
     distances = np.abs(margins(nodes, rotation))
     off = (distances >= 0.05 * design.reach).all(axis=1)
-    clear = leg_clearances(design, nodes, rotation).clearance
+    clear = leg_clearances(Configuration(design, nodes, rotation)).clearance
     volume, share = workspace_volume(design).volume, (clear > 0.0).all(axis=1).mean()
     return volume, distances.min(axis=0), distances.mean(), clear[off].min(axis=0), share
 

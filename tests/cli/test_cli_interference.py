@@ -12,6 +12,7 @@ from command_line import CommandLine
 
 import explorer
 from explorer.legs.clearance import leg_axes
+from explorer.mechanism.configuration import Configuration
 
 COMMAND = ("interference",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -125,7 +126,7 @@ def test_interference_default_steps_are_within_the_node_step(
 
     def farthest(steps: int) -> float:
         shares = np.linspace(0.0, 1.0, steps + 1)
-        axes = leg_axes(design, *explorer.poses_between(start, end, shares))
+        axes = leg_axes(Configuration(design, *explorer.poses_between(start, end, shares)))
         return float(np.linalg.norm(np.diff(axes, axis=0), axis=-1).max())
 
     assert farthest(found["steps"]) <= step * (1.0 + 1e-9)

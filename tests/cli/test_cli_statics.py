@@ -12,10 +12,14 @@ from numpy.testing import assert_allclose
 
 import explorer
 from explorer.measures.positions import positions_over
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.typical import typical_machine
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.weights import machine_weights
+from explorer.statics.accuracy import actuator_errors
 from explorer.statics.budget.costs import stated_tolerances
+from explorer.statics.compliance import deflection, stiffness_of
+from explorer.statics.error_sources import error_by_source
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.weights import carry, payload_wrench
 
@@ -67,7 +71,9 @@ def test_forces_with_limits_have_a_largest_force(cli: CommandLine, machine: Path
     expected = explorer.largest_force(MACHINE, *AT, MACHINE.actuators.limits[0])
     assert own["largest_force"] == pytest.approx(float(expected))
     assert own["worst_actuator"] in explorer.JOINTS
-    assert own["largest_payload"] == pytest.approx(float(explorer.largest_payload(MACHINE, *AT)))
+    assert own["largest_payload"] == pytest.approx(
+        float(explorer.largest_payload(explorer.Configuration(MACHINE, *AT)))
+    )
     assert max(own["shares"].values()) > 0.0
 
 
@@ -105,7 +111,7 @@ def test_where_a_load_is_not_held_the_nearest_position_is_told(
 def test_parts_of_the_prototype_weigh_in_place_of_bars(cli: CommandLine) -> None:
     design = explorer.PRESETS["paper-optimal"]
     weights = machine_weights(design, make_prototype(design).masses(2700.0), payload=False)
-    carried = carry(design, *AT, weights).wrench
+    carried = carry(Configuration(design, *AT), weights).wrench
     expected = explorer.actuator_forces(design, *AT, carried)
     found = cli.answer("forces", *POSE, "--density", "2700", "--parts")
     assert_allclose(found["actuator_forces"], expected)
@@ -152,12 +158,15 @@ def test_accuracy_json_has_errors_compliance_and_deflection(
     cli: CommandLine, machine: Path
 ) -> None:
     found = cli.answer("accuracy", *POSE, "--load", *LOAD, "--payload", "0", "--design", machine)
-    precision = explorer.pose_precision(MACHINE, *AT)
-    assert_allclose(found["compliance"], precision.compliance)
-    assert_allclose(found["deflection"], explorer.deflection(precision.compliance, LOAD))
-    assert found["worst_displacement"] == pytest.approx(float(precision.worst.displacement))
-    assert found["worst_turn"] == pytest.approx(float(precision.worst.turn))
-    assert_allclose(found["pose_error_by_geometry"], precision.by_geometry, atol=1e-12)
+    soft = explorer.compliance(MACHINE, *AT, *stiffness_of(MACHINE))
+    worst = explorer.worst_error(MACHINE, *AT, actuator_errors(MACHINE))
+    assert_allclose(found["compliance"], soft)
+    assert_allclose(found["deflection"], deflection(soft, LOAD))
+    assert found["worst_displacement"] == pytest.approx(float(worst.displacement))
+    assert found["worst_turn"] == pytest.approx(float(worst.turn))
+    assert_allclose(
+        found["pose_error_by_geometry"], explorer.pose_error_by_geometry(MACHINE, *AT), atol=1e-12
+    )
     assert sum(found["deflection_shares"].values()) == pytest.approx(1.0)
     assert len(found["dimensions"]) == len(found["displacement_by_geometry"]) == 23
 
@@ -337,7 +346,7 @@ def test_accuracy_has_totals_of_dimensions_and_of_all_sources(
     cli: CommandLine, stated: Path
 ) -> None:
     found = cli.answer("accuracy", "--design", stated)
-    by_source = explorer.pose_error_by_source(STATED, HOME.position, HOME.rotation)
+    by_source = error_by_source(explorer.Configuration(STATED, HOME.position, HOME.rotation))
     bounds = explorer.source_errors(STATED)
     for name, sources in (("dimensions", slice(6, 29)), ("all", slice(0, 29))):
         worst = explorer.largest_error(by_source[:, sources], bounds[sources])

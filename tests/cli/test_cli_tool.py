@@ -162,7 +162,7 @@ def test_interference_of_a_move_of_the_tool_is_that_of_its_line(
     limits = msgspec.structs.replace(TOOLED.limits, leg_radii=(0.2,) * 4)
     design = msgspec.structs.replace(TOOLED, limits=limits)
     poses = tool_move(start, end, np.linspace(0.0, 1.0, 2001), np.array(TOOL))
-    least = explorer.leg_clearances(design, *poses).clearance.min(axis=0)
+    least = explorer.leg_clearances(explorer.Configuration(design, *poses)).clearance.min(axis=0)
     for pair, expected in zip(found["pairs"], least, strict=True):
         assert pair["bound"] <= expected + 1e-9
         assert pair["clearance"] == pytest.approx(expected, abs=1e-4)

@@ -29,22 +29,21 @@ from explorer import (
     deflection,
     draw_deviations,
     inverse,
-    pose_error_by_source,
-    pose_precision,
-    rms_error,
     rms_of_sources,
     source_costs,
 )
 from explorer.export.servos import joint_inertia
 from explorer.export.simulation import DENSITY, simulation_joints, simulation_mjcf
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.machine import Six
 from explorer.mechanism.typical import typical_machine
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED
 from explorer.prototype.weights import bar_masses
+from explorer.statics.accuracy import tool_errors
 from explorer.statics.compliance import stiffness_of
 from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.error_sources import SOURCES, source_errors
+from explorer.statics.error_sources import SOURCES, error_by_source, source_errors
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.tool_precision import ToolPrecision
 
@@ -141,7 +140,7 @@ def test_rms_errors_are_those_of_drawn_machines(design: Design) -> None:
     precision = ToolPrecision(LoadedPose(design, home, (0, 0, 0, 0, 0, 0), point=TOOL))
     costs = source_costs(design, home.position, home.rotation, TOOL)
     drawn = np.array([draw_deviations(design, seed) for seed in range(4000)])
-    by_source = pose_error_by_source(design, home.position, home.rotation, TOOL)
+    by_source = error_by_source(Configuration.at(design, home, TOOL))
     moved = drawn @ by_source.T
     displacement, turn = (
         float(np.sqrt((moved[:, half] ** 2).sum(axis=1).mean())) for half in (slice(3), slice(3, 6))
@@ -155,10 +154,9 @@ def test_rms_errors_are_those_of_drawn_machines(design: Design) -> None:
     expected = np.sqrt(np.linalg.eigvalsh(moved[:, :3].T @ moved[:, :3] / len(moved))[::-1])
     assert_allclose(semi_axes, expected, rtol=0.05)
     # Those of the actuators alone, by their own functions.
-    joints = drawn[:, :6] @ twists_of_actuators(design, home.position, home.rotation, TOOL).T
-    given = design, home.position, home.rotation
-    alone = rms_error(*given, source_errors(design)[:6], TOOL)
-    assert_allclose(pose_precision(*given, TOOL).rms, alone, rtol=1e-12)
+    joints = drawn[:, :6] @ twists_of_actuators(Configuration.at(design, home, TOOL)).T
+    at_home = Configuration.at(design, home, TOOL)
+    alone = tool_errors(at_home, source_errors(design)[:6]).rms
     found = float(np.sqrt((joints[:, :3] ** 2).sum(axis=1).mean()))
     assert float(alone.displacement) == pytest.approx(found, rel=0.03)
 

@@ -20,7 +20,8 @@ from explorer.measures.case import Case
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.compliance import largest_deflection, stiffness_of
+from explorer.statics.compliance import compliance_shares, largest_deflection, stiffness_of
+from explorer.statics.error_sources import error_by_source
 from explorer.statics.reactions import PART_NAMES
 from explorer.statics.weights import design_weights, payload_wrench
 from explorer.workspace.held import held_workspace
@@ -78,7 +79,7 @@ def reactions_at_home(design: Design) -> explorer.Reactions:
     home = design.home_pose
     weights = design_weights(design)
     tool = design.tool.position
-    return explorer.reactions(design, home.position, home.rotation, ZERO, tool, weights)
+    return explorer.reactions(explorer.Configuration.at(design, home, tool), ZERO, weights)
 
 
 def design_with(**parts: object) -> Design:
@@ -165,7 +166,7 @@ def test_report_of_limits_or_a_payload_alone_tells_what_follows_from_it() -> Non
     design = msgspec.structs.replace(OPTIMAL, actuators=limits)
     page, home = page_of(design), design.home_pose
     assert table_of(page, "Forces of the actuators")["d1"].values == [100.0, 100.0]
-    payload = float(explorer.largest_payload(design, home.position, home.rotation))
+    payload = float(explorer.largest_payload(explorer.Configuration.at(design, home)))
     assert table_of(page, "Most that is held")["payload"].values == [payload]
     assert "Where the payload is held" not in titles(page)
     assert "share of its limit" not in page.text
@@ -227,7 +228,7 @@ def test_report_of_a_singular_pose_says_that_nothing_holds_a_load_or_bounds_erro
 def test_report_precision_tells_the_errors_of_the_pose_and_ranks_their_sources() -> None:
     design = design_with(actuators=ERRORS, tolerances=TOLERANCES)
     section, tool = precision_of(design), design.tool.position
-    by = explorer.pose_error_by_source(*given(design), tool)
+    by = error_by_source(explorer.Configuration(*given(design), tool))
     bounds = explorer.source_errors(design)
     rows = table_of(section, "Errors of the tool")
     for name, part in (("actuators", slice(6)), ("dimensions", slice(6, 29)), ("all", slice(29))):
@@ -279,7 +280,9 @@ def test_report_precision_tells_what_the_payload_bends(payload: Payload) -> None
     if payload.force_n:
         load[:3] += payload.force_n * np.array(deflection["direction of the force"].values)
     assert vector == pytest.approx((soft @ load)[:3] * design.unit_mm, rel=1e-9)
-    shares = explorer.compliance_shares(*given(design), load, *stiffness_of(design), tool)
+    shares = compliance_shares(
+        explorer.Configuration(*given(design), tool), load, *stiffness_of(design)
+    )
     told = [row.values[0] for name, row in deflection.items() if name.startswith("share")]
     assert told == pytest.approx([100.0 * float(share) for share in shares], rel=1e-9)
 

@@ -29,6 +29,7 @@ from explorer import (
     tool_position,
 )
 from explorer.export.simulation import DENSITY, SimulationModel, simulation_mjcf
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DOWN, LENGTHS, Swing
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.typical import typical_machine
@@ -239,7 +240,9 @@ def test_servos_at_rest_give_the_forces_of_statics_at_home(design: Design, masse
     start = data.site("tool").xpos.copy(), data.site("tool").xmat.reshape(3, 3).copy()
     home = design.home_pose
     given = design, home.position, home.rotation
-    forces = actuator_forces(*given, carry(*given, machine_weights(design, found)).wrench)
+    forces = actuator_forces(
+        *given, carry(Configuration(*given), machine_weights(design, found)).wrench
+    )
     rest(model, data)
     assert_allclose(data.actuator_force, forces, atol=1e-3 * np.abs(forces).max())
     # Nothing droops, but for what the loops give way in steps of 2 ms.
@@ -281,7 +284,7 @@ def test_servos_upside_down_bear_the_weights_of_a_ceiling() -> None:
     rotation = turn @ platform.xmat.reshape(3, 3)
     hung = msgspec.structs.replace(design, gravity=(0.0, 0.0, 1.0))
     weights = machine_weights(hung, bar_masses(design, DENSITY))
-    wrench = carry(hung, position, rotation, weights).wrench
+    wrench = carry(Configuration(hung, position, rotation), weights).wrench
     forces = actuator_forces(hung, position, rotation, wrench)
     assert_allclose(data.actuator_force, forces, atol=1e-3 * np.abs(forces).max())
 

@@ -13,6 +13,7 @@ from strategies import Case, ordinary_cases, uniform_rotations
 
 from explorer import PAIRS, Design, leg_clearances
 from explorer.legs.clearance import joined_pairs, leg_axes, pair_rows
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 
@@ -92,7 +93,7 @@ def test_closest_points_few_and_many_pairs_agree() -> None:
 
 @given(ordinary_cases())
 def test_leg_axes_any_pose_run_from_base_ends_to_platform_ends(case: Case) -> None:
-    axes = leg_axes(case.design, case.position, case.rotation)
+    axes = leg_axes(Configuration(case.design, case.position, case.rotation))
     ends = case.position + case.design.platform_points @ case.rotation.T
     np.testing.assert_allclose(axes[:, 1], ends, atol=1e-12 * case.size)
     a3 = [*case.design.a3, 0.0]
@@ -104,8 +105,8 @@ def test_leg_axes_any_pose_run_from_base_ends_to_platform_ends(case: Case) -> No
 def test_leg_clearances_any_pose_are_axis_distances_less_radii(case: Case) -> None:
     radii = (0.1, 0.2, 0.4, 0.8)
     design = limited(case.design, leg_radii=radii)
-    axes = leg_axes(design, case.position, case.rotation)
-    found = leg_clearances(design, case.position, case.rotation)
+    axes = leg_axes(Configuration(design, case.position, case.rotation))
+    found = leg_clearances(Configuration(design, case.position, case.rotation))
     for index, (i, j) in enumerate(PAIRS):
         if joined_pairs(design)[index]:
             continue
@@ -122,8 +123,12 @@ def test_leg_clearances_pair_with_a_shared_joint_is_infinite(
     rotation: FloatArray, least: float
 ) -> None:
     position = np.array([1.0, 2.0, 3.0])
-    second = leg_clearances(Design(a3=(10, 4), b1=(4, -1), b2=least, b3=2), position, rotation)
-    third = leg_clearances(Design(a3=(10, 4), b1=(4, -1), b2=2, b3=-least), position, rotation)
+    second = leg_clearances(
+        Configuration(Design(a3=(10, 4), b1=(4, -1), b2=least, b3=2), position, rotation)
+    )
+    third = leg_clearances(
+        Configuration(Design(a3=(10, 4), b1=(4, -1), b2=2, b3=-least), position, rotation)
+    )
     for found, pair in ((second, (2, 4)), (third, (3, 4))):
         infinite = [PAIRS[k] for k in range(6) if math.isinf(found.clearance[k])]
         assert infinite == [pair]

@@ -34,6 +34,7 @@ from explorer import (
     tetrahedra_overlap,
 )
 from explorer.legs.clearance import joined_pairs, leg_axes
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -79,14 +80,16 @@ def test_swept_tetrahedra_constant_orientation_hold_the_legs(
     end = Pose(end.position, start.quaternion)
     swept = swept_tetrahedra(design, *arrays(start, end))
     assert swept.shape == (4, 4, 3)
-    axes = leg_axes(design, *poses_between(start, end, share))
+    axes = leg_axes(Configuration(design, *poses_between(start, end, share)))
     points = axes[:, 0] + along * (axes[:, 1] - axes[:, 0])
     assert tetrahedra_overlap(swept, np.repeat(points[:, None], 4, axis=1)).all()
     overlaps = step_overlaps(design, *arrays(start, end))
     assert bool(step_is_free(design, *arrays(start, end))) is not bool(overlaps.any())
     # Legs within disjoint tetrahedra are apart.
     poses = poses_between(start, end, np.linspace(0.0, 1.0, 101))
-    assert (leg_clearances(design, *poses).clearance.min(axis=0)[~overlaps] > 0.0).all()
+    assert (
+        leg_clearances(Configuration(design, *poses)).clearance.min(axis=0)[~overlaps] > 0.0
+    ).all()
 
 
 def test_step_overlaps_batch_matches_its_moves() -> None:
@@ -156,14 +159,14 @@ def test_move_clearance_bound_holds_and_is_nearly_attained(
     found = move_clearance(design, start, end, tolerance=tolerance, tool=(x, y, z))
     pairs = ~joined_pairs(design)
     poses = tool_move(start, end, np.linspace(0.0, 1.0, 501), tool)
-    least = leg_clearances(design, *poses).clearance.min(axis=0)[pairs]
+    least = leg_clearances(Configuration(design, *poses)).clearance.min(axis=0)[pairs]
     rounding = 1e-12 * longest
     bound, clearance = found.bound[pairs], found.clearance[pairs]
     assert (bound <= least + rounding).all()
     assert (bound <= clearance).all()
     assert (clearance <= bound + found.tolerance * (1.0 + 1e-9)).all()
     assert (clearance <= least + found.tolerance).all()
-    at = leg_clearances(design, *tool_move(start, end, found.share, tool))
+    at = leg_clearances(Configuration(design, *tool_move(start, end, found.share, tool)))
     attained = at.clearance[np.arange(6), np.arange(6)][pairs]
     np.testing.assert_allclose(attained, clearance, atol=rounding)
     apart = np.linalg.norm(found.points[:, 0] - found.points[:, 1], axis=-1)[pairs]

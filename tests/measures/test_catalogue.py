@@ -16,6 +16,7 @@ from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.clearance import clearance_beyond, clearance_margin_of
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import evaluate
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import margins
@@ -116,7 +117,7 @@ def test_least_clearance_alone_equals_that_of_all_pairs(seed: int) -> None:
     assert (least.bound <= full.clearance + 1e-12 * design.reach).all()
     pair = int(least.clearance.argmin())
     r = design.home_pose.rotation if rotation is None else rotation
-    own = leg_clearances(design, least.position[pair], r)
+    own = leg_clearances(Configuration(design, least.position[pair], r))
     assert own.clearance[pair] == pytest.approx(other, abs=2e-9 * design.reach)
 
 

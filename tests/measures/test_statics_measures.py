@@ -20,13 +20,15 @@ from explorer import (
     Tool,
     deflection,
     limit_shares,
-    pose_precision,
     reactions,
 )
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import measure_design, reason_for_missing
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
+from explorer.statics.accuracy import actuator_errors, tool_errors
+from explorer.statics.compliance import compliance_of, stiffness_of
 from explorer.statics.weights import design_weights, payload_wrench
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -64,17 +66,19 @@ def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
     rotation = MACHINE.home_pose.rotation
     positions = np.random.default_rng(1).uniform(*BOX, (1000, 3))
     given = MACHINE, positions, rotation
-    held = reactions(*given, np.zeros(6), None, design_weights(MACHINE))
+    held = reactions(Configuration(*given), np.zeros(6), design_weights(MACHINE))
     shares = limit_shares(MACHINE, held)
-    precision = pose_precision(*given, MACHINE.tool.position)
-    bent = deflection(precision.compliance, payload_wrench(MACHINE, rotation))
+    poses = Configuration(*given, MACHINE.tool.position)
+    soft = compliance_of(poses, *stiffness_of(MACHINE))
+    worst = tool_errors(poses, actuator_errors(MACHINE)).worst
+    bent = deflection(soft, payload_wrench(MACHINE, rotation))
     sampled = {
         "load_share": shares.max(),
         "largest_bending": held.bending.max() * 1e-3 * MACHINE.unit_mm,
-        "worst_error": precision.worst.displacement.max(),
-        "softest_compliance": np.linalg.norm(precision.compliance[:, :3, :3], 2, axis=(1, 2)).max()
+        "worst_error": worst.displacement.max(),
+        "softest_compliance": np.linalg.norm(soft[:, :3, :3], 2, axis=(1, 2)).max()
         * MACHINE.unit_mm,
-        "worst_turn": np.degrees(precision.worst.turn.max()),
+        "worst_turn": np.degrees(worst.turn.max()),
         "deflection": np.linalg.norm(bent[:, :3], axis=1).max(),
     }
     for name, value in sampled.items():

@@ -25,6 +25,7 @@ from explorer import (
     rotation_from_quaternion,
     stratum,
 )
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import singular_plane_distances
 from explorer.singularity.jacobian import determinant, inverse_condition, tetrahedron_volumes
@@ -65,9 +66,15 @@ FUNCTIONS = (
     PoseFunction("volumes", lambda d, p, r: tetrahedron_volumes(d, margins(p, r)), (3,), 3),
     PoseFunction("stratum", lambda _, p, r: stratum(p, r), (4,), 0),
     PoseFunction("plane_distances", lambda _, p, r: singular_plane_distances(p, r), (3,), 1),
-    PoseFunction("nearest", lambda d, p, r: nearest_singular_poses(d, p, r).distance, (3,), 1),
-    PoseFunction("clearance", lambda d, p, r: leg_clearances(d, p, r).clearance, (6,), 1),
-    PoseFunction("points", lambda d, p, r: leg_clearances(d, p, r).points, (6, 2, 3), 1),
+    PoseFunction(
+        "nearest", lambda d, p, r: nearest_singular_poses(Configuration(d, p, r)).distance, (3,), 1
+    ),
+    PoseFunction(
+        "clearance", lambda d, p, r: leg_clearances(Configuration(d, p, r)).clearance, (6,), 1
+    ),
+    PoseFunction(
+        "points", lambda d, p, r: leg_clearances(Configuration(d, p, r)).points, (6, 2, 3), 1
+    ),
 )
 each_function = pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.name)
 

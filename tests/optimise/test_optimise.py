@@ -35,6 +35,7 @@ from explorer import (
 from explorer.measures.case import Case
 from explorer.measures.size import corners_of, longest_leg
 from explorer.measures.statics import BoxStatics
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
@@ -74,7 +75,7 @@ def least_clearance_by_sampling(design: Design, margin: float, count: int) -> fl
     p[: count // 2, 2] = margin * (1.0 + 0.05 * random.random(count // 2))
     inside = slacks(constraints(design, rotation), p).min(axis=-1) >= 0.0
     inside &= np.abs(margins(p, rotation)).min(axis=-1) >= margin
-    return float(leg_clearances(design, p[inside], rotation).clearance.min())
+    return float(leg_clearances(Configuration(design, p[inside], rotation)).clearance.min())
 
 
 def assert_is_sound(outcome: Outcome) -> None:

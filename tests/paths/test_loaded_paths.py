@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from tool_moves import tool_move
 
 from explorer import PRESETS, Actuators, Design, InputError, Pose, inverse
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
@@ -64,7 +65,7 @@ def densest(case: Case, poses: tuple[Pose, ...], at: Triple = (0.0, 0.0, 0.0)) -
     for start, end in itertools.pairwise(poses):
         positions, rotations = tool_move(start, end, np.linspace(0.0, 1.0, 300), tool)
         assert poses_are_valid(design, positions, rotations).all()
-        given = design, positions, rotations, load, design.tool.position
+        given = Configuration(design, positions, rotations, design.tool.position), load
         held = reactions(*given, weights or design_weights(design))
         most = max(most, float(limit_shares(design, held).max()))
     return most

@@ -13,6 +13,7 @@ from long_cases import long_after
 from tool_moves import tool_move
 
 from explorer import PRESETS, Design, InputError, Pose, margins
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
 from explorer.paths.loads import TOLERANCE, DemandedLoad, path_loads
@@ -32,7 +33,7 @@ def dense_shares(
 ) -> FloatArray:
     """Return the shares of the limits at dense samples of a move, shape (n, 12)."""
     positions, rotations = tool_move(*move, DENSE, tool)
-    given = design, positions, rotations, load, design.tool.position
+    given = Configuration(design, positions, rotations, design.tool.position), load
     return limit_shares(design, reactions(*given, weights or design_weights(design)))
 
 
@@ -59,7 +60,7 @@ def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
     assert along.largest.part is not None
     # The part and the place are those of the share that is told.
     there = tool_move(*move, along.largest.place, tool)
-    given = design, *there, load, design.tool.position
+    given = Configuration(design, *there, design.tool.position), load
     here = limit_shares(design, reactions(*given, weights or design_weights(design)))[0]
     assert here[along.largest.part] == here.max() == pytest.approx(along.largest.share, rel=1e-10)
 
@@ -95,7 +96,7 @@ def test_path_loads_samples_have_the_shares_of_their_poses() -> None:
         move = 0 if at <= 1.0 else 1
         ends = poses[move], poses[move + 1]
         there = tool_move(*ends, at - move, np.zeros(3))
-        given = design, *there, load, design.tool.position
+        given = Configuration(design, *there, design.tool.position), load
         expected = limit_shares(design, reactions(*given, design_weights(design)))[0]
         np.testing.assert_allclose(shares, expected, rtol=1e-9)
     assert along.shares.max() <= along.largest.share

@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, Design, InputError, Pose, leg_clearances
 from explorer.errors import TooTightError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import Prototype, make_prototype
@@ -184,7 +185,9 @@ def test_legs_whose_parts_meet_are_named_though_their_capsules_are_clear() -> No
     design, position, rotation = close_legs()
     prototype = make_prototype(design)
     assert leg_gap(prototype, position, rotation) == 0.0
-    assert (leg_clearances(prototype.design, position, rotation).clearance > 0.0).all()
+    assert (
+        leg_clearances(Configuration(prototype.design, position, rotation)).clearance > 0.0
+    ).all()
     (problem,) = prototype.broken_joint_limits(position, rotation)
     assert "the axes of legs 3 and 4 are 8.817 mm apart and need" in problem
 

@@ -33,6 +33,7 @@ from explorer import (
     nearest_singularities,
     stratum,
 )
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.displacement import PlatformPoints, displacement
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
@@ -57,7 +58,7 @@ def test_nearest_poses_are_as_near_as_those_of_slsqp_from_many_starts(seed: int)
     ).tolist()
     design = Design(a3=(a3x, a3y), b1=(b1x, b1y), b2=b2, b3=b2 + span)
     position, rotation = (each[0] for each in random_poses(seed, 1))
-    nearest = nearest_singular_poses(design, position, rotation)
+    nearest = nearest_singular_poses(Configuration(design, position, rotation))
     for incidence in (1, 2, 3):
         searched = searched_distance(design, position, rotation, incidence, starts=8)
         assert nearest.distance[incidence - 1] == pytest.approx(searched, abs=1e-8)
@@ -67,7 +68,7 @@ def test_nearest_poses_are_as_near_as_those_of_slsqp_from_many_starts(seed: int)
 @given(all_cases())
 @example(Case(OPTIMAL, np.zeros(3), np.eye(3)))
 def test_nearest_poses_lie_on_the_singular_set_at_their_distance(case: Case) -> None:
-    nearest = nearest_singular_poses(case.design, case.position, case.rotation)
+    nearest = nearest_singular_poses(Configuration(case.design, case.position, case.rotation))
     span = max(case.size, float(np.abs(nearest.position).max()))
     gram = nearest.rotation @ np.swapaxes(nearest.rotation, -1, -2)
     assert_allclose(gram, np.broadcast_to(np.eye(3), (3, 3, 3)), atol=1e-12)
@@ -77,7 +78,9 @@ def test_nearest_poses_lie_on_the_singular_set_at_their_distance(case: Case) -> 
         moved = displacement(case.design, case.position, case.rotation, p, r)
         assert distance == pytest.approx(float(moved), abs=8 * EPSILON * span)
         # From there it is at no distance.
-        assert nearest_singular_poses(case.design, p, r).distance[index] <= 1e-12 * span
+        assert (
+            nearest_singular_poses(Configuration(case.design, p, r)).distance[index] <= 1e-12 * span
+        )
     # They are no farther than a translation.
     margin = np.abs(case.margins)
     margin[1] /= max(math.hypot(case.rotation[1, 0], case.rotation[2, 0]), 1e-300)
@@ -90,7 +93,7 @@ def test_bounds_of_many_poses_are_close_to_the_distances(b1y: float) -> None:
     design = OPTIMAL.with_variable("b1y", b1y)
     positions, rotations = random_poses(1, MANY_ROWS)
     positions[::2] *= 30.0
-    nearest = nearest_singular_poses(design, positions, rotations)
+    nearest = nearest_singular_poses(Configuration(design, positions, rotations))
     length = PlatformPoints.of(design).length
     assert (nearest.bound <= nearest.distance).all()
     # The tolerance of the bound is one of squares, where the two lines do not nearly coincide.
@@ -119,7 +122,7 @@ def test_bound_of_a_box_is_below_its_values_and_close_to_them() -> None:
 
 @given(singular_cases())
 def test_nearest_pose_of_a_singular_pose_is_itself(case: Case) -> None:
-    nearest = nearest_singular_poses(case.design, case.position, case.rotation)
+    nearest = nearest_singular_poses(Configuration(case.design, case.position, case.rotation))
     vanishing = np.abs(case.margins) <= 8.0 * EPSILON * case.size
     length = PlatformPoints.of(case.design).length
     assert vanishing.any()
@@ -142,7 +145,7 @@ def test_nearest_singularity_at_a_distance_of_zero_is_the_pose_itself() -> None:
 
 def test_nearest_pose_lies_in_the_stratum_of_its_incidence() -> None:
     p, r = random_poses(10, MANY_ROWS)
-    nearest = nearest_singular_poses(OPTIMAL, p, r)
+    nearest = nearest_singular_poses(Configuration(OPTIMAL, p, r))
     for index, closure in enumerate(((3, 4, 2, 1), (4, 2, 3, 1), (4, 3, 1, 2))):
         seen = stratum(nearest.position[:, index], nearest.rotation[:, index], OPTIMAL.reach)
         assert (seen == closure).all()
@@ -151,17 +154,19 @@ def test_nearest_pose_lies_in_the_stratum_of_its_incidence() -> None:
 @given(ordinary_cases())
 def test_distances_of_mirror_images_and_turns_about_the_guide_are_equal(case: Case) -> None:
     assume(case.design.b2 * case.design.b3 != 0.0)
-    here = nearest_singular_poses(case.design, case.position, case.rotation).distance
+    here = nearest_singular_poses(Configuration(case.design, case.position, case.rotation)).distance
     # Mirrored in the plane y = 0, platform too: b1 comes to the other side of its x-axis.
     mirror = np.diag([1.0, -1.0, 1.0])
     x = case.design.variables
     mirrored = case.design.with_variables([x[0], -x[1], x[2], -x[3], x[4], x[5]])
     there = nearest_singular_poses(
-        mirrored, mirror @ case.position, mirror @ case.rotation @ mirror
+        Configuration(mirrored, mirror @ case.position, mirror @ case.rotation @ mirror)
     ).distance
     assert_allclose(there, here, atol=1e-9 * case.size)
     turn = Rotation.from_euler("x", 0.7).as_matrix()
-    turned = nearest_singular_poses(case.design, turn @ case.position, turn @ case.rotation)
+    turned = nearest_singular_poses(
+        Configuration(case.design, turn @ case.position, turn @ case.rotation)
+    )
     assert_allclose(turned.distance[:2], here[:2], atol=1e-9 * case.size)
 
 
@@ -171,7 +176,7 @@ def test_nearest_pose_of_two_equally_near_ones_is_one_of_them() -> None:
     smaller = float(np.linalg.eigvalsh(platform.scatter)[1])
     for height in np.sqrt(smaller) * np.array([0.5, 0.9, 1.0, 1.1, 2.0, 50.0]):
         position = np.array([0.0, 0.0, height]) - platform.centroid
-        nearest = nearest_singular_poses(OPTIMAL, position, np.eye(3))
+        nearest = nearest_singular_poses(Configuration(OPTIMAL, position, np.eye(3)))
         # The tilt about the longer axis with cos θ = λ₂ / height², where there is one.
         cosine = min(1.0, smaller / height**2)
         square = 2.0 * smaller * (1.0 - cosine) + (height * cosine) ** 2
@@ -184,7 +189,7 @@ def test_poses_with_nearly_coinciding_lines_are_nearly_singular(
 ) -> None:
     small = Rotation.from_rotvec(share * Rotation.from_matrix(turn).as_rotvec()).as_matrix()
     position = np.array([5.0, 0.0, 0.0]) + share * shift
-    nearest = nearest_singular_poses(design, position, small)
+    nearest = nearest_singular_poses(Configuration(design, position, small))
     assert np.isfinite(nearest.position).all()
     assert nearest.distance[1] <= 20.0 * share
     assert (nearest.bound <= nearest.distance).all()
@@ -192,7 +197,9 @@ def test_poses_with_nearly_coinciding_lines_are_nearly_singular(
 
 def test_nearest_poses_of_a_compiled_batch_equal_interpreted_ones() -> None:
     p, r = random_poses(4, MANY_ROWS)
-    many = nearest_singular_poses(OPTIMAL, p.reshape(-1, 4, 3), r.reshape(-1, 4, 3, 3))
+    many = nearest_singular_poses(
+        Configuration(OPTIMAL, p.reshape(-1, 4, 3), r.reshape(-1, 4, 3, 3))
+    )
     assert many.distance.shape == (MANY_ROWS // 4, 4, 3)
     assert many.position.shape == (MANY_ROWS // 4, 4, 3, 3)
     assert many.rotation.shape == (MANY_ROWS // 4, 4, 3, 3, 3)

@@ -17,29 +17,24 @@ from explorer import (
     SOURCES,
     Actuators,
     InputError,
-    Struts,
     Tolerances,
-    compliance,
-    error_by_actuator,
     errors_alone,
     forward,
     inverse,
     largest_error,
     margins,
     pose_error_by_geometry,
-    pose_error_by_source,
-    pose_precision,
-    rms_error,
     rms_of_sources,
     source_errors,
     worst_error,
 )
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.machine import DIMENSIONS
 from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.compliance import stiffness_of
+from explorer.statics.accuracy import actuator_errors, tool_errors
 from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.error_sources import by_source
+from explorer.statics.error_sources import error_by_source
 
 OPTIMAL = PRESETS["paper-optimal"]
 ERRORS = np.array([0.01, 0.02, 0.015, 0.005, 0.02, 0.01])
@@ -60,11 +55,13 @@ def test_worst_error_is_the_largest_of_all_corners() -> None:
     worst = worst_error(OPTIMAL, positions, rotations, ERRORS, TOOL)
     corners = ERRORS * np.array(list(itertools.product((-1.0, 1.0), repeat=6)))
     twists = np.einsum(
-        "nij,cj->nci", twists_of_actuators(OPTIMAL, positions, rotations, TOOL), corners
+        "nij,cj->nci",
+        twists_of_actuators(Configuration(OPTIMAL, positions, rotations, TOOL)),
+        corners,
     )
     for half, found in ((slice(0, 3), worst.displacement), (slice(3, 6), worst.turn)):
         assert_allclose(np.linalg.norm(twists[..., half], axis=-1).max(axis=1), found, rtol=1e-12)
-    alone = error_by_actuator(OPTIMAL, positions, rotations, ERRORS, TOOL)
+    alone = tool_errors(Configuration(OPTIMAL, positions, rotations, TOOL), ERRORS).by_actuator
     assert (alone.displacement.sum(axis=1) >= worst.displacement * (1.0 - 1e-12)).all()
     assert (alone.turn.max(axis=1) <= worst.turn * (1.0 + 1e-12)).all()
 
@@ -81,8 +78,9 @@ def test_errors_are_the_largest_and_the_mean_of_random_errors_of_forward_kinemat
     moves = found.position[:, mode] + turned @ TOOL - position - rotation @ TOOL
     turns = Rotation.from_matrix(turned @ rotation.T).as_rotvec()
     given = OPTIMAL, position, rotation, largest, TOOL
+    poses = Configuration(OPTIMAL, position, rotation, TOOL)
     for vectors, worst, mean in zip(
-        (moves, turns), worst_error(*given), rms_error(*given), strict=True
+        (moves, turns), worst_error(*given), tool_errors(poses, largest).rms, strict=True
     ):
         assert np.linalg.norm(vectors, axis=1).max() == pytest.approx(worst, rel=1e-4)
         # Errors of equal chance within ± e.
@@ -103,31 +101,20 @@ def test_error_by_geometry_of_a_shift_of_the_whole_base_is_that_shift() -> None:
     assert (np.abs(platform - behind) < 1e-12 * scale).all()
 
 
-def test_precision_of_poses_is_that_of_the_single_functions() -> None:
+def test_errors_alone_of_the_actuators_are_those_of_a_machine_without_tolerances() -> None:
     design = msgspec.structs.replace(
         OPTIMAL,
         actuators=Actuators(
             error_mm=(0.1, 0.2, 0.1, 0.2, 0.1, 0.05),
-            stiffness_n_mm=(50.0, 60.0, 50.0, 60.0, 50.0, 40.0),
         ),
-        struts=Struts(outer_mm=6.0, inner_mm=4.0),
         tolerances=Tolerances(a3=(0.1, 0.2, 0.0), guide_tilt_deg=(0.1, 0.0)),
     )
     positions, rotations = random_poses(design, 500)
-    found = pose_precision(design, positions, rotations, TOOL)
-    errors = np.array(design.actuators.error_mm) / design.unit_mm
-    given = design, positions, rotations
-    for each, function in (
-        (found.worst, worst_error),
-        (found.rms, rms_error),
-        (found.by_actuator, error_by_actuator),
-    ):
-        assert_allclose(each, function(*given, errors, TOOL))
-    assert_allclose(found.by_geometry, pose_error_by_geometry(*given, TOOL))
-    assert_allclose(found.compliance, compliance(*given, *stiffness_of(design), TOOL))
-    alone = errors_alone(by_source(found), source_errors(design))
-    assert_allclose(alone.displacement[:, :6], found.by_actuator.displacement)
-    assert_allclose(alone.turn[:, :6], found.by_actuator.turn)
+    poses = Configuration(design, positions, rotations, TOOL)
+    found = tool_errors(poses, actuator_errors(design)).by_actuator
+    alone = errors_alone(error_by_source(poses), source_errors(design))
+    assert_allclose(alone.displacement[:, :6], found.displacement)
+    assert_allclose(alone.turn[:, :6], found.turn)
     used = np.flatnonzero(alone.displacement[:, 6:].any(axis=0))
     assert [DIMENSIONS[index] for index in used] == ["a3x", "a3y", "guide tilt y"]
 
@@ -135,8 +122,8 @@ def test_precision_of_poses_is_that_of_the_single_functions() -> None:
 @pytest.mark.parametrize("count", [1, 600])
 def test_errors_of_singular_pose_are_infinite(count: int) -> None:
     positions = np.resize([3.0, 4.0, 5.0], (count, 3))
-    for function in (worst_error, rms_error, error_by_actuator):
-        for error in function(OPTIMAL, positions, np.eye(3), ERRORS):
+    for errors in tool_errors(Configuration(OPTIMAL, positions, np.eye(3)), ERRORS):
+        for error in errors:
             assert (error == np.inf).all()
     assert (pose_error_by_geometry(OPTIMAL, positions, np.eye(3)) == np.inf).all()
 
@@ -195,7 +182,7 @@ def test_largest_error_is_the_longest_sum_of_all_signs(seed: int) -> None:
 
 def test_largest_error_of_a_machine_exceeds_random_errors_and_all_its_neighbours() -> None:
     positions, rotations = random_poses(OPTIMAL, 300)
-    sources = pose_error_by_source(OPTIMAL, positions, rotations, TOOL)
+    sources = error_by_source(Configuration(OPTIMAL, positions, rotations, TOOL))
     found = largest_error(sources, BOUNDS)
     rng = np.random.default_rng(2)
     drawn = BOUNDS * np.sign(rng.normal(size=(2000, len(SOURCES))))
@@ -211,13 +198,17 @@ def test_largest_error_of_a_machine_exceeds_random_errors_and_all_its_neighbours
 
 def test_largest_error_of_actuators_alone_is_the_worst_error() -> None:
     positions, rotations = random_poses(OPTIMAL, 300)
-    sources = pose_error_by_source(OPTIMAL, positions, rotations, TOOL)
+    sources = error_by_source(Configuration(OPTIMAL, positions, rotations, TOOL))
     found = largest_error(sources[..., :6], BOUNDS[:6])
     expected = worst_error(OPTIMAL, positions, rotations, BOUNDS[:6], TOOL)
     assert_allclose(found.displacement, expected.displacement, rtol=1e-12)
     assert_allclose(found.turn, expected.turn, rtol=1e-12)
     rms = rms_of_sources(sources[..., :6], BOUNDS[:6])
-    assert_allclose(rms, rms_error(OPTIMAL, positions, rotations, BOUNDS[:6], TOOL), rtol=1e-12)
+    assert_allclose(
+        rms,
+        tool_errors(Configuration(OPTIMAL, positions, rotations, TOOL), BOUNDS[:6]).rms,
+        rtol=1e-12,
+    )
     assert (rms.displacement <= found.displacement).all()
 
 
@@ -232,17 +223,16 @@ def test_errors_of_sources_are_those_of_actuators_and_dimensions() -> None:
     assert_allclose(errors[:9], [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.01, 0.02, 0.03])
     assert_allclose(np.degrees(errors[[SOURCES.index("guide tilt y"), 16]]), [0.1, 0.2])
     positions, rotations = random_poses(design, 5)
-    found = pose_error_by_source(design, positions, rotations, TOOL)
+    found = error_by_source(Configuration(design, positions, rotations, TOOL))
     given = design, positions, rotations, TOOL
-    assert_allclose(found[..., :6], twists_of_actuators(*given))
+    assert_allclose(found[..., :6], twists_of_actuators(Configuration(*given)))
     assert_allclose(found[..., 6:], pose_error_by_geometry(*given))
-    assert_allclose(found, by_source(pose_precision(*given)))
 
 
 @pytest.mark.parametrize("count", [1, 600])
 def test_largest_error_of_singular_or_overflowing_pose_is_infinite(count: int) -> None:
     positions = np.resize([3.0, 4.0, 5.0], (count, 3))
-    singular = pose_error_by_source(OPTIMAL, positions, np.eye(3))
+    singular = error_by_source(Configuration(OPTIMAL, positions, np.eye(3)))
     for errors in (singular, np.full((count, 6, 29), 1e300)):
         found = largest_error(errors, np.full(29, 1e10))
         assert (found.displacement == np.inf).all()
@@ -255,7 +245,7 @@ def test_largest_error_of_singular_or_overflowing_pose_is_infinite(count: int) -
 
 def test_largest_error_without_errors_is_zero_and_of_unusable_bounds_refused() -> None:
     home = OPTIMAL.home_pose
-    sources = pose_error_by_source(OPTIMAL, home.position, home.rotation)
+    sources = error_by_source(Configuration.at(OPTIMAL, home))
     found = largest_error(sources, source_errors(OPTIMAL))
     assert (float(found.displacement), float(found.turn)) == (0.0, 0.0)
     assert not found.vectors.any()

@@ -25,7 +25,6 @@ from explorer import (
     encode_design,
     largest_error,
     make_prototype,
-    pose_error_by_source,
     rms_of_sources,
     source_costs,
     source_errors,
@@ -33,6 +32,7 @@ from explorer import (
     with_tolerances,
 )
 from explorer.measures.positions import positions_over
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.budget.costs import (
@@ -42,6 +42,7 @@ from explorer.statics.budget.costs import (
     source_influences,
     stated_tolerances,
 )
+from explorer.statics.error_sources import error_by_source
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose
@@ -68,7 +69,7 @@ def as_errors(design: Design, tolerances: FloatArray) -> FloatArray:
 def test_costs_are_those_of_the_worst_position_in_mm_and_degrees() -> None:
     positions = box_positions()
     costs = source_costs(STATED, positions, HOME.rotation, TOOL)
-    by_source = pose_error_by_source(STATED, positions, HOME.rotation, TOOL)
+    by_source = error_by_source(Configuration(STATED, positions, HOME.rotation, TOOL))
     bounds = source_errors(STATED)
     worst, rms = largest_error(by_source, bounds), rms_of_sources(by_source, bounds)
     place = int(worst.displacement.argmax())
@@ -110,7 +111,7 @@ def test_found_tolerances_keep_what_is_wanted_for_all_errors(
     positions = box_positions()
     given = design, positions, HOME.rotation
     found = tolerance_budget(*given, 0.05, wanted_turn, tool=TOOL, keep_actuators=keep)
-    by_source = pose_error_by_source(*given, TOOL)
+    by_source = error_by_source(Configuration(*given, TOOL))
     bounds = as_errors(design, found.tolerances)
     worst = largest_error(by_source, bounds)
     displacement, turn = 10.0 * worst.displacement.max(), np.degrees(worst.turn.max())

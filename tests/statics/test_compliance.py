@@ -105,12 +105,12 @@ def test_principal_compliances_are_the_extremes_of_directions() -> None:
 def test_compliance_shares_add_up_and_follow_what_is_soft() -> None:
     positions, rotations = random_poses(OPTIMAL, 50)
     load = [3.0, -2.0, 4.0, 5.0, -6.0, 2.0]
-    given = OPTIMAL, positions, rotations, load
-    shares = compliance_shares(*given, STIFFNESS, BENDING, TOOL)
+    given = Configuration(OPTIMAL, positions, rotations, TOOL), load
+    shares = compliance_shares(*given, STIFFNESS, BENDING)
     assert_allclose(np.sum(shares, axis=0), 1.0, rtol=1e-12)
-    rigid = compliance_shares(*given, STIFFNESS, None, TOOL)
+    rigid = compliance_shares(*given, STIFFNESS)
     assert not rigid.struts.any()
-    only_struts = compliance_shares(*given, np.full(6, np.inf), BENDING, TOOL)
+    only_struts = compliance_shares(*given, np.full(6, np.inf), BENDING)
     assert_allclose(only_struts.struts, 1.0, rtol=1e-12)
     # The work of the load is twice the energy that the parts store.
     found = compliance(OPTIMAL, positions, rotations, STIFFNESS, BENDING, TOOL)
@@ -145,7 +145,7 @@ def test_compliance_of_singular_pose_is_infinite(count: int) -> None:
     principal = principal_compliances(found)
     assert (principal.displacement == np.inf).all()
     assert np.isnan(principal.moment_directions).all()
-    shares = compliance_shares(OPTIMAL, positions, np.eye(3), np.ones(6), STIFFNESS)
+    shares = compliance_shares(Configuration(OPTIMAL, positions, np.eye(3)), np.ones(6), STIFFNESS)
     assert np.isnan(shares).all()
 
 

@@ -107,7 +107,7 @@ def test_forces_of_a_batch_are_those_of_its_poses(count: int) -> None:
 
 def test_twists_of_actuators_invert_the_jacobian() -> None:
     positions, rotations = random_poses(OPTIMAL, 200)
-    twists = twists_of_actuators(OPTIMAL, positions, rotations)
+    twists = twists_of_actuators(Configuration(OPTIMAL, positions, rotations))
     products = jacobian(OPTIMAL, positions, rotations) @ twists
     scale = np.abs(twists).max(axis=(1, 2))[:, None, None]
     assert (np.abs(products - np.eye(6)) < 1e-12 * np.maximum(scale, 1.0)).all()
@@ -133,7 +133,7 @@ def test_forces_do_the_work_of_load_and_weights_in_every_displacement(gravity: T
     rng = np.random.default_rng(4)
     for position, rotation in zip(*random_poses(design, 30, seed=4), strict=True):
         load, tool, step = rng.normal(size=6), rng.normal(size=3), 1e-5 * rng.normal(size=6)
-        wrench = load + carry(design, position, rotation, WEIGHTS, tool).wrench
+        wrench = load + carry(Configuration(design, position, rotation, tool), WEIGHTS).wrench
         forces = actuator_forces(design, position, rotation, wrench, tool)
         ends = [moved(position, rotation, sign * step) for sign in (1.0, -1.0)]
         joints = np.subtract(*(inverse(design, *end) for end in ends))
@@ -149,7 +149,7 @@ def test_joint_forces_balance_the_platform_and_each_leg(gravity: Triple) -> None
     g = STANDARD_GRAVITY * np.array(design.gravity)
     positions, rotations = random_poses(design, 20, seed=6)
     load = np.array([3.0, -2.0, 5.0, 1.0, 4.0, -6.0])
-    held = reactions(design, positions, rotations, load, None, WEIGHTS)
+    held = reactions(Configuration(design, positions, rotations), load, WEIGHTS)
     scale = np.abs(held.joints).max()
     for k, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
         at = Configuration(design, position, rotation).points
@@ -181,7 +181,7 @@ def test_joint_forces_balance_the_platform_and_each_leg(gravity: Triple) -> None
 def test_reactions_without_weights_are_those_of_the_load() -> None:
     positions, rotations = random_poses(OPTIMAL, 20)
     load = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
-    held = reactions(OPTIMAL, positions, rotations, load)
+    held = reactions(Configuration(OPTIMAL, positions, rotations), load)
     assert_allclose(held.actuators, actuator_forces(OPTIMAL, positions, rotations, load))
     assert_allclose(held.bending, strut_bending(OPTIMAL, positions, rotations, load))
     assert_allclose(held.guide_force, np.abs(held.actuators[:, [2, 4]]), rtol=1e-12)
@@ -191,7 +191,7 @@ def test_worst_direction_loads_its_actuator_to_the_limit() -> None:
     positions, rotations = random_poses(OPTIMAL, 40, seed=8)
     most = np.array([50.0, 60.0, 70.0, 80.0, 90.0, 40.0])
     tool = (0.3, 0.2, 1.0)
-    worst = worst_direction(OPTIMAL, positions, rotations, most, tool)
+    worst = worst_direction(Configuration(OPTIMAL, positions, rotations, tool), most)
     force = largest_force(OPTIMAL, positions, rotations, most, tool)
     load = np.concatenate([force[:, None] * worst.direction, np.zeros((40, 3))], axis=1)
     shares = np.abs(actuator_forces(OPTIMAL, positions, rotations, load, tool)) / most
@@ -209,13 +209,13 @@ def test_worst_direction_loads_its_actuator_to_the_limit() -> None:
 def test_largest_payload_uses_a_limit_up_and_keeps_all() -> None:
     positions, rotations = random_poses(LIMITED, 40, seed=9)
     load = [1.0, 2.0, -3.0, 0.0, 1.0, 0.0]
-    most = largest_payload(LIMITED, positions, rotations, load, None, WEIGHTS)
+    most = largest_payload(Configuration(LIMITED, positions, rotations), load, WEIGHTS)
 
     def largest_share(k: int, mass: float) -> float:
         """Return the largest share of a limit in a pose under a payload."""
         payload = Payload(mass, LIMITED.payload.centre)
         weights = replace(WEIGHTS, on_platform=(*WEIGHTS.on_platform, payload))
-        held = reactions(LIMITED, positions[k], rotations[k], load, None, weights)
+        held = reactions(Configuration(LIMITED, positions[k], rotations[k]), load, weights)
         return float(limit_shares(LIMITED, held).max())
 
     assert 10 < (most > 0.0).sum() < 40
@@ -230,23 +230,23 @@ def test_largest_payload_uses_a_limit_up_and_keeps_all() -> None:
 
 def test_mass_may_hold_a_load_that_exceeds_a_limit_alone() -> None:
     home = LIMITED.home_pose
-    given = LIMITED, home.position, home.rotation
-    alone = limit_shares(LIMITED, reactions(*given, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])).max()
+    at_home = Configuration.at(LIMITED, home)
+    alone = limit_shares(LIMITED, reactions(at_home, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])).max()
     load = [0.0, 0.0, 1.2 / float(alone), 0.0, 0.0, 0.0]
-    assert limit_shares(LIMITED, reactions(*given, load)).max() > 1.0
-    most = float(largest_payload(*given, load))
-    assert most > float(largest_payload(*given)) > 0.0
+    assert limit_shares(LIMITED, reactions(at_home, load)).max() > 1.0
+    most = float(largest_payload(at_home, load))
+    assert most > float(largest_payload(at_home)) > 0.0
     for factor, kept in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
         weights = Weights(on_platform=(Payload(most * factor, LIMITED.payload.centre),))
-        held = reactions(*given, load, None, weights)
+        held = reactions(at_home, load, weights)
         assert (limit_shares(LIMITED, held).max() <= 1.0) == kept
 
 
 def test_limit_shares_without_limits_are_zero_and_the_payload_is_unbounded() -> None:
     positions, rotations = random_poses(OPTIMAL, 10)
-    held = reactions(OPTIMAL, positions, rotations, [0.0, 0.0, -10.0, 0.0, 0.0, 0.0])
+    held = reactions(Configuration(OPTIMAL, positions, rotations), [0.0, 0.0, -10.0, 0.0, 0.0, 0.0])
     assert not limit_shares(OPTIMAL, held).any()
-    assert np.isinf(largest_payload(OPTIMAL, positions, rotations)).all()
+    assert np.isinf(largest_payload(Configuration(OPTIMAL, positions, rotations))).all()
     assert np.isinf(largest_force(OPTIMAL, positions, rotations, np.full(6, np.inf))).all()
 
 
@@ -268,13 +268,13 @@ def test_forces_of_singular_pose_are_infinite(
     assert (actuator_forces(*given, load) == np.inf).all()
     assert (strut_bending(*given, load) == np.inf).all()
     assert (largest_force(*given, np.ones(6)) == 0.0).all()
-    assert (largest_payload(*given) == 0.0).all()
+    assert (largest_payload(Configuration(*given)) == 0.0).all()
     # Without a limit, too.
     for most in (np.ones(6), np.full(6, np.inf)):
-        worst = worst_direction(*given, most)
+        worst = worst_direction(Configuration(*given), most)
         assert np.isnan(worst.direction).all()
         assert (worst.share == np.inf).all()
-    held = reactions(*given, load)
+    held = reactions(Configuration(*given), load)
     for values in (*held[:-1], limit_shares(LIMITED, held)):
         assert (values == np.inf).all()
 
@@ -324,7 +324,7 @@ def test_slopes_match_central_differences(seed: int) -> None:
         else:
             at[:, "xyz".index(PARAMETERS[index])] += step
         changed = design.with_variables(variables)
-        twists = twists_of_actuators(changed, at, r, design.tool.position)
+        twists = twists_of_actuators(Configuration(changed, at, r, design.tool.position))
         return twists, inverse(changed, at, r)[:, [2, 4]]
 
     for index in range(len(PARAMETERS)):

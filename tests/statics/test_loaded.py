@@ -20,6 +20,7 @@ from explorer import (
     Weights,
     rotation_from_yaw_pitch_roll,
 )
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
@@ -68,7 +69,7 @@ def test_no_sampled_direction_uses_a_larger_share_than_the_worst(limits: str) ->
         loads[:, :3] += 12.0 * directions
         pose = loaded.pose
         held = reactions(
-            design, pose.position, pose.rotation, loads, design.tool.position, loaded.weights
+            Configuration.at(design, pose, design.tool.position), loads, loaded.weights
         )
         sampled = float(limit_shares(design, held).max())
         assert sampled <= worst.share * (1.0 + 1e-12)
@@ -176,7 +177,7 @@ def positions(count: int) -> FloatArray:
 def shares(design: Design, at: FloatArray, load: FloatArray) -> FloatArray:
     """Return the shares of the limits under a load at the tool, besides the payload's weight."""
     weights = design_weights(design)
-    held = reactions(design, at, ROTATION, load, design.tool.position, weights)
+    held = reactions(Configuration(design, at, ROTATION, design.tool.position), load, weights)
     return limit_shares(design, held)
 
 

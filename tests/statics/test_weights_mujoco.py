@@ -13,6 +13,7 @@ from statics_cases import random_poses
 
 from explorer import PRESETS, Design, Payload, actuator_forces
 from explorer.export.simulation import DENSITY, simulation_joints, simulation_mjcf
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DOWN, VARIABLES
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.numerics.arrays import FloatArray
@@ -86,6 +87,6 @@ def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design)
         needed = np.array(data.qfrc_bias) - np.array(data.qfrc_applied)
         columns = np.concatenate([np.eye(model.nv)[list(ACTUATED)], loops_of(model, data)]).T
         forces = np.linalg.solve(columns, needed)[:6]
-        wrench = LOAD + carry(design, position, rotation, weights, TOOL).wrench
+        wrench = LOAD + carry(Configuration(design, position, rotation, TOOL), weights).wrench
         ours = actuator_forces(design, position, rotation, wrench, TOOL)
         assert_allclose(ours, forces, atol=1e-8 * np.abs(forces).max())

@@ -25,6 +25,7 @@ from explorer import (
 )
 from explorer.files.json_text import LONGEST_LINE
 from explorer.measures.catalogue import measures_in
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.pose import Pose
@@ -321,7 +322,7 @@ def test_node_measures_match_each_position(seed: int) -> None:
     assert len(kept)
     assert found.positions == pytest.approx(kept, rel=1e-12)
     distances = np.abs(margins(kept, rotation))
-    clear = leg_clearances(design, kept, rotation).clearance
+    clear = leg_clearances(Configuration(design, kept, rotation)).clearance
     assert found.extent == pytest.approx(np.ptp(kept, axis=0), abs=1e-12)
     assert found.margins == pytest.approx(distances.min(axis=0), rel=1e-12)
     assert found.mean_margin == pytest.approx(distances.min(axis=1).mean(), rel=1e-12)

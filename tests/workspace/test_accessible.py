@@ -29,6 +29,7 @@ from explorer import (
     workspace_volume,
 )
 from explorer.legs.clearance import distance_gradients
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.accessible.nodes import Grid, survey
@@ -52,7 +53,7 @@ def random_designs(count: int) -> list[Design]:
     for seed in itertools.count():
         design = thick(ordinary_case(seed)[0], (0.0, 0.005, 0.02)[seed % 3])
         home = design.home_pose
-        if (leg_clearances(design, home.position, home.rotation).clearance > 0.0).all():
+        if (leg_clearances(Configuration.at(design, home)).clearance > 0.0).all():
             found.append(design)
         if len(found) == count:
             return found
@@ -74,7 +75,7 @@ def test_accessible_workspace_with_thin_legs_loses_nodes_of_the_base_plane_alone
     flat = np.stack(np.meshgrid(*[np.arange(-20, 21)] * 2, [0], indexing="ij"), -1) * step
     within = (slacks(constraints(design, r), flat) >= -1e-9 * design.reach).all(axis=-1)
     near = 1e-9 * design.reach
-    crossing = (leg_clearances(design, flat, r).clearance <= near).any(axis=-1)
+    crossing = (leg_clearances(Configuration(design, flat, r)).clearance <= near).any(axis=-1)
     assert found.node_count is not None
     assert found.accessible_node_count is not None
     assert found.node_count - found.accessible_node_count == int((within & crossing).sum()) > 0
@@ -94,7 +95,7 @@ def test_accessible_solid_of_random_designs_holds_the_ends_of_clear_moves_alone(
     inside = np.array([solid.winding(p) > 0.5 for p in points])
     limits = constraints(design, r)
     slack = slacks(limits, points).min(axis=-1)
-    clearance = leg_clearances(design, points, r).clearance.min(axis=-1)
+    clearance = leg_clearances(Configuration(design, points, r)).clearance.min(axis=-1)
     assert (slack[inside] > -2.0 * solid.tolerance).all()
     # A rim of a wall thinner than the grid's step may be missed.
     assert (clearance[inside] < -0.25 * step).sum() <= 0.02 * len(points)
@@ -114,7 +115,7 @@ def test_accessible_volume_agrees_with_random_positions(design: Design, radius: 
     lows, highs = design.limits.box or (-design.reach, design.reach)
     points = rng.uniform(lows, highs, (100_000, 3))
     points = points[(slacks(constraints(design, r), points) >= 0.0).all(axis=-1)]
-    clear = (leg_clearances(design, points, r).clearance > 0.0).all(axis=-1)
+    clear = (leg_clearances(Configuration(design, points, r)).clearance > 0.0).all(axis=-1)
     # In these designs everything that is clear hangs together.
     share, error = clear.mean(), clear.std() / math.sqrt(len(points))
     assert found.accessible_volume / found.volume == pytest.approx(share, abs=4.0 * error + 5e-4)
@@ -124,7 +125,7 @@ def test_accessible_solid_faces_name_their_limit_or_pair() -> None:
     design = thick(OPTIMAL, 0.01)
     solid = accessible_workspace(design, nodes=30).solid
     centres = solid.vertices[solid.faces].mean(axis=1)
-    clearance = leg_clearances(design, centres, home_rotation(design)).clearance
+    clearance = leg_clearances(Configuration(design, centres, home_rotation(design))).clearance
     seen: set[str] = {solid.limits[index] for index in solid.limit_of_face.tolist()}
     offs: FloatArray = np.zeros(0)
     for pair, (i, j) in enumerate(PAIRS):
@@ -200,7 +201,9 @@ def test_nearest_clear_position_has_no_nearer_one() -> None:
     others = low + 0.98 * best * rng.uniform(-1.0, 1.0, (10_000, 3))
     others = others[np.linalg.norm(others - low, axis=1) < 0.98 * best]
     kept = (slacks(constraints(design, r), others) >= 0.0).all(axis=-1)
-    assert not (kept & (leg_clearances(design, others, r).clearance > 0.0).all(axis=-1)).any()
+    assert not (
+        kept & (leg_clearances(Configuration(design, others, r)).clearance > 0.0).all(axis=-1)
+    ).any()
 
 
 @pytest.mark.parametrize("nodes", [7, 161])
@@ -249,14 +252,14 @@ def test_least_clearances_at_random_positions_hold(design: Design, margin: float
     assert (found.bound <= found.clearance).all()
     limits = constraints(design, r)
     assert (slacks(limits, found.position) >= -1e-8 * design.reach).all()
-    own = leg_clearances(design, found.position, r).clearance
+    own = leg_clearances(Configuration(design, found.position, r)).clearance
     # Axes that are as good as crossing are said to cross.
     assert np.diagonal(own) == pytest.approx(found.clearance, abs=2e-9 * design.reach)
     rng = np.random.default_rng(8)
     points = design.reach * rng.uniform(-1.2, 1.2, (60_000, 3))
     points = points[(slacks(limits, points) >= 0.0).all(axis=-1)]
     assert len(points) > 300
-    sampled = leg_clearances(design, points, r).clearance.min(axis=0)
+    sampled = leg_clearances(Configuration(design, points, r)).clearance.min(axis=0)
     assert (found.clearance <= sampled + 1e-12).all()
 
 
@@ -264,11 +267,13 @@ def test_distance_gradients_agree_with_finite_differences() -> None:
     rng = np.random.default_rng(2)
     design, r = OPTIMAL, rotation_from_yaw_pitch_roll((-60.0, 20.0, 10.0))
     p = np.array([10.0, 5.0, 9.0]) + rng.uniform(-4.0, 4.0, (200, 3))
-    gradient = distance_gradients(design, p, r, leg_clearances(design, p, r))
+    gradient = distance_gradients(Configuration(design, p, r))
     step, differences = 1e-5, np.zeros_like(gradient)
     for axis in range(3):
         off = step * np.eye(3)[axis]
-        up, down = (leg_clearances(design, p + s * off, r).distance for s in (1.0, -1.0))
+        up, down = (
+            leg_clearances(Configuration(design, p + s * off, r)).distance for s in (1.0, -1.0)
+        )
         differences[..., axis] = (up - down) / (2.0 * step)
     # Where closest points jump from one end to another a difference means nothing.
     assert np.quantile(np.abs(gradient - differences), 0.98) < 1e-6

@@ -30,6 +30,7 @@ from explorer import (
     reactions,
     workspace_solid,
 )
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import decode_design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
@@ -66,7 +67,7 @@ def largest_shares(
     """Return the largest share of a limit at positions (n, 3), in home's orientation if none."""
     r = design.home_pose.rotation if rotation is None else rotation
     weights = design_weights(design)
-    held = reactions(design, at, r, np.array(load), design.tool.position, weights)
+    held = reactions(Configuration(design, at, r, design.tool.position), np.array(load), weights)
     return np.asarray(limit_shares(design, held).max(axis=1))
 
 

@@ -12,6 +12,7 @@ from long_cases import long_after
 from reference import read_reference
 
 from explorer import PRESETS, Actuators, Limits, Payload, Struts, Tool
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import decode_design
 from explorer.mechanism.margins import margins, mode_of, signs_of
 from explorer.mechanism.pose import Pose
@@ -39,7 +40,7 @@ def distances_held(loaded: LoadedPose, positions: FloatArray) -> FloatArray:
     rules = Rules.of(design, signs_of(int(mode_of(margins(pose.position, pose.rotation)))))
     kept = positions[poses_are_valid(design, positions, pose.rotation, rules=rules)]
     tool, weights = design.tool.position, loaded.weights
-    held = reactions(design, kept, pose.rotation, loaded.load, tool, weights)
+    held = reactions(Configuration(design, kept, pose.rotation, tool), loaded.load, weights)
     kept = kept[(limit_shares(design, held) <= 1.0).all(axis=1)]
     return np.linalg.norm(kept - np.array(pose.position), axis=1)
 

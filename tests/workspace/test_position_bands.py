@@ -22,6 +22,7 @@ from explorer import (
     reactions,
 )
 from explorer.export.report.drawings.slices import Slices
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
@@ -80,7 +81,7 @@ def asked(design: Design, points: FloatArray, rotation: FloatArray, measure: str
     if measure == "error":
         return largest_displacement(design, points, rotation)
     tool, weights = design.tool.position, design_weights(design)
-    held = reactions(design, points, rotation, LOAD, tool, weights)
+    held = reactions(Configuration(design, points, rotation, tool), LOAD, weights)
     if measure == "deflection":
         return displacement(design, points, rotation, held.actuators)
     if measure == "share":
@@ -94,7 +95,9 @@ def asked(design: Design, points: FloatArray, rotation: FloatArray, measure: str
 def unit_forces(design: Design, points: FloatArray, rotation: FloatArray) -> FloatArray:
     """Return the actuator forces that hold unit forces at the tool, shape (3, n, 6)."""
     loads, tool = np.eye(6)[:3], design.tool.position
-    return np.stack([reactions(design, points, rotation, w, tool).actuators for w in loads])
+    return np.stack(
+        [reactions(Configuration(design, points, rotation, tool), w).actuators for w in loads]
+    )
 
 
 def largest_displacement(design: Design, points: FloatArray, rotation: FloatArray) -> FloatArray:
@@ -215,7 +218,7 @@ def test_levels_of_forces_are_round_numbers_that_suit_the_load(factor: float) ->
 
 
 def asked_force(factor: float, rotation: FloatArray) -> float:
-    held = reactions(OPTIMAL, OPTIMAL.home_pose.position, rotation, factor * LOAD)
+    held = reactions(Configuration(OPTIMAL, OPTIMAL.home_pose.position, rotation), factor * LOAD)
     return float(np.abs(held.actuators).max())
 
 

@@ -16,7 +16,7 @@ from explorer.cli.values import hint, numbers
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import DIMENSIONS, Six
 from explorer.mechanism.pose import Triple
-from explorer.statics.accuracy import RMS_ERRORS
+from explorer.statics.accuracy import RMS_ERRORS, error_by_geometry
 from explorer.statics.compliance import is_elastic
 from explorer.statics.error_sources import SOURCES
 from explorer.statics.loaded import LoadedPose
@@ -106,7 +106,7 @@ def _as_json(answer: Answer) -> dict[str, object]:
         totals[f"{kind.lower()}_displacement{suffix}"] = moved
         totals[f"{kind.lower()}_turn{suffix}"] = turned
     return {
-        "compliance": precision.precision.compliance,
+        "compliance": precision.compliance,
         "deflection": precision.deflection,
         "deflection_shares": shares,
         "principal_compliances": {
@@ -119,7 +119,7 @@ def _as_json(answer: Answer) -> dict[str, object]:
         "displacement_by_actuator": alone.displacement[BY_ACTUATORS],
         "turn_by_actuator": alone.turn[BY_ACTUATORS],
         "dimensions": list(DIMENSIONS),
-        "pose_error_by_geometry": precision.precision.by_geometry,
+        "pose_error_by_geometry": error_by_geometry(precision.loaded.configuration),
         "displacement_by_geometry": alone.displacement[BY_DIMENSIONS],
         "turn_by_geometry": alone.turn[BY_DIMENSIONS],
         "assumed": answer.assumed,

@@ -12,6 +12,7 @@ from explorer.cli.load_options import LoadOptions, check_regular
 from explorer.cli.output import figure, figures, finite, heading, pose_json, pose_table, table
 from explorer.cli.values import hint, numbers, positive
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
@@ -80,8 +81,8 @@ class Forces(LoadOptions):
             raise InputError("--parts needs the density of the parts: add --density KG_PER_M3")
         design = self.read_loaded_design()
         pose, tool = self.pose(design), self.tool(design)
-        given = design, pose.position, pose.rotation
-        check_regular(pose, twists_of_actuators(*given), "the forces that hold a load")
+        configuration = Configuration.at(design, pose, tool)
+        check_regular(pose, twists_of_actuators(configuration), "the forces that hold a load")
         point = tool or (0.0, 0.0, 0.0)
         loaded = LoadedPose(design, pose, self.load, self._own_weights(design), point=point)
         most = np.minimum(*design.actuators.limits) if self.most is None else self.most
@@ -93,7 +94,7 @@ class Forces(LoadOptions):
         answer = Answer(
             loaded,
             tool,
-            worst_direction(*given, most, tool),
+            worst_direction(configuration, most),
             None if self.force is None else loaded.worst_force(self.force),
             nearest,
         )

@@ -21,7 +21,7 @@ def precision_of(case: Case) -> ToolPrecision | None:
     if not (weighed.has_errors or case.is_elastic):
         return None
     force = case.design.payload.force_n
-    _, worst = largest_deflection(weighed.precision.compliance, weighed.wrench, force)
+    _, worst = largest_deflection(weighed.compliance, weighed.wrench, force)
     if not np.isfinite(worst).all():
         return weighed
     x, y, z = worst.tolist()

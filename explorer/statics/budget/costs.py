@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError, NoAnswerError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import DIMENSIONS, Tolerances
 from explorer.mechanism.margins import INCIDENCES, margins
@@ -21,8 +22,8 @@ from explorer.numerics.arrays import FloatArray, IntArray, finite_array
 from explorer.statics.error_sources import (
     IS_TILT,
     SOURCES,
+    error_by_source,
     largest_error,
-    pose_error_by_source,
     rms_of_sources,
 )
 
@@ -150,7 +151,7 @@ def source_influences(
         raise InputError("costs of tolerances need at least one position; got none")
     signs = np.sign(margins(positions, rotation))
     crossed = np.flatnonzero(np.abs(signs.sum(axis=0)) < len(signs))
-    by_source = pose_error_by_source(design, positions, rotation, tool)
+    by_source = error_by_source(Configuration(design, positions, rotation, tool))
     if len(crossed) or not np.isfinite(by_source).all():
         where = "; ".join(f"δ{k + 1} = 0: {INCIDENCES[k]}" for k in crossed)
         singular = (

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from explorer.legs.clearance import PAIRS, leg_axes, leg_clearances, point_rates, radii_of_pairs
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
 
@@ -89,11 +90,11 @@ def _first_collisions(
     near = NEAR * float(step.min())
     chosen = np.asarray(pairs, dtype=np.int64)
     covered, at = np.zeros(len(start)), start
-    clearance = leg_clearances(design, at, rotation).clearance[:, chosen]
+    clearance = leg_clearances(Configuration(design, at, rotation)).clearance[:, chosen]
     for _ in range(STRIDES):
         covered = np.minimum(length, covered + np.maximum(clearance.min(axis=1), 0.0))
         at = start + (covered / np.maximum(length, 1e-300))[:, None] * segment
-        clearance = leg_clearances(design, at, rotation).clearance[:, chosen]
+        clearance = leg_clearances(Configuration(design, at, rotation)).clearance[:, chosen]
     return at, chosen[clearance.argmin(axis=1)][:, None], covered < length - near
 
 
@@ -101,7 +102,7 @@ def nearest_pair(
     design: Design, rotation: FloatArray, pairs: Sequence[int], points: FloatArray
 ) -> IntArray:
     """Return the index of the pair with the least clearance at positions (n, 3), shape (n,)."""
-    clearance = leg_clearances(design, points, rotation).clearance
+    clearance = leg_clearances(Configuration(design, points, rotation)).clearance
     return np.asarray(pairs, dtype=np.int64)[clearance[:, list(pairs)].argmin(axis=1)]
 
 
@@ -118,8 +119,8 @@ def _signed_distances(
         The distances, shape (n, m); their gradients in position, shape (n, m, 3); whether they are
         signed, shape (n, m); the signed distances of the lines in any case, shape (n, m).
     """
-    clearances = leg_clearances(design, at, rotation)
-    axes = leg_axes(design, at, rotation)
+    poses = Configuration(design, at, rotation)
+    clearances, axes = leg_clearances(poses), leg_axes(poses)
     rows = np.arange(len(at))[:, None]
     ends = np.array(PAIRS)[pair] - 1
     one, two = axes[rows, ends[..., 0]], axes[rows, ends[..., 1]]

@@ -16,6 +16,7 @@ import numpy as np
 
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.moves import pairs_are_clear
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.workspace.limits.constraints import constraints, satisfies
@@ -148,7 +149,7 @@ def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
     positions = grid.positions
     slack = SLACK * design.reach
     satisfied = satisfies(design, constraints(design, rotation), positions)
-    clearance = leg_clearances(design, positions, rotation).clearance
+    clearance = leg_clearances(Configuration(design, positions, rotation)).clearance
     index = np.arange(math.prod(grid.counts)).reshape(grid.counts)
     ends = [
         (np.delete(index, -1, axis).ravel(), np.delete(index, 0, axis).ravel()) for axis in range(3)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.moves import move_clearances
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
@@ -143,7 +144,9 @@ def _bottleneck_clearances(surveyed: Survey, start: FloatArray) -> FloatArray:
     steps = allowed[surveyed.first] & allowed[surveyed.second] & surveyed.clear.all(axis=1)
     first, second = surveyed.first[steps], surveyed.second[steps]
     near_start = np.flatnonzero(surveyed.nodes_near(start))
-    at_start = float(leg_clearances(surveyed.design, start, surveyed.rotation).clearance.min())
+    at_start = float(
+        leg_clearances(Configuration(surveyed.design, start, surveyed.rotation)).clearance.min()
+    )
     # The start is one more node.
     first = np.append(first, np.full(len(near_start), node_count))
     second = np.append(second, near_start)

@@ -6,6 +6,7 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, leg_clearances
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins
@@ -59,7 +60,7 @@ def start_faults(design: Design, rotation: FloatArray, position: FloatArray) -> 
     """Return the limits that a position breaks and the pairs of legs that touch there."""
     joints, delta = inverse(design, position, rotation), margins(position, rotation)
     broken = violations(design, position, rotation, joints, delta, design.home_signs)
-    clearance = leg_clearances(design, position, rotation).clearance
+    clearance = leg_clearances(Configuration(design, position, rotation)).clearance
     faults = [str(violation) for violation in broken]
     for (i, j), depth in zip(PAIRS, (-clearance).tolist(), strict=True):
         if depth >= 0.0:
@@ -86,14 +87,16 @@ def nearest_clear_position(
         return None
     nodes = make_cell_grid(lows, highs, CELLS).positions.reshape(-1, 3)
     nodes = nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]
-    nodes = nodes[(leg_clearances(design, nodes, rotation).clearance > 0.0).all(axis=-1)]
+    nodes = nodes[
+        (leg_clearances(Configuration(design, nodes, rotation)).clearance > 0.0).all(axis=-1)
+    ]
     if not len(nodes):
         return None
     reach = design.reach
     nodes = nodes[np.linalg.norm(nodes - position, axis=1).argsort()[:STARTS]]
 
     def slacks_at(p: FloatArray) -> FloatArray:
-        clearance = leg_clearances(design, p * reach, rotation).clearance / reach
+        clearance = leg_clearances(Configuration(design, p * reach, rotation)).clearance / reach
         spare: FloatArray = np.asarray(np.minimum(clearance, 1.0), dtype=np.float64) - CLEAR
         return np.concatenate([slacks(limits, p * reach) / reach, spare])
 

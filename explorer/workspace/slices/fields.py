@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import checked_rotation
@@ -126,4 +127,6 @@ def field_at(design: Design, position: ArrayLike, rotation: ArrayLike, field: Fi
         case "ball":
             return singular_plane_distances(position, rotation).min(axis=-1)
         case "distance":
-            return nearest_singular_poses(design, position, rotation).distance.min(axis=-1)
+            return nearest_singular_poses(Configuration(design, position, rotation)).distance.min(
+                axis=-1
+            )

@@ -37,9 +37,7 @@ class ClearanceScene(ScenePart):
         for part in (self._rods, self._ends):
             yield from part.show(has_radii)
         if has_radii:
-            axes = placed.scale * leg_axes(
-                state.design, np.array(state.pose.position), snapshot.rotation
-            )
+            axes = placed.scale * leg_axes(snapshot)
             yield from self._rods.between(axes[:, 0], axes[:, 1], radii)
             yield from self._ends.at(axes.reshape(-1, 3), np.repeat(radii, 2))
         shown = state.view.clearance and not state.view.is_twin

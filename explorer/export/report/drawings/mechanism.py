@@ -18,6 +18,7 @@ from explorer.export.report.markup import coordinate, drawing_text, element
 from explorer.legs.clearance import leg_axes
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import verdict
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import css, proximity_colour
@@ -111,7 +112,7 @@ def mechanism(
 ) -> Iterator[Element]:
     """Yield the elements of a mechanism, with labels within a box, or without labels if None."""
     points = snapshot.points
-    legs = leg_axes(snapshot.design, snapshot.pose.position, snapshot.rotation)
+    legs = leg_axes(Configuration(snapshot.design, snapshot.pose.position, snapshot.rotation))
     here = verdict(snapshot)
     tints = [css(proximity_colour(level)) for level in here.levels]
     low, high = _guide(snapshot)

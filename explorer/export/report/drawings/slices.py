@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from explorer.export.report.drawings.mechanism import path_of, round_length
 from explorer.export.report.markup import coordinate, element
 from explorer.legs.clearance import leg_clearances
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design, Swing
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
@@ -153,7 +154,9 @@ class Slices:
         )
         if any(self.design.limits.leg_radii):
             grid = self._grid(axis, level, CELLS)
-            clearance = leg_clearances(self.design, grid.points, self.rotation).clearance
+            clearance = leg_clearances(
+                Configuration(self.design, grid.points, self.rotation)
+            ).clearance
             add(
                 grid.loops(-clearance.min(axis=-1), 0.0),
                 fill=css(OUTLINE),

@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes, pair_rows, radii_of_pairs
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.search.demands.geometry import Measured
 from explorer.optimise.search.state import State
@@ -78,7 +79,7 @@ class ClearanceDemand:
     def _spare(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return axes of the legs, closest points, distances, and distances less the demanded."""
         p = self.positions
-        axes = leg_axes(state.design, p, state.rotation)
+        axes = leg_axes(Configuration(state.design, p, state.rotation))
         distance, points = np.empty((len(p), 6)), np.empty((len(p), 6, 2, 3))
         pair_rows(len(p), axes, distance, points)
         spare = distance - radii_of_pairs(state.design) - self.clearance

@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 
 from explorer.measures.statics import BoxStatics
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, VARIABLES
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
@@ -215,4 +216,6 @@ def _displacements(box: BoxStatics, cause: Cause) -> FloatArray:
 
 def _twists(box: BoxStatics) -> FloatArray:
     design = box.design
-    return twists_of_actuators(design, box.positions, box.rotation, design.tool.position)
+    return twists_of_actuators(
+        Configuration(design, box.positions, box.rotation, design.tool.position)
+    )
