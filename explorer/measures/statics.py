@@ -26,7 +26,6 @@ from explorer.statics.compliance import (
     principal_compliances,
     stiffness_of,
 )
-from explorer.statics.equilibrium import STRUT_ROWS
 from explorer.statics.load_slopes import (
     BENDING,
     TURN,
@@ -83,11 +82,6 @@ class BoxStatics:
         return reactions(self.configuration, np.zeros(6), design_weights(self.design))
 
     @cached_property
-    def strut_lengths(self) -> FloatArray:
-        """The lengths d2 and d4 at the nodes, shape (n, 2), in design units."""
-        return self.configuration.joints[:, STRUT_ROWS]
-
-    @cached_property
     def errors(self) -> ToolError:
         """The worst errors of the tool at the nodes, each of shape (n,)."""
         return tool_errors(self.configuration, actuator_errors(self.design)).worst
@@ -109,9 +103,14 @@ class BoxStatics:
         return largest_deflection(self.compliances, weight, self.design.payload.force_n)[0]
 
     @cached_property
+    def node_shares(self) -> FloatArray:
+        """The shares of the limits at the nodes, shape (n, 12), as in `LIMITED`."""
+        return limit_shares(self.design, self.held)
+
+    @property
     def shares(self) -> FloatArray:
         """The largest shares of the limits over the nodes, shape (12,), as in `LIMITED`."""
-        return limit_shares(self.design, self.held).max(axis=0)
+        return self.node_shares.max(axis=0)
 
     @property
     def largest_share(self) -> float:

@@ -1,14 +1,21 @@
-"""Problems with sensible bounds and margins where none are given."""
+"""Problems with sensible bounds and margins where none are given, the paper's among them.
+
+The paper's designs have, by our reading, the orientation of its optimum, the optimum's box, and
+lengths up to the reach.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 
+import msgspec
+
 from explorer.errors import InputError
 from explorer.measures.clearance import MARGIN_OF_CLEARANCE
 from explorer.measures.size import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
+from explorer.mechanism.design_file import PRESETS
 from explorer.optimise.demands import Box, Demands
 from explorer.optimise.problem import (
     DISTANCES,
@@ -21,6 +28,12 @@ from explorer.optimise.problem import (
     longest_minimum,
     start_value,
 )
+
+PAPER_VOLUME = 8000.0
+"""Volume that the paper demands, V′, in cubed design units."""
+
+CLEARANCE = 0.2
+"""Clearance demanded where interference is on, in design units; the legs have no radii."""
 
 # Default bounds, as multiples of the start's largest variable.
 A3_WITHIN, B_WITHIN = 3.0, 1.0
@@ -133,3 +146,32 @@ def _own_volume(start: Design) -> float:
     if volume <= 0.0:
         raise InputError("the start has an empty workspace: give the volume to reach")
     return volume
+
+
+def paper_start() -> Design:
+    """Return the paper's initial design with the box of its optimum."""
+    initial, optimal = PRESETS["paper-initial"], PRESETS["paper-optimal"]
+    return msgspec.structs.replace(initial, limits=optimal.limits)
+
+
+def paper_problem(clearance: float | None = CLEARANCE) -> Problem:
+    """Return the paper's problem: from its initial design to a volume of 8000."""
+    return make_problem(paper_start(), "match-volume", volume=PAPER_VOLUME, clearance=clearance)
+
+
+def reach_problem(clearance: float | None = None) -> Problem:
+    """Return the smallest reach for the exact volume of the paper's optimum.
+
+    |b1y|, |a3y| and |b3 − b2| are at least 1 and every coordinate of b within ±10.
+    """
+    optimal = PRESETS["paper-optimal"]
+    bounds = [Variable(name, -10.0, 10.0) for name in ("b1x", "b1y", "b2", "b3")]
+    bounds += [Variable("a3x", -40.0, 40.0), Variable("a3y", 1.0, 40.0)]
+    return make_problem(
+        optimal,
+        "smallest-reach",
+        clearance=clearance,
+        clearance_margin=paper_problem().demands.clearance_margin,
+        least=1.0,
+        bounds=bounds,
+    )

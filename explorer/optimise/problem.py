@@ -14,7 +14,7 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.measures.size import longest_leg
-from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Limits, Swing
+from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Swing
 from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
 from explorer.numerics.checks import number
 from explorer.optimise.demands import MOST_TILT, Box, Demands
@@ -54,8 +54,24 @@ OPTIONAL = (YAW, REACH, *SHIFTS)
 """Variables besides the six of a design: the yaw of home in degrees, one maximum for all four
 lengths, and the shift of the required box along each axis."""
 
+SWING_LIMIT, MAXIMA = "swing", "maximum lengths"
+NO_LOAD, NO_ERRORS, RIGID = "no load", "no errors", "rigid"
+"""What keeps a problem from a start: bounds of the swing, fixed maxima, or what it lacks."""
+
 # Least value of the reach as a variable, as a share of the start's.
 LEAST_REACH = 1e-3
+
+
+class StartError(InputError):
+    """A design from which a problem cannot start.
+
+    Attributes:
+        limit: Limit that prevents it, or what the design lacks, such as `SWING_LIMIT` or `NO_LOAD`.
+    """
+
+    def __init__(self, message: str, limit: str = "") -> None:
+        super().__init__(message)
+        self.limit = limit
 
 
 class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -87,6 +103,7 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         demands: Demands.
 
     Raises:
+        StartError: a start that its limits, or what it lacks, keep from a search.
         InputError: bounds that cross or leave the start out, numbers that are not finite or
             out of range, or an objective that nothing free has an influence on.
     """
@@ -106,9 +123,10 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         msgspec.structs.force_setattr(self, "objective", str(self.objective))
         msgspec.structs.force_setattr(self, "variables", tuple(self.variables))
         if self.start.limits.swing != Swing():
-            raise InputError(
+            raise StartError(
                 "the volume has no gradient while joints bound the swing of legs: take these "
-                "bounds out of the design to optimise it"
+                "bounds out of the design to optimise it",
+                SWING_LIMIT,
             )
         _check_variables(self)
         _check_demands(self)
@@ -182,8 +200,15 @@ def varied(design: Design, values: Mapping[str, float]) -> Design:
         changed = msgspec.structs.replace(changed, home=home)
     if REACH in values:
         ranges = {name: (getattr(changed.limits, name)[0], values[REACH]) for name in LENGTHS}
-        changed = msgspec.structs.replace(changed, limits=_with_lengths(changed.limits, ranges))
+        limits = msgspec.structs.replace(changed.limits, **ranges)
+        changed = msgspec.structs.replace(changed, limits=limits)
     return changed
+
+
+def with_box(design: Design, box: Box | None) -> Design:
+    """Return a design with another box, or none; its home stays where it was."""
+    limits = msgspec.structs.replace(design.limits, box=box)
+    return msgspec.structs.replace(design, limits=limits, home=design.home_pose)
 
 
 def with_strokes(design: Design, ratio: float | None) -> Design:
@@ -203,7 +228,7 @@ def with_strokes(design: Design, ratio: float | None) -> Design:
         )
         for name in LENGTHS
     }
-    return msgspec.structs.replace(design, limits=_with_lengths(limits, ranges))
+    return msgspec.structs.replace(design, limits=msgspec.structs.replace(limits, **ranges))
 
 
 DISTANCES = ("a3y", "b1y", "b3 − b2")
@@ -235,10 +260,6 @@ def start_value(start: Design, name: str) -> float:
 def longest_minimum(design: Design) -> float:
     """Return the largest of the four minimum lengths."""
     return max(design.length_range(name)[0] for name in LENGTHS)
-
-
-def _with_lengths(limits: Limits, ranges: Mapping[str, tuple[float, float | None]]) -> Limits:
-    return msgspec.structs.replace(limits, **ranges)
 
 
 def _check_variables(problem: Problem) -> None:
@@ -304,19 +325,20 @@ def _check_statics(problem: Problem) -> None:
     if demands.tilt is not None and not demands.tilt < MOST_TILT:
         raise InputError(f"the tilt demanded must be below {MOST_TILT:g}°; got {demands.tilt:g}°")
     if (needs_load or bends) and not (design.payload.mass_kg or design.payload.force_n):
-        raise InputError(
-            "the design has no load: give its payload a mass, or a force of any direction"
+        raise StartError(
+            "the design has no load: give its payload a mass, or a force of any direction", NO_LOAD
         )
     if needs_load and np.isinf(part_limits(design)).all():
-        raise InputError(
+        raise StartError(
             "the design limits neither its actuators nor its struts nor its guide: give a limit "
-            "of forces or moments"
+            "of forces or moments",
+            NO_LOAD,
         )
     if needs_error and not any(design.actuators.error_mm):
-        raise InputError("the actuators of the design have no errors: give them")
+        raise StartError("the actuators of the design have no errors: give them", NO_ERRORS)
     if bends and not is_elastic(design):
-        raise InputError(
-            "the design is rigid: give its actuators a stiffness, or its struts a diameter"
+        raise StartError(
+            "the design is rigid: give its actuators a stiffness, or its struts a diameter", RIGID
         )
 
 
@@ -329,9 +351,10 @@ def _check_objective(problem: Problem) -> None:
             if demands.volume is None:
                 raise InputError(f"{problem.objective} needs a volume")
             if problem.objective == "smallest-reach" and not (REACH in names or is_tied):
-                raise InputError(
+                raise StartError(
                     "the design fixes maximum lengths: tie them to the reach |a3|, or let the "
-                    "reach change as a variable of its own"
+                    "reach change as a variable of its own",
+                    MAXIMA,
                 )
         case "largest-volume" | "smallest-load" | "smallest-error" | "smallest-deflection":
             pass

@@ -16,14 +16,15 @@ from explorer.mechanism.folds import from_folds, to_folds
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.reproduce.claim import Measurement, below
-from explorer.reproduce.samples import (
+from explorer.reproduce.claim import (
     BETA,
     EPSILON,
     PHI1,
     PHI2,
     PHI3,
+    Measurement,
     R,
+    below,
     random_folds,
     random_poses,
 )

@@ -12,10 +12,8 @@ from explorer.reproduce.comparison import large_workspace, orientations
 from explorer.reproduce.flags import strata, uncoupled
 from explorer.reproduce.interference import FROM, clear_optimum, lower_risk
 from explorer.reproduce.kinematics import closed_form, same_kinematics
-from explorer.reproduce.mode_paths import mode_paths
 from explorer.reproduce.search import search
-from explorer.reproduce.simplicity import cost, simplicity
-from explorer.reproduce.singularities import flat_tetrahedra
+from explorer.reproduce.singularities import flat_tetrahedra, mode_paths
 from explorer.reproduce.table_one import extents
 
 OUR_READING = (
@@ -165,23 +163,6 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
                 SIX_LEGS,
                 "explorer orientation --design paper-optimal --position 10 5 9",
                 orientations,
-            ),
-            Claim(
-                "simpler",
-                "It is simpler in structure than most other designs.",
-                "It is simpler in structure (it posses four legs) …",
-                "“Most other designs” are read as the 6-4 and an octahedral Stewart-Gough "
-                "platform.",
-                "explorer reproduce --claim simpler",
-                simplicity,
-            ),
-            Claim(
-                "cheaper",
-                "It is cheaper than most other designs.",
-                "… and consequently cheaper than most other designs.",
-                "",
-                "explorer reproduce --claim cheaper",
-                cost,
             ),
         )
     }

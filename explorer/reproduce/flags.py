@@ -13,8 +13,17 @@ from explorer.mechanism.kinematics import forward, inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, lengths_of
-from explorer.reproduce.claim import Measurement, below
-from explorer.reproduce.samples import PHI1, PHI2, PHI3, flatten, random_folds, random_poses
+from explorer.reproduce.claim import (
+    PHI1,
+    PHI2,
+    PHI3,
+    Measurement,
+    below,
+    flatten,
+    random_folds,
+    random_poses,
+)
+from explorer.singularity.bruhat import is_below
 from explorer.singularity.jacobian import jacobian
 from explorer.singularity.strata import STRATA, inversions, stratum
 from explorer.singularity.uncoupled import UNCOUPLED
@@ -48,7 +57,8 @@ def judge_strata(neighbours: Order, count: int) -> Measurement:
         neighbours: Strata of a pose and of a neighbour of it, as they were found.
         count: Number of poses with a neighbour.
     """
-    found, order = {w for w, _ in neighbours}, _order_by_covers()
+    found = {w for w, _ in neighbours}
+    order = {(w, other) for w in STRATA for other in STRATA if is_below(w, other)}
     outside, missing = len(neighbours - order), len(order - neighbours)
     counts = [sum(inversions(w) == k for w in STRATA) for k in range(7)]
     text = (
@@ -66,18 +76,6 @@ def judge_strata(neighbours: Order, count: int) -> Measurement:
         "confirmed" if is_so else "not confirmed",
         {"found": len(found), "by_dimension": counts, "outside": outside, "missing": missing},
     )
-
-
-def _order_by_covers() -> Order:
-    """Return the Bruhat order from its covers: exchanges that add exactly one inversion."""
-    above = {w: {w} for w in STRATA}
-    for w in sorted(STRATA, key=inversions, reverse=True):
-        for i, j in itertools.combinations(range(4), 2):
-            other = list(w)
-            other[i], other[j] = other[j], other[i]
-            if inversions(tuple(other)) == inversions(w) + 1:
-                above[w] |= above[tuple(other)]
-    return {(w, other) for w, others in above.items() for other in others}
 
 
 def uncoupled() -> Measurement:

@@ -12,8 +12,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import forward, inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.numerics.arrays import FloatArray, dot
-from explorer.reproduce.claim import Measurement, below
-from explorer.reproduce.samples import random_design, random_poses
+from explorer.reproduce.claim import Measurement, below, random_design, random_poses
 from explorer.reproduce.six_legs import six_four_twin
 
 DESIGNS, POSES, A2X = 6, 500, (5.0, 12.0, 26.0)

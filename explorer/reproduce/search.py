@@ -10,14 +10,14 @@ from explorer.measures.catalogue import measures_in
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.optimise.demands import Box
-from explorer.optimise.paper import (
+from explorer.optimise.defaults import (
     CLEARANCE,
     PAPER_VOLUME,
     paper_problem,
     paper_start,
     reach_problem,
 )
+from explorer.optimise.demands import Box
 from explorer.optimise.solver import optimise_design
 from explorer.reproduce.claim import Measurement, Values, below
 

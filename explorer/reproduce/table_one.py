@@ -12,7 +12,7 @@ import numpy as np
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.pose import Pose
+from explorer.optimise.problem import YAW, varied
 from explorer.reproduce.claim import Measurement
 from explorer.workspace.slices.volume import (
     NodeCount,
@@ -81,7 +81,7 @@ def extents() -> Measurement:
     ]
     optimal, initial = PRESETS["paper-optimal"], PRESETS["paper-initial"]
     by_yaw = {
-        yaw: (workspace_nodes(_turned(optimal, yaw)).count, _initial_off(initial, yaw))
+        yaw: (workspace_nodes(varied(optimal, {YAW: yaw})).count, _initial_off(initial, yaw))
         for yaw in YAWS
     }
     as_scanned = msgspec.structs.replace(initial, b3=15.0, home=initial.home_pose)
@@ -170,7 +170,7 @@ def _extent(nodes: NodeCount) -> Extent:
 
 def _initial_off(design: Design, yaw: float) -> float:
     """Return the largest difference of an extent at a yaw from that of the initial row."""
-    return Row("paper-initial", workspace_nodes(_turned(design, yaw)), 0.0).off
+    return Row("paper-initial", workspace_nodes(varied(design, {YAW: yaw})), 0.0).off
 
 
 def _lines(row: Row) -> list[str]:
@@ -187,10 +187,3 @@ def _lines(row: Row) -> list[str]:
     lines.append(f"{'node volume':16}{text:>22}{nodes.volume:>22.2f}")
     lines.append(f"{'exact volume':16}{'not printed':>22}{row.exact:>22.2f}")
     return lines
-
-
-def _turned(design: Design, yaw: float) -> Design:
-    home = design.home_pose
-    return msgspec.structs.replace(
-        design, home=Pose.of_yaw_pitch_roll(home.position, (yaw, 0.0, 0.0))
-    )

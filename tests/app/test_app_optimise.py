@@ -41,9 +41,9 @@ from explorer.app.features.optimise.panel import OptimisePanel
 from explorer.app.features.optimise.plots import curves_of, data_of
 from explorer.app.features.optimise.problem import (
     box_within,
-    liftable,
+    find_refusals,
+    liftable_limits,
     problem_of,
-    refuted,
     requested_box,
     requested_reach,
     requested_volume,
@@ -72,10 +72,9 @@ from explorer.errors import InputError
 from explorer.measures.size import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
+from explorer.optimise.defaults import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.paper import paper_problem, paper_start
-from explorer.optimise.problem import OBJECTIVES, YAW
-from explorer.optimise.refutation.lifting import SWING_LIMIT
+from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
 from explorer.optimise.search.trail import Trail
 from explorer.workspace.limits.constraints import GAP, constraints, slacks
 from explorer.workspace.slices.volume import workspace_volume
@@ -454,8 +453,8 @@ def test_default_demands_can_be_kept_by_every_preset(name: str, objective: Any) 
     machine = {key: getattr(MACHINE, key) for key in ("payload", "actuators", "struts")}
     design = msgspec.structs.replace(PRESETS[name], **machine)
     state = ask(OptimisationRequest(objective=objective), opened(design))
-    assert refuted(state) == ()
-    assert liftable(state) == ()
+    assert find_refusals(state) == ()
+    assert liftable_limits(state) == ()
     assert StartRun().apply(state).optimisation.is_on
 
 
@@ -476,21 +475,21 @@ def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
     design: Design, request_: OptimisationRequest, limit: str, title: str
 ) -> None:
     before = ask(request_, opened(design))
-    assert liftable(before) == (limit,)
+    assert liftable_limits(before) == (limit,)
     assert filled_buttons(before) == [LIFT]
     assert buttons_of(before)[START] == "disabled"
     assert f">{title}<" in result_words(before)
     assert LiftLimit(limit).title == title
     after = LiftLimit(limit).apply(before)
-    assert limit not in {refusal.limit for refusal in refuted(after)}
+    assert limit not in {refusal.limit for refusal in find_refusals(after)}
     assert after.design.home_pose == design.home_pose
 
 
 def test_paper_box_allows_the_search_and_keeps_the_home() -> None:
     before = ask(SMALL, opened(INITIAL))
     after = TakePaperBox().apply(before)
-    assert refuted(before) != ()
-    assert refuted(after) == ()
+    assert find_refusals(before) != ()
+    assert find_refusals(after) == ()
     assert after.design.home_pose == INITIAL.home_pose
 
 
@@ -500,8 +499,8 @@ def test_tilt_is_demanded_over_the_required_box() -> None:
     assert problem.demands.tilt == 20.0
     assert problem.demands.required_box == requested_box(state)
     state = SetRequest("optimisation.request.tilt", 95.0).apply(state)
-    (refutation,) = refuted(state)
-    assert "the tilt demanded must be below 90°" in refutation.message
+    (refusal,) = find_refusals(state)
+    assert "the tilt demanded must be below 90°" in refusal.message
 
 
 def test_limits_in_force_are_listed_and_no_others() -> None:

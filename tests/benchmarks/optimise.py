@@ -17,9 +17,9 @@ from benchmarks.table import Row, seconds, times
 from explorer.errors import DesignError
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import warm
-from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_problem, reach_problem
+from explorer.optimise.defaults import CLEARANCE, PAPER_VOLUME, paper_problem, reach_problem
 from explorer.optimise.problem import Problem
-from explorer.optimise.search.model import Evaluation, Model
+from explorer.optimise.search.model import Evaluation, Model, reported_objective
 from explorer.optimise.search.starts import more_starts
 from explorer.optimise.solver import optimise_design
 from explorer.reproduce.search import STARTS
@@ -74,7 +74,7 @@ class _Watched:
         except DesignError:
             return self.last
         if self.model.worst(self.last)[0] >= -MET:
-            self.best = min(self.best, self.model.reported(self.last))
+            self.best = min(self.best, reported_objective(self.model.problem, self.last.state))
         if self.best <= ENOUGH or self.model.evaluations >= MOST_EVALUATIONS:
             raise StopIteration
         return self.last

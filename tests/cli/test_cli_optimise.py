@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -71,10 +70,6 @@ def test_optimise_without_convergence_writes_no_design(cli: CommandLine, tmp_pat
     assert found["status"] == "infeasible"
     message = found["message"].replace(",", "")
     assert found["volume"] == pytest.approx(float(message.rsplit(" ", 1)[1]), rel=1e-3)
-    without = re.search(r"has ([0-9.]+) without its box\)", message)
-    assert without is not None
-    assert float(without[1]) >= 12_000.0
-    assert found["holding"] == "box"
     assert out.read_text() == "as it was"
     assert found["files"] == [str(kept)]
     assert load_record(kept).runs[0].status == "infeasible"
@@ -162,7 +157,7 @@ def test_optimise_refuses_a_box_where_no_load_is_held(
 
     monkeypatch.setattr("explorer.optimise.solver.optimise_design", never)
     refused = cli.refusal(*LOADED, "--box", "none", *argv, *box, status=1)
-    assert "no load is held at z = 0" in refused
+    assert "singular plane δ3 = 0, where no load is held" in refused
     found = cli.answer(*LOADED, "--box", "none", *argv, *box, status=1)
     assert (found["objective"], found["holding"]) == (
         None,

@@ -14,7 +14,7 @@ from report_page import read, table_of
 
 import explorer
 from explorer.mechanism.design_file import encode_design
-from explorer.optimise.paper import paper_problem
+from explorer.optimise.defaults import paper_problem
 from explorer.optimise.record import Settings, encode_record, record_of
 from explorer.optimise.solver import optimise_design
 

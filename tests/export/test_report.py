@@ -30,7 +30,7 @@ from explorer.export.report.markup import as_html, element, number
 from explorer.mechanism.design import JOINTS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.numerics.number_text import format_number
-from explorer.optimise.paper import paper_problem
+from explorer.optimise.defaults import paper_problem
 from explorer.optimise.record import Record, Settings, record_of
 from explorer.optimise.solver import optimise_design
 from explorer.prototype.assembly import make_prototype

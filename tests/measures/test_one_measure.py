@@ -26,8 +26,7 @@ from explorer.measures.catalogue import CATALOGUE, Measure, measures_in
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, encode_design
-from explorer.optimise.defaults import make_problem
-from explorer.optimise.paper import paper_start
+from explorer.optimise.defaults import make_problem, paper_start
 from explorer.optimise.problem import Problem
 from explorer.sweep.rows import evaluate
 from explorer.sweep.study import Study, decode_study, encode_study

@@ -39,8 +39,8 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.optimise.defaults import paper_problem, paper_start, reach_problem
 from explorer.optimise.demands import AZIMUTHS
-from explorer.optimise.paper import paper_problem, paper_start, reach_problem
 from explorer.optimise.problem import DISTANCES, ObjectiveName, distance_of
 from explorer.optimise.record import (
     Settings,

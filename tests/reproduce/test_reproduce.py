@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import claims_page
 import numpy as np
 import pytest
 from command_line import CommandLine
+from incidence import is_below
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
@@ -25,13 +26,16 @@ from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.reproduce import charts, comparison, flags, interference, kinematics, singularities
-from explorer.reproduce.claim import VERDICTS, Measurement, Result
+from explorer.reproduce.claim import Measurement, Result, Verdict, random_design, random_poses
 from explorer.reproduce.claims import CLAIMS, measure_claims
 from explorer.reproduce.interference import Interference
-from explorer.reproduce.mode_paths import Paths, conditions_at_crossings, judge_paths, random_paths
-from explorer.reproduce.samples import random_design, random_poses
+from explorer.reproduce.singularities import (
+    Paths,
+    conditions_at_crossings,
+    judge_paths,
+    random_paths,
+)
 from explorer.reproduce.six_legs import SixLegs, octahedral, six_four_twin
-from explorer.singularity.bruhat import is_below
 from explorer.singularity.strata import STRATA
 from explorer.singularity.uncoupled import UNCOUPLED
 from explorer.workspace.accessible.radii import with_radius
@@ -56,7 +60,8 @@ def test_manual_and_report_have_each_claim_as_it_is_measured(results: dict[str, 
     manual = read_page("claims.md")
     listed = json.loads(packaged_file("claims", "claims.json").read_text("utf-8"))
     for result in results.values():
-        row, section = claims_page.page([result]).removeprefix(claims_page.HEAD).split("\n", 1)
+        text = claims_page.page([result]).removeprefix(claims_page.HEAD)
+        row, section = text.removesuffix(claims_page.TAIL).split("\n", 1)
         assert row in manual
         assert section in manual
         assert json.loads(claims_page.data([result]))[0] in listed
@@ -70,7 +75,7 @@ def test_manual_and_report_are_made_of_all_claims_and_conditions_stand_where_nee
     assert claims_page.data(measured) == listed
     for result in measured:
         measurement = result.measurement
-        assert measurement.verdict in VERDICTS
+        assert measurement.verdict in get_args(Verdict)
         assert bool(measurement.condition) == (measurement.verdict == "confirmed within")
 
 

@@ -26,6 +26,19 @@ reading* is how the explorer reads what the paper leaves open. `--claim NAME` me
 | claim | verdict |
 |---|---|
 """
+TAIL = """\
+
+## Simpler and cheaper
+
+> It is simpler in structure (it posses four legs) and consequently cheaper than most other designs.
+
+`explorer reproduce` leaves this claim out. The 4-4 has 4 legs, 11 moving bodies and 14 joints; its
+6-4 twin and an octahedral Stewart-Gough platform have 6 legs, 13 bodies and 18 joints. No two
+joints of the 4-4 share a centre, as they do in 4 and 6 points of the others, but its legs 2 and 3
+bear bending, and robots with three legs, two actuators in each, have fewer parts still. The cost
+cannot be tested: the paper prints no parts list, material, tolerance or price, neither of its
+prototype nor of another design.
+"""
 
 
 def verdict_of(result: Result) -> str:
@@ -52,7 +65,7 @@ def page(results: list[Result]) -> str:
             parts.append(f"\n```sh\n{own}\n```\n\n```text\n{table}\n```\n")
         if claim.command != own or not measurement.table:
             parts.append(f"\n```sh\n{claim.command}\n```\n")
-    return "".join(parts)
+    return "".join([*parts, TAIL])
 
 
 def data(results: list[Result]) -> str:

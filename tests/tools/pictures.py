@@ -51,7 +51,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.folds import pose_of_folds
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.typical import typical_machine
-from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_start
+from explorer.optimise.defaults import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.sweep.results import load_results
 from explorer.sweep.run import run_study
 from explorer.sweep.study import STUDIES, Sampling

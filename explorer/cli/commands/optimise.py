@@ -154,9 +154,6 @@ class Optimise(JsonOptions, DesignOptions):
     repeat: Annotated[Path | None, FILE] = None
     """Record whose problem to solve again, instead of one given by options."""
 
-    findings: Flag = False
-    """Measure the claim search of `explorer reproduce` instead: our optima beside the paper's."""
-
     def run(self) -> None:
         """Write the outcome of the search.
 
@@ -164,13 +161,6 @@ class Optimise(JsonOptions, DesignOptions):
             PartialAnswerError: The search did not converge, and the best iterate has been
                 written; or a file could not be written.
         """
-        if self.findings:
-            from explorer.cli.commands.reproduce import claim_lines
-            from explorer.reproduce.claims import measure_claims
-
-            (result,) = measure_claims(["search"])
-            self.write(lambda: dict(result.measurement.values), lambda: claim_lines(result))
-            return
         from explorer.files.writing import check_writable
 
         record = self.record
@@ -225,7 +215,7 @@ class Optimise(JsonOptions, DesignOptions):
         design = self._loaded(self.read_design())
         if self.box is None:
             return design
-        from explorer.optimise.refutation.refutation import with_box
+        from explorer.optimise.problem import with_box
 
         return with_box(design, _as_box(self.box) if self.box else None)
 
@@ -249,14 +239,13 @@ class Optimise(JsonOptions, DesignOptions):
             NoAnswerError: No design within the bounds meets the demands; the message says what
                 would help.
         """
-        from explorer.optimise.refutation.lifting import BOX_LIMIT
-        from explorer.optimise.refutation.refutation import paper_box, refutations, words_of
+        from explorer.optimise.conflicts import BOX_LIMIT, find_conflicts, paper_box
 
-        refuted = refutations(problem)
-        if not refuted:
+        conflicts = find_conflicts(problem)
+        if not conflicts:
             return
-        message = words_of(refuted)
-        if self.repeat is None and any(reason.limit == BOX_LIMIT for reason in refuted):
+        message = "; ".join(conflict.message for conflict in conflicts)
+        if self.repeat is None and any(conflict.limit == BOX_LIMIT for conflict in conflicts):
             advice = "lift the box with --box none"
             box = paper_box(problem)
             if box is not None:
@@ -264,7 +253,7 @@ class Optimise(JsonOptions, DesignOptions):
                 advice += f", or take the paper's with --box {corners}"
             message += f": {advice}"
         if self.json:
-            write_json(infeasible_json(problem, refuted[0].limit, message))
+            write_json(infeasible_json(problem, conflicts[0].limit, message))
         raise NoAnswerError(message)
 
     def _files(

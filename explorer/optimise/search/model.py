@@ -17,7 +17,7 @@ from explorer.errors import DesignError
 from explorer.measures.size import box_margins
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.optimise.problem import OF_THE_MACHINE, OVER_BOX, Problem
-from explorer.optimise.search.demands.clearances import ClearanceDemand
+from explorer.optimise.search.demands.clearances import ClearanceDemand, first_positions
 from explorer.optimise.search.demands.geometry import (
     MET,
     BoxDemand,
@@ -27,15 +27,14 @@ from explorer.optimise.search.demands.geometry import (
     MarginDemand,
     ReachDemand,
     VolumeDemand,
+    tilt_demands,
 )
 from explorer.optimise.search.demands.loads import (
     CAUSES,
     DisplacementDemand,
     LoadDemand,
 )
-from explorer.optimise.search.demands.tilts import tilt_demands
-from explorer.optimise.search.starts import first_positions
-from explorer.optimise.search.state import State, scales
+from explorer.optimise.search.state import UNBOUNDED, State, scaled_bounds, scales
 
 MISSED = 1e3
 """Value of an objective that is not finite or of no design; with a minus, of such a demand."""
@@ -129,14 +128,8 @@ class Model:
     @cached_property
     def bounds(self) -> FloatArray:
         """Lows and highs of the scaled variables, shape (n, 2)."""
-        problem = self.problem
-        pairs = [
-            (variable.low / scale, variable.high / scale)
-            for variable, scale in zip(problem.variables, self.scales, strict=True)
-        ]
-        if self.raises_worst:
-            pairs.append((-np.inf, np.inf))
-        return np.array(pairs)
+        bounds = scaled_bounds(self.problem)
+        return np.vstack([bounds, UNBOUNDED]) if self.raises_worst else bounds
 
     def add_positions(self, positions: FloatArray) -> None:
         """Demand clearance at more positions, shape (k, 3)."""
@@ -196,9 +189,8 @@ class Model:
                 value, gradient = state.longest_leg
                 return value / self.problem.size, gradient / self.problem.size
             case "largest-volume":
-                root = (state.volume / self._volume) ** (1.0 / 3.0)
-                slope = root / (3.0 * state.volume) if state.volume > 0.0 else 0.0
-                return -root, -slope * state.volume_gradient
+                root, gradient = state.volume_root(self._volume)
+                return -root, -gradient
             case "largest-margin" | "smallest-load" | "smallest-error" | "smallest-deflection":
                 slope = np.zeros(len(u))
                 slope[-1] = -1.0
@@ -225,10 +217,6 @@ class Model:
             return spare, name
         least, pair = self._clearance.worst(at.state)
         return (spare, name) if spare <= max(least, -MET) else (least, pair)
-
-    def reported(self, at: Evaluation) -> float:
-        """Return the objective in its own unit, see `reported_objective`."""
-        return reported_objective(self.problem, at.state)
 
 
 def reported_objective(problem: Problem, state: State) -> float:

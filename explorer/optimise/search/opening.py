@@ -16,22 +16,19 @@ from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import Problem
 from explorer.optimise.search.demands.geometry import DegenerateDemand, GapDemand
 from explorer.optimise.search.sqp import slsqp
-from explorer.optimise.search.state import State, scales
+from explorer.optimise.search.state import UNBOUNDED, State, scaled_bounds
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace
 
 # Number of positions on each axis among which the search begins at the least broken one.
 SEARCHED = 13
+# Radius of the ball in an open workspace, over the edge of a cube of the demanded volume or over
+# the size of the start.
+ROOM = 0.1
 # Cost of moving the position, relative to that of changing the design.
 COST_OF_PLACE = 0.01
 MOST_ITERATIONS = 60
 # Value of each limit where no design exists.
 NO_DESIGN = -1e3
-
-
-def room(problem: Problem) -> float:
-    """Return the radius of the ball that an open workspace holds at least."""
-    volume = problem.demands.volume
-    return 0.1 * (volume ** (1.0 / 3.0) if volume is not None else problem.size)
 
 
 def open_workspace(
@@ -45,7 +42,8 @@ def open_workspace(
         see: Called with each iterate and the limit that it breaks most; may raise.
     """
     here, size, n = State(problem, start), problem.size, len(start)
-    radius = room(problem)
+    volume = problem.demands.volume
+    radius = ROOM * (size if volume is None else volume ** (1.0 / 3.0))
     sides: list[DegenerateDemand | GapDemand] = []
     if problem.demands.least > 0.0:
         sides.append(DegenerateDemand(problem.demands.least, here))
@@ -92,15 +90,11 @@ def open_workspace(
         see(State(problem, x[:n]), labels[int(slacks(x)[0].argmin())])
         return costs * (x - first)
 
-    bounds = [
-        (variable.low / unit, variable.high / unit)
-        for variable, unit in zip(problem.variables, scales(problem), strict=True)
-    ]
     end = slsqp(
         lambda x: 0.5 * float(costs @ (x - first) ** 2),
         slope,
         first,
-        np.array([*bounds, *[(-np.inf, np.inf)] * 3]),
+        np.vstack([scaled_bounds(problem), [UNBOUNDED] * 3]),
         [("ineq", lambda x: slacks(x)[0], lambda x: slacks(x)[1])],
         most=MOST_ITERATIONS,
         precision=1e-8,

@@ -16,26 +16,26 @@ import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
-from explorer.optimise.outcome import Iterate, Phase, Run
+from explorer.numerics.number_text import format_ascii, format_number
+from explorer.optimise.curves import CALLED
+from explorer.optimise.outcome import Iterate, Phase, Run, Status
 from explorer.optimise.problem import OVER_BOX, Problem
-from explorer.optimise.refutation.binding import BindingLimit, find_binding_limit
-from explorer.optimise.search.attempt import Attempt, default_message
-from explorer.optimise.search.crossings import crossings
 from explorer.optimise.search.demands.geometry import MET
-from explorer.optimise.search.elsewhere import promising_starts
 from explorer.optimise.search.feasible import nearest_feasible
-from explorer.optimise.search.model import Evaluation, Model
+from explorer.optimise.search.model import Evaluation, Model, reported_objective
 from explorer.optimise.search.opening import open_workspace
 from explorer.optimise.search.optimality import optimality
 from explorer.optimise.search.sqp import Stop, solve
+from explorer.optimise.search.starts import promising_starts
 from explorer.optimise.search.state import State, scales
 from explorer.optimise.search.trail import Trail
+from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.slices.volume import find_emptying_limits
 
 # Largest F = |1 − V/V′| of a matched volume.
@@ -60,6 +60,15 @@ BETWEEN, ANYWHERE = 0.1, 0.001
 ENDED = ("converged", "outdone", "cancelled")
 # Objectives that differ by less than this share are the same.
 SAME = 1e-6
+
+
+class Attempt(NamedTuple):
+    """Result of one attempt."""
+
+    status: Status
+    holding: str
+    message: str
+    best: Iterate
 
 
 class Search:
@@ -102,7 +111,6 @@ class Search:
         chosen = min(attempts, key=self._rank)
         if self.trail.is_cancelled:
             chosen = chosen._replace(status="cancelled", holding="", message="")
-        limit = self._binding_limit(chosen)
         return Run(
             start=self.start,
             status=chosen.status,
@@ -110,8 +118,8 @@ class Search:
             iterations=self.steps,
             evaluations=self.evaluations,
             attempts=len(attempts),
-            holding=chosen.holding if limit is None else limit.limit,
-            message=self._message(chosen, limit),
+            holding=chosen.holding,
+            message=self._message(chosen),
         )
 
     def _attempts(self) -> Iterator[Attempt]:
@@ -127,31 +135,14 @@ class Search:
     def _rank(self, attempt: Attempt) -> tuple[bool, tuple[bool, float, float]]:
         return attempt.status != "converged", self.trail.rank(attempt.best)
 
-    def _binding_limit(self, chosen: Attempt) -> BindingLimit | None:
-        """Return the limit that alone keeps a search from the volume demanded, if one does."""
-        missed = self._missed_volume(chosen)
-        return None if missed is None else find_binding_limit(chosen.best.design, missed)
-
-    def _missed_volume(self, chosen: Attempt) -> float | None:
-        """Return the demanded volume if designs were enlarged towards it in vain."""
-        demanded = self.problem.demands.volume
-        if chosen.status != "infeasible" or demanded is None:
-            return None
-        return demanded if 0.0 < self.largest_volume < demanded else None
-
-    def _message(self, chosen: Attempt, limit: BindingLimit | None) -> str:
-        missed = self._missed_volume(chosen)
-        if missed is not None:
-            without = ""
-            if limit is not None:
-                best = format_number(limit.volume, 6)
-                without = f" (the best so far has {best} without its {limit.limit})"
+    def _message(self, chosen: Attempt) -> str:
+        demanded, largest = self.problem.demands.volume or 0.0, self.largest_volume
+        if chosen.status == "infeasible" and 0.0 < largest < demanded:
             return (
-                f"no design within the bounds was found with a volume of "
-                f"{format_number(missed, 6)}{without}; the largest found is "
-                f"{format_number(self.largest_volume, 6)}"
+                "no design within the bounds was found with a volume of "
+                f"{format_number(demanded, 6)}; the largest found is {format_number(largest, 6)}"
             )
-        return chosen.message or default_message(self.problem, chosen, self.steps)
+        return chosen.message or _default_message(self.problem, chosen, self.steps)
 
     def _attempt(self, values: Sequence[float], *, is_relaxed: bool = False) -> Attempt:
         """Search from some values of the variables.
@@ -268,7 +259,7 @@ class Search:
     def _meets(self, model: Model, at: Evaluation) -> bool:
         most = MATCHED if self.problem.objective == "match-volume" else math.inf
         # An infinite objective is no optimum.
-        if not model.reported(at) < most:
+        if not reported_objective(self.problem, at.state) < most:
             return False
         return model.worst(at)[0] >= 0.0 and at.state.volume > at.state.measured.error
 
@@ -335,14 +326,15 @@ class Search:
         demands, state = self.problem.demands, at.state.read_back()
         if demands.clearance is None:
             return np.zeros((0, 3))
-        return crossings(
+        least = least_clearances(
             state.design,
             state.rotation,
-            demands.clearance,
-            demands.clearance_margin,
-            ANYWHERE if model.is_relaxed else BETWEEN,
-            self.trail.before_each,
+            (ANYWHERE if model.is_relaxed else BETWEEN) * demands.clearance,
+            below=demands.clearance,
+            margin=demands.clearance_margin,
+            before_each=self.trail.before_each,
         )
+        return least.position[least.clearance < demands.clearance]
 
     def _verdict(
         self, model: Model, at: Evaluation, missed: FloatArray, *, is_done: bool
@@ -375,6 +367,30 @@ class Search:
             words = f"the workspace of the best design found is empty because of {because}"
             return Attempt("infeasible", because, words, best)
         return Attempt("stalled", holding, "", best)
+
+
+def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
+    """Return the message of a run."""
+    name = CALLED[problem.objective]
+    # F compares numbers of unit size.
+    size = 1.0 if problem.objective == "match-volume" else 0.0
+    objective = attempt.best.objective
+    value = "infinite" if objective is None else format_ascii(objective, 6, size=size)
+    end = f"{name} = {value} after {steps} iterations"
+    held = f", held by {attempt.holding}" if attempt.holding else ""
+    match attempt.status:
+        case "converged":
+            return f"converged: {end}{held}"
+        case "infeasible":
+            return f"no design was found that meets all demands: {end}{held}"
+        case "not converged":
+            return f"not converged: {end}{held}; allow more iterations or start elsewhere"
+        case "stalled":
+            return f"stalled: {end}{held}; try several starts"
+        case "outdone":
+            return f"no better than an earlier start, even without the clearance: {end}"
+        case "cancelled":
+            return f"cancelled: {end}"
 
 
 def _coordinates(p: FloatArray) -> str:

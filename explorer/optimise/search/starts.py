@@ -1,25 +1,20 @@
-"""The beginnings of searches: designs out of a low-discrepancy sequence, positions on a grid."""
+"""The designs that searches start from, out of a low-discrepancy sequence."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from explorer.errors import DesignError, InputError
-from explorer.measures.size import longest_leg
-from explorer.mechanism.design import Design
-from explorer.mechanism.margins import margins
-from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import DISTANCES, Problem, distance_of
+from explorer.optimise.search.model import Model
 
-# Number of first positions on each axis at which clearance is demanded; more follow where needed.
-IN_SPACE, IN_SURFACE = 7, 21
-# Margins with a smaller slope along z than this take a given value at no height.
-STEEP = 1e-3
 # Designs tried for each start, before the bounds are taken to allow no more.
 TRIES = 64
 MOST_STARTS = 10_000
+# Number of designs compared by what they miss.
+CANDIDATES = 64
 
 
 def check_starts(starts: int) -> None:
@@ -58,35 +53,23 @@ def more_starts(problem: Problem, count: int, seed: int) -> Iterator[tuple[float
                 return
 
 
-def first_positions(problem: Problem, design: Design) -> FloatArray:
-    """Return the positions at which clearance is demanded at first, shape (k, 3).
+def promising_starts(
+    problem: Problem, seed: int, before_each: Callable[[], None]
+) -> Iterator[tuple[float, ...]]:
+    """Yield values of the variables that miss the demands by little, the best first.
 
-    They fill the box, or without one the cube of the design's reach. They lie closer in the
-    surface on which a margin is the least one at which clearance is demanded: with a level platform
-    the legs of a column of positions come nearest at its foot.
+    Args:
+        problem: The problem.
+        seed: Seed of the sequence that the values are taken from.
+        before_each: Called before each evaluation; may raise.
     """
-    if problem.demands.clearance is None:
-        return np.zeros((0, 3))
-    reach = longest_leg(design)
-    lows, highs = design.limits.box or ((-reach,) * 3, (reach,) * 3)
-
-    def grid(*counts: int) -> FloatArray:
-        shares = np.indices(counts).reshape(len(counts), -1).T / (np.array(counts) - 1.0)
-        start, end = np.array(lows)[: len(counts)], np.array(highs)[: len(counts)]
-        return start + (end - start) * shares
-
-    rotation, least = design.home_pose.rotation, problem.demands.clearance_margin
-    columns = grid(IN_SURFACE, IN_SURFACE)
-    foot = np.column_stack([columns, np.zeros(len(columns))])
-    # Margins are linear in z: δ = δ at the foot + rise · z.
-    at_foot = margins(foot, rotation)
-    rise = margins(np.array([0.0, 0.0, 1.0]), rotation)
-    groups = [grid(IN_SPACE, IN_SPACE, IN_SPACE)]
-    for index in np.flatnonzero(np.abs(rise) > STEEP):
-        for side in (-1.0, 1.0):
-            height = (side * least - at_foot[:, index]) / rise[index]
-            groups.append(np.column_stack([columns, height]))
-    positions = np.vstack(groups)
-    within = (positions >= np.array(lows)).all(axis=1) & (positions <= np.array(highs)).all(axis=1)
-    clear = (np.abs(margins(positions, rotation)) >= least * (1.0 - 1e-9)).all(axis=1)
-    return positions[within & clear]
+    candidates = list(more_starts(problem, CANDIDATES, seed))
+    missed: list[float] = []
+    for values in candidates:
+        model = Model(problem, values, before_each)
+        at = model.at(model.start)
+        missed.append(
+            float(np.abs(at.values[model.equalities]).sum()) - min(0.0, model.worst(at)[0])
+        )
+    for index in np.argsort(missed):
+        yield candidates[index]

@@ -31,6 +31,9 @@ from explorer.workspace.limits.constraints import (
 )
 from explorer.workspace.slices.volume import Volume, workspace_volume
 
+UNBOUNDED = (-np.inf, np.inf)
+"""Bounds of a scaled variable that has none."""
+
 Chain = Mapping[str, FloatArray]
 """By parameter of a workspace: its derivatives by the n scaled variables, shape (n,)."""
 
@@ -38,6 +41,12 @@ Chain = Mapping[str, FloatArray]
 def scales(problem: Problem) -> FloatArray:
     """Return the size of one unit of each scaled variable, shape (n,)."""
     return np.array([math.degrees(1.0) if name == YAW else problem.size for name in problem.names])
+
+
+def scaled_bounds(problem: Problem) -> FloatArray:
+    """Return the lows and highs of the scaled variables, shape (n, 2)."""
+    pairs = np.array([(variable.low, variable.high) for variable in problem.variables])
+    return pairs / scales(problem)[:, None]
 
 
 class State:
@@ -106,10 +115,11 @@ class State:
         """The exact volume of the workspace."""
         return self.measured.volume
 
-    @cached_property
-    def volume_gradient(self) -> FloatArray:
-        """The derivatives of the volume by the scaled variables, shape (n,)."""
-        return self.along(self.measured.gradient)
+    def volume_root(self, unit: float) -> tuple[float, FloatArray]:
+        """Return the cube root of the volume over a unit, and its derivatives, shape (n,)."""
+        root = (self.volume / unit) ** (1.0 / 3.0)
+        slope = root / (3.0 * self.volume) if self.volume > 0.0 else 0.0
+        return root, slope * self.along(self.measured.gradient)
 
     @cached_property
     def chain(self) -> Chain:

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import msgspec
 
-from explorer.app.features.optimise.problem import problem_of, refuted
+from explorer.app.features.optimise.problem import find_refusals, problem_of
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Open, Set, check_free, moved
 from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
@@ -23,14 +23,13 @@ from explorer.app.storage.library import LONGEST_NAME
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
+from explorer.optimise.conflicts import PAPER_BOX, without_limit
+from explorer.optimise.defaults import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_start
-from explorer.optimise.problem import YAW
-from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT, lift
-from explorer.optimise.refutation.refutation import PAPER_BOX, with_box, words_of
-from explorer.workspace.limits.constraints import GAP
+from explorer.optimise.problem import MAXIMA, SWING_LIMIT, YAW, with_box
 
 SUFFIX = "-optimised"
+LIMIT_NAMES = {SWING_LIMIT: "bounds of the swing", "margin": "least margin"}
 
 
 @dataclass(frozen=True)
@@ -68,9 +67,9 @@ class StartRun(Action):
         optimisation = state.optimisation
         if optimisation.is_on:
             return state
-        impossible = refuted(state)
+        impossible = find_refusals(state)
         if impossible:
-            raise NoAnswerError(words_of(impossible))
+            raise NoAnswerError("; ".join(refusal.message for refusal in impossible))
         last = optimisation.run
         # A result that is not accepted is not yet a design of the user.
         own = last.own if last is not None and last.is_undecided else state
@@ -110,7 +109,7 @@ class LiftLimit(Action):
     """Take a limit out of the design, or tie maximum lengths to the reach.
 
     Attributes:
-        limit: Name of the limit, see `explorer.optimise.refutation.lifting.lift`.
+        limit: Name of the limit, see `explorer.optimise.conflicts.without_limit`.
     """
 
     template: ClassVar[str] = "{action.title}"
@@ -125,8 +124,7 @@ class LiftLimit(Action):
         name, _, end = self.limit.partition(" ")
         if end == "maximum":
             return f"Tie the maximum of {name} to the reach"
-        words = {SWING_LIMIT: "bounds of the swing", "margin": "least margin", GAP: "gap"}
-        return f"Lift the {words.get(self.limit, f'minimum of {name}' if end else name)}"
+        return f"Lift the {LIMIT_NAMES.get(name, name)}"
 
     def apply(self, state: State) -> State:
         """Return the next state.
@@ -135,7 +133,7 @@ class LiftLimit(Action):
             InputError: the design is being optimised, or has no such limit.
         """
         check_free(state)
-        design = lift(state.design, self.limit)
+        design = without_limit(state.design, self.limit)
         if design is None:
             raise InputError(f"the design has no limit named {self.limit!r} to lift")
         return replace(state, design=design)

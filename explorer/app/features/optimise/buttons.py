@@ -20,7 +20,7 @@ from explorer.app.features.optimise.actions import (
     TakePaperBox,
     TakePaperProblem,
 )
-from explorer.app.features.optimise.problem import box_on_offer, liftable, refuted
+from explorer.app.features.optimise.problem import box_on_offer, find_refusals, liftable_limits
 from explorer.app.features.workspace.files import WorkspaceFiles
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
@@ -75,14 +75,14 @@ def _has_result(state: State) -> bool:
 
 
 def _lift(state: State, value: str) -> Action:
-    return LiftLimit(value or next(iter(liftable(state)), ""))
+    return LiftLimit(value or next(iter(liftable_limits(state)), ""))
 
 
 BUTTONS: Mapping[str, Button] = {
     START: Button(
         "Optimise",
         "Search for the best design from the present one; its limits hold throughout.",
-        lambda state: _is_idle(state) and not refuted(state),
+        lambda state: _is_idle(state) and not find_refusals(state),
         lambda _, __: StartRun(),
         (Key("O"),),
     ),
@@ -116,7 +116,7 @@ BUTTONS: Mapping[str, Button] = {
     LIFT: Button(
         "Lift the limit",
         "Take the limit that prevents the search out of the design; one undo brings it back.",
-        lambda state: bool(liftable(state)),
+        lambda state: bool(liftable_limits(state)),
         _lift,
     ),
     HULL: Button(

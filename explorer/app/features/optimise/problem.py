@@ -11,23 +11,25 @@ import numpy as np
 from explorer.app.state.optimisation import PLACE, OptimisationRequest
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
-from explorer.measures.case import Case
 from explorer.measures.size import longest_leg
-from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Swing
+from explorer.mechanism.design import VARIABLES, Design
+from explorer.optimise.conflicts import (
+    BOX_LIMIT,
+    Conflict,
+    find_conflicts,
+    paper_box,
+    without_limit,
+)
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.demands import Box
 from explorer.optimise.problem import (
     SHIFTS,
     YAW,
     Problem,
+    StartError,
 )
-from explorer.optimise.refutation.lifting import BOX_LIMIT, MAXIMA, SWING_LIMIT, lift
-from explorer.optimise.refutation.refutation import Refutation, paper_box, refutations
 from explorer.workspace.limits.constraints import Never, constraints
 from explorer.workspace.slices.volume import workspace_volume
-
-NO_LOAD, NO_ERRORS, RIGID = "no load", "no errors", "rigid"
-"""What a design may lack for the demands; they stand for the limit of a refusal."""
 
 # Default volume to match, as a multiple of the present volume.
 MORE = 1.1
@@ -97,68 +99,44 @@ def _problem(design: Design, base: Design, request: OptimisationRequest) -> Prob
     return msgspec.structs.replace(problem, variables=variables)
 
 
-def refuted(state: State) -> tuple[Refutation, ...]:
+def find_refusals(state: State) -> tuple[Conflict, ...]:
     """Return why no search can start: demands that the limits rule out, or no problem at all."""
-    return _refuted(state.design, state.base, state.optimisation.request)
+    return _find_refusals(state.design, state.base, state.optimisation.request)
 
 
 @lru_cache(maxsize=16)
-def _refuted(design: Design, base: Design, request: OptimisationRequest) -> tuple[Refutation, ...]:
+def _find_refusals(
+    design: Design, base: Design, request: OptimisationRequest
+) -> tuple[Conflict, ...]:
     try:
         problem = _problem(design, base, request)
+    except StartError as error:
+        return (Conflict(error.limit, str(error)),)
     except ExplorerError as error:
-        return (Refutation(_limit_against_problem(design, request), str(error)),)
-    return refutations(problem)
+        return (Conflict("", str(error)),)
+    return find_conflicts(problem)
 
 
-def _limit_against_problem(design: Design, request: OptimisationRequest) -> str:
-    """Return the limit or lack because of which values make no problem, "" if it is none."""
-    limits, case = design.limits, Case(design)
-    needs_load = request.held or request.objective == "smallest-load"
-    if needs_load and not (case.is_loaded and case.is_limited):
-        return NO_LOAD
-    if (request.error or request.objective == "smallest-error") and not case.has_errors:
-        return NO_ERRORS
-    bends = request.deflection > 0.0 or request.objective == "smallest-deflection"
-    if bends and not case.is_loaded:
-        return NO_LOAD
-    if bends and not case.is_elastic:
-        return RIGID
-    if limits.swing != Swing():
-        return SWING_LIMIT
-    has_fixed = any(getattr(limits, name)[1] is not None for name in LENGTHS)
-    return MAXIMA if request.objective == "smallest-reach" and has_fixed else ""
-
-
-def liftable(state: State) -> tuple[str, ...]:
-    """Return the limits that can be lifted of those that prevent a search or held the last one."""
+def liftable_limits(state: State) -> tuple[str, ...]:
+    """Return the limits that prevent a search and can be lifted, one press for each."""
     if state.optimisation.is_on:
         return ()
-    refusals = refuted(state)
+    refusals = find_refusals(state)
     found: list[str] = []
-    for limit in dict.fromkeys([refusal.limit for refusal in refusals] + _holding(state)):
-        lifted = lift(state.design, limit)
+    for limit in dict.fromkeys(refusal.limit for refusal in refusals):
+        lifted = without_limit(state.design, limit)
         if lifted is None:
             continue
-        after = _refuted(lifted, state.base, state.optimisation.request)
+        after = _find_refusals(lifted, state.base, state.optimisation.request)
         messages = {refusal.message for refusal in refusals if refusal.limit == limit}
         if all(left.limit != limit and left.message not in messages for left in after):
             found.append(limit)
     return tuple(found)
 
 
-def _holding(state: State) -> list[str]:
-    """Return the limit that kept the last search from all demands, if it is still in force."""
-    run = state.optimisation.run
-    if run is None or run.accepted or run.verdict is None or run.verdict.status != "infeasible":
-        return []
-    is_same = run.problem.start.limits == state.design.limits
-    return [run.verdict.holding] if is_same else []
-
-
 def box_on_offer(state: State) -> Box | None:
     """Return the box of the paper's optimum in place of one that is too small, if it may do."""
-    if BOX_LIMIT not in liftable(state):
+    if BOX_LIMIT not in liftable_limits(state):
         return None
     box = _box_on_offer(state.design, state.base, state.optimisation.request)
     return None if box == state.design.limits.box else box
@@ -166,15 +144,7 @@ def box_on_offer(state: State) -> Box | None:
 
 @lru_cache(maxsize=8)
 def _box_on_offer(design: Design, base: Design, request: OptimisationRequest) -> Box | None:
-    problem = _problem_or_none(design, base, request)
-    return None if problem is None else paper_box(problem)
-
-
-def _problem_or_none(design: Design, base: Design, request: OptimisationRequest) -> Problem | None:
-    try:
-        return _problem(design, base, request)
-    except ExplorerError:
-        return None
+    return paper_box(_problem(design, base, request))
 
 
 @lru_cache(maxsize=8)

@@ -23,12 +23,9 @@ from explorer.app.features.optimise.buttons import (
 )
 from explorer.app.features.optimise.limits import limits_table
 from explorer.app.features.optimise.problem import (
-    NO_ERRORS,
-    NO_LOAD,
-    RIGID,
     box_on_offer,
-    liftable,
-    refuted,
+    find_refusals,
+    liftable_limits,
 )
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import Run, State
@@ -51,11 +48,18 @@ from explorer.measures.clearance import CERTAIN
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
 from explorer.numerics.number_text import format_decimals
+from explorer.optimise.conflicts import Conflict
 from explorer.optimise.curves import CALLED, GOALS
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.problem import YAW, Problem
-from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT
-from explorer.optimise.refutation.refutation import Refutation
+from explorer.optimise.problem import (
+    MAXIMA,
+    NO_ERRORS,
+    NO_LOAD,
+    RIGID,
+    SWING_LIMIT,
+    YAW,
+    Problem,
+)
 
 TITLES = {
     "converged": "Converged",
@@ -147,7 +151,7 @@ def result_words(state: State) -> str:
     run = state.optimisation.run
     if state.optimisation.is_on:
         return _running(state)
-    refusals, limits = refuted(state), liftable(state)
+    refusals, limits = find_refusals(state), liftable_limits(state)
     remedies = _remedies(state, limits)
     is_success = run is not None and run.is_undecided and run.has_converged
     verdict = "" if run is None or run.verdict is None else verdict_words(state, run, run.verdict)
@@ -191,7 +195,7 @@ def _remedies(state: State, limits: Sequence[str]) -> str:
     return "".join(lifts)
 
 
-def refused_words(refusals: Sequence[Refutation], limits: Sequence[str] = ()) -> str:
+def refused_words(refusals: Sequence[Conflict], limits: Sequence[str] = ()) -> str:
     """Return why no search can start, as HTML.
 
     Args:

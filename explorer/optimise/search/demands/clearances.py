@@ -4,7 +4,7 @@ At each of many fixed positions the pair must keep its clearance, or the positio
 outside the workspace or nearer to a singular plane than where clearance is demanded. That
 "or" is a smooth maximum, "at each" a smooth minimum, both by Kreisselmeier and Steinhauser
 (1979) and both from below: where the bound is not negative, every position satisfies it.
-`explorer.optimise.search.crossings` searches between the positions afterwards.
+A search looks between the positions afterwards.
 """
 
 from __future__ import annotations
@@ -14,12 +14,20 @@ import math
 import numpy as np
 
 from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes, pair_rows, radii_of_pairs
+from explorer.measures.size import longest_leg
 from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import Design
+from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
+from explorer.optimise.problem import Problem
 from explorer.optimise.search.demands.geometry import Measured
 from explorer.optimise.search.state import State
 from explorer.workspace.limits.constraints import YAW, BallOrCylinder, HalfSpace
 
+# Number of first positions on each axis at which clearance is demanded; more follow where needed.
+IN_SPACE, IN_SURFACE = 7, 21
+# Margins with a smaller slope along z than this take a given value at no height.
+STEEP = 1e-3
 # Sharpness of the smooth extremes, per demanded clearance.
 SHARPNESS = 60.0
 # Positions of less weight than this in a smooth minimum add nothing to its gradient.
@@ -30,6 +38,40 @@ FAR = 1e3
 # Parameters that move the ends of legs while p stays, and the legs of each pair from 0.
 PARAMETERS = ("a3x", "a3y", "b1x", "b1y", "b2", "b3", YAW)
 LEGS = np.array(PAIRS) - 1
+
+
+def first_positions(problem: Problem, design: Design) -> FloatArray:
+    """Return the positions at which clearance is demanded at first, shape (k, 3).
+
+    They fill the box, or without one the cube of the design's reach. They lie closer in the
+    surface on which a margin is the least one at which clearance is demanded: with a level platform
+    the legs of a column of positions come nearest at its foot.
+    """
+    if problem.demands.clearance is None:
+        return np.zeros((0, 3))
+    reach = longest_leg(design)
+    lows, highs = design.limits.box or ((-reach,) * 3, (reach,) * 3)
+
+    def grid(*counts: int) -> FloatArray:
+        shares = np.indices(counts).reshape(len(counts), -1).T / (np.array(counts) - 1.0)
+        start, end = np.array(lows)[: len(counts)], np.array(highs)[: len(counts)]
+        return start + (end - start) * shares
+
+    rotation, least = design.home_pose.rotation, problem.demands.clearance_margin
+    columns = grid(IN_SURFACE, IN_SURFACE)
+    foot = np.column_stack([columns, np.zeros(len(columns))])
+    # Margins are linear in z: δ = δ at the foot + rise · z.
+    at_foot = margins(foot, rotation)
+    rise = margins(np.array([0.0, 0.0, 1.0]), rotation)
+    groups = [grid(IN_SPACE, IN_SPACE, IN_SPACE)]
+    for index in np.flatnonzero(np.abs(rise) > STEEP):
+        for side in (-1.0, 1.0):
+            height = (side * least - at_foot[:, index]) / rise[index]
+            groups.append(np.column_stack([columns, height]))
+    positions = np.vstack(groups)
+    within = (positions >= np.array(lows)).all(axis=1) & (positions <= np.array(highs)).all(axis=1)
+    clear = (np.abs(margins(positions, rotation)) >= least * (1.0 - 1e-9)).all(axis=1)
+    return positions[within & clear]
 
 
 class ClearanceDemand:

@@ -13,9 +13,10 @@ import numpy as np
 from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.size import box_margins, corners_of
 from explorer.mechanism.margins import margins
+from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.numerics.arrays import BoolArray, FloatArray, lengths_of
-from explorer.optimise.demands import Box
-from explorer.optimise.problem import SHIFTS
+from explorer.optimise.demands import AZIMUTHS, Box
+from explorer.optimise.problem import DISTANCES, SHIFTS, distance_of
 from explorer.optimise.search.state import State
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.equilibrium import SINGULAR
@@ -81,10 +82,8 @@ class VolumeDemand:
 
     def measure(self, state: State) -> Measured:
         """Return (V / V′)^⅓ − 1."""
-        share = state.volume / self.volume
-        root = share ** (1.0 / 3.0)
-        slope = root / (3.0 * state.volume) if state.volume > 0.0 else 0.0
-        return Measured(np.array([root - 1.0]), slope * state.volume_gradient[None, :])
+        root, gradient = state.volume_root(self.volume)
+        return Measured(np.array([root - 1.0]), gradient[None, :])
 
 
 class ReachDemand:
@@ -127,8 +126,7 @@ class DegenerateDemand:
 
 
 def _distances(state: State) -> FloatArray:
-    design = state.design
-    return np.array([design.a3[1], design.b1[1], design.b3 - design.b2])
+    return np.array([distance_of(state.design, name) for name in DISTANCES])
 
 
 class GapDemand:
@@ -245,6 +243,43 @@ def _slack_outside(
         by_u = (np.array([*normal, -1.0]) @ state.motion(limit))[None, :]
         by_p = -normal[None, :]
     return slack, by_u, by_p
+
+
+class TiltDemand:
+    """The required box within the workspace of one tilted orientation.
+
+    The azimuths turn with the yaw of home, so that a change of the yaw turns every orientation
+    about the base's z-axis, and its limits have the derivatives that they have at home.
+
+    Args:
+        start: The problem where a run starts.
+        azimuth: Azimuth of the tilt from home's yaw, in degrees.
+        tilt: The tilt, in degrees.
+    """
+
+    is_equality = False
+    is_limit = True
+
+    def __init__(self, start: State, azimuth: float, tilt: float) -> None:
+        self.turn: FloatArray = rotation_from_tilt_torsion((azimuth, tilt, 0.0))
+        tilted = start.turned(self.turn)
+        self.box, self.gap = BoxDemand(tilted), GapDemand(start)
+        where = f", tilted by {tilt:g}° towards {azimuth:g}° from home's yaw"
+        self.names = tuple(f"{name}{where}" for name in (*self.box.names, *self.gap.names))
+
+    def measure(self, state: State) -> Measured:
+        """Return the slacks of the box and of the gap of the carriages."""
+        tilted = state.turned(self.turn)
+        box, gap = self.box.measure(tilted), self.gap.measure(tilted)
+        return Measured(
+            np.concatenate([box.values, gap.values]), np.vstack([box.gradients, gap.gradients])
+        )
+
+
+def tilt_demands(start: State, tilt: float) -> list[TiltDemand]:
+    """Return the demands of a tilt in every azimuth of `AZIMUTHS`."""
+    azimuths = np.linspace(0.0, 360.0, AZIMUTHS, endpoint=False)
+    return [TiltDemand(start, azimuth, tilt) for azimuth in azimuths.tolist()]
 
 
 class MarginDemand:

@@ -17,30 +17,26 @@ from typing import Literal
 import numpy as np
 
 from explorer.measures.statics import BoxStatics
-from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import JOINTS, VARIABLES
+from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.optimise.problem import SHIFTS, ObjectiveName
 from explorer.optimise.search.demands.geometry import MarginDemand, Measured
 from explorer.optimise.search.state import State
-from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.load_slopes import (
-    ACTUATOR_OF,
     BENDING,
     deflection_slopes,
     error_slopes,
     share_slopes,
 )
-from explorer.statics.reactions import part_limits
+from explorer.statics.reactions import LIMITED, part_limits
 from explorer.statics.slopes import twist_slopes
-from explorer.statics.weights import payload_wrench
 from explorer.workspace.limits.constraints import YAW
 
 CHAIN = (*VARIABLES, YAW, *SHIFTS)
 """The parameters of the chain rule that are those of `twist_slopes`, in their order."""
 
-PARTS = (*JOINTS, "bending 2", "bending 3", "guide force 2", "guide force 3")
+PARTS = LIMITED[:10]
 """The loaded parts; the moment on the guide is the bending of the strut."""
 
 EIGHTHS = 8
@@ -122,27 +118,15 @@ class LoadDemand:
         box, counts = state.statics, self.side.keeps(state, state.statics.positions)
         if not counts.any():
             return _miss_beyond_plane(state, self.side, len(self.names))
-        twists = np.where(counts[:, None, None], _twists(box), 0.0)
-        shares = self._shares(state, twists, box)
-        parts = np.flatnonzero(self.counts)
+        shares, parts = box.node_shares[:, : len(PARTS)].copy(), np.flatnonzero(self.counts)
+        # The guide takes the bending of the struts as a moment, which may be closer to its limit.
+        shares[:, BENDING] = np.maximum(shares[:, BENDING], box.node_shares[:, len(PARTS) :])
         worst = _worst_nodes(box, shares[:, parts], counts).T.ravel()
         part = np.repeat(parts, EIGHTHS)
         nodes, row = np.unique(worst, return_inverse=True)
         slopes = twist_slopes(state.design, box.positions[nodes], state.rotation)
         share, by = share_slopes(state.design, state.rotation, slopes, (row, part), self.limits)
         return Measured(spare_of(share), _spare_slope(share)[:, None] * by @ state.rows(CHAIN))
-
-    def _shares(self, state: State, twists: FloatArray, box: BoxStatics) -> FloatArray:
-        """Return the shares of the limits at the nodes, shape (n, 10)."""
-        design = state.design
-        forces = -np.einsum("nki,k->ni", twists, payload_wrench(design, state.rotation))
-        spread = design.payload.force_n * np.linalg.norm(twists[:, :3], axis=1)
-        highs, lows = self.limits
-        lever = np.ones((len(twists), len(PARTS)))
-        lever[:, BENDING] = box.strut_lengths
-        up = (forces + spread)[:, ACTUATOR_OF] * lever / highs
-        down = (spread - forces)[:, ACTUATOR_OF] * lever / lows
-        return np.asarray(np.maximum(up, down))
 
 
 class DisplacementDemand:
@@ -212,10 +196,3 @@ def _scale_of(start: State, values: Callable[[BoxStatics], FloatArray]) -> float
 
 def _displacements(box: BoxStatics, cause: Cause) -> FloatArray:
     return box.errors.displacement if cause == "error" else box.deflections
-
-
-def _twists(box: BoxStatics) -> FloatArray:
-    design = box.design
-    return twists_of_actuators(
-        Configuration(design, box.positions, box.rotation, design.tool.position)
-    )

@@ -1,4 +1,4 @@
-"""What limits cannot give is known before a search: no design within the bounds proves it wrong."""
+"""Conflicts of demands with limits: no design within the bounds shows that one is none."""
 
 from __future__ import annotations
 
@@ -11,24 +11,23 @@ import pytest
 from limited_designs import limited
 
 from explorer import InputError, workspace_volume
-from explorer.measures.clearance import CERTAIN, clearance_beyond
-from explorer.mechanism.design import Design, DesignError, Limits
+from explorer.measures.size import corners_of
+from explorer.mechanism.design import JOINTS, Design, DesignError, Limits
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose
-from explorer.optimise.defaults import make_problem
-from explorer.optimise.problem import Problem, Variable
-from explorer.optimise.refutation.most_volume import (
+from explorer.numerics.arrays import FloatArray
+from explorer.optimise.conflicts import (
     LONGEST_LEG,
-    ceilings,
-)
-from explorer.optimise.refutation.ranges import Ranges
-from explorer.optimise.refutation.refutation import (
     PAPER_BOX,
+    Intervals,
+    find_conflicts,
+    needed_lengths,
     paper_box,
-    refutations,
-    with_box,
-    words_of,
+    volume_bounds,
 )
+from explorer.optimise.defaults import make_problem
+from explorer.optimise.problem import Problem, Variable, with_box
 from explorer.optimise.search.model import Model
 from explorer.optimise.search.trail import MET
 from explorer.optimise.solver import optimise_design
@@ -62,7 +61,6 @@ def random_problem(rng: np.random.Generator) -> Problem:
         gap=maybe(float(rng.uniform(0.0, 4.0))) or 0.0,
         box=maybe(box((9.0, 3.0, 7.0), 14.0), 0.6),
         margin=maybe(float(rng.choice([0.0, 1.0, 4.0])), 0.8),
-        leg_radii=(0.1, 0.2, 0.3, 0.0),
     )
     start = msgspec.structs.replace(OPTIMAL, limits=limits, home=home)
     names = ["a3x", "a3y", "b1x", "b1y", "b2", "b3"]
@@ -80,7 +78,6 @@ def random_problem(rng: np.random.Generator) -> Problem:
         "match-volume" if free or rng.random() < 0.7 else "largest-margin",
         volume=float(10.0 ** rng.uniform(1.5, 4.3)),
         reach=maybe(float(rng.uniform(12.0, 30.0))),
-        clearance=maybe(float(rng.uniform(0.05, 3.0))),
         least=0.1,
         stroke_ratio=maybe(float(rng.uniform(1.5, 4.0)), 0.2),
         required_box=required,
@@ -100,52 +97,61 @@ def random_designs(rng: np.random.Generator, problem: Problem) -> list[tuple[flo
 
 def meets(problem: Problem, values: tuple[float, ...]) -> bool:
     """Whether a design meets all demands, by the optimiser's own measure of them."""
-    demands = problem.demands
     model = Model(problem, values)
     at = model.at(model.start)
     if np.abs(at.values[model.equalities]).max(initial=0.0) > MET:
         return False
-    if not (at.state.volume > 0.0 and model.worst(at)[0] >= -MET):
-        return False
-    # The optimiser measures clearances at some positions first, and in between at its end.
-    clearance, _ = clearance_beyond(at.state.design, demands.clearance_margin)
-    wanted = demands.clearance or 0.0
-    return clearance is None or clearance >= wanted - CERTAIN * at.state.design.reach
+    return at.state.volume > 0.0 and model.worst(at)[0] >= -MET
+
+
+def corner_joints(problem: Problem, values: tuple[float, ...]) -> dict[str, FloatArray]:
+    """Return the joints at the corners of the required box by their names, shape (8,) each."""
+    design = problem.design_at(values)
+    corners = corners_of(problem.required_box_at(values))
+    joints = inverse(design, corners, design.home_pose.rotation)
+    return dict(zip(JOINTS, joints.T, strict=True))
 
 
 @pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.long)])
-def test_refutations_of_random_problems_are_never_contradicted(count: int) -> None:
+def test_conflicts_of_random_problems_are_never_contradicted(count: int) -> None:
     rng = np.random.default_rng(15)
-    refuted, nearest = Counter[str](), 0.0
+    limits, nearest = Counter[str](), 0.0
     for _ in range(count):
         try:
             problem = random_problem(rng)
         except InputError:
             continue
-        found = refutations(problem)
-        refuted.update(each.limit for each in found)
-        bounds = list(ceilings(Ranges(problem)))
+        limits.update(limits_of(problem))
+        intervals = Intervals(problem)
+        bounds = list(volume_bounds(intervals))
         demanded = problem.demands.reach
         for values in random_designs(rng, problem):
             try:
                 design = problem.design_at(values)
             except DesignError:
                 continue
-            is_long = demanded is not None and problem.objective == "match-volume"
+            volume = workspace_volume(design, explain=False).volume
             reach = dict(zip(problem.names, values, strict=True)).get("reach", design.reach)
-            if not (is_long and demanded is not None and reach > demanded):
-                volume = workspace_volume(design, explain=False).volume
-                for bound in bounds:
-                    assert volume <= bound.volume * (1.0 + 1e-9), (problem, values, bound)
-                    nearest = max(nearest, volume / bound.volume if bound.volume else 0.0)
+            # The bounds are those of a problem whose demand of a reach is met.
+            if demanded is None or reach <= demanded:
+                for limit, _, most in bounds:
+                    assert volume <= most * (1.0 + 1e-8), (problem, values, limit)
+                    nearest = max(nearest, volume / most if most else 0.0)
             # A volume is matched by none of them: any would do that the limits leave room for.
-            larger = replace_volume(problem, workspace_volume(design, explain=False).volume)
-            if larger is not None and refutations(larger):
-                assert not meets(larger, values), (larger, values, refutations(larger))
+            larger = replace_volume(problem, volume)
+            if larger is not None and find_conflicts(larger):
+                assert not meets(larger, values), (larger, values, find_conflicts(larger))
+            required = problem.demands.required_box
+            if required is not None:
+                joints = corner_joints(problem, values)
+                for name, needed in needed_lengths(intervals, required).items():
+                    assert joints[name].max() >= needed * (1.0 - 1e-9), (problem, values, name)
+                low, high = intervals.apart
+                assert low - 1e-9 <= (joints["d3"] - joints["d1"])[0] <= high + 1e-9
     # The bounds are worth something, and of many problems every kind of limit has its turn.
     assert nearest > 0.9
-    kinds = {"box", LONGEST_LEG, "l1 maximum", "guide", "required box", "margin", "gap |d1 − d3|"}
-    assert len(kinds & {*refuted}) >= (len(kinds) if count == 100 else 3)
+    kinds = {"box", LONGEST_LEG, "l1 maximum", "guide", "margin", "gap |d1 − d3|"}
+    assert len(kinds & {*limits}) >= (len(kinds) if count == 100 else 3)
 
 
 def replace_volume(problem: Problem, volume: float) -> Problem | None:
@@ -160,15 +166,16 @@ def paper_problem(start: Design = INITIAL, volume: float = 8000.0, **demands: An
 
 
 def limits_of(problem: Problem) -> list[str]:
-    return [each.limit for each in refutations(problem)]
+    return [each.limit for each in find_conflicts(problem)]
+
+
+def words_of(problem: Problem) -> str:
+    return "; ".join(each.message for each in find_conflicts(problem))
 
 
 def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> None:
     problem = paper_problem(clearance=0.2)
-    assert (
-        words_of(refutations(problem))
-        == "the box holds at most 2,499 of the 8,000 units³ asked for"
-    )
+    assert words_of(problem) == "the box holds at most 2,499 of the 8,000 units³ asked for"
     assert paper_box(problem) == PAPER_BOX == OPTIMAL.limits.box
     outcome = optimise_design(paper_problem(with_box(INITIAL, PAPER_BOX), clearance=0.2))
     assert outcome.converged
@@ -176,45 +183,57 @@ def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> No
     # Of what the paper's box does not hold either nobody is told to take it.
     assert paper_box(paper_problem(volume=12_300.0)) is None
     assert paper_box(paper_problem(volume=12_200.0)) == PAPER_BOX
-    assert refutations(paper_problem(volume=2400.0)) == ()
-    assert refutations(paper_problem(OPTIMAL)) == ()
+    assert find_conflicts(paper_problem(volume=2400.0)) == ()
+    assert find_conflicts(paper_problem(OPTIMAL)) == ()
 
 
 @pytest.mark.parametrize(
     ("limits", "demands", "words"),
     [
-        ({}, {"reach": 14.0}, "a longest leg of at most 14 units leaves room for at most 5,747"),
-        ({"l1": (0.0, 12.0)}, {}, "l1 of at most 12 units leaves room for at most 3,619"),
+        ({}, {"reach": 14.0}, "the longest leg of 14 units leaves room for at most 5,747"),
+        ({"l1": (0.0, 12.0)}, {}, "the l1 maximum of 12 units leaves room for at most 3,619"),
         (
             {"guide": (0.0, 5.0), "box": None},
             {"reach": 25.0},
             "a guide from 0 to 5 units leaves room for at most 4,909 of the 8,000 units³ asked for",
         ),
-        ({"guide": (0.0, 5.0)}, {}, "the box holds at most 6,473 of the 8,000 units³ asked for"),
-        ({"margin": 9.0}, {}, "the box holds at most 5,844 of the 8,000 units³ asked for, wh"),
-        ({"gap": 30.0}, {}, "the carriages are at most 11.15 units apart within the b"),
-        ({}, {"clearance": 12.0}, "legs 2 and 3 keep at most 11.15 of the clearance of 12"),
+        (
+            {"gap": 30.0},
+            {},
+            "the carriages are at most 11.15 units apart, and the gap is to be 30 units",
+        ),
+        (
+            {"l4": (0.0, 12.0)},
+            {"reach": 10.0, "volume": 500.0},
+            "the longest leg is at least 12 units, and 10 units are asked for",
+        ),
         (
             {},
             {"required_box": ((8.0, 3.0, 7.0), (12.0, 7.0, 19.0))},
-            "the required box lies beyond the box along z: from 7 to 19 units, and the box fr",
+            "along z the required box from 7 to 19 units lies beyond the box from 0 to 18 units",
+        ),
+        (
+            {"l4": (0.0, 12.0), "box": None},
+            {"required_box": ((0.0, 0.0, 7.0), (30.0, 7.0, 9.0)), "volume": 500.0},
+            "the required box needs l4 up to 17.84 units, and the l4 maximum is 12 units",
         ),
         (
             {"box": None},
             {"required_box": ((8.0, 3.0, -7.0), (12.0, 7.0, 9.0))},
-            "a margin of at most −7 units on the home's side, and the limits demand 0 units",
+            "the margin over the required box is at most −7 units, and the limits demand 0 units",
         ),
     ],
 )
-def test_refutation_names_the_limit_and_the_most_that_it_allows(
+def test_conflict_names_the_limit_and_the_most_that_it_allows(
     limits: dict[str, Any], demands: dict[str, Any], words: str
 ) -> None:
-    assert words in words_of(refutations(paper_problem(limited(OPTIMAL, **limits), **demands)))
+    assert words in words_of(paper_problem(limited(OPTIMAL, **limits), **demands))
 
 
-def test_free_yaw_refutes_nothing_that_another_yaw_gives() -> None:
-    # The margins of a tilted platform turn with it: those of one yaw cut off most of the box.
+def test_free_yaw_leaves_what_another_yaw_allows() -> None:
+    # The margins of a tilted platform turn with it: at one yaw the box is beyond them.
     tilted = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-73.0, 60.0, 0.0))
     start = msgspec.structs.replace(limited(OPTIMAL, margin=7.0), home=tilted)
-    assert "box" in limits_of(paper_problem(start, 5000.0))
-    assert limits_of(paper_problem(start, 5000.0, free=("yaw",))) == []
+    box = ((8.0, 3.0, 7.0), (12.0, 7.0, 11.0))
+    assert limits_of(paper_problem(start, 5000.0, required_box=box)) == ["margin"]
+    assert limits_of(paper_problem(start, 5000.0, required_box=box, free=("yaw",))) == []

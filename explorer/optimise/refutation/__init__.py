@@ -1,1 +1,0 @@
-"""Demands that limits make impossible, known before a search."""
