@@ -10,6 +10,7 @@ were evaluated.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,8 +25,8 @@ from explorer.legs.move_bounds import least_rows
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple, checked_rotation
-from explorer.mechanism.tool_point import tool_offset
-from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array
+from explorer.mechanism.tool_point import one_tool, tool_offset
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, batch_shape, finite_array
 
 # Tolerances as shares of the reach, or of the longest travel of a leg's end if that is longer.
 DEFAULT_TOLERANCE = 1e-6
@@ -96,6 +97,65 @@ class MoveClearance:
         return not self.overlaps.any()
 
 
+@dataclass(frozen=True)
+class StraightMoves:
+    """Straight moves: a point of the platform goes along a line while the platform turns evenly.
+
+    Attributes:
+        start: That point at the start, in the base frame, shape (n, 3), in design units.
+        step: Its displacement, shape (n, 3).
+        rotation: Platform to base at the start, shape (n, 3, 3).
+        turn: Rotation vector of the whole turn along the axes of the base, shape (n, 3).
+        tool: The point in the platform frame, shape (3,).
+    """
+
+    start: FloatArray
+    step: FloatArray
+    rotation: FloatArray
+    turn: FloatArray
+    tool: FloatArray
+
+    @staticmethod
+    def between(
+        p: FloatArray, r: FloatArray, q: FloatArray, s: FloatArray, tool: ArrayLike | None = None
+    ) -> StraightMoves:
+        """Return the moves from poses to others, the shorter way round.
+
+        Args:
+            p: b4 at the start, shape (n, 3), in design units.
+            r: Platform to base at the start, shape (n, 3, 3).
+            q: b4 at the end, shape (n, 3).
+            s: Platform to base at the end, shape (n, 3, 3).
+            tool: Point that moves straight in the platform frame, shape (3,), in design units; None
+                for b4.
+
+        Raises:
+            InputError: The tool is not finite.
+        """
+        point = one_tool(tool)
+        start = p + tool_offset(r, point)
+        turn = Rotation.from_matrix(s @ np.swapaxes(r, -1, -2)).as_rotvec()
+        return StraightMoves(start, q + tool_offset(s, point) - start, r, turn, point)
+
+    @staticmethod
+    def along(poses: Sequence[Pose], tool: ArrayLike | None = None) -> StraightMoves:
+        """Return the moves of a path, given by its corners."""
+        p, r = np.array([e.position for e in poses]), np.array([e.rotation for e in poses])
+        return StraightMoves.between(p[:-1], r[:-1], p[1:], r[1:], tool)
+
+    def poses(self, number: IntArray, share: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return positions of b4, shape (..., 3), and rotations, (..., 3, 3), at shares of moves.
+
+        Args:
+            number: Numbers of the moves, shape (...).
+            share: Shares of them, from 0 to 1, shape (...).
+        """
+        turn = Rotation.from_rotvec(share[..., None] * self.turn[number])
+        rotation = turn.as_matrix() @ self.rotation[number]
+        at = self.start[number] + share[..., None] * self.step[number]
+        return at - tool_offset(rotation, self.tool), rotation
+
+
 def poses_between(
     start: Pose, end: Pose, shares: ArrayLike, tool: ArrayLike | None = None
 ) -> tuple[FloatArray, FloatArray]:
@@ -114,14 +174,8 @@ def poses_between(
     Raises:
         InputError: Shares or the tool are not finite.
     """
-    share = finite_array("shares of the move", shares, ())[..., None]
-    first, last = np.array(start.position), np.array(end.position)
-    turn = Rotation.from_matrix(end.rotation @ start.rotation.T).as_rotvec()
-    rotations = Rotation.from_rotvec(share * turn).as_matrix() @ start.rotation
-    if tool is None:
-        return first + share * (last - first), rotations
-    first, last = first + tool_offset(start.rotation, tool), last + tool_offset(end.rotation, tool)
-    return first + share * (last - first) - tool_offset(rotations, tool), rotations
+    share = finite_array("shares of the move", shares, ())
+    return StraightMoves.along((start, end), tool).poses(np.zeros(share.shape, np.int64), share)
 
 
 def move_clearances(
@@ -283,25 +337,19 @@ class _Moves:
         )
         r, s = map(checked_rotation, arrays[1::2])
         batch = batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
-        start, end = (np.broadcast_to(x, (*batch, 3)).reshape(-1, 3) for x in (p, q))
-        first, last = (np.broadcast_to(x, (*batch, 3, 3)).reshape(-1, 3, 3) for x in (r, s))
-        turn = Rotation.from_matrix(last @ np.swapaxes(first, -1, -2)).as_rotvec()
-        angle = np.linalg.norm(turn, axis=-1)
-        axis = turn / np.where(angle > 0.0, angle, 1.0)[:, None]
-        points = design.platform_points
-        if tool is not None:
-            points = points - finite_array("tool", tool, (3,))
-            start, end = start + tool_offset(first, tool), end + tool_offset(last, tool)
-        arms = points @ np.swapaxes(first, -1, -2)
+        p, q = (np.broadcast_to(x, (*batch, 3)).reshape(-1, 3) for x in (p, q))
+        r, s = (np.broadcast_to(x, (*batch, 3, 3)).reshape(-1, 3, 3) for x in (r, s))
+        moves = StraightMoves.between(p, r, q, s, tool)
+        angle = np.linalg.norm(moves.turn, axis=-1)
+        axis = moves.turn / np.where(angle > 0.0, angle, 1.0)[:, None]
+        arms = (design.platform_points - moves.tool) @ np.swapaxes(r, -1, -2)
         fixed = (arms @ axis[:, :, None]) * axis[:, None, :]
         up = np.cross(axis[:, None, :], arms)
         across = np.where(angle[:, None, None] > 0.0, arms - fixed, 0.0)
         parts = np.stack([arms - across, across, up], axis=2)
-        step = end - start
-        travel = np.linalg.norm(step, axis=-1) + angle * np.linalg.norm(across, axis=-1).max(
-            axis=-1
-        )
-        return _Moves(batch, start.copy(), step, np.asarray(angle), parts, np.asarray(travel))
+        swing = angle * np.linalg.norm(across, axis=-1).max(axis=-1)
+        travel = np.linalg.norm(moves.step, axis=-1) + swing
+        return _Moves(batch, moves.start, moves.step, np.asarray(angle), parts, np.asarray(travel))
 
     def tolerance(self, design: Design, requested: float | None) -> FloatArray:
         """Return the tolerance of each move, shape (n,).

@@ -1,92 +1,83 @@
-"""The load along a path: the largest share of a limit that it uses, and where.
+"""The load along a path: the largest share of a limit at samples, and a bound of all between them.
 
-Besides the load act the payload's weight and its force of any direction. The largest share of
-each straight move is found with a proof, see `explorer.paths.move_shares`.
+A sample is in the middle of an interval of a straight move. In the axes of the platform the force
+f_j of joint j acts at a fixed point, and within the interval it turns by ν_j at most. By virtual
+work that asks |v_ij| ν_j f_j of actuator i at most, where v_ij is the velocity of the point at a
+unit rate of actuator i. Where m = max_i Σ_j |v_ij| ν_j is below 1, no pose of the interval is
+singular, and all that is asked changes the forces by at most 1 / (1 − m) times as much. Intervals
+are halved until the bounds are near the largest share.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.legs.moves import poses_between
+from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import BoolArray, FloatArray, finite_array, for_kernel
-from explorer.paths.crossings import SAMPLES, PathMargins, path_margins
-from explorer.paths.move_shares import (
-    BOUND,
-    CARRIAGE,
-    COLUMNS,
-    CYLINDER,
-    CYLINDER_MOMENT,
-    END,
-    FIRST_MOMENT,
-    FORCE,
-    GRAVITY,
-    LEG,
-    LEGS,
-    LIMITS,
-    LOAD,
-    PLACE,
-    POINT,
-    ROD,
-    ROD_MOMENT,
-    SHARE,
-    WEIGHT,
-    share_rows_of_moves,
+from explorer.numerics.arrays import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    finite_array,
+    lengths_of,
+    rotate,
 )
-from explorer.statics.reactions import limit_shares, part_limits, reactions
+from explorer.paths.crossings import PathMargins, path_margins
+from explorer.statics.equilibrium import twists_of_actuators
+from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS
+from explorer.statics.reactions import LIMITED, Reactions, limit_shares, reactions
 from explorer.statics.weights import Weights, design_weights
 
-# Largest error of the largest share, over that share if it exceeds 1.
-TOLERANCE = 1e-6
-# Number of rows for each move, on which compiling depends; a row of this kernel takes long.
-ROWS_OF_MOVE = 256
-
-
-class LargestShare(NamedTuple):
-    """The largest share of a limit over a path.
-
-    Attributes:
-        share: The share, of which 1 is the limit; infinite if the path is singular somewhere.
-        bound: Upper bound of the share over the whole path, at most a millionth above it, or a
-            millionth of it if it exceeds 1; infinite where no bound was found near a singular pose.
-        place: Number of the move plus the share of it where the share is largest.
-        part: Index in `LIMITED` of the part with this share; None without a limit or load, and if
-            the path is singular.
-    """
-
-    share: float
-    bound: float
-    place: float
-    part: int | None
+# Difference of bound and largest share, over that share, at which halving ends; and rounding.
+TOLERANCE, ROUNDING = 0.02, 1e-9
+# Samples within a move at first, and the most samples of all moves.
+FIRST_SAMPLES, MOST_SAMPLES = 16, 20_000
+# The joints along legs 1 to 4, by `JOINTS`.
+LEGS = [0, 2, 4, 5]
 
 
 @dataclass(frozen=True)
 class PathLoads:
-    """The shares of the limits that a load uses over a path.
+    """The shares of the limits that a load uses over a path, at samples.
 
     Attributes:
-        poses: Corners of the path.
-        at: Place of the samples: number of the move plus the share of it, shape (n,).
+        at: Place of the samples: number of the move plus the share of it, ascending, shape (n,).
         shares: Shares of the samples in the order of `LIMITED`, shape (n, 12); infinite in a
             singular pose.
-        largest: The largest share over the path.
+        bound: Upper bound of the shares over the whole path; infinite if the path is singular, or
+            so nearly that none was found.
     """
 
-    poses: tuple[Pose, ...]
     at: FloatArray
     shares: FloatArray
-    largest: LargestShare
+    bound: float
+
+    @property
+    def share(self) -> float:
+        """The largest share of the samples, of which 1 is the limit."""
+        return float(self.shares.max())
+
+    @property
+    def place(self) -> float:
+        """Where the largest share is: number of the move plus the share of it."""
+        return float(self.at[self.shares.max(axis=1).argmax()])
+
+    @property
+    def part(self) -> int | None:
+        """Index in `LIMITED` of the part with the largest share.
+
+        It is None without a limit or load, and if the path is singular.
+        """
+        part = int(self.shares.max(axis=0).argmax())
+        return part if 0.0 < self.share < math.inf else None
 
 
 @dataclass(frozen=True)
@@ -97,32 +88,21 @@ class DemandedLoad:
         design: The manipulator.
         load: (F; M) at the tool point of the design, shape (6,), in N and N × unit.
         weights: All masses, the payload's included.
-        row: Numbers of the kernel.
-        tool: Point that moves straight in the platform frame, shape (3,), in design units.
     """
 
     design: Design
     load: FloatArray
     weights: Weights
-    row: FloatArray
-    tool: FloatArray
 
     @staticmethod
-    def of(
-        design: Design,
-        load: ArrayLike,
-        weights: Weights | None = None,
-        tool: ArrayLike | None = None,
-    ) -> DemandedLoad:
+    def of(design: Design, load: ArrayLike, weights: Weights | None = None) -> DemandedLoad:
         """Return a load on a design.
 
         Arguments and errors are those of `path_loads`.
         """
         checked = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
-        point = np.zeros(3) if tool is None else finite_array("tool", tool, (3,))
         masses = design_weights(design) if weights is None else weights
-        row = _row(design, checked, masses)
-        return DemandedLoad(design, checked, masses, row, for_kernel(point))
+        return DemandedLoad(design, checked, masses)
 
     def shares(self, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
         """Return the shares of the limits in poses, shape (..., 12), in the order of `LIMITED`.
@@ -131,86 +111,124 @@ class DemandedLoad:
             position: b4 in the base frame, shape (..., 3), in design units.
             rotation: Platform to base, shape (..., 3, 3).
         """
-        poses = Configuration(self.design, position, rotation, self.design.tool.position)
-        return limit_shares(self.design, reactions(poses, self.load, self.weights))
+        return limit_shares(
+            self.design, self._reactions(Configuration(self.design, position, rotation))
+        )
 
-    def holds_along(
-        self,
-        start: FloatArray,
-        start_rotation: FloatArray,
-        end: FloatArray,
-        end_rotation: FloatArray,
-    ) -> BoolArray:
-        """Return whether the load is held all along straight moves, shape (n,).
+    def holds_along(self, moves: StraightMoves) -> BoolArray:
+        """Return whether the load is held along moves, shape (m,).
 
-        True is a proof that no share exceeds 1 by more than `TOLERANCE`, to rounding.
+        True says that no sample exceeds a limit, and that no pose between exceeds it by more than
+        `TOLERANCE` of it.
+        """
+        return np.asarray(self._sample(moves, only_holds=True)[2] <= 1.0 + TOLERANCE)
+
+    def over(self, path: PathMargins, tool: ArrayLike | None = None) -> PathLoads:
+        """Return the shares over a path of a tool, given with its crossings."""
+        at, shares, bounds = self._sample(StraightMoves.along(path.poses, tool))
+        for crossing in path.crossings:
+            at = np.append(at, crossing.move + crossing.share)
+            shares = np.append(shares, np.full((1, len(LIMITED)), np.inf), axis=0)
+        order = np.argsort(at, kind="stable")
+        bound = math.inf if path.crossings else float(bounds.max())
+        return PathLoads(at[order], shares[order], bound)
+
+    def _sample(
+        self, moves: StraightMoves, *, only_holds: bool = False
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return places (n,), shares of the limits (n, 12), and bounds of them over the moves (m,).
+
+        With `only_holds` halving of a move ends once it is certain whether it holds the load, and
+        the bound of a move that does not is infinite.
+        """
+        count = len(moves.step)
+        best, bounds = np.zeros(count), np.zeros(count)
+        # The ends of moves are samples too, of intervals without a length.
+        number = np.repeat(np.arange(count), FIRST_SAMPLES + 2)
+        middles, half = (np.arange(FIRST_SAMPLES) + 0.5) / FIRST_SAMPLES, 0.5 / FIRST_SAMPLES
+        share: FloatArray = np.tile([0.0, *middles, 1.0], count)
+        half = np.tile([0.0, *[half] * FIRST_SAMPLES, 0.0], count)
+        found: list[tuple[FloatArray, FloatArray]] = []
+        left = MOST_SAMPLES
+        while True:
+            shares, bound = self._bound(moves, number, share, half)
+            found.append((number + share, shares))
+            np.maximum.at(best, number, shares.max(axis=1))
+            is_loose = bound > (1.0 + TOLERANCE) * (1.0 if only_holds else best.max())
+            if only_holds:
+                bounds[best > 1.0 + ROUNDING] = np.inf
+                is_loose &= bounds[number] < np.inf
+            left -= len(number)
+            if 2 * np.count_nonzero(is_loose) > left:
+                is_loose[:] = False
+            np.maximum.at(bounds, number[~is_loose], bound[~is_loose])
+            if not is_loose.any():
+                places, samples = map(np.concatenate, zip(*found, strict=True))
+                return places, samples, bounds
+            number, half = np.repeat(number[is_loose], 2), np.repeat(0.5 * half[is_loose], 2)
+            share = np.repeat(share[is_loose], 2) + half * np.tile([-1.0, 1.0], len(half) // 2)
+
+    def _bound(
+        self, moves: StraightMoves, number: IntArray, share: FloatArray, half: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the shares of the limits in the middle of intervals, (n, 12), and bounds, (n,).
 
         Args:
-            start: b4 at the start, shape (n, 3), in design units.
-            start_rotation: Platform to base, shape (n, 3, 3).
-            end: b4 at the end, shape (n, 3), in design units.
-            end_rotation: Platform to base at the end, shape (n, 3, 3).
+            moves: The moves.
+            number: Number of the move of each interval, shape (n,).
+            share: Share of the move in the middle, shape (n,).
+            half: Half of the interval, as a share of the move, shape (n,).
         """
-        most = 1.0 + TOLERANCE
-        bound, _, _ = self._largest(start, start_rotation, end, end_rotation, most)
-        return np.asarray(bound <= most)
+        design, masses = self.design, self.weights
+        position, rotation = moves.poses(number, share)
+        poses = Configuration(design, position, rotation)
+        held = self._reactions(poses)
+        forces = np.abs(held.actuators) + held.spread[:, :6]
+        lengths, turn = poses.joints, moves.turn[number]
+        bodies, gravity = masses.on_platform, STANDARD_GRAVITY * math.hypot(*design.gravity)
+        joints = design.platform_points[[0, 1, 1, 2, 2, 3]]
+        points = [*joints, design.tool.position, *(body.centre for body in bodies)]
+        arms = np.array(points) @ np.swapaxes(rotation, 1, 2)
+        twists = np.swapaxes(twists_of_actuators(poses), 1, 2)[:, :, None]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            # Speeds of the points for unit rates of the actuators, shape (n, 6, 7 + bodies).
+            speeds = lengths_of(twists[..., :3] + np.cross(twists[..., 3:], arms[:, None]))
+            # How far the joints' points move, the platform turns, and the legs turn.
+            swing = np.cross(turn[:, None], arms[:, :6] - rotate(rotation, moves.tool)[:, None])
+            way = half[:, None] * (lengths_of(moves.step[number])[:, None] + lengths_of(swing))
+            angle = half[:, None] * lengths_of(turn)[:, None]
+            least = lengths - way
+            tilt = np.where(least > 0.0, way / least, np.inf)[:, LEGS]
+            turns = np.repeat(angle, 6, axis=1)
+            turns[:, LEGS] += tilt
+            asked = speeds[:, :, :6] * turns[:, None]
+            # Loads that keep their direction in the base turn in the axes of the platform.
+            sizes = [lengths_of(self.load[:3]), *(body.mass_kg * gravity for body in bodies)]
+            change = rotate(asked, forces) + angle * (speeds[:, :, 6:] @ np.array(sizes))
+            change += angle * lengths_of(twists[:, :, 0, 3:]) * lengths_of(self.load[3:])
+            # The weights of the legs act at their joints, partly across the legs.
+            rods, cylinders = np.array(masses.rods), np.array(masses.cylinders)
+            leaning = np.abs(cylinders * masses.cylinder_centres - rods * masses.rod_centres)
+            leaning = gravity * leaning / lengths[:, LEGS]
+            standing = gravity * (rods + cylinders + np.array(masses.carriages))
+            tilting = 2.0 * leaning * tilt
+            change += rotate(speeds[:, :, LEGS], tilting + angle * (leaning + standing))
+            sums = asked.sum(axis=2)
+            most = sums.max(axis=1, keepdims=True)
+            change += sums * change.max(axis=1, keepdims=True) / (1.0 - most)
+            longer, along = way[:, STRUT_ROWS], forces[:, GUIDE_ROWS] + standing[1:3]
+            bending = change[:, GUIDE_ROWS] * (lengths[:, STRUT_ROWS] + longer) + along * longer
+            across = change[:, STRUT_ROWS]
+            if masses.has_legs:
+                across = across + tilting[:, 1:3] + forces[:, STRUT_ROWS] * tilt[:, 1:3]
+            widening = np.concatenate([change, bending, across, bending], axis=1)
+        is_bounded = (most < 1.0) & np.isfinite(widening).all(axis=1, keepdims=True)
+        wider = held._replace(spread=held.spread + np.where(is_bounded, widening, 0.0))
+        bound = np.where(is_bounded, limit_shares(design, wider), np.inf).max(axis=1)
+        return limit_shares(design, held), bound
 
-    def largest_along(
-        self,
-        start: FloatArray,
-        start_rotation: FloatArray,
-        end: FloatArray,
-        end_rotation: FloatArray,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return upper bound, largest share and its share of straight moves, shape (n,) each.
-
-        Arguments are those of `holds_along`.
-        """
-        return self._largest(start, start_rotation, end, end_rotation, math.nan)
-
-    def largest_over(self, path: PathMargins) -> LargestShare:
-        """Return the largest share over a path of the same tool, given with its crossings."""
-        moves = list(itertools.pairwise(path.poses))
-        p, r = (
-            np.array([each.position for each in path.poses]),
-            np.array([each.rotation for each in path.poses]),
-        )
-        bounds, shares, places = self.largest_along(p[:-1], r[:-1], p[1:], r[1:])
-        places = places + np.arange(len(moves))
-        singular = [crossing.move + crossing.share for crossing in path.crossings]
-        singular += places[np.isinf(shares)].tolist()
-        if singular:
-            return LargestShare(math.inf, math.inf, min(singular), None)
-        move = int(shares.argmax())
-        share, place = float(shares[move]), float(places[move])
-        part: int | None = None
-        if share > 0.0:
-            there = poses_between(*moves[move], place - move, self.tool)
-            part = int(self.shares(*there).argmax())
-        return LargestShare(share, float(bounds.max()), place, part)
-
-    def _largest(
-        self,
-        start: FloatArray,
-        start_rotation: FloatArray,
-        end: FloatArray,
-        end_rotation: FloatArray,
-        target: float,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        out = np.empty((len(start), COLUMNS))
-        share_rows_of_moves(
-            ROWS_OF_MOVE * len(start),
-            self.row,
-            for_kernel(start),
-            for_kernel(start_rotation),
-            for_kernel(end),
-            for_kernel(end_rotation),
-            self.tool,
-            TOLERANCE,
-            target,
-            out,
-        )
-        return out[:, BOUND], out[:, SHARE], out[:, PLACE]
+    def _reactions(self, poses: Configuration) -> Reactions:
+        return reactions(poses.with_tool(self.design.tool.position), self.load, self.weights)
 
 
 def path_loads(
@@ -220,7 +238,6 @@ def path_loads(
     *,
     tool: Triple | None = None,
     weights: Weights | None = None,
-    samples: int = SAMPLES,
 ) -> PathLoads:
     """Return the shares of the limits that a load uses over a path of straight moves.
 
@@ -233,39 +250,8 @@ def path_loads(
             and N × unit.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
         weights: All masses, the payload's included; None for the payload alone.
-        samples: Number of samples of a move, both ends included.
 
     Raises:
-        InputError: There are fewer than two poses or samples, or a number is not finite.
+        InputError: There are fewer than two poses, or a number is not finite.
     """
-    demanded = DemandedLoad.of(design, load, weights, tool)
-    along = path_margins(poses, samples, tool)
-    moves = list(itertools.pairwise(poses))
-    number = np.minimum(along.at.astype(np.int64), len(moves) - 1)
-    positions, rotations = np.empty((len(number), 3)), np.empty((len(number), 3, 3))
-    for index, (start, end) in enumerate(moves):
-        at = number == index
-        positions[at], rotations[at] = poses_between(start, end, along.at[at] - index, tool)
-    shares = demanded.shares(positions, rotations)
-    return PathLoads(along.poses, along.at, shares, demanded.largest_over(along))
-
-
-def _row(design: Design, load: FloatArray, weights: Weights) -> FloatArray:
-    """Return what `explorer.paths.move_shares` needs of a machine and its load."""
-    gravity = STANDARD_GRAVITY * np.array(design.gravity)
-    first_moment = np.zeros(3)
-    for body in weights.on_platform:
-        first_moment += body.mass_kg * np.array(body.centre)
-    mass = sum(body.mass_kg for body in weights.on_platform)
-    legs = np.empty((4, LEG))
-    legs[:, CARRIAGE], legs[:, CYLINDER] = weights.carriages, weights.cylinders
-    legs[:, CYLINDER_MOMENT] = np.multiply(weights.cylinders, weights.cylinder_centres)
-    legs[:, ROD] = weights.rods
-    legs[:, ROD_MOMENT] = np.multiply(weights.rods, weights.rod_centres)
-    row = np.empty(END)
-    row[:POINT], row[POINT:LOAD] = design.variables, design.tool.position
-    row[LOAD:FORCE], row[FORCE] = load, design.payload.force_n
-    row[FIRST_MOMENT:WEIGHT], row[WEIGHT:GRAVITY] = first_moment, mass * gravity
-    row[GRAVITY:LEGS], row[LEGS:LIMITS] = gravity, legs.ravel()
-    row[LIMITS:] = part_limits(design).ravel()
-    return row
+    return DemandedLoad.of(design, load, weights).over(path_margins(poses, tool=tool), tool)

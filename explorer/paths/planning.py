@@ -1,13 +1,13 @@
 """Paths between two poses of one mode that keep all limits, margins and clearances.
 
-A load can be demanded too: every pose of the path then holds it within the limits of actuators,
-struts and guide.
+A load can be demanded too: the path then holds it within the limits of actuators, struts and guide,
+see `explorer.paths.loads`.
 
 Two kinds of ends that no path joins are refused before any search: those of different modes, and
 those between which two legs would have to pass each other on the guide. Other ends are joined by
 the straight line in the folds, which meets no singularity and keeps the margins of its ends. Only
 where that line is not proven valid, mostly for another limit, does `explorer.paths.tree_search`
-look for a way round. In both cases a proof covers every move as a whole.
+look for a way round. In both cases a proof of the limits covers every move as a whole.
 """
 
 from __future__ import annotations
@@ -30,8 +30,7 @@ from explorer.mechanism.margins import INCIDENCES, margins, mode_name
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tool_point import one_tool
 from explorer.numerics.arrays import FloatArray
-from explorer.paths.loads import TOLERANCE, DemandedLoad
-from explorer.paths.move_shares import share_rows_of_moves
+from explorer.paths.loads import ROUNDING, DemandedLoad
 from explorer.paths.proofs import Proofs, divide_line, positions_and_rotations
 from explorer.paths.smoothing import Smoother, lengths_of_moves
 from explorer.paths.tree_search import TreeSearch
@@ -136,8 +135,9 @@ def plan_path(
             b4. If the platform turns, b4 goes along a curve.
         load: (F; M) at the tool point of the design, shape (6,), in N and N × unit, that every
             pose has to hold within the limits of actuators, struts and guide, besides the weights
-            and the payload's force of any direction. A proof covers every move, to a millionth of
-            the limits; see `explorer.path_loads`. None to demand no load.
+            and the payload's force of any direction. Samples of every move hold it, and poses
+            between them to two hundredths of the limits; see `explorer.path_loads`. None to demand
+            no load.
         weights: All masses for the load, the payload's included; None for the payload alone.
 
     Raises:
@@ -152,7 +152,7 @@ def plan_path(
     if tool is not None:
         x, y, z = one_tool(tool).tolist()
         tool = (x, y, z)
-    demanded_load = None if load is None else DemandedLoad.of(design, load, weights, tool)
+    demanded_load = None if load is None else DemandedLoad.of(design, load, weights)
     ends = evaluate(design, start), evaluate(design, goal)
     named_ends = {"start": ends[0], "goal": ends[1]}
     for name, snapshot in named_ends.items():
@@ -164,7 +164,7 @@ def plan_path(
             _check_held(name, snapshot.pose, demanded_load)
     _check_same_order(*ends)
     # Compiling takes seconds, once on a machine; they do not count as search.
-    for kernel in (divide_line, valid_move_rows, valid_rows, write_poses, share_rows_of_moves):
+    for kernel in (divide_line, valid_move_rows, valid_rows, write_poses):
         kernel.compile()
     started = time.perf_counter()
     planner = _Planner(design, start, goal, seed, tool, demanded_load)
@@ -321,7 +321,7 @@ def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) ->
 def _check_held(name: str, pose: Pose, load: DemandedLoad) -> None:
     shares = load.shares(pose.position, pose.rotation)
     part, share = int(shares.argmax()), float(shares.max())
-    if share > 1.0 + TOLERANCE:
+    if share > 1.0 + ROUNDING:
         shown = f"{100.0 * share:.{4 if share > 1.001 else 9}g}"
         message = f"the {name} does not hold the load: {PART_NAMES[part]} at {shown} % of its limit"
         raise EndError("load not held", message)

@@ -1,4 +1,4 @@
-"""Proofs that straight moves, and straight lines in the folds, keep rules and hold a load.
+"""Proofs that straight moves, and straight lines in the folds, keep rules; loads are sampled.
 
 A straight line in fold coordinates between two poses of one mode meets no singularity, and along
 it no |δi| is below the smaller of its two ends (see `explorer.mechanism.folds`). It is cut into
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from explorer.legs.moves import StraightMoves
 from explorer.mechanism.design import Design
 from explorer.mechanism.folds import from_folds, write_pose
 from explorer.mechanism.pose import Pose, Triple
@@ -44,7 +45,7 @@ class Proofs:
         design: The manipulator.
         rules: Rules that every pose keeps.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
-        load: Load that every pose holds, for moves of the same tool; None for none.
+        load: Load that the moves hold, see `DemandedLoad.holds_along`; None for none.
         tolerance: Length by which limits may be exceeded between poses that keep them, in design
             units; a 10,000th of the reach if None.
     """
@@ -63,7 +64,8 @@ class Proofs:
             self.design, p, r, q, s, rules=rules, tolerance=tolerance, tool=tool
         )
         if self.load is not None and valid.any():
-            valid[valid] = self.load.holds_along(p[valid], r[valid], q[valid], s[valid])
+            ends = p[valid], r[valid], q[valid], s[valid]
+            valid[valid] = self.load.holds_along(StraightMoves.between(*ends, tool))
         return valid.tolist()
 
     def prove_line(self, first: FloatArray, last: FloatArray) -> FloatArray | None:
@@ -90,7 +92,8 @@ class Proofs:
         corners = (1.0 - share) * first + share * last
         if self.load is not None:
             p, r = from_folds(corners)
-            if not self.load.holds_along(p[:-1], r[:-1], p[1:], r[1:]).all():
+            moves = StraightMoves.between(p[:-1], r[:-1], p[1:], r[1:], tool)
+            if not self.load.holds_along(moves).all():
                 return None
         return corners
 

@@ -6,7 +6,6 @@ spaced in time and lie on the path exactly; their joints come from inverse kinem
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
-from explorer.legs.moves import poses_between
+from explorer.legs.moves import StraightMoves
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose, quaternion_from_rotation
@@ -58,13 +57,6 @@ class Trajectory:
         """Duration in seconds."""
         return float(self.time[-1])
 
-    def pose(self, seconds: float) -> Pose:
-        """Return the pose of the sample nearest in time."""
-        index = int(np.abs(self.time - seconds).argmin())
-        x, y, z = self.position[index].tolist()
-        w, i, j, k = self.quaternion[index].tolist()
-        return Pose((x, y, z), (w, i, j, k))
-
 
 def trajectory(
     design: Design,
@@ -96,23 +88,18 @@ def trajectory(
     actuator_speed = DEFAULT_SPEED * design.reach if speed is None else speed
     if not (math.isfinite(actuator_speed) and actuator_speed > 0.0):
         raise InputError(f"the speed must be above zero; got {actuator_speed:g}")
-    moves = list(itertools.pairwise(poses))
-    shares = np.linspace(0.0, 1.0, STEPS + 1, dtype=np.float64)
-    time: list[FloatArray] = [np.zeros(1)]
-    for start, end in moves:
-        joints = inverse(design, *poses_between(start, end, shares, tool))
-        travels = np.abs(np.diff(joints, axis=0)).max(axis=-1)
-        time.append(time[-1][-1] + np.cumsum(travels) / actuator_speed)
-    times = np.concatenate(time)
+    moves = StraightMoves.along(poses, tool)
+    count = len(poses) - 1
+    number, share = np.arange(count)[:, None], np.linspace(0.0, 1.0, STEPS + 1, dtype=np.float64)
+    joints = inverse(design, *moves.poses(*np.broadcast_arrays(number, share)))
+    travels = np.abs(np.diff(joints, axis=1)).max(axis=-1).ravel()
+    times = np.concatenate([[0.0], np.cumsum(travels)]) / actuator_speed
     sampled = np.linspace(0.0, float(times[-1]), samples, dtype=np.float64)
     # A path without motion takes no time: all its samples are at its start.
     at = np.interp(sampled, times, np.arange(len(times)) / STEPS)
-    at[-1] = len(moves)
-    number = np.minimum(at.astype(np.int64), len(moves) - 1)
-    position, rotation = np.empty((samples, 3)), np.empty((samples, 3, 3))
-    for index, (start, end) in enumerate(moves):
-        on_move = number == index
-        position[on_move], rotation[on_move] = poses_between(start, end, at[on_move] - index, tool)
+    at[-1] = count
+    number = np.minimum(at.astype(np.int64), count - 1)
+    position, rotation = moves.poses(number, at - number)
     quaternion = quaternion_from_rotation(rotation)
     flips = (quaternion[1:] * quaternion[:-1]).sum(axis=-1) < 0.0
     signs = np.cumprod(np.where(np.concatenate([[False], flips]), -1.0, 1.0))

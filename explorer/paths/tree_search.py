@@ -12,7 +12,6 @@ import importlib
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,39 +27,26 @@ from explorer.workspace.limits.valid_poses import valid_rows
 LONGEST_LINE = 0.25
 
 
-@dataclass(frozen=True)
-class _Ompl:
-    """The modules of OMPL, which has no types."""
-
-    base: Any
-    geometric: Any
-
-    @staticmethod
-    def load() -> _Ompl:
-        """Import the modules.
-
-        Raises:
-            MissingExtraError: OMPL is not installed.
-        """
-        try:
-            util: Any = importlib.import_module("ompl.util")
-            modules = _Ompl(
-                importlib.import_module("ompl.base"), importlib.import_module("ompl.geometric")
-            )
-        except ImportError:
-            raise MissingExtraError(
-                "a path that is not straight in the folds needs OMPL: pip install "
-                "'flagged-explorer[planning]'"
-            ) from None
-        _prepare(util)
-        return modules
-
-
 @functools.cache
-def _prepare(util: Any) -> None:
-    """Make OMPL quiet, and its random numbers the same in every process."""
+def load_ompl() -> tuple[Any, Any]:
+    """Return OMPL's modules of spaces and of planners, which have no types.
+
+    It is quiet, and its random numbers are the same in every process.
+
+    Raises:
+        MissingExtraError: OMPL is not installed.
+    """
+    names = ("ompl.util", "ompl.base", "ompl.geometric")
+    try:
+        util, base, geometric = map(importlib.import_module, names)
+    except ImportError:
+        raise MissingExtraError(
+            "a path that is not straight in the folds needs OMPL: pip install "
+            "'flagged-explorer[planning]'"
+        ) from None
     util.setLogLevel(util.LOG_NONE)
     util.RNG.setSeed(1)
+    return base, geometric
 
 
 class TreeSearch:
@@ -93,8 +79,7 @@ class TreeSearch:
         Raises:
             MissingExtraError: OMPL is not installed.
         """
-        ompl = _Ompl.load()
-        base, geometric = ompl.base, ompl.geometric
+        base, geometric = load_ompl()
         space, bounds = base.RealVectorStateSpace(6), base.RealVectorBounds(6)
         lows, highs = _box(self._proofs.design, first, last)
         for axis, edges in enumerate(zip(lows / self._units, highs / self._units, strict=True)):

@@ -72,7 +72,7 @@ from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.paths.loads import TOLERANCE, path_loads
+from explorer.paths.loads import path_loads
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
 
@@ -331,7 +331,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     # It is played at once, as a straight one.
     assert bench.wait(lambda state: journey_of(state).at > 0.0).pose != GOAL
     assert not journey.margins.crossings
-    least = np.abs(journey.margins.margins).min(axis=0)
+    least = np.array(journey.margins.least)
     closest = int(least.argmin())
     assert f"|δ{closest + 1}| = {least[closest]:.3g}" in crossing_words(journey)
     inner = [journey.pose_at(float(t)) for t in np.linspace(0, journey.trajectory.duration, 50)]
@@ -524,7 +524,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
     own = weights_of_parts(WeightsRequest(PRESS, 3000.0)).weights
     weights = replace(own, on_platform=(*own.on_platform, PRESS.payload))
     along = path_loads(PRESS, poses, load_of(state), tool=state.tool, weights=weights)
-    assert 0.5 < along.largest.share <= 1.0 + TOLERANCE
+    assert 0.5 < along.share <= 1.0 + 1e-4
 
 
 def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
@@ -532,11 +532,10 @@ def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
     journey = journey_of(state)
     found = PathShares(services).of(Frame(state))
     assert found is not None
-    expected = path_loads(PRESS, journey.poses, load_of(state), tool=journey.tool, samples=2001)
-    assert found.largest == expected.largest
-    largest: FloatArray = expected.shares.max(axis=1)
-    most = np.interp(journey.trajectory.at, expected.at, largest)
-    np.testing.assert_allclose(found.shares, most, atol=2e-3)
+    expected = path_loads(PRESS, journey.poses, load_of(state), tool=journey.tool)
+    np.testing.assert_array_equal(found.path.shares, expected.shares)
+    timed = journey.trajectory
+    np.testing.assert_allclose(np.interp(found.time, timed.time, timed.at), expected.at, atol=1e-9)
     pose = journey.pose_at(found.seconds)
-    here = path_loads(PRESS, (pose, pose), load_of(state)).largest
-    assert (here.share, here.part) == (pytest.approx(found.largest.share), found.largest.part)
+    here = path_loads(PRESS, (pose, pose), load_of(state))
+    assert (here.share, here.part) == (pytest.approx(expected.share), expected.part)

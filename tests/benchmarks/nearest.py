@@ -71,6 +71,6 @@ def run() -> Iterator[Row]:
             path_margins([start, end])
 
     yield Row(
-        "a straight move to anywhere: margins at 101 samples, all crossings",
+        "a straight move to anywhere: least margins, all crossings",
         seconds(best_of(3, cross) / MOVES),
     )

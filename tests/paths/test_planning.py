@@ -36,6 +36,7 @@ from explorer.paths.crossings import path_margins
 from explorer.paths.planning import EndError, NoPathError, PlannedPath, plan_path
 from explorer.paths.proofs import Proofs, positions_and_rotations
 from explorer.paths.smoothing import Smoother, lengths_of_moves
+from explorer.paths.tree_search import load_ompl
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 DESIGN = limited(PRESETS["paper-optimal"], leg_radii=(0.2,) * 4)
@@ -84,7 +85,7 @@ def assert_keeps_everything(path: PlannedPath, poses: tuple[Pose, ...]) -> None:
     margins = path_margins(poses, tool=tool)
     assert margins.crossings == ()
     assert margins.lies_in == ()
-    assert np.abs(margins.margins).min() >= room[0]
+    assert min(margins.least) >= room[0]
 
 
 def travel(poses: tuple[Pose, ...]) -> float:
@@ -178,6 +179,7 @@ def test_plan_path_line_in_the_folds_of_some_moves_needs_no_search(
 
 def test_plan_path_without_ompl_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ompl.util", None)
+    load_ompl.cache_clear()
     with pytest.raises(MissingExtraError, match=r"flagged-explorer\[planning\]"):
         plan_path(DESIGN, *pairs(0)[0])
 

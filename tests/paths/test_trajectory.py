@@ -78,15 +78,6 @@ def test_trajectory_speed_is_in_units_per_second() -> None:
     assert trajectory(DESIGN, path).duration == pytest.approx(3.0 / (0.1 * DESIGN.reach))
 
 
-def test_trajectory_pose_is_that_of_the_nearest_sample() -> None:
-    found = trajectory(DESIGN, random_path(1, 4), samples=11)
-    for index in (0, 4, 10):
-        pose = found.pose(float(found.time[index]) + 0.01 * found.duration)
-        assert pose.position == tuple(found.position[index].tolist())
-    assert found.pose(-1.0).position == tuple(found.position[0].tolist())
-    assert found.pose(1e9).position == tuple(found.position[-1].tolist())
-
-
 def test_trajectory_csv_reads_back_to_the_last_bit() -> None:
     found = trajectory(DESIGN, random_path(2, 3), samples=50)
     head, *rows = csv.reader(trajectory_csv(found).splitlines())

@@ -47,7 +47,7 @@ from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.statics.reactions import LIMITED, PART_NAMES
 
 if TYPE_CHECKING:
-    from explorer.paths.loads import LargestShare
+    from explorer.paths.loads import PathLoads
     from explorer.paths.planning import PlannedPath
     from explorer.paths.trajectory import Trajectory
 
@@ -188,15 +188,15 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
                 write_json({"found": False, "reason": error.reason, "poses": []})
             raise
         timed = trajectory(design, path.poses, speed=self.speed, samples=self.samples, tool=tool)
-        largest = None
+        loads = None
         if self.load is not None:
-            largest = path_loads(design, path.poses, self.load, tool=tool).largest
+            loads = path_loads(design, path.poses, self.load, tool=tool)
         files = {} if self.out is None else {self.out: trajectory_csv(timed).encode()}
         written, errors = write_files(files)
         out = next(iter(written), None)
         self.write(
-            lambda: _as_json(path, timed, largest, out),
-            lambda: _as_lines(design, path, timed, largest, out),
+            lambda: _as_json(path, timed, loads, out),
+            lambda: _as_lines(design, path, timed, loads, out),
             errors,
         )
 
@@ -236,7 +236,7 @@ def _pose(
 
 
 def _as_json(
-    path: PlannedPath, timed: Trajectory, largest: LargestShare | None, out: File | None
+    path: PlannedPath, timed: Trajectory, loads: PathLoads | None, out: File | None
 ) -> dict[str, object]:
     names = "time joints position quaternion" + (" tool_position" if path.tool else "")
     answer: dict[str, object] = {
@@ -247,10 +247,11 @@ def _as_json(
         "duration": timed.duration,
         "trajectory": attributes(timed, names),
     }
-    if largest is not None:
-        answer["largest_share"] = largest.share
-        answer["largest_share_part"] = None if largest.part is None else LIMITED[largest.part]
-        answer["largest_share_at"] = largest.place
+    if loads is not None:
+        answer["largest_share"] = loads.share
+        answer["largest_share_bound"] = loads.bound
+        answer["largest_share_part"] = None if loads.part is None else LIMITED[loads.part]
+        answer["largest_share_at"] = loads.place
     return answer if out is None else {**answer, "file": out}
 
 
@@ -258,7 +259,7 @@ def _as_lines(
     design: Design,
     path: PlannedPath,
     timed: Trajectory,
-    largest: LargestShare | None,
+    loads: PathLoads | None,
     out: File | None,
 ) -> Iterator[str]:
     from explorer.paths.crossings import path_margins
@@ -276,11 +277,12 @@ def _as_lines(
         ("takes", f"{figure(timed.duration)} s"),
         ("least |δ|", "  ".join(f"δ{i + 1} {figure(v)}" for i, v in enumerate(least))),
     ]
-    if largest is not None:
-        words = f"held, with {100.0 * largest.share:.1f} % of a limit at most"
-        if largest.part is not None:
-            seconds = float(np.interp(largest.place, timed.at, timed.time))
-            words += f": {PART_NAMES[largest.part]}, at {figure(seconds)} s"
+    if loads is not None:
+        words = f"held, with {100.0 * loads.share:.1f} % of a limit"
+        words += f" at {len(loads.at)} samples and {100.0 * loads.bound:.1f} % at most between them"
+        if loads.part is not None:
+            seconds = float(np.interp(loads.place, timed.at, timed.time))
+            words += f": {PART_NAMES[loads.part]}, at {figure(seconds)} s"
         rows.append(("load", words))
     yield from ("", table(rows, "<<"))
     if out is not None:

@@ -19,6 +19,7 @@ from explorer.app.features.paths.time_chart import (
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, axis, level_axis, line
+from explorer.numerics.arrays import FloatArray
 from explorer.statics.reactions import has_limits
 
 HEIGHT = 62
@@ -59,13 +60,9 @@ def columns_of(loads: JourneyLoads, now: float) -> tuple[NDArray[Any], ...]:
         now: The present time, in seconds.
     """
     # Room above the largest share and the limit, in percent.
-    top = float(np.clip(115.0 * loads.largest.share, LEAST_TOP, MOST_TOP))
-    # The largest share has a row of its own.
-    row = np.searchsorted(loads.time, loads.seconds)
-    times = np.insert(loads.time, row, loads.seconds)
-    shares = np.insert(loads.shares, row, loads.largest.share)
+    top = float(np.clip(115.0 * loads.path.share, LEAST_TOP, MOST_TOP))
     # Far above the chart a line is as good as at infinity.
-    percent = np.minimum(100.0 * shares, 4.0 * top)
-    share = np.append(percent, np.interp([now, now], times, percent))
+    percent: FloatArray = np.minimum(100.0 * loads.path.shares.max(axis=1), 4.0 * top)
+    share = np.append(percent, np.interp([now, now], loads.time, percent))
     beyond = np.where(share > 100.0, share, np.nan)
-    return time_columns(times, (share, beyond), now, (0.0, top))
+    return time_columns(loads.time, (share, beyond), now, (0.0, top))

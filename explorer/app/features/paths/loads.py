@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 from html import escape
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,29 +15,28 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
 from explorer.app.widgets.markup import note
-from explorer.mechanism.pose import rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
-from explorer.paths.loads import DemandedLoad, LargestShare
+from explorer.paths.loads import DemandedLoad, PathLoads
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import PART_NAMES, has_limits
 
 
-@dataclass(frozen=True)
-class JourneyLoads:
+class JourneyLoads(NamedTuple):
     """The shares of the limits along a path over time.
 
     Attributes:
         time: Times of the samples, in seconds, shape (n,).
-        shares: Largest shares of the samples, shape (n,); infinite in singular poses.
-        largest: The largest share over the whole path.
-        seconds: Time at which it occurs.
+        path: The shares along the path.
     """
 
     time: FloatArray
-    shares: FloatArray
-    largest: LargestShare
-    seconds: float
+    path: PathLoads
+
+    @property
+    def seconds(self) -> float:
+        """Time at which the largest share occurs."""
+        return float(np.interp(self.path.place, self.path.at, self.time))
 
 
 class PathShares:
@@ -59,24 +59,24 @@ class PathShares:
 
 
 def _loads_of(journey: Journey, loaded: LoadedPose) -> JourneyLoads:
-    demanded = DemandedLoad.of(journey.design, loaded.load, loaded.weights, journey.tool)
-    timed = journey.trajectory
-    shares = demanded.shares(timed.position, rotation_from_quaternion(timed.quaternion))
-    largest = demanded.largest_over(journey.margins)
-    seconds = float(np.interp(largest.place, timed.at, timed.time))
-    return JourneyLoads(timed.time, shares.max(axis=1), largest, seconds)
+    demanded = DemandedLoad.of(journey.design, loaded.load, loaded.weights)
+    along, timed = demanded.over(journey.margins, journey.tool), journey.trajectory
+    return JourneyLoads(np.interp(along.at, timed.at, timed.time), along)
 
 
 def load_words(loads: JourneyLoads) -> str:
-    """Return the largest share of a limit along a path, and where, as HTML."""
-    share, _, _, part = loads.largest
+    """Return the largest share of a limit along a path, its bound and its place, as HTML."""
+    share, bound, part = loads.path.share, loads.path.bound, loads.path.part
     at = f"at {format_decimals(loads.seconds, 2)} s"
+    hint = ""
     if part is None:
         words = f"Nothing holds a load {at}: singular" if share else "No part bears a load"
     else:
-        number = format_number(100.0 * share, 3) if share < MOST else "∞"
-        words = f"Largest share {number} %: {PART_NAMES[part]}, {at}"
-    return f'<div class="ex-{share_look(share)}">{escape(words)}</div>'
+        number = f"{format_number(100.0 * share, 3)} %" if share < MOST else "∞"
+        most = "no bound" if math.isinf(bound) else f"{format_number(100.0 * bound, 3)} % at most"
+        words = f"Largest share {number} ({most}): {PART_NAMES[part]}, {at}"
+        hint = f"That of {len(loads.time)} samples; in parentheses a bound of all between them"
+    return f'<div class="ex-{share_look(share)}" title="{hint}">{escape(words)}</div>'
 
 
 def demand_note(state: State) -> str:
