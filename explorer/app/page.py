@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 import traceback
@@ -23,14 +22,14 @@ from explorer.app.scene.placing import Placed
 from explorer.app.session import clock
 from explorer.app.session.history import History
 from explorer.app.session.jobs import Worker
+from explorer.app.session.log import log_error
 from explorer.app.session.session import Session, Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Presses
 from explorer.app.state.state import State
 from explorer.app.storage.autosaver import Autosaver
-from explorer.app.storage.preferences import PreferenceFile
 from explorer.app.storage.study_folders import StudyFolders
-from explorer.app.storage.user_data import UserData
+from explorer.app.storage.user_data import PreferenceFile, UserData
 from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.compiling import CompilingNotice
@@ -119,8 +118,7 @@ class Page:
         self.session = Session(
             state, self._draw, self._complain, self._report, history, press_at=presses.at
         )
-        faults = None if user_data is None else user_data.faults
-        self.worker = Worker(self._announce, preload=TASKS, faults=faults)
+        self.worker = Worker(self._announce, preload=TASKS)
         gui = server.gui
         gui.set_panel_label(TITLE)
         self.buttons = Buttons(server)
@@ -368,8 +366,10 @@ class Page:
         self.session.redraw()
 
     def _report(self, error: Exception) -> None:
-        traceback.print_exception(error, file=sys.stderr)
-        self._notify("Something went wrong", f"In the explorer itself: {error}", None)
+        message = log_error(
+            f"In the explorer itself: {error}", "".join(traceback.format_exception(error))
+        )
+        self._notify("Something went wrong", message, None)
 
     def _notify(self, title: str, message: str, who: Who) -> None:
         now = clock.now()

@@ -14,24 +14,23 @@ from pathlib import Path
 
 import viser
 
-from explorer.app.browser.viser_gaps import ServerControls
 from explorer.app.browser.viser_server import (
     refuse_tunnels,
     report_uploads_to_senders,
+    restrict_messages,
     start_viser,
     stop_viser,
 )
 from explorer.app.page import TITLE, Page
 from explorer.app.security.access import EVERYWHERE, Access, is_loopback
 from explorer.app.security.guard import Guard
-from explorer.app.session.drawable import check_drawable
-from explorer.app.session.memory import freeze_objects, limit_arenas, trim_repeatedly
+from explorer.app.session.gestures import check_drawable
+from explorer.app.session.log import start_log
 from explorer.app.state.state import opened
 from explorer.app.state.view import View
 from explorer.app.storage.folder import data_folder
-from explorer.app.storage.preferences import PreferenceFile
 from explorer.app.storage.study_folders import STUDIES_FOLDER, StudyFolders
-from explorer.app.storage.user_data import UserData, open_user_data
+from explorer.app.storage.user_data import PreferenceFile, UserData, open_user_data
 from explorer.errors import ExplorerError, ServerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
@@ -117,6 +116,7 @@ def start(
         raise _taken(port)
     refuse_tunnels(server)
     report_uploads_to_senders(server)
+    restrict_messages(server)
     page = Page(
         server,
         state,
@@ -126,7 +126,7 @@ def start(
         preferences=preferences,
         studies=studies,
     )
-    guard.let_in(ServerControls(server), lambda: page.session.waiting)
+    guard.let_in()
     return Running(server, page, access)
 
 
@@ -155,7 +155,7 @@ def serve(
     Raises:
         ServerError: the address or the port cannot be had, or the token or a name cannot be used.
     """
-    limit_arenas()
+    start_log(data_folder())
     user_data = open_user_data(resume=design is None)
     for message in user_data.messages:
         sys.stderr.write(f"{message}\n")
@@ -178,7 +178,7 @@ def serve(
         name = user_data.history.step.state.design.name
         sys.stderr.write(f"Going on with {name!r} where it was left.\n")
     try:
-        with contextlib.suppress(KeyboardInterrupt), trim_repeatedly():
+        with contextlib.suppress(KeyboardInterrupt):
             _wait_for_interruption(running, open_browser)
         sys.stderr.write("Stopped.\n")
     finally:
@@ -202,8 +202,7 @@ def _wait_for_interruption(running: Running, open_browser: bool) -> None:
             f"Through a proxy: {access.proxy_url(name)}   (http if the proxy does not encrypt)\n"
         )
     sys.stderr.flush()
-    freeze_objects()
-    warm_in_background(then=freeze_objects, tell=running.page.compiling.show)
+    warm_in_background(tell=running.page.compiling.show)
     running.page.start_workers()
     if open_browser:
         threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()

@@ -382,9 +382,6 @@ CATALOGUE: Mapping[str, Measure] = {
 }
 """All measures by name, in the order in which every list has them."""
 
-FORMER_NAMES: Mapping[str, str] = {"reachable_volume": "accessible_volume"}
-"""Present names of measures by those in files of older explorers."""
-
 
 def measures_in(place: Place) -> dict[str, Measure]:
     """Return the measures that a place lists, by name in their order."""

@@ -1,13 +1,12 @@
 """Design files: JSON, read strictly, and the presets.
 
 Unknown fields are refused, so that a misspelt limit is never silently ignored, and so are
-repeated fields. A file of an older schema is converted to the present one first; a file of a
-newer schema is refused. The presets are both rows of the paper's Table 1.
+repeated fields. Schema 1 has a part of the fields of schema 2, and both are read. The presets are both rows of the paper's Table 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -21,32 +20,13 @@ from explorer.mechanism.design import Design
 
 # Largest accepted size of a design file, in bytes.
 LARGEST_FILE = 1_000_000
-SCHEMA = 2
-
-# Fields that the second schema added; each may be left out.
-_OF_SECOND_SCHEMA = (*("tool", "payload", "gravity", "actuators", "struts", "guide", "tolerances"),)
-
-
-def _from_first_schema(fields: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a design of schema 1 as those of schema 2, which only added some.
-
-    Raises:
-        DesignError: A field is of schema 2.
-    """
-    for name in _OF_SECOND_SCHEMA:
-        if name in fields:
-            raise DesignError(f'unknown field `{name}` of schema 1; it needs "schema": 2', name)
-    return fields
-
-
-MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {1: _from_first_schema}
-"""Conversions of a file's fields to those of the next schema, by schema."""
+SCHEMA, READ_SCHEMAS = 2, (1, 2)
 
 
 class _Versioned(msgspec.Struct):
-    """The schema of a design file; a file without the field is of the first schema."""
+    """The schema of a design file; a file without the field is of the present schema."""
 
-    schema: int = 1
+    schema: int = SCHEMA
 
 
 def decode_design(data: bytes, source: str) -> Design:
@@ -57,7 +37,7 @@ def decode_design(data: bytes, source: str) -> Design:
         source: Name of the text in an error message.
 
     Raises:
-        DesignError: The text is not JSON, is of a newer schema, or has unknown fields,
+        DesignError: The text is not JSON, is of another schema, or has unknown fields,
             repeated fields or unusable values.
     """
     if len(data) > LARGEST_FILE:
@@ -66,24 +46,15 @@ def decode_design(data: bytes, source: str) -> Design:
         )
     with located_errors(data, Design, source, DesignError) as text:
         schema = msgspec.json.decode(text, type=_Versioned).schema
-        if schema > SCHEMA:
+        if schema not in READ_SCHEMAS:
             raise DesignError(
-                f"schema {schema} was made by a newer explorer; this one reads up to {SCHEMA}"
+                f"the file has schema {schema}, of another version of the explorer; this one reads "
+                "schemas 1 and 2"
             )
-        if schema in MIGRATIONS:
-            fields = msgspec.json.decode(text, type=dict[str, Any])
-            design = msgspec.convert(migrate(fields), Design)
-        else:
-            design = msgspec.json.decode(text, type=Design)
+        fields = msgspec.json.decode(text, type=dict[str, Any])
+        design = msgspec.convert(fields | {"schema": SCHEMA}, Design)
         check_unique_fields(text)
         return design
-
-
-def migrate(fields: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a design of any older schema, converted to the present one."""
-    for older in range(fields.get("schema", 1), SCHEMA):
-        fields = MIGRATIONS[older](fields)
-    return fields | {"schema": SCHEMA}
 
 
 def encode_design(design: Design) -> bytes:

@@ -130,21 +130,16 @@ def warm(tell: Callable[[float], None] | None = None) -> None:
             tell(done / effort if missing else 1.0)
 
 
-def warm_in_background(
-    then: Callable[[], None] | None = None, tell: Callable[[float], None] | None = None
-) -> threading.Thread:
+def warm_in_background(tell: Callable[[float], None] | None = None) -> threading.Thread:
     """Call `warm` in a thread; a kernel runs interpreted until its compiled form is loaded.
 
     Args:
-        then: Callback in that thread, after every kernel is loaded.
         tell: Callback in that thread, for `warm`.
     """
 
     def run() -> None:
         with _warm_lock:
             warm(tell)
-        if then is not None:
-            then()
 
     thread = threading.Thread(target=run, name="warm kernels", daemon=True)
     thread.start()

@@ -12,13 +12,12 @@ import importlib
 import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from explorer.errors import InputError, MissingExtraError
 from explorer.files.writing import storage_error, write_whole
-from explorer.measures.catalogue import FORMER_NAMES
 from explorer.sweep.rows import Kind, Rows, columns_of, one_line
 from explorer.sweep.study import Study, decode_study, encode_study, study_hash
 
@@ -143,10 +142,7 @@ def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, A
         file = parquet.ParquetFile(path, page_checksum_verification=True)
         with file:
             part = _checked_metadata(file.schema_arrow.metadata or {}, file.metadata.metadata or {})
-            table = file.read(columns=None if columns is None else list(columns))
-            names = [FORMER_NAMES.get(name, name) for name in table.column_names]
-            table = table.rename_columns(names).replace_schema_metadata(table.schema.metadata)
-            return _with_present_names(part, str(path)), table
+            return part, file.read(columns=None if columns is None else list(columns))
     except (arrow.ArrowException, OSError, ValueError, KeyError) as error:
         raise BadPartError(f"{path} is no part of a study: {one_line(error)}") from None
 
@@ -158,13 +154,12 @@ def _checked_metadata(metadata: Mapping[bytes, bytes], copy: Mapping[bytes, byte
         KeyError: a value is missing.
         ValueError: the metadata are damaged.
     """
-    versions = _OTHER_VERSIONS if _OTHER_VERSIONS in metadata else _VERSIONS
-    names = (_STUDY, _HASH, _SEED, _CHUNK, versions)
+    names = (_STUDY, _HASH, _SEED, _CHUNK, _VERSIONS)
     part = Part(
         study=metadata[_STUDY],
         study_hash=metadata[_HASH].decode(),
         chunk=int(metadata[_CHUNK]),
-        versions=json.loads(metadata[versions]),
+        versions=json.loads(metadata[_VERSIONS]),
     )
     if (
         any(metadata[name] != copy[name] for name in names)
@@ -172,14 +167,6 @@ def _checked_metadata(metadata: Mapping[bytes, bytes], copy: Mapping[bytes, byte
     ):
         raise ValueError("its metadata is damaged")
     return part
-
-
-def _with_present_names(part: Part, source: str) -> Part:
-    """Return the metadata of a part with the present names of its measures."""
-    if not any(name.encode() in part.study for name in FORMER_NAMES):
-        return part
-    study = decode_study(part.study, source)
-    return replace(part, study=encode_study(study), study_hash=study_hash(study))
 
 
 def sound_parts(

@@ -19,7 +19,7 @@ from explorer.errors import InputError
 from explorer.files.json_text import decode_strictly
 from explorer.files.packaged import packaged_files
 from explorer.files.writing import read_at_most
-from explorer.measures.catalogue import FORMER_NAMES, measures_in
+from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.checks import instance, number, one_of, positive, two, whole
@@ -143,8 +143,7 @@ class Objective(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sense: Sense
 
     def __post_init__(self) -> None:
-        measure = str(self.measure)
-        _set(self, "measure", FORMER_NAMES.get(measure, measure))
+        _set(self, "measure", str(self.measure))
         _set(self, "sense", one_of("the sense of an objective", self.sense, get_args(Sense)))
 
 
@@ -191,8 +190,7 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         _set(self, "name", str(self.name))
         _set(self, "design", _complete(self.design))
         _set(self, "variables", _ranges("variables", self.variables, NAMES))
-        present = (FORMER_NAMES.get(name, name) for name in map(str, self.measures))
-        _set(self, "measures", tuple(present))
+        _set(self, "measures", tuple(map(str, self.measures)))
         self._check_ranges()
         self._check_sampling()
         self._check_measures()

@@ -83,7 +83,7 @@ def test_design_saved_again_replaces_the_first_which_can_be_restored(
     assert library.open("mine") == first == desk.state.base
     saved.save(first)
     settle(desk, saved)
-    assert library.deleted() == ()
+    assert library.last_deleted is None
     desk.session.do(Set("design.unit_mm", 3.0))
     save_as(desk, saved, "mine")
     assert library.open("mine").unit_mm == 3.0
@@ -156,7 +156,7 @@ def test_upload_is_read_strictly_and_its_name_is_no_path(
     # Beside the designs' own folder there is nothing new.
     assert [each.name for each in tmp_path.iterdir()] == ["designs"]
     before = desk.state
-    for data in (b"", b"{", b"[" * 10000, b'{"schema": 1, "a3": [1, 2, 3]}', b"\xff\xfe"):
+    for data in (b"", b"{", b"[" * 10000, b'{"schema": 2, "a3": [1, 2, 3]}', b"\xff\xfe"):
         saved.take(data, "broken.json")
     settle(desk, saved)
     assert desk.state.design == before.design
@@ -198,10 +198,17 @@ def test_panel_lists_opens_copies_and_deletes_designs(
         ("open", "paper-initial", ["mine <b>"]),
         ("duplicate", "mine <b>", ["mine <b> copy", "mine <b>"]),
         ("duplicate", "paper-initial", ["paper-initial copy", "mine <b> copy", "mine <b>"]),
-        ("delete", "mine <b> copy", ["paper-initial copy", "mine <b>"]),
+        # The question is asked once; nothing else is deleted by an answer.
+        ("delete", "mine <b> copy", ["paper-initial copy", "mine <b> copy", "mine <b>"]),
+        ("keep", "mine <b> copy", ["paper-initial copy", "mine <b> copy", "mine <b>"]),
+        ("confirm", "mine <b> copy", ["paper-initial copy", "mine <b> copy", "mine <b>"]),
+        ("delete", "mine <b> copy", ["paper-initial copy", "mine <b> copy", "mine <b>"]),
+        ("confirm", "mine <b>", ["paper-initial copy", "mine <b> copy", "mine <b>"]),
+        ("confirm", "mine <b> copy", ["paper-initial copy", "mine <b>"]),
         # What is no longer in the list is not opened, and presets are not deleted.
         ("open", "gone", ["paper-initial copy", "mine <b>"]),
         ("delete", "paper-initial", ["paper-initial copy", "mine <b>"]),
+        ("confirm", "paper-initial", ["paper-initial copy", "mine <b>"]),
     ):
         desk.press(buttons, f"designs.{name}", value)
         markup_of_rows(desk, saved, panel)

@@ -23,13 +23,11 @@ from explorer.app.features.designs.name import UNSAVED
 from explorer.app.features.help.tour import STEPS, start_tour
 from explorer.app.layout import is_narrow
 from explorer.app.server import Running, start
-from explorer.app.session.faults import Faults
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.storage.library import Library
-from explorer.app.storage.preferences import NAME, PreferenceFile, Preferences
 from explorer.app.storage.session_file import SessionFile
-from explorer.app.storage.user_data import UserData
+from explorer.app.storage.user_data import PREFERENCES, PreferenceFile, Preferences, UserData
 from explorer.app.widgets.theme import BRAND, BRAND_ON_DARK, Theme
 from explorer.errors import StorageError
 from explorer.mechanism.design import Design
@@ -67,7 +65,7 @@ def folder(tmp_path: Path) -> Path:
 
 def data_in(folder: Path) -> UserData:
     store = SessionFile(folder / "sessions")
-    return UserData(Library(folder / "designs"), store, faults=Faults(folder / "faults"))
+    return UserData(Library(folder / "designs"), store)
 
 
 def test_data_folder_unwritable_from_the_start_stands_in_the_bar_until_it_can_be_written(
@@ -174,7 +172,7 @@ def test_preferences_are_remembered_each_by_itself_and_of_two_explorers(tmp_path
     other.choose(dark=True)
     assert PreferenceFile(folder).chosen == Preferences(dark=True, tour_seen=True)
     # A later explorer may remember more.
-    (tmp_path / NAME).write_bytes(b'{"dark": true, "language": "fr"}')
+    (tmp_path / PREFERENCES).write_bytes(b'{"dark": true, "language": "fr"}')
     assert PreferenceFile(tmp_path).chosen == Preferences(dark=True)
 
 
@@ -185,11 +183,11 @@ def test_preferences_are_remembered_each_by_itself_and_of_two_explorers(tmp_path
 def test_preferences_in_a_broken_file_count_as_none_and_are_replaced(
     tmp_path: Path, text: bytes
 ) -> None:
-    (tmp_path / NAME).write_bytes(text)
+    (tmp_path / PREFERENCES).write_bytes(text)
     file = PreferenceFile(tmp_path)
     assert file.chosen == Preferences()
     file.choose(dark=True)
-    assert json.loads((tmp_path / NAME).read_bytes()) == {"dark": True, "tour_seen": False}
+    assert json.loads((tmp_path / PREFERENCES).read_bytes()) == {"dark": True, "tour_seen": False}
 
 
 def test_preferences_in_a_folder_that_takes_no_file_are_refused_in_a_line(tmp_path: Path) -> None:

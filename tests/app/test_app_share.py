@@ -1,11 +1,9 @@
-"""What is taken away: the session as a table, the scene as a page, pictures from pixels."""
+"""What is taken away: the scene as a page, pictures from pixels."""
 
 from __future__ import annotations
 
 import base64
-import csv
 import datetime as dt
-import io
 import struct
 from dataclasses import dataclass
 from typing import Any
@@ -16,11 +14,8 @@ import numpy as np
 import pytest
 import zstandard
 from hypothesis import given, strategies as st
-from numpy.testing import assert_allclose
 
-from explorer import JOINTS, VARIABLES, forward, margins as margins_of, rotation_from_quaternion
 from explorer.app.features.sharing.scene_html import FileCamera, caption_of, scene_html, shown
-from explorer.app.features.sharing.session_log import SessionLog
 from explorer.app.features.sharing.view_picture import (
     ALIKE,
     LEAST,
@@ -32,67 +27,15 @@ from explorer.app.features.sharing.view_picture import (
     on_background,
 )
 from explorer.app.server import Running
-from explorer.app.state.actions import Open, Set, SetMode, SetPosition, SetVariable
+from explorer.app.state.actions import Set
 from explorer.app.state.state import opened
 from explorer.app.state.view import View
 from explorer.errors import InputError
-from explorer.export.session_log import SessionTable, session_csv
 from explorer.mechanism.design_file import PRESETS
 
 OPTIMAL = PRESETS["paper-optimal"]
 DATE = dt.date(2031, 2, 3)
 EYE = FileCamera(np.array([12.0, -9.0, 7.5]), np.array([1.0, 2.0, 3.0]), 0.5)
-
-
-def rows_of(table: SessionTable) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(session_csv(table))))
-
-
-def floats(row: dict[str, str], *names: str) -> list[float]:
-    return [float(row[name]) for name in names]
-
-
-@given(
-    st.lists(
-        st.one_of(
-            st.builds(SetPosition, st.integers(0, 2), st.floats(4.0, 12.0)),
-            st.builds(SetMode, st.integers(0, 7)),
-            st.builds(SetVariable, st.just("a3x"), st.floats(8.0, 21.0)),
-            st.builds(Set, st.just("design.unit_mm"), st.floats(0.5, 50.0)),
-            st.just(Open(PRESETS["paper-initial"])),
-        ),
-        max_size=12,
-    )
-)
-def test_row_of_a_session_computes_again_by_itself(actions: list[SetPosition]) -> None:
-    log, state = SessionLog(), opened(OPTIMAL)
-    log.record(state, None, "Open")
-    states = [state]
-    for number, action in enumerate(actions):
-        state = action.apply(state)
-        log.record(state, None, f"step {number}")
-        before = states[-1]
-        is_new = state.pose != before.pose or (
-            (state.design.variables, state.design.unit_mm)
-            != (before.design.variables, before.design.unit_mm)
-        )
-        if is_new:
-            states.append(state)
-    rows = rows_of(log.table())
-    for row, expected in zip(rows, states, strict=True):
-        position = floats(row, "x", "y", "z")
-        assert tuple(position) == expected.pose.position
-        assert tuple(floats(row, *VARIABLES)) == expected.design.variables
-        assert float(row["unit_mm"]) == expected.design.unit_mm
-        mode = int(row["mode"])
-        assert mode == expected.mode
-        # Forward kinematics and margins of the row are what is in it.
-        solution = forward(OPTIMAL.with_variables(floats(row, *VARIABLES)), floats(row, *JOINTS))
-        rotation = rotation_from_quaternion(np.array(floats(row, "qw", "qx", "qy", "qz")))
-        assert_allclose(solution.position[mode], position, atol=1e-7)
-        assert_allclose(solution.rotation[mode], rotation, atol=1e-7)
-        deltas = floats(row, "kappa1", "kappa2", "kappa3")
-        assert_allclose(deltas, margins_of(np.array(position), rotation), atol=1e-12)
 
 
 @dataclass(frozen=True)

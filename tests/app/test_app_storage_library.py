@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import unicodedata
 from collections.abc import Callable, Generator
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import pytest
 from hypothesis import example, given, strategies as st
 from killed import run_until_killed
 
-from explorer.app.storage.library import MOST_DELETED, Entry, Library, copy_name, file_of
+from explorer.app.storage.library import Entry, Library, copy_name, file_of
 from explorer.errors import InputError, StorageError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
@@ -22,7 +21,7 @@ from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 OPTIMAL = PRESETS["paper-optimal"]
 
 HOSTILE = (
-    "../../../etc/passwd", "C:\\Windows\\system32", "..", ".", "~", "NUL.json", ".lock", ".order",
+    "../../../etc/passwd", "C:\\Windows\\system32", "..", ".", "~", "NUL.json", ".lock",
     "trash", 'a/b\\c:d*e?f"g<h>i|j', "$(rm -rf ~)", "%00", "<b>bold</b>", "é", "δ1 = 0 ✓",
     "🦾" * 100,
 )  # fmt: skip
@@ -75,18 +74,14 @@ def library(tmp_path: Path) -> Library:
     return Library(tmp_path / "data" / "designs")
 
 
-def test_saved_designs_are_opened_and_listed_newest_first_although_clocks_were_set_back(
-    library: Library,
-) -> None:
+def test_saved_designs_are_opened_and_listed_newest_first(library: Library) -> None:
     assert library.list() == ()
     for number, name in enumerate(("c", "a", " b ")):
         saved = library.save(name, design(number))
         assert saved == msgspec.structs.replace(design(number), name=name.strip())
         assert library.open(name) == library.open(name.strip()) == saved
-        for path in library.folder.iterdir():
-            os.utime(path, (1e9 - 1e6 * number, 1e9 - 1e6 * number))
     assert names(library) == ["b", "a", "c"]
-    library.save("a", design(9), replace=True)
+    library.save("a", design(9))
     assert names(library) == ["a", "b", "c"]
     # Each file is a design file as any other.
     for entry in library.list():
@@ -102,10 +97,12 @@ def test_hostile_name_is_never_a_path(library: Library) -> None:
         assert library.open(name).name == wanted
         (file,) = (path for path in library.folder.iterdir() if path.suffix == ".json")
         assert file.name == file_of(wanted)
-        gone = library.delete(name)
-        assert library.list() == ()
-        assert library.restore(gone.file).name == wanted
         library.delete(name)
+        assert library.list() == ()
+        library.restore()
+        assert names(library) == [wanted]
+        library.delete(name)
+        (library.folder / "trash" / file.name).unlink()
         assert [path.name for path in outside.iterdir()] == ["designs"]
 
 
@@ -142,18 +139,34 @@ def test_different_names_have_different_files_on_any_system(one: str, other: str
     assert (file_of(one).casefold() == file_of(other).casefold()) == (one == other)
 
 
-def test_taken_name_is_refused_unless_the_design_is_to_be_replaced(library: Library) -> None:
+def test_replaced_design_can_be_brought_back_and_a_taken_name_is_refused(library: Library) -> None:
     library.save("caf\u00e9", design(1))
-    # Names that look the same are the same.
-    with pytest.raises(InputError, match=r"replace it.*'café copy'"):
-        library.save("cafe\u0301 ", design(3))
-    library.save("café", design(1), replace=True)
-    # The same design replaces nothing.
-    assert library.deleted() == ()
-    library.save("café", design(3), replace=True)
-    (deleted,) = library.deleted()
-    assert library.restore(deleted.file, "before").b2 == design(1).b2
+    # The same design replaces nothing; names that look the same are the same.
+    library.save("cafe\u0301 ", design(1))
+    assert library.last_deleted is None
+    library.save("café", design(3))
+    assert library.last_deleted == "café"
+    library.restore()
+    assert {name: library.open(name).b2 for name in names(library)} == {
+        "café": design(3).b2,
+        "café copy": design(1).b2,
+    }
+    assert library.last_deleted is None
     assert library.rename("café", " café ").name == "café"
+    with pytest.raises(InputError, match="'café copy' already"):
+        library.rename("café", "café copy")
+
+
+def test_last_deleted_is_brought_back_first_and_of_a_name_the_last_one(library: Library) -> None:
+    for number, name in enumerate(("a", "b", "a")):
+        library.save(name, design(number))
+        library.delete(name)
+        assert library.last_deleted == name
+    for expected in ({"a": design(2).b2}, {"a": design(2).b2, "b": design(1).b2}):
+        library.restore()
+        assert {name: library.open(name).b2 for name in names(library)} == expected
+    with pytest.raises(InputError, match="nothing has been deleted"):
+        library.restore()
 
 
 def test_copies_have_numbered_names_of_at_most_100_characters() -> None:
@@ -162,31 +175,13 @@ def test_copies_have_numbered_names_of_at_most_100_characters() -> None:
     assert copy_name("x" * 100, {"x" * 95 + " copy"}) == "x" * 93 + " copy 2"
 
 
-def test_newest_deleted_designs_are_kept_and_can_be_restored(library: Library) -> None:
-    for number in range(MOST_DELETED + 5):
-        library.save("same", design(number))
-        library.delete("same")
-    deleted = library.deleted()
-    assert [each.name for each in deleted] == ["same"] * MOST_DELETED
-    assert library.restore(deleted[0].file).b2 == design(MOST_DELETED + 4).b2
-    assert [each.file for each in library.deleted()] == [each.file for each in deleted[1:]]
-    with pytest.raises(InputError, match="already"):
-        library.restore(deleted[1].file)
-    assert library.restore(deleted[1].file, "another").name == "another"
-    for file in (deleted[0].file, "../" + deleted[2].file, "", "..", "\0"):
-        with pytest.raises(InputError, match="not in the trash"):
-            library.restore(file)
-    library.delete("same")
-    assert library.deleted()[0].name == "same"
-
-
 def test_file_copied_into_the_folder_appears_by_the_name_inside(library: Library) -> None:
     library.save("own", design(1))
     copied = copy_in(library, "My Design (1).json", "theirs", 2)
-    assert names(library) == ["own", "theirs"]
+    assert names(library) == ["theirs", "own"]
     assert library.open("theirs").b2 == design(2).b2
     # One that is replaced or renamed gets a file of the library's own.
-    library.save("theirs", design(3), replace=True)
+    library.save("theirs", design(3))
     assert not copied.exists()
     copy_in(library, "x.json", "fourth", 4)
     library.rename("fourth", "mine")
@@ -195,7 +190,7 @@ def test_file_copied_into_the_folder_appears_by_the_name_inside(library: Library
     # A file of the library precedes others with the same name.
     for file in ("0.json", "z.json"):
         copy_in(library, file, "own", 5)
-    assert [each.file for each in problems(library)] == ["0.json", "z.json"]
+    assert {each.file for each in problems(library)} == {"0.json", "z.json"}
     assert all("has the name 'own' too" in (each.problem or "") for each in problems(library))
     library.delete("0.json")
     assert library.open("own").b2 == design(1).b2
@@ -238,99 +233,18 @@ def test_unusable_files_are_listed_with_a_reason_and_can_be_deleted(library: Lib
             library.open(entry.name)
     for entry in others[:3]:
         library.delete(entry.name)
-    assert len(library.list()) == 1 + count - 3
-    for deleted in library.deleted():
-        with pytest.raises(InputError):
-            library.restore(deleted.file)
-    # An unusable file stays in the trash.
-    assert len(library.deleted()) == 3
+        assert library.last_deleted == entry.name
+        assert len(library.list()) == count
+        library.restore()
+        assert sorted(each.file for each in library.list()[1:]) == sorted(e.file for e in others)
+    # Another file has come in its place.
+    library.delete("empty.json")
+    (library.folder / "empty.json").write_bytes(b"")
+    with pytest.raises(InputError, match="lies in"):
+        library.restore()
 
 
-OPERATIONS = ("save", "replace", "rename", "duplicate", "delete", "restore", "open")
 NAMES = ("a", "A", "á", "b/..", "a copy")
-
-
-@given(
-    st.lists(
-        st.tuples(
-            st.sampled_from(OPERATIONS),
-            st.sampled_from(NAMES),
-            st.sampled_from(NAMES),
-            st.integers(0, 1),
-        ),
-        max_size=15,
-    )
-)
-def test_two_explorers_see_one_dictionary(
-    tmp_path_factory: pytest.TempPathFactory, operations: list[tuple[str, str, str, int]]
-) -> None:
-    folder = tmp_path_factory.mktemp("designs")
-    libraries = Library(folder), Library(folder)
-    known: dict[str, float] = {}
-    trash: list[tuple[str, str, float]] = []
-    for number, (act, name, other, who) in enumerate(operations):
-        library, new = libraries[who], design(number)
-        try:
-            match act:
-                case "save":
-                    library.save(name, new)
-                    assert name not in known
-                    known[name] = new.b2
-                case "replace":
-                    library.save(name, new, replace=True)
-                    if name in known:
-                        trash.append((name, library.deleted()[0].file, known[name]))
-                    known[name] = new.b2
-                case "rename":
-                    library.rename(name, other)
-                    assert name == other or other not in known
-                    known[other] = known.pop(name)
-                case "duplicate":
-                    copy = library.duplicate(name)
-                    assert copy.name not in known
-                    known[copy.name] = known[name]
-                case "delete":
-                    trash.append((name, library.delete(name).file, known.pop(name)))
-                case "restore":
-                    if trash:
-                        was, file, value = trash[-1]
-                        assert library.restore(file).name == was
-                        assert was not in known
-                        known[was] = value
-                        trash.pop()
-                case _:
-                    assert library.open(name).b2 == known[name]
-        except InputError:
-            assert act != "replace"
-            expected = {
-                "save": name in known,
-                "rename": name not in known or (other in known and other != name),
-                "restore": bool(trash) and trash[-1][0] in known,
-            }
-            assert expected.get(act, name not in known)
-        for each in libraries:
-            assert {entry.name: entry.design.b2 for entry in each.list() if entry.design} == known
-            assert [deleted.file for deleted in each.deleted()] == [
-                file for _, file, _ in trash[::-1]
-            ]
-
-
-def test_designs_saved_by_many_threads_at_once_are_all_kept(
-    library: Library, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # On a slow disk the last in the row waits long.
-    monkeypatch.setattr("explorer.app.storage.folder.PATIENCE_SECONDS", 60.0)
-
-    def work(worker: int) -> None:
-        own = Library(library.folder)
-        for number in range(3):
-            own.save(f"{worker}-{number}", design(number))
-            own.duplicate(f"{worker}-{number}")
-            own.delete(f"{worker}-{number}")
-
-    with ThreadPoolExecutor(4) as threads:
-        list(threads.map(work, range(4)))
-    assert sorted(names(library)) == sorted(f"{w}-{n} copy" for w in range(4) for n in range(3))
 
 
 def full_disk(_: int) -> None:
@@ -339,11 +253,11 @@ def full_disk(_: int) -> None:
 
 CHANGES: dict[str, Callable[[Library], object]] = {
     "save": lambda library: library.save("new", design(3)),
-    "replace": lambda library: library.save("mine", design(3), replace=True),
+    "replace": lambda library: library.save("mine", design(3)),
     "rename": lambda library: library.rename("mine", "new"),
-    "duplicate": lambda library: library.duplicate("mine"),
     "delete": lambda library: library.delete("mine"),
-    "restore": lambda library: library.restore(library.deleted()[0].file),
+    "restore": lambda library: library.restore(),
+    "restore as a copy": lambda library: library.restore(),
 }
 
 
@@ -356,7 +270,7 @@ def filled(library: Library) -> Library:
     return library
 
 
-@pytest.mark.parametrize("act", [act for act in CHANGES if act != "delete"])
+@pytest.mark.parametrize("act", ["save", "replace", "rename"])
 def test_write_that_fails_changes_nothing(
     filled: Library, monkeypatch: pytest.MonkeyPatch, act: str
 ) -> None:
@@ -369,18 +283,15 @@ def test_write_that_fails_changes_nothing(
 
 @pytest.mark.parametrize("act", CHANGES)
 def test_kill_between_any_two_writes_loses_no_design(filled: Library, act: str) -> None:
+    if act == "restore as a copy":
+        filled.save("gone", design(4))
     start = contents(filled)
     writes, is_killed = 0, True
     while is_killed:
         is_killed = run_until_killed(partial(CHANGES[act], filled), writes)
-        found = Library(filled.folder)
-        there = {entry.design.b2 for entry in found.list() if entry.design}
-        restored = {found.restore(each.file, f"back {each.file}").b2 for each in found.deleted()}
-        assert {design(1).b2, design(2).b2} <= there | restored
-        assert problems(found) == []
-        # A half-written file is gone after the next write.
-        found.save("next", OPTIMAL)
-        assert not [path for path in contents(filled) if path.endswith(".part")]
+        kept = [each for path, each in contents(filled).items() if path.endswith(".json")]
+        assert {design(1).b2, design(2).b2} <= {decode_design(each, "").b2 for each in kept}
+        assert problems(filled) == []
         for path in contents(filled):
             Path(path).unlink()
         for path, data in start.items():
@@ -393,7 +304,7 @@ def test_file_in_place_of_the_folder_is_reported_in_one_line(tmp_path: Path) -> 
     assert Library().folder == Path(os.environ["EXPLORER_DATA"]) / "designs"
     (tmp_path / "file").write_bytes(b"")
     library = Library(tmp_path / "file")
-    assert library.list() == library.deleted() == ()
+    assert (library.list(), library.last_deleted) == ((), None)
     with pytest.raises(StorageError, match="a file lies where") as refusal:
         library.save("mine", OPTIMAL)
     assert "\n" not in str(refusal.value)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-import threading
 import time
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,13 +26,13 @@ from explorer.app.session.session import REDO, UNDO, Session
 from explorer.app.state.actions import SetName, SetPosition
 from explorer.app.state.state import Run, State, joints_of, opened
 from explorer.app.storage.autosaver import Autosaver
-from explorer.app.storage.folder import data_folder, lock_folder
-from explorer.app.storage.session_file import MOST_ORPHANS, SessionFile
+from explorer.app.storage.folder import SCRATCH_SECONDS, data_folder
+from explorer.app.storage.session_file import MOST_ORPHANS, Resumed, SessionFile
 from explorer.app.storage.session_format import (
     MOST_BYTES,
     MOST_STEPS,
     SCHEMA,
-    SchemaError,
+    DamagedError,
     decode_header,
     decode_session,
     encode_session,
@@ -193,28 +192,27 @@ def test_state_that_no_page_shows_is_refused_wherever_it_is(nonsense: str, place
     assert str(refusal.value).isprintable()
 
 
-@pytest.mark.parametrize("schema", [2, 3])
-def test_file_of_an_earlier_schema_opens_and_is_the_same_once_it_is_written_again(
-    schema: int,
-) -> None:
-    data = (DATA / f"session-{schema}.json").read_bytes()
-    assert decode_header(data, "file").schema == schema
-    read = decode_session(data, "file")
-    assert len({step.number for step in read.steps}) == len(read.steps) > 1
-    assert read.step.state.design.name.startswith("é «one»")
+def test_file_of_this_version_opens_and_is_the_same_once_it_is_written_again() -> None:
+    read = decode_session((DATA / "session.json").read_bytes(), "file")
+    assert [step.words for step in read.steps] == ["Open é «one»", "All"]
     assert repr(decode_session(encode_session(read, 3), "file")) == repr(read)
 
 
-def test_file_of_a_newer_schema_is_told_from_a_damaged_one() -> None:
-    head = b'{"schema": %d, "generation": 5, "what": "nobody knows"}\n' % (SCHEMA + 1)
-    assert decode_header(head, "file").generation == 5
+@pytest.mark.parametrize("schema", [1, SCHEMA - 1, SCHEMA + 1])
+def test_file_of_another_version_is_refused_in_one_sentence_whatever_it_holds(schema: int) -> None:
+    head = b'{"schema": %d, "generation": 5, "what": "nobody knows"}\n' % schema
     for rest in (b"", b"anything", b"\xff"):
-        with pytest.raises(SchemaError, match="newer"):
+        with pytest.raises(StorageError) as refusal:
             decode_session(head + rest, "file")
+        assert not isinstance(refusal.value, DamagedError)
+        assert str(refusal.value) == (
+            "file is a session of another version of the explorer: "
+            f"it has schema {schema}, and this version reads schema {SCHEMA}"
+        )
 
 
-# Seconds that no test waits, and those after which a test gives up.
-NEVER, PATIENCE = 1e6, 60.0
+# Seconds that no test waits.
+NEVER = 1e6
 
 
 def numbered(number: int) -> History:
@@ -251,23 +249,31 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in files}
 
 
+def saved_numbers(folder: Path) -> list[float | None]:
+    """Return the numbers of the sessions in a folder, which an explorer may be writing."""
+    files = sorted(folder.glob("*.json"))
+    return [number_of(decode_session(file.read_bytes(), "file")) for file in files]
+
+
 def test_next_explorer_continues_in_the_same_file(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "sessions"
     first = SessionFile(folder)
     assert first.resume().history is None
     assert first.path is None
+    generations: list[int] = []
     for number in range(5):
-        generation = first.save(numbered(number))
+        first.save(numbered(number))
         assert first.path is not None
         data = first.path.read_bytes()
-        assert data == encode_session(numbered(number), generation)
-        assert decode_header(data, "file").generation == generation == 1 + number
+        generations.append(decode_header(data, "file").generation)
+        assert data == encode_session(numbered(number), generations[-1])
+    assert generations == sorted({*generations})
+    path = first.path
     first.close()
     second = SessionFile(folder)
-    resumed = second.resume()
-    assert (resumed.history, resumed.messages) == (numbered(4), ())
-    assert second.path == first.path or first.path is None
-    assert second.save(numbered(5)) == 6
+    assert second.resume() == Resumed(numbered(4))
+    assert second.path == path
+    second.save(numbered(5))
     second.close()
     assert len(contents(folder)) == 1
     assert resume(folder) == 5
@@ -295,48 +301,42 @@ def test_explorers_side_by_side_have_a_file_each_and_the_last_save_is_the_newest
         store.close()
 
 
-def test_only_the_newest_sessions_are_kept_although_clocks_were_set_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_the_newest_sessions_are_kept_and_those_of_running_explorers(tmp_path: Path) -> None:
     living = SessionFile(tmp_path)
     living.save(numbered(-1))
-    now = time.time()
     for number in range(MOST_ORPHANS + 5):
-        # Each start of the explorer is a year before the last one.
-        before = now - number * 365.25 * 86400.0
-        monkeypatch.setattr(time, "time", lambda before=before: before)
-        os.utime(leave_session(tmp_path, number), (before, before))
+        leave_session(tmp_path, number)
     store = SessionFile(tmp_path)
     assert number_of(store.resume().history) == MOST_ORPHANS + 4
-    # Its own, those without an explorer, and that of the explorer that runs.
-    assert len(contents(tmp_path)) == 1 + MOST_ORPHANS + 1
-    assert living.save(numbered(-2)) > 0
+    numbers = saved_numbers(tmp_path)
+    assert sorted(n for n in numbers if n is not None) == [-1, *range(4, MOST_ORPHANS + 5)]
+    living.save(numbered(-2))
     store.close()
     living.close()
     assert resume(tmp_path) == -2
 
 
-def test_leftovers_are_removed_unless_their_explorer_runs_and_other_paths_ignored(
-    tmp_path: Path,
+def test_scratch_files_are_removed_unless_they_are_new_and_other_paths_ignored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    living = SessionFile(tmp_path)
-    living.save(numbered(1))
-    assert living.path is not None
-    path = leave_session(tmp_path, 2)
-    writing = tmp_path / f".{living.path.name}.0123.part"
-    dead = [tmp_path / f".{path.name}.0123.part", tmp_path / ".0123.json.4.part"]
-    dead.append(tmp_path / "0123.lock")
-    for each in (writing, *dead):
+    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
+    folder = tmp_path / "sessions"
+    leave_session(folder, 2)
+    writing, dead = folder / ".one.json.0123.part", folder / ".two.json.0123.part"
+    for each in (writing, dead):
         each.write_bytes(b"part")
+    before = time.time() - 2.0 * SCRATCH_SECONDS
+    os.utime(dead, (before, before))
     # Folders, links and pipes named like sessions are ignored.
-    (tmp_path / "folder.json").mkdir()
-    (tmp_path / "gone.json").symlink_to(tmp_path / "nowhere")
+    (folder / "folder.json").mkdir()
+    (folder / "gone.json").symlink_to(folder / "nowhere")
     if hasattr(os, "mkfifo"):
-        os.mkfifo(tmp_path / "pipe.json")
-    assert resume(tmp_path) == 2
+        os.mkfifo(folder / "pipe.json")
+    data = open_user_data(resume=True)
+    data.store.close()
+    assert (number_of(data.history), data.messages) == (2, ())
     assert writing.exists()
-    assert not any(each.exists() for each in dead)
-    living.close()
+    assert not dead.exists()
 
 
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
@@ -345,7 +345,7 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda _: b"",
     "other": lambda _: b'{"schema": 1}\n',
     # No page can show it.
-    "too far": lambda _: encode_session(history_of([NONSENSE["a pose far away"](OPENED)]), 3),
+    "too far": lambda _: encode_session(history_of([NONSENSE["a pose far away"](OPENED)]), 2**61),
 }
 
 
@@ -356,54 +356,54 @@ def test_damaged_file_is_renamed_and_the_session_before_is_resumed(
     leave_session(tmp_path, 1)
     path = leave_session(tmp_path, 2)
     damaged = DAMAGES[damage](path.read_bytes())
-    for ending in (".broken", ".broken2"):
-        path.write_bytes(damaged)
-        store = SessionFile(tmp_path)
-        resumed = store.resume()
-        store.close()
-        assert number_of(resumed.history) == 1
-        (message,) = resumed.messages
-        assert "\n" not in message
-        assert path.name in message
-        assert repr(path.name + ending) in message
-        assert (tmp_path / (path.name + ending)).read_bytes() == damaged
-        assert not path.exists()
+    path.write_bytes(damaged)
+    store = SessionFile(tmp_path)
+    resumed = store.resume()
+    store.close()
+    assert number_of(resumed.history) == 1
+    (message,) = resumed.messages
+    assert "\n" not in message
+    assert path.name in message
+    assert message.endswith(f"; it is kept as {path.name + '.broken'!r}")
+    assert path.with_name(path.name + ".broken").read_bytes() == damaged
+    assert not path.exists()
     assert resume(tmp_path) == 1
 
 
-def test_file_of_a_newer_explorer_is_left_alone_and_new_saves_are_newer(tmp_path: Path) -> None:
+def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     leave_session(tmp_path, 1)
-    newer = tmp_path / "newer.json"
-    newer.write_bytes(b'{"schema": 99, "generation": 1000, "more": [1]}\nbinary \xff')
-    before = newer.read_bytes()
+    other = tmp_path / "other.json"
+    other.write_bytes(b'{"schema": 99, "generation": 4000000000000000000, "more": [1]}\n\xff')
+    before = other.read_bytes()
     store = SessionFile(tmp_path)
     resumed = store.resume()
     assert number_of(resumed.history) == 1
     (message,) = resumed.messages
-    assert "newer" in message
-    assert newer.read_bytes() == before
-    assert store.save(numbered(2)) == 1001
+    assert "another version" in message
+    assert message.endswith("; it is left as it is")
+    assert other.read_bytes() == before
     store.close()
 
 
 def test_session_is_only_read_where_nothing_can_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(*_: object) -> None:
-        raise StorageError("read-only")
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
 
     for number in (1, 2):
         path = leave_session(tmp_path, number)
     path.write_bytes(b"damaged")
     before = contents(tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr("explorer.app.storage.session_file.lock_folder", refuse)
+        patch.setattr("explorer.app.storage.folder.FileLock.acquire", refuse)
+        patch.setattr(Path, "replace", refuse)
         store = SessionFile(tmp_path)
         resumed = store.resume()
         assert number_of(resumed.history) == 1
-        assert any("read-only" in message for message in resumed.messages)
-        assert any(path.name in message for message in resumed.messages)
-        with pytest.raises(StorageError, match="read-only"):
+        assert any("Permission denied" in message for message in resumed.messages)
+        assert any(message.endswith("left as it is") for message in resumed.messages)
+        with pytest.raises(StorageError, match="Permission denied"):
             store.save(numbered(3))
         assert contents(tmp_path) == before
     # Once it can be written, the session is saved in a file of its own.
@@ -412,21 +412,13 @@ def test_session_is_only_read_where_nothing_can_be_written(
     store.close()
 
 
-def test_folder_that_is_a_file_or_locked_is_reported_in_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_folder_that_is_a_file_is_reported_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "data").write_bytes(b"")
     store = SessionFile(tmp_path / "data" / "sessions")
-    resumed = store.resume()
-    assert resumed.history is None
+    assert store.resume() == Resumed(None)
     with pytest.raises(StorageError, match="EXPLORER_DATA") as refusal:
         store.save(numbered(1))
-    assert resumed.messages == (str(refusal.value),)
     assert "\n" not in str(refusal.value)
-    # So is a folder that another explorer locks.
-    monkeypatch.setattr("explorer.app.storage.folder.PATIENCE_SECONDS", 0.0)
-    with lock_folder(tmp_path), pytest.raises(StorageError, match="another explorer"):
-        SessionFile(tmp_path).save(numbered(1))
 
 
 def test_data_folder_is_that_of_the_environment(
@@ -459,118 +451,82 @@ def test_save_killed_between_any_two_writes_leaves_the_session_before_or_the_new
         # The system releases the lock of a process that is killed.
         store.close()
         assert resume(tmp_path) in ({before, number} if is_killed else {number})
-        # A half-written file is gone with the next start.
-        assert len(contents(tmp_path)) == 1
         writes += 1
     assert writes > 1
 
 
-@dataclass
-class MemoryStore:
-    """A store in memory that can fail and block."""
-
-    saved: list[float | None] = field(default_factory=list[float | None])
-    problem: Exception | None = None
-    may_save: threading.Event = field(default_factory=threading.Event)
-    began: threading.Event = field(default_factory=threading.Event)
-    is_closed: bool = False
-
-    def __post_init__(self) -> None:
-        self.may_save.set()
-
-    def save(self, history: History) -> int:
-        assert threading.current_thread() is not threading.main_thread()
-        assert not self.is_closed
-        self.began.set()
-        assert self.may_save.wait(PATIENCE)
-        if self.problem is not None:
-            raise self.problem
-        self.saved.append(number_of(history))
-        return len(self.saved)
-
-    def close(self) -> None:
-        self.is_closed = True
-
-
-def start_autosaver(
-    store: MemoryStore, quiet: float, longest: float
-) -> tuple[Autosaver, list[str]]:
-    messages: list[str] = []
-    saver = Autosaver(store, messages.append, quiet=quiet, longest=longest, retry=NEVER)
-    return saver, messages
-
-
-def test_last_of_many_changes_is_saved_and_one_posted_during_a_save_is_next() -> None:
-    store = MemoryStore()
-    saver, messages = start_autosaver(store, NEVER, NEVER)
-    for number in range(100):
-        saver.post(numbered(number))
-    assert store.saved == []
-    assert saver.flush(PATIENCE)
-    assert store.saved == [99]
-    # Without a change nothing is saved; and the next change waits again.
-    assert saver.flush(PATIENCE)
-    saver.post(numbered(100))
-    assert store.saved == [99]
-    saver.stop()
-    assert store.saved == [99, 100]
-    assert store.is_closed
-    assert messages == []
-    store = MemoryStore()
-    store.may_save.clear()
-    saver, _ = start_autosaver(store, 0.0, 0.0)
-    saver.post(numbered(1))
-    assert store.began.wait(PATIENCE)
-    saver.post(numbered(2))
-    store.may_save.set()
-    assert saver.flush(PATIENCE)
-    assert store.saved == [1, 2]
-    saver.stop()
-
-
-@pytest.mark.parametrize(
-    ("quiet", "longest", "is_endless"), [(0.01, NEVER, False), (NEVER, 0.05, True)]
-)
-def test_change_is_saved_once_it_is_quiet_or_after_the_longest_time(
-    quiet: float, longest: float, is_endless: bool
+def test_last_of_many_changes_is_saved_in_the_background_and_the_next_one_too(
+    tmp_path: Path,
 ) -> None:
-    store = MemoryStore()
-    saver, _ = start_autosaver(store, quiet, longest)
-    saver.post(numbered(0))
-
-    def is_saved() -> bool:
-        if is_endless:
-            saver.post(numbered(len(store.saved)))
-        return len(store.saved) >= (3 if is_endless else 1)
-
-    wait_for(is_saved)
+    messages: list[str] = []
+    saver = Autosaver(SessionFile(tmp_path), messages.append, delay=0.0)
+    for number in range(20):
+        saver.follow(OPENED, numbered(number))
+    wait_for(lambda: saved_numbers(tmp_path) == [19])
+    saver.follow(OPENED, numbered(20))
+    wait_for(lambda: saved_numbers(tmp_path) == [20])
     saver.stop()
+    assert messages == []
 
 
-def test_failure_is_reported_once_and_so_is_its_end() -> None:
-    store = MemoryStore(problem=StorageError("the disk is full; make room"))
-    saver, messages = start_autosaver(store, 0.0, 0.0)
+def test_change_is_saved_at_once_by_a_flush_and_when_the_explorer_stops(tmp_path: Path) -> None:
+    saver = Autosaver(SessionFile(tmp_path), print, delay=NEVER)
+    saver.follow(OPENED, numbered(1))
+    assert saved_numbers(tmp_path) == []
+    assert saver.flush()
+    assert saved_numbers(tmp_path) == [1]
+    # Without a change nothing is written.
+    before = contents(tmp_path)
+    assert saver.flush()
+    assert contents(tmp_path) == before
+    saver.follow(OPENED, numbered(2))
+    saver.stop()
+    assert resume(tmp_path) == 2
+
+
+def test_failure_to_save_is_reported_once_and_so_is_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    messages: list[str] = []
+    store = SessionFile(tmp_path / "file")
+    saver = Autosaver(store, messages.append, delay=NEVER)
     for number in range(3):
-        saver.post(numbered(number))
-        assert not saver.flush(PATIENCE)
-    assert messages == [
-        "The session is not saved: the disk is full; make room. The explorer keeps trying."
-    ]
-    store.problem = None
+        saver.follow(OPENED, numbered(number))
+        assert not saver.flush()
+    (message,) = messages
+    assert message == saver.problem
+    assert message.startswith("The session is not saved: cannot make the folder")
+    assert message.endswith(". The explorer keeps trying.")
+    (tmp_path / "file").unlink()
     # The last one posted is not lost.
-    assert saver.flush(PATIENCE)
-    assert store.saved == [2]
+    assert saver.flush()
     assert messages[1:] == ["The session is saved again."]
-    store.problem = ZeroDivisionError("a\nfault")
-    saver.post(numbered(3))
-    assert not saver.flush(PATIENCE)
+    assert saver.problem is None
+
+    def fail(_: History) -> None:
+        raise ZeroDivisionError("a\nfault")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "save", fail)
+        saver.follow(OPENED, numbered(3))
+        assert not saver.flush()
     assert "\n" not in messages[2]
     assert "a fault" in messages[2]
     saver.stop()
-    # It ends although it cannot save.
-    assert store.saved == [2]
-    assert store.is_closed
-    assert len(messages) == 3
+    assert resume(tmp_path / "file") == 3
+
+
+def test_failed_save_is_tried_again_without_another_change(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    messages: list[str] = []
+    saver = Autosaver(SessionFile(tmp_path / "file"), messages.append, delay=0.0, retry=0.01)
+    saver.follow(OPENED, numbered(1))
+    wait_for(lambda: messages)
+    (tmp_path / "file").unlink()
+    wait_for(lambda: saver.problem is None)
+    saver.stop()
+    assert resume(tmp_path / "file") == 1
 
 
 def test_resumed_session_is_undone_and_redone(desk: Desk, tmp_path: Path) -> None:

@@ -1,20 +1,15 @@
-"""What a tab sends and is sent: switches of the view, notices, and tables of the session."""
+"""What a tab sends and is sent: switches of the view, and notices."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from client import Client, client_of, press_update, wait_for
 
-import explorer
 from explorer.app.features.sharing.files import SharedFiles
 from explorer.app.features.view.panel import FORMS, LAYERS
 from explorer.app.server import Running
-from explorer.app.state.actions import Open, SetPosition
 from explorer.app.state.view import View
 from explorer.mechanism.margins import TETRAHEDRA
 
@@ -102,31 +97,3 @@ def test_notice_of_compiling_counts_up_and_goes_when_it_is_done(running: Running
             ((found, text),) = notices(client.read_all_sent(running))
             assert found == kind
             assert words in text
-
-
-def test_session_is_sent_as_a_table_of_its_poses_and_their_steps(running: Running) -> None:
-    session, design = running.page.session, explorer.PRESETS["paper-optimal"]
-    session.do(Open(design))
-    assert session.wait_until_idle(PATIENCE_SECONDS)
-    with client_of(running) as client:
-        client.update(client.find("x"), 12.5)
-        wait_for(lambda: session.state.pose.position[0] == 12.5)
-        assert session.wait_until_idle(PATIENCE_SECONDS)
-        session.do(SetPosition(2, 7.0))
-        assert session.wait_until_idle(PATIENCE_SECONDS)
-        running.page.services.get(SharedFiles).session(client.client_id)
-        messages: list[dict[str, Any]] = []
-        while not any(message["type"] == "FileTransferPart" for message in messages):
-            messages += client.read()
-    start, *_ = (m for m in messages if m["type"] == "FileTransferStartDownload")
-    assert start["filename"] == "paper-optimal-session.csv"
-    content = b"".join(m["content"] for m in messages if m["type"] == "FileTransferPart")
-    rows = list(csv.DictReader(io.StringIO(content.decode())))
-    assert [row["moved_by"] for row in rows[-3:]] == ["Open paper-optimal", "x = 12.5", "z = 7"]
-    poses = [[float(row[name]) for name in "xyz"] for row in rows]
-    assert poses[-3:] == [[10.0, 5.0, 9.0], [12.5, 5.0, 9.0], [12.5, 5.0, 7.0]]
-    times = [float(row["time_s"]) for row in rows]
-    assert times == sorted(times)
-    joints = [float(rows[-1][name]) for name in explorer.JOINTS]
-    found = explorer.forward(design, joints)
-    np.testing.assert_allclose(found.position[int(rows[-1]["mode"])], poses[-1], atol=1e-9)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from queue import Queue
@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 from client import wait_for
 
-from explorer.app.session import jobs, memory
-from explorer.app.session.faults import Faults, read_fault
+from explorer.app.session import jobs
 from explorer.app.session.jobs import RESTARTED, Worker
+from explorer.app.session.log import NAME, log_error, start_log
 from explorer.app.session.worker import CANCELLED
 from tests.app import telling
 
@@ -305,42 +305,61 @@ def has_ended(process: int) -> bool:
 PROBLEM = "ValueError: setting 2.5 with ('a', 'b')"
 
 
+@pytest.fixture
+def log(tmp_path: Path) -> Iterator[Path]:
+    """The log of this process, in a folder of its own."""
+    root = logging.getLogger()
+    before = [*root.handlers]
+    start_log(tmp_path / "new")
+    yield tmp_path / "new" / NAME
+    for handler in {*root.handlers} - {*before}:
+        root.removeHandler(handler)
+        handler.close()
+
+
 @pytest.mark.parametrize(
-    ("task", "arguments", "problem", "reports"),
+    ("task", "arguments", "problem", "reports", "logged"),
     [
-        ("fail", (2.5, ("a", "b")), PROBLEM, [PROBLEM]),
-        ("fall", (), "it died", [RESTARTED, "it died; the request is kept in"]),
-        ("refuse", (), "refused on purpose", []),
+        (
+            "fail",
+            (2.5, ("a", "b")),
+            PROBLEM,
+            [PROBLEM],
+            ["ValueError", "telling.fail", "('a', 'b')"],
+        ),
+        ("fall", (), "it died", [RESTARTED, "it died"], ["it died", "telling.fall"]),
+        ("refuse", (), "refused on purpose", [], []),
     ],
 )
-def test_fault_of_a_task_is_saved_and_reported_unless_it_is_a_refusal(
-    tmp_path: Path, task: str, arguments: tuple[Any, ...], problem: str, reports: list[str]
+def test_error_of_a_task_is_logged_and_reported_unless_it_is_a_refusal(
+    log: Path,
+    task: str,
+    arguments: tuple[Any, ...],
+    problem: str,
+    reports: list[str],
+    logged: list[str],
 ) -> None:
-    told, failed = list[str](), Queue[str]()
+    messages, failed = list[str](), Queue[str]()
     receive = None if task == "fall" else Queue[object]().put
-    worker = Worker(told.append, died="it died", faults=Faults(tmp_path / "faults"))
+    worker = Worker(messages.append, died="it died")
     try:
         worker.submit(task, getattr(telling, task), arguments, failed.put, failed.put, receive)
         assert failed.get(timeout=PATIENCE) == problem
     finally:
         worker.stop()
-    assert len(told) == len(reports)
-    assert all(report in each for report, each in zip(reports, told, strict=True))
-    kept = list((tmp_path / "faults").glob("*"))
-    assert len(kept) == bool(reports)
-    for path in kept:
-        assert str(path) in told[-1]
-        fault = read_fault(path)
-        assert (fault.task, fault.arguments) == (task, arguments)
+    assert len(messages) == len(reports)
+    assert all(report in each for report, each in zip(reports, messages, strict=True))
+    assert log.exists() == bool(logged)
+    if logged:
+        assert messages[-1].endswith(f"; the log is {log}")
+        text = log.read_text()
+        assert all(words in text for words in logged)
 
 
-def test_memory_is_trimmed_repeatedly_within_the_context(
-    monkeypatch: pytest.MonkeyPatch,
+def test_log_that_cannot_be_written_hides_no_error(
+    log: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    thrice = threading.Semaphore(0)
-    monkeypatch.setattr(memory, "TRIM_SECONDS", 0.001)
-    monkeypatch.setattr(memory, "trim", thrice.release)
-    before = set(threading.enumerate())
-    with memory.trim_repeatedly():
-        assert all(thrice.acquire(timeout=60.0) for _ in range(3))
-    assert set(threading.enumerate()) <= before
+    log.parent.rmdir()
+    log.parent.write_bytes(b"")
+    assert log_error("it failed", "Traceback").startswith("it failed")
+    assert "it failed" in capfd.readouterr().err

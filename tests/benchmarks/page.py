@@ -24,7 +24,6 @@ from explorer.app.browser.headless import headless_browser
 from explorer.app.browser.viser_gaps import mark_broadcasts
 from explorer.app.screenshot import AWAIT_FRAMES, PATIENCE_SECONDS, SCENE_CANVAS, open_page, settle
 from explorer.app.server import Running, start
-from explorer.app.session.memory import freeze_objects
 from explorer.numerics.compiled import warm
 
 RUNS = 5
@@ -111,10 +110,9 @@ def _openings(browser: Browser) -> list[list[float]]:
 
 @contextmanager
 def ready_page(*, panels: bool = True) -> Generator[Running]:
-    """Run an explorer meanwhile, its kernels compiled and the collector at rest."""
+    """Run an explorer meanwhile, its kernels compiled."""
     running = start(PRESETS["paper-optimal"], port=0, panels=panels)
     warm()
-    freeze_objects()
     try:
         yield running
     finally:

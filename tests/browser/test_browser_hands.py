@@ -16,7 +16,7 @@ from explorer.app.layout import DRAWER_HEIGHT, NARROW
 from explorer.app.scene.camera import framing
 from explorer.app.screenshot import SCENE_CANVAS
 from explorer.app.server import start
-from explorer.app.storage.preferences import PreferenceFile, Preferences
+from explorer.app.storage.user_data import PreferenceFile, Preferences
 from explorer.mechanism.design_file import PRESETS
 
 OpenWindow = Callable[[tuple[int, int]], Tab]

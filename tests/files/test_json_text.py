@@ -216,7 +216,6 @@ def test_text_that_is_no_json_is_reported_with_line_and_text(seed: int) -> None:
         ('"tolerances": {"a3": [0, 0, 0], "a1": [0, 0, 0]},\n"a3": [9, 0]', "degenerate design"),
         ('"home": {"position": [1, 1, 1],\n"quaternion": [0, 0, 0, 0]}', "quaternion must not"),
         ('"unit_mm": 4,\n"unit_mm": 5', "the field 'unit_mm' is given twice"),
-        ('"schema": 1,\n"tool": {}', "unknown field `tool` of schema 1"),
     ],
 )
 def test_unusable_value_is_reported_with_its_line(field: str, words: str) -> None:

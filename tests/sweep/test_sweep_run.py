@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import importlib
 import logging
 import os
@@ -116,33 +115,6 @@ def test_run_writes_one_row_of_every_design_in_order(whole: Path) -> None:
         assert part.versions["numpy"] == np.__version__
         assert {"python", "scipy", "flagged-explorer"} <= set(part.versions)
         assert table.schema.metadata[b"explorer.seed"] == b"4"
-
-
-def test_results_with_a_former_name_of_a_measure_are_continued_with_the_present_one(
-    whole: Path, tmp_path: Path
-) -> None:
-    # The former name stands for the clearance, so that the results are known.
-    arrow = importlib.import_module("pyarrow.parquet")
-    for path in part_paths(whole):
-        table = read_part(path)[1]
-        text = encode_study(STUDY).replace(b'"clearance"', b'"reachable_volume"')
-        metadata = {
-            **table.schema.metadata,
-            b"explorer.study": text,
-            b"explorer.study_hash": hashlib.sha256(text).hexdigest().encode(),
-        }
-        # The versions have had another key too.
-        metadata[b"explorer.files.versions"] = metadata.pop(b"explorer.versions")
-        names = [name.replace("clearance", "reachable_volume") for name in table.column_names]
-        table = table.rename_columns(names).replace_schema_metadata(metadata)
-        arrow.write_table(table, tmp_path / path.name)
-    results = load_results(tmp_path)
-    expected = load_results(whole).columns
-    assert results.columns["accessible_volume"].tolist() == expected["clearance"].tolist()
-    assert Objective("reachable_volume", "max") == Objective("accessible_volume", "max")
-    before = contents(tmp_path)
-    assert run_study(results.study, tmp_path, HereWorkers()).is_complete
-    assert contents(tmp_path) == before
 
 
 def test_pandas_polars_and_duckdb_read_the_same_columns(whole: Path) -> None:

@@ -20,8 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from explorer.app.session.drawable import check_drawable
-from explorer.app.session.gestures import UserAction
+from explorer.app.session.gestures import UserAction, check_drawable
 from explorer.app.state.actions import Open
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
@@ -36,7 +35,7 @@ PLAIN: dict[str, Any] = {"a3": [8, 5], "b1": [3, -2.5], "b2": 2, "b3": 5}
 """The fields that every design file has."""
 
 FULL: dict[str, Any] = {
-    "schema": 1,
+    "schema": 2,
     "name": "Großer Entwurf",
     "unit_mm": 2.5,
     "node_step": 0.5,

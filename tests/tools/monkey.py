@@ -54,8 +54,8 @@ BROKEN = (
     b"\xff\xfe\x00",
     b'{"a3": [1, 2]}',
     b'{"schema": 99}',
-    b'{"schema": 1, "a3": [1e999, 0], "b1": [1, 1], "b2": 1, "b3": 2}',
-    b'{"schema": 1, "a3": [4, 0], "b1": [1, 1], "b2": 1, "b3": 2}',
+    b'{"schema": 2, "a3": [1e999, 0], "b1": [1, 1], "b2": 1, "b3": 2}',
+    b'{"schema": 2, "a3": [4, 0], "b1": [1, 1], "b2": 1, "b3": 2}',
     b"PK\x03\x04" + bytes(200),
 )
 NUMBERS = (0.0, -1.0, 1e-12, 1e9, math.nan, math.inf, -math.inf, 1e308)
@@ -155,10 +155,11 @@ class Monkey:
             shelves = [each.services.get(SavedDesigns) for each in (fresh.page, page)]
             for saved in shelves:
                 saved.wait_until_idle()
-            shelves[0].entries, shelves[0].deleted = shelves[1].entries, shelves[1].deleted
-            # The part of the list that is shown is no state.
+            shelves[0].entries = shelves[1].entries
+            shelves[0].last_deleted = shelves[1].last_deleted
+            # The part of the list that is shown and the question in it are no state.
             lists = [each.services.get(DesignsPanel) for each in (fresh.page, page)]
-            lists[0].first = lists[1].first
+            lists[0].first, lists[0].asked = lists[1].first, lists[1].asked
             session.redraw()
             assert fresh.page.wait_until_drawn(PATIENCE_SECONDS)
             self.report.drift += differences(shown_by(self.running), shown_by(fresh))

@@ -6,13 +6,16 @@ viser reports neither. A script sends both to a hidden text field of its tab.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Annotated, TypeVar
 
 import msgspec
 import viser
 
 from explorer.app.browser.viser_gaps import element_id, run_script_in
 from explorer.app.look import read_script
-from explorer.app.security.client_messages import Pixels, decode_text
+
+Pixels = Annotated[float, msgspec.Meta(ge=0, le=100_000)]
+Described = TypeVar("Described")
 
 
 class BrowserFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -49,6 +52,14 @@ def ask_browser(client: viser.ClientHandle, answered: Callable[[BrowserFacts], N
             answered(facts)
 
     run_script_in(client, read_script("window_facts", element_id(field)))
+
+
+def decode_text(text: str, decoder: msgspec.json.Decoder[Described]) -> Described | None:
+    """Return what a text from a browser describes; None if no script of the page wrote it."""
+    try:
+        return decoder.decode(text)
+    except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError):
+        return None
 
 
 def decode_facts(answer: str) -> BrowserFacts | None:

@@ -10,7 +10,6 @@ import numpy as np
 import viser
 from numpy.typing import ArrayLike
 
-from explorer.app.security.client_messages import ControlValue
 from explorer.numerics.arrays import FloatArray
 
 SceneMessage = dict[str, Any]
@@ -179,36 +178,6 @@ def _script(source: str) -> Any:
 
     guarded = f"try {{\n{source}\n}} catch (error) {{ console.error(error); }}"
     return _messages.RunJavascriptMessage(source=guarded)
-
-
-class ServerControls:
-    """The values of the controls of a server and of its clients, by their ids."""
-
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._server = server
-        # A viser without these names fails here, rather than when a browser connects.
-        self._inputs()
-
-    def value_of(self, uuid: str) -> ControlValue | None:
-        """Return the value of a control; None if there is no such control."""
-        handle = self._handle(uuid)
-        if handle is None:
-            return None
-        state = handle._impl
-        options = getattr(state.props, "options", None)
-        return ControlValue(state.value, None if options is None else tuple(options))
-
-    def takes_files(self, uuid: str) -> bool:
-        """Whether this is a button to upload files with."""
-        return isinstance(self._handle(uuid), viser.GuiUploadButtonHandle)
-
-    def _handle(self, uuid: str) -> Any:
-        return next((i[uuid] for i in self._inputs() if uuid in i), None)
-
-    def _inputs(self) -> list[Any]:
-        guis: list[Any] = [self._server.gui]
-        guis += [client.gui for client in self._server.get_clients().values()]
-        return [gui._gui_input_handle_from_uuid for gui in guis]
 
 
 def scene_as_html(

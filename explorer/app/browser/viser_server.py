@@ -9,7 +9,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Generator
-from typing import Any
+from typing import Any, cast
 
 import viser
 import websockets.asyncio.server
@@ -20,6 +20,10 @@ from explorer.errors import ServerError
 # Name of the module of viser that serves.
 SERVING_MODULE = "viser.infra._infra"
 _serving_lock = threading.Lock()
+# Size in bytes beyond which no upload is read; no purpose of the page needs as much.
+LARGEST_UPLOAD = 32_000_000
+# Number up to which JavaScript represents every whole number.
+LARGEST_NUMBER = 2.0**53
 
 
 def start_viser(
@@ -128,7 +132,68 @@ def refuse_tunnels(server: viser.ViserServer) -> None:
     from viser import _messages
 
     internals: Any = server
-    internals._websock_server.unregister_handler(_messages.ShareUrlRequest)
+    for kind in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+        internals._websock_server.unregister_handler(kind)
+
+
+def restrict_messages(server: viser.ViserServer) -> None:
+    """Ignore messages by which one browser could harm all of them.
+
+    viser sets any property of a control, even to a number that it cannot send to any browser, and
+    it stores uploads of any size.
+    """
+    from viser import _messages
+
+    gui: Any = server.gui
+    interface = gui._websock_interface
+
+    def is_value(_: int, message: Any) -> bool:
+        control = gui._gui_input_handle_from_uuid.get(message.uuid)
+        if control is None or [*message.updates] != ["value"]:
+            return False
+        message.updates = {"value": _bounded(message.updates["value"], control._impl.value)}
+        return True
+
+    def is_small_file(_: int, message: Any) -> bool:
+        return message.size_bytes <= LARGEST_UPLOAD
+
+    def is_rest_of_file(client_id: int, message: Any) -> bool:
+        upload = gui._current_file_upload_states.get(message.transfer_uuid)
+        return (
+            upload is not None
+            and upload["client_id"] == client_id
+            and len(message.content) <= upload["total_bytes"] - upload["transferred_bytes"]
+        )
+
+    def check(kind: type[Any], is_allowed: Callable[[int, Any], bool]) -> None:
+        (handle,) = interface._incoming_handlers[kind]
+
+        async def handle_checked(client_id: int, message: Any) -> None:
+            if is_allowed(client_id, message):
+                handling = handle(client_id, message)
+                if handling is not None:
+                    await handling
+
+        interface.unregister_handler(kind)
+        interface.register_handler(kind, handle_checked)
+
+    check(_messages.GuiUpdateMessage, is_value)
+    check(_messages.FileTransferStartUpload, is_small_file)
+    check(_messages.FileTransferPart, is_rest_of_file)
+
+
+def _bounded(value: Any, present: object) -> Any:
+    """Return a value for a control that has another one; a number is bounded, also if it is NaN.
+
+    Raises:
+        ValueError, TypeError: it is no number where the control has one.
+    """
+    if isinstance(present, tuple):
+        entries = cast("tuple[object, ...]", present)
+        return [_bounded(each, entry) for each, entry in zip(value, entries, strict=True)]
+    if isinstance(present, int | float) and not isinstance(present, bool):
+        return max(-LARGEST_NUMBER, min(LARGEST_NUMBER, float(value)))
+    return value
 
 
 def report_uploads_to_senders(server: viser.ViserServer) -> None:

@@ -16,16 +16,14 @@ import viser
 from explorer.app.browser.downloads import Downloads
 from explorer.app.scene.camera import Cameras
 from explorer.app.scene.part import ScenePart
-from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Session, Who
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.storage.autosaver import Autosaver
-from explorer.app.storage.preferences import PreferenceFile
 from explorer.app.storage.study_folders import StudyFolders
-from explorer.app.storage.user_data import UserData
+from explorer.app.storage.user_data import PreferenceFile, UserData
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.commands import Key
@@ -89,11 +87,6 @@ class Services:
     def scene(self) -> viser.SceneApi:
         """The API that adds parts of the scene."""
         return self.server.scene
-
-    @property
-    def faults(self) -> Faults | None:
-        """The record of requests that failed unexpectedly; None to keep none."""
-        return None if self.user_data is None else self.user_data.faults
 
     def get(self, kind: Callable[[Services], Shared]) -> Shared:
         """Return the one object of a class that the features share, made at the first call."""

@@ -1,1 +1,1 @@
-"""Rules for who may connect to the server, and for the messages of browsers."""
+"""Rules for who may connect to the server."""

@@ -29,7 +29,6 @@ TOKEN = re.compile(r"[A-Za-z0-9_-]{16,128}")
 # Plain words, since viser's page would connect to the address of another server in its query.
 PLAIN_QUERY = re.compile(r"[A-Za-z0-9_.~,=&-]*")
 HOST = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:(?P<port>[0-9]{1,5}))?")
-ORIGIN = re.compile(rf"https?://(?P<host>{HOST.pattern})")
 HTTP_PORT = 80
 # Ports that browsers leave out, by the scheme of the address.
 USUAL_PORTS = {"http": "80", "https": "443"}
@@ -151,7 +150,11 @@ class Access:
                 "The explorer's page is opened with nothing but its token in the address.",
             )
         if head.upgrade and not self._is_own_page(head.origins, host):
-            return Refusal(HTTPStatus.FORBIDDEN, _reason_for_origin(head.origins, host))
+            return Refusal(
+                HTTPStatus.FORBIDDEN,
+                "Only the explorer's own page may connect: the Origin must be that of this Host, "
+                "which a proxy must pass on.",
+            )
         if self.token is not None and not self._has_token(query, head.cookies, port):
             return Refusal(
                 HTTPStatus.UNAUTHORIZED,
@@ -192,13 +195,13 @@ class Access:
         return _is_address(name.strip("[]")) or name in known or short == known[-1]
 
     def _reason_for_host(self, host: str, port: int) -> str:
-        own = self.url(port).partition("?")[0].rstrip("/")
+        reason = f"The explorer has another address: {self.url(port).partition('?')[0].rstrip('/')}"
         parts = HOST.fullmatch(host)
         if parts is None:
-            return f"This address is not one of the explorer's; open {own}"
+            return reason
         return (
-            f"The explorer does not answer to the name {host}. Open {own}, or if a proxy has that "
-            f"name, allow it on start: explorer --allow-host {parts['name']}"
+            f"{reason}. If a proxy has the name {parts['name']}, allow it on start: "
+            f"explorer --allow-host {parts['name']}"
         )
 
     def _is_own_page(self, origins: Sequence[str], host: str) -> bool:
@@ -226,18 +229,6 @@ class Access:
                 given.append(cookie.value)
         secret = (self.token or "").encode()
         return any(hmac.compare_digest(v.encode(errors="replace"), secret) for v in given)
-
-
-def _reason_for_origin(origins: Sequence[str], host: str) -> str:
-    reason = "Only the explorer's own page may connect: the Origin must be that of this Host."
-    origin = ORIGIN.fullmatch(origins[0].lower()) if len(origins) == 1 else None
-    if origin is None:
-        return reason
-    return (
-        f"{reason} The page comes from {origin['host']}, and this request names {host}. A proxy "
-        "must pass on the header Host, and its name must be allowed on start: explorer "
-        f"--allow-host {origin['name']}"
-    )
 
 
 def is_loopback(host: str) -> bool:

@@ -1,41 +1,29 @@
-"""Checks of every request and every message before they reach viser.
+"""Checks of every request before it reaches viser, which serves any client.
 
-The guard is called by websockets, which speaks the protocol, and calls viser, which serves any
-client and trusts any message.
+The guard is called by websockets, which speaks the protocol. A message that viser cannot read ends
+the connection that it came by, and no other.
 """
 
 from __future__ import annotations
 
 import asyncio
-import functools
 import logging
-import time
 from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
-from dataclasses import replace
-from http import HTTPStatus
 from typing import Any
 
 import viser
 from websockets.asyncio.server import Server, ServerConnection
+from websockets.datastructures import Headers
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 from websockets.protocol import State
 
 from explorer.app.security.access import Access, Head, Refusal
-from explorer.app.security.client_messages import LARGEST_PICTURE, Controls, Inbox
-from explorer.app.security.refusals import add_explanations, asked_origin, explain, refuse
 
-# Largest number of tabs. Each is sent the whole scene, and unread messages are kept for it.
-MOST_TABS = 100
-# Limits of one tab's messages: a page sends 20 a second of each control that is dragged.
-MESSAGES_PER_SECOND = 1000.0
-MESSAGES_AT_ONCE = 200.0
-# Number of waiting changes of the session beyond which no message is read.
-MOST_WAITING = 200
+# Largest size in bytes of a message, that of a picture of the scene.
+LARGEST_MESSAGE = 24_000_000
 WAIT_SECONDS = 0.02
-# Number of unread messages of one client in memory; more stay in the network.
-MOST_UNREAD = 4
 # Turns of the event loop between accepting a connection and its handler's start.
 ACCEPT_TURNS = 3
 
@@ -43,7 +31,7 @@ Serve = Callable[..., Any]
 
 
 class Guard:
-    """Checks the requests and messages to one server.
+    """Checks the requests to one server.
 
     Args:
         access: The rule for requests.
@@ -51,18 +39,11 @@ class Guard:
 
     def __init__(self, access: Access) -> None:
         self._access = access
-        self._controls: Controls | None = None
-        self._waiting: Callable[[], int] = lambda: 0
-        self._tabs: set[ServerConnection] = set()
+        self._is_complete = False
 
-    def let_in(self, controls: Controls, waiting: Callable[[], int]) -> None:
-        """Pass messages on from now on, since the page is complete.
-
-        Args:
-            controls: The controls of the page.
-            waiting: Returns the number of changes that wait for the session.
-        """
-        self._controls, self._waiting = controls, waiting
+    def let_in(self) -> None:
+        """Pass connections on from now on, since the page is complete."""
+        self._is_complete = True
 
     def guarded(self, serve: Serve) -> Serve:
         """Return websockets' function that serves, with the checks of this guard."""
@@ -78,25 +59,12 @@ class Guard:
 
             options |= {
                 "process_request": process_request,
-                "create_connection": functools.partial(_GuardedConnection, self),
-                "max_size": LARGEST_PICTURE,
-                "max_queue": MOST_UNREAD,
+                "max_size": LARGEST_MESSAGE,
                 "logger": _logger(),
             }
             return _closing(serve(handle, *args, **options))
 
         return guarded_serve
-
-    async def inbox(self) -> Inbox:
-        """Return a new inbox for one client's messages, once the page is complete."""
-        while self._controls is None:
-            await asyncio.sleep(WAIT_SECONDS)
-        return Inbox(self._controls)
-
-    async def wait_for_room(self) -> None:
-        """Wait while too many changes wait for the session."""
-        while self._waiting() > MOST_WAITING:
-            await asyncio.sleep(WAIT_SECONDS)
 
     def _answer(
         self,
@@ -106,26 +74,14 @@ class Guard:
     ) -> Response | None:
         port: int = connection.local_address[1]
         head = _head(request)
-        origin = asked_origin(head.target)
-        if origin is not None:
-            # The page asks why a websocket of its origin is refused.
-            judged = replace(head, target="/", origins=[origin], upgrade=True)
-            return explain(self._refusal(judged, port))
-        refusal = self._refusal(head, port)
+        refusal = self._access.judge(head, port)
         if refusal is not None:
-            return refuse(refusal, as_page="text/html" in request.headers.get("Accept", ""))
+            return _refuse(refusal)
         response = answer(connection, request)
         if response is not None:
-            add_explanations(response)
             for name, value in self._access.headers(head, port):
                 response.headers[name] = value
         return response
-
-    def _refusal(self, head: Head, port: int) -> Refusal | None:
-        refusal = self._access.judge(head, port)
-        if refusal is None and head.upgrade and len(self._tabs) >= MOST_TABS:
-            return Refusal(HTTPStatus.SERVICE_UNAVAILABLE, f"{MOST_TABS} tabs are open; close one.")
-        return refusal
 
     async def _handle(
         self, connection: ServerConnection, handler: Callable[[ServerConnection], Awaitable[None]]
@@ -135,15 +91,10 @@ class Guard:
             await connection.close(CloseCode.PROTOCOL_ERROR, "Version mismatch: reload the page")
             return
         # A page that was open before the explorer comes while its server is half made.
-        while self._controls is None and connection.state is State.OPEN:
+        while not self._is_complete and connection.state is State.OPEN:
             await asyncio.sleep(WAIT_SECONDS)
-        if self._controls is None:
-            return
-        self._tabs.add(connection)
-        try:
+        if self._is_complete:
             await handler(connection)
-        finally:
-            self._tabs.discard(connection)
 
 
 @asynccontextmanager
@@ -168,38 +119,6 @@ async def _closing(serving: AbstractAsyncContextManager[Server]) -> AsyncGenerat
                 connection.transport.abort()
 
 
-class _GuardedConnection(ServerConnection):
-    """A connection that passes on only messages that its inbox admits, at a limited rate."""
-
-    def __init__(self, guard: Guard, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self._guard = guard
-        self._inbox: Inbox | None = None
-        self._allowance = MESSAGES_AT_ONCE
-        self._counted_at = time.monotonic()
-
-    async def recv(self, decode: bool | None = None) -> Any:
-        """Return the next message that the page may send."""
-        while True:
-            data = await super().recv(decode)
-            await self._pace()
-            self._inbox = self._inbox or await self._guard.inbox()
-            if self._inbox.admits(data):
-                return data
-            if self._inbox.is_out_of_patience:
-                await self.close(CloseCode.POLICY_VIOLATION, "These are no messages of the page")
-
-    async def _pace(self) -> None:
-        now = time.monotonic()
-        earned = (now - self._counted_at) * MESSAGES_PER_SECOND
-        self._allowance = min(MESSAGES_AT_ONCE, self._allowance + earned) - 1.0
-        self._counted_at = now
-        # The messages of a client that has gone are read without a delay.
-        if self._allowance < 0.0 and self.state is State.OPEN:
-            await asyncio.sleep(-self._allowance / MESSAGES_PER_SECOND)
-        await self._guard.wait_for_room()
-
-
 def _head(request: Request) -> Head:
     def values(name: str) -> list[str]:
         return list(request.headers.get_all(name))
@@ -207,6 +126,18 @@ def _head(request: Request) -> Head:
     return Head(
         request.path, values("Host"), values("Origin"), values("Cookie"), bool(values("Upgrade"))
     )
+
+
+def _refuse(refusal: Refusal) -> Response:
+    body = f"{refusal.reason}\n".encode()
+    headers = {
+        "Content-Type": "text/plain; charset=utf-8",
+        "Content-Length": str(len(body)),
+        "X-Content-Type-Options": "nosniff",
+        "Cross-Origin-Resource-Policy": "same-origin",
+        "Cache-Control": "no-store",
+    }
+    return Response(refusal.status.value, refusal.status.phrase, Headers(headers), body)
 
 
 def _logger() -> logging.Logger:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, Generic, Protocol, TypeVar, cast
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 from explorer.app.session.clock import Timer, now, start_timer
 from explorer.app.session.jobs import LONG_SECONDS, Worker
@@ -51,31 +51,6 @@ Request = TypeVar("Request")
 Drawing = TypeVar("Drawing", bound=_Drawn)
 
 
-@dataclass(frozen=True)
-class _Status(Generic[Request, Drawing]):
-    """The status of a feed; a new value replaces it as a whole, so that readers need no lock.
-
-    Attributes:
-        request: The newest request; None if nothing is to be drawn.
-        drawing: The newest drawing; None before the first.
-        part: What has arrived of a drawing that is newer still; None for nothing.
-        problem: Why there is no newer drawing, if the last request failed.
-        count: Number of requests that were submitted so far.
-        submitted: Time of the newest request in seconds, by the monotonic clock.
-        order: Number of the newest request in the worker; None once it is answered.
-        stage: Stage of its drawing; None before the first.
-    """
-
-    request: Request | None = None
-    drawing: Drawing | None = None
-    part: object = None
-    problem: str | None = None
-    count: int = 0
-    submitted: float = 0.0
-    order: int | None = None
-    stage: Stage | None = None
-
-
 class Feed(Generic[Request, Drawing]):
     """Requests drawings of one kind and holds the newest.
 
@@ -89,6 +64,10 @@ class Feed(Generic[Request, Drawing]):
         key: Key of the requests, of which the newest counts; the task if None.
         has_stages: Whether the task sends each `Stage`, and parts of the drawing as soon as they
             are known, and can be cancelled.
+
+    Attributes:
+        request: The newest request; None if nothing is to be drawn.
+        problem: Why there is no newer drawing, if the last request failed.
     """
 
     def __init__(
@@ -101,6 +80,8 @@ class Feed(Generic[Request, Drawing]):
         *,
         has_stages: bool = False,
     ) -> None:
+        self.request: Request | None = None
+        self.problem: str | None = None
         self._worker = worker
         self._task = task
         self._has_stages = has_stages
@@ -108,70 +89,57 @@ class Feed(Generic[Request, Drawing]):
         self._request_of = request_of
         self._redraw = redraw
         self._lock = threading.RLock()
+        self._drawing: Drawing | None = None
+        # What has arrived of a newer drawing, and its stage.
+        self._part: object = None
+        self._stage: Stage | None = None
         # Shows the first stage of a drawing that takes long.
         self._stage_timer: Timer | None = None
-        self._status = cast("_Status[Request, Drawing]", _Status())
+        # Number of the newest request, its time, and its number in the worker until it is answered.
+        self._count, self._submitted = 0, 0.0
+        self._order: int | None = None
 
     @property
     def drawing(self) -> Drawing | None:
         """The newest drawing; None if there is none, none is requested, or it was cancelled."""
-        status = self._status
-        return status.drawing if self._is_shown(status) else None
+        return None if self.request is None or self.is_cancelled else self._drawing
 
     @property
     def part(self) -> object:
         """What has arrived of a drawing newer than the newest; None for nothing, or as there."""
-        status = self._status
-        return status.part if self._is_shown(status) else None
-
-    @staticmethod
-    def _is_shown(status: _Status[Request, Drawing]) -> bool:
-        return status.request is not None and status.problem != CANCELLED
-
-    @property
-    def request(self) -> Request | None:
-        """The newest request; None if nothing is to be drawn."""
-        return self._status.request
-
-    @property
-    def problem(self) -> str | None:
-        """Why there is no newer drawing, if the last request failed."""
-        return self._status.problem
+        return None if self.request is None or self.is_cancelled else self._part
 
     @property
     def stage(self) -> Stage | None:
         """The stage of a drawing that takes long; None if none does, or before the first stage."""
-        status = self._status
-        is_long = now() - status.submitted >= LONG_SECONDS
-        return status.stage if is_long and not self.is_settled else None
+        is_long = now() - self._submitted >= LONG_SECONDS
+        return self._stage if is_long and not self.is_settled else None
 
     @property
     def is_cancelled(self) -> bool:
         """Whether the newest request was cancelled."""
-        status = self._status
-        return status.request is not None and status.problem == CANCELLED
+        return self.request is not None and self.problem == CANCELLED
 
     @property
     def is_current(self) -> bool:
         """Whether the drawing is that of the newest request."""
-        status = self._status
-        return status.drawing is not None and status.drawing.request == status.request
+        drawing = self._drawing
+        return drawing is not None and drawing.request == self.request
 
     @property
     def is_settled(self) -> bool:
         """Whether no newer drawing is being computed."""
-        status = self._status
-        return status.request is None or status.problem is not None or self.is_current
+        return self.request is None or self.problem is not None or self.is_current
 
     def follow(self, frame: Frame) -> None:
         """Request the drawing of a frame, unless it is the newest request already."""
         request = self._request_of(frame)
         with self._lock:
-            if request == self._status.request:
+            if request == self.request:
                 return
             if request is None:
                 self._cancel_order(None)
-            self._set(request=request, problem=None)
+            self.problem, self.request = None, request
             self._submit()
 
     def cancel(self) -> None:
@@ -179,7 +147,7 @@ class Feed(Generic[Request, Drawing]):
         with self._lock:
             if not self._has_stages or self.is_settled:
                 return
-            self._set(problem=CANCELLED)
+            self.problem = CANCELLED
             self._cancel_order(CANCEL_SECONDS)
         self._redraw()
 
@@ -188,20 +156,16 @@ class Feed(Generic[Request, Drawing]):
         with self._lock:
             if not self.is_cancelled:
                 return
-            self._set(problem=None)
+            self.problem = None
             self._submit()
         self._redraw()
 
-    def _set(self, **changes: Any) -> None:
-        with self._lock:
-            self._status = replace(self._status, **changes)
-
     def _submit(self) -> None:
-        request = self._status.request
-        if request is None:
+        if self.request is None:
             return
-        count = self._status.count + 1
-        self._set(count=count, submitted=now(), stage=None)
+        self._count += 1
+        self._stage, self._submitted = None, now()
+        count = self._count
 
         def failed(problem: str) -> None:
             self._show_problem(count, problem)
@@ -210,28 +174,26 @@ class Feed(Generic[Request, Drawing]):
             if isinstance(value, Stage):
                 self._receive(count, value)
             else:
-                self._show_part(value)
+                self._part = value
+                self._redraw()
 
-        order = (self._key, self._task, (request,), self._show_drawing, failed)
+        order = (self._key, self._task, (self.request,), self._show_drawing, failed)
         if self._has_stages:
-            number = self._worker.submit(*order, receive, is_drawing=True)
+            self._order = self._worker.submit(*order, receive, is_drawing=True)
         else:
-            number = self._worker.submit(*order)
-        self._set(order=number)
+            self._worker.submit(*order)
 
     def _cancel_order(self, patience: float | None) -> None:
         """Cancel the newest order, if it is not answered yet."""
-        order = self._status.order
-        if self._has_stages and order is not None:
-            self._worker.cancel(order, patience)
-        self._set(order=None)
+        if self._order is not None:
+            self._worker.cancel(self._order, patience)
+        self._order = None
 
     def _receive(self, count: int, stage: Stage) -> None:
         with self._lock:
-            if count != self._status.count:
+            if count != self._count:
                 return
-            is_first = self._status.stage is None
-            self._set(stage=stage)
+            is_first, self._stage = self._stage is None, stage
         if self.stage is not None:
             self._redraw()
         elif is_first:
@@ -239,31 +201,27 @@ class Feed(Generic[Request, Drawing]):
             self._stage_timer = start_timer(LONG_SECONDS, self._show_stage, count)
 
     def _show_stage(self, count: int) -> None:
-        if count == self._status.count and not self.is_settled:
+        if count == self._count and not self.is_settled:
             self._redraw()
-
-    def _stop_timer(self) -> None:
-        if self._stage_timer is not None:
-            self._stage_timer.cancel()
-
-    def _show_part(self, part: object) -> None:
-        self._set(part=part)
-        self._redraw()
 
     def _show_drawing(self, drawing: Drawing) -> None:
         with self._lock:
             # An older drawing is shown until the newest has arrived.
-            self._set(drawing=drawing, part=None)
+            self._drawing, self._part = drawing, None
             if self.is_current:
-                self._set(problem=None, order=None)
-                self._stop_timer()
+                self.problem = None
+                self._end_order()
         self._redraw()
 
     def _show_problem(self, count: int, problem: str) -> None:
         with self._lock:
-            is_newest = count == self._status.count and self._status.request is not None
-            if not is_newest or self.is_cancelled:
+            if count != self._count or self.request is None or self.is_cancelled:
                 return
-            self._set(drawing=None, part=None, problem=problem, order=None)
-            self._stop_timer()
+            self._drawing, self._part, self.problem = None, None, problem
+            self._end_order()
         self._redraw()
+
+    def _end_order(self) -> None:
+        self._order = None
+        if self._stage_timer is not None:
+            self._stage_timer.cancel()

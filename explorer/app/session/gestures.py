@@ -1,18 +1,25 @@
-"""Gestures: the events of one drag count as one move, from the pose where the drag began."""
+"""Gestures: the events of one drag count as one move, from the pose where the drag began.
+
+No event leads to a length that cannot be drawn.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from explorer.app.session.drawable import check_drawable
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Open, Reset, SetMode
 from explorer.app.state.presses import Press
 from explorer.app.state.state import Gesture, State
+from explorer.errors import InputError
+from explorer.mechanism.design import JOINTS, VARIABLES
+from explorer.numerics.number_text import format_number
 
 # Seconds without an event of a control after which the next one begins a new gesture, where no
 # press is known.
 PAUSE_SECONDS = 1.0
+# Largest length over the reach of the design as it was opened: browsers draw in single precision.
+LARGEST_SHARE = 1e6
 
 
 @dataclass(frozen=True)
@@ -70,3 +77,27 @@ class UserAction:
         if after.pose == before.pose:
             return gesture
         return Gesture(before.pose, self.source, self.time, self.press)
+
+
+def check_drawable(state: State) -> None:
+    """Check that every length of a state can be drawn at the scale that it was opened in.
+
+    Raises:
+        InputError: a design variable, a coordinate, a joint, the guide or a radius is too long.
+    """
+    reach = state.base.reach
+    for names, values in (
+        (VARIABLES, state.design.variables),
+        ("xyz", state.pose.position),
+        (JOINTS, state.joints),
+        (("the end of the guide",) * 2, state.design.limits.guide or (0.0, 0.0)),
+        (("the radius of a leg",) * 4, state.design.limits.leg_radii),
+    ):
+        for name, value in zip(names, values, strict=True):
+            # Also where it is no number.
+            if not abs(value) <= LARGEST_SHARE * reach:
+                most = format_number(LARGEST_SHARE * reach)
+                raise InputError(
+                    f"{name} = {format_number(value)} is too far to be drawn; "
+                    f"{most}, a million times the reach, is the most"
+                )

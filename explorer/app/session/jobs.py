@@ -16,9 +16,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import IO, Any, cast
 
-from explorer.app.session.clock import Timer, now, start_timer
-from explorer.app.session.faults import Fault, Faults, log_fault
+from explorer.app.session.clock import Timer, start_timer
 from explorer.app.session.latest import LatestWins
+from explorer.app.session.log import log_error, text_of_arguments
 from explorer.app.session.worker import (
     Cancel,
     Message,
@@ -59,7 +59,6 @@ class Worker:
         report: Called with a message when the process died or failed unexpectedly.
         preload: The modules that the process imports first, so that its first task starts at once.
         died: The message when the process died.
-        faults: Where requests are saved that failed unexpectedly; None to save none.
     """
 
     def __init__(
@@ -68,10 +67,8 @@ class Worker:
         *,
         preload: Sequence[str] = (),
         died: str = "The worker process died over this twice; the next change starts it again.",
-        faults: Faults | None = None,
     ) -> None:
         self._report = report
-        self._faults = faults
         self._preload = tuple(preload)
         self._died = died
         self._numbers = itertools.count()
@@ -79,14 +76,13 @@ class Worker:
         self._stopped = False
         # Guards the process: it must not be started after `stop`.
         self._lock = threading.Lock()
-        # Guards writing to the process, killing it, and these four: the request under way and
-        # its start, the orders that were cancelled, and the timers that kill the process for
-        # those that do not end.
+        # Guards writing to the process, killing it, and these three: the request under way, the
+        # patience with each order that was cancelled, and the timer that kills the process for
+        # the one under way.
         self._writing = threading.Lock()
         self._current: _Request | None = None
-        self._current_since = 0.0
-        self._cancelled: set[int] = set()
-        self._deadlines: dict[int, Timer] = {}
+        self._cancelled: dict[int, float | None] = {}
+        self._deadline: Timer | None = None
         # Order of the drawing that is to be cancelled since a newer one waits.
         self._outdated = -1
         self._queue: LatestWins[_Request] = LatestWins(self._serve_all, "worker")
@@ -120,8 +116,7 @@ class Worker:
             A number to cancel it by.
         """
         number = next(self._numbers)
-        is_sending = receive is not None
-        order = Order(number, task.__module__, task.__name__, arguments, is_sending)
+        order = Order(number, task.__module__, task.__name__, arguments, receive is not None)
         self._queue.post(key, number, _Request(key, order, done, failed, receive, is_drawing))
         self._cancel_outdated(key)
         return number
@@ -136,46 +131,38 @@ class Worker:
             patience: Seconds after which it ends together with its process; None for never.
         """
         with self._writing:
-            self._cancel(number, patience)
+            self._cancelled[number] = patience
+            if self._is_current(number):
+                self._write_cancel(number, patience)
 
-    def _cancel(self, number: int, patience: float | None) -> None:
-        """Cancel a task while this thread holds the lock for writing."""
-        self._cancelled.add(number)
-        if self._is_current(number) and self._process is not None:
+    def _write_cancel(self, number: int, patience: float | None, after: float = 0.0) -> None:
+        """Cancel the order under way while this thread holds the lock for writing."""
+        if self._process is not None:
             with contextlib.suppress(*PIPE_ERRORS):
-                write_frame(cast("IO[bytes]", self._process.stdin), Cancel(number))
-        self._drop_deadline(number)
-        if patience is not None:
-            self._deadlines[number] = start_timer(patience, self._kill, number)
-
-    def _drop_deadline(self, number: int) -> None:
-        deadline = self._deadlines.pop(number, None)
-        if deadline is not None:
-            deadline.cancel()
+                write_frame(cast("IO[bytes]", self._process.stdin), Cancel(number, after))
+        if patience is not None and self._deadline is None:
+            self._deadline = start_timer(patience, self._kill, number)
 
     def _is_current(self, number: int) -> bool:
         return self._current is not None and self._current.order.number == number
 
     def _cancel_outdated(self, key: object) -> None:
-        """Cancel the drawing under way, now or soon, if a newer one of its key waits.
+        """Cancel the drawing under way once it is long, if a newer one of its key waits.
 
         This is done on a thread of its own, as writing may have to wait for the process.
         """
-        current, since = self._current, self._current_since
+        current = self._current
         if current is None or not current.is_drawing or current.key != key:
             return
         number = current.order.number
         if number != self._outdated and self._queue.is_waiting(key):
             self._outdated = number
-            # One that was cancelled ends by itself, or at its deadline.
-            if number not in self._deadlines:
-                delay = max(0.0, since + LONG_SECONDS - now())
-                self._deadlines[number] = start_timer(delay, self._cancel_if_current, number)
+            start_timer(0.0, self._cancel_if_current, number)
 
     def _cancel_if_current(self, number: int) -> None:
         with self._writing:
             if self._is_current(number):
-                self._cancel(number, None)
+                self._write_cancel(number, None, LONG_SECONDS)
 
     @property
     def process_id(self) -> int | None:
@@ -204,7 +191,7 @@ class Worker:
             # Requests that became outdated while others were served are left out.
             if not self._queue.is_waiting(request.key):
                 self._serve(request)
-            self._cancelled.discard(request.order.number)
+            self._cancelled.pop(request.order.number, None)
 
     def _serve(self, request: _Request) -> None:
         reply = self._attempt(request)
@@ -217,7 +204,7 @@ class Worker:
             if self._stopped:
                 return
             if not self._is_cancelled(request):
-                self._report_fault(request, self._died, "the process died")
+                self._report_error(request, self._died)
             request.failed(self._died)
         elif reply.problem is None:
             request.done(reply.value)
@@ -225,13 +212,14 @@ class Worker:
             if not reply.expected:
                 task = request.order.task.replace("_", " ")
                 message = f"Something went wrong in the worker ({task}): {reply.problem}"
-                self._report_fault(request, message, reply.problem, reply.trace)
+                self._report_error(request, message, reply.trace)
             request.failed(reply.problem)
 
-    def _report_fault(self, request: _Request, message: str, problem: str, trace: str = "") -> None:
+    def _report_error(self, request: _Request, message: str, trace: str = "") -> None:
         order = request.order
-        fault = Fault(order.module, order.task, order.arguments, order.is_sending, problem, trace)
-        self._report(log_fault(fault, message, self._faults))
+        place = f"{order.module}.{order.task}, called with"
+        details = "\n".join((trace + place, text_of_arguments(order.arguments)))
+        self._report(log_error(message, details))
 
     def _is_cancelled(self, request: _Request) -> bool:
         return self._stopped or request.order.number in self._cancelled
@@ -245,34 +233,39 @@ class Worker:
         if process is None:
             return None
         try:
-            if not self._send(request, process):
-                return None
-            return _receive(request, process)
+            is_sent = self._send(request, process)
+            while is_sent:
+                frame: Message | Reply = read_frame(cast("IO[bytes]", process.stdout))
+                if isinstance(frame, Reply):
+                    return frame
+                if request.receive is not None:
+                    request.receive(frame.value)
         except PIPE_ERRORS:
             with self._lock:
                 _end(process)
                 self._process = None
-            return None
         finally:
             with self._writing:
                 self._current = None
-                self._drop_deadline(request.order.number)
+                if self._deadline is not None:
+                    self._deadline.cancel()
+                    self._deadline = None
+        return None
 
     def _send(self, request: _Request, process: subprocess.Popen[bytes]) -> bool:
         """Write an order to the process; return whether it is to be done at all."""
         order = request.order
         with self._writing:
             is_cancelled = order.number in self._cancelled
-            # A task without a channel would not notice, and its deadline may have passed.
+            # A task without a channel would not notice.
             if is_cancelled and not order.is_sending:
                 return False
             # `Popen` was called with pipes.
             stream = cast("IO[bytes]", process.stdin)
             write_frame(stream, order)
-            self._current_since = now()
             self._current = request
             if is_cancelled:
-                write_frame(stream, Cancel(order.number))
+                self._write_cancel(order.number, self._cancelled[order.number])
         # A newer drawing may have been queued before this one counted as under way.
         self._cancel_outdated(request.key)
         return True
@@ -280,7 +273,6 @@ class Worker:
     def _kill(self, number: int) -> None:
         # No other order is written meanwhile, so that none but this task is killed.
         with self._writing:
-            self._deadlines.pop(number, None)
             if self._is_current(number) and self._process is not None:
                 self._process.kill()
 
@@ -295,7 +287,6 @@ class Worker:
                 self._process = None
                 self._report(RESTARTED)
             if self._process is None:
-                paths = {"PYTHONPATH": str(SOURCES)}
                 code = (
                     "import sys; from explorer.app.session.worker import main; main(sys.argv[1:])"
                 )
@@ -303,19 +294,9 @@ class Worker:
                     [sys.executable, "-P", "-c", code, *self._preload],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
-                    env={**os.environ, **paths},
+                    env=os.environ | {"PYTHONPATH": str(SOURCES)},
                 )
             return self._process
-
-
-def _receive(request: _Request, process: subprocess.Popen[bytes]) -> Reply:
-    """Return the reply to a request; messages before it are passed on."""
-    while True:
-        frame: Message | Reply = read_frame(cast("IO[bytes]", process.stdout))
-        if isinstance(frame, Reply):
-            return frame
-        if request.receive is not None:
-            request.receive(frame.value)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -51,10 +51,10 @@ class LatestWins(Generic[Item]):
             return key in self._waiting
 
     @property
-    def waiting(self) -> int:
-        """Number of items that wait."""
+    def has_waiting(self) -> bool:
+        """Whether any item waits."""
         with self._condition:
-            return len(self._waiting)
+            return bool(self._waiting)
 
     def wait_until_idle(self, timeout: float) -> bool:
         """Wait until no item waits and none is handled; return whether that is so."""

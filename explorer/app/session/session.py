@@ -152,12 +152,7 @@ class Session:
     @property
     def has_more(self) -> bool:
         """Whether any change waits, so that another frame follows at once."""
-        return self.waiting > 0
-
-    @property
-    def waiting(self) -> int:
-        """Number of changes that wait."""
-        return self._jobs.waiting
+        return self._jobs.has_waiting
 
     def wait_until_idle(self, timeout: float = 60.0) -> bool:
         """Wait until all changes are made and drawn; return whether they are."""

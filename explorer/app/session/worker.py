@@ -7,11 +7,13 @@ parent writes to it. A task may send values while it runs, and may be cancelled.
 from __future__ import annotations
 
 import importlib
+import math
 import os
 import pickle
 import queue
 import signal
 import threading
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -45,9 +47,15 @@ class Order:
 
 @dataclass(frozen=True)
 class Cancel:
-    """A request to cancel the order with this number."""
+    """A request to cancel the order with this number.
+
+    Attributes:
+        number: Number of the order.
+        after: Seconds after its start until it counts.
+    """
 
     number: int
+    after: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -119,7 +127,8 @@ class Inbox:
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
         self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
-        self._cancelled = -1
+        # By the number of an order: when it is to end, in seconds after its start.
+        self._cancelled: dict[int, float] = {}
         self._is_closed = threading.Event()
         threading.Thread(target=self._read, name="inbox", daemon=True).start()
 
@@ -127,16 +136,18 @@ class Inbox:
         """Wait for the next order and return it; None once the parent closed the pipe."""
         return self._orders.get()
 
-    def is_cancelled(self, number: int) -> bool:
-        """Whether an order is cancelled."""
-        return self._is_closed.is_set() or self._cancelled == number
+    def is_cancelled(self, number: int, start: float) -> bool:
+        """Whether an order is cancelled that began at a time of the monotonic clock."""
+        after = self._cancelled.get(number, math.inf)
+        return self._is_closed.is_set() or time.monotonic() - start >= after
 
     def _read(self) -> None:
         try:
             while True:
                 frame: Order | Cancel = read_frame(self._stream)
                 if isinstance(frame, Cancel):
-                    self._cancelled = frame.number
+                    before = self._cancelled.get(frame.number, math.inf)
+                    self._cancelled = {frame.number: min(before, frame.after)}
                 else:
                     self._orders.put(frame)
         except (EOFError, OSError, pickle.UnpicklingError):
@@ -174,12 +185,11 @@ def main(preload: Sequence[str]) -> None:
 
 
 def _reply(order: Order, inbox: Inbox, replies: IO[bytes]) -> Reply:
-    number = order.number
-    arguments = order.arguments
+    number, arguments, start = order.number, order.arguments, time.monotonic()
     if order.is_sending:
         channel = Channel(
             lambda value: write_frame(replies, Message(number, value)),
-            lambda: inbox.is_cancelled(number),
+            lambda: inbox.is_cancelled(number, start),
         )
         arguments = (*arguments, channel)
     try:

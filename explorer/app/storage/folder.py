@@ -1,11 +1,11 @@
-"""The user's data folder, and folders that several explorers share."""
+"""The user's data folder, its locks, and the scratch files left in it."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import time
 import unicodedata
-from collections.abc import Generator
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -19,11 +19,8 @@ NAME = "flagged-explorer"
 OVERRIDE = "EXPLORER_DATA"
 """The environment variable that names another folder."""
 
-LOCK = ".lock"
-"""Name of the file in a folder that is locked while one explorer changes the folder."""
-
-# Changes to a folder take milliseconds; an explorer that locks it for longer is stuck.
-PATIENCE_SECONDS = 5.0
+# Seconds after which a scratch file belongs to a writer that was killed.
+SCRATCH_SECONDS = 60.0
 
 
 def data_folder() -> Path:
@@ -58,24 +55,12 @@ def make_data_folder(folder: Path) -> Path:
     return folder
 
 
-@contextlib.contextmanager
-def lock_folder(folder: Path) -> Generator[None]:
-    """Keep other explorers from changing a folder, which is made if need be.
-
-    Raises:
-        StorageError: it cannot be made or locked, or another explorer locks it for too long.
-    """
-    make_data_folder(folder)
-    lock = _lock(folder / LOCK, PATIENCE_SECONDS)
-    if lock is None:
-        raise StorageError(
-            f"another explorer has been working in {str(folder)!r} for {PATIENCE_SECONDS:g} "
-            "seconds; try again, or close it"
-        )
-    try:
-        yield
-    finally:
-        lock.release()
+def remove_scratch(folder: Path) -> None:
+    """Remove the scratch files of writers that were killed."""
+    for path in folder.glob(".*.part"):
+        with contextlib.suppress(OSError):
+            if time.time() - path.stat().st_mtime > SCRATCH_SECONDS:
+                path.unlink()
 
 
 def try_lock(path: Path) -> FileLock | None:
@@ -84,13 +69,9 @@ def try_lock(path: Path) -> FileLock | None:
     Raises:
         StorageError: it can be neither opened nor made.
     """
-    return _lock(path, 0.0)
-
-
-def _lock(path: Path, patience: float) -> FileLock | None:
     lock = FileLock(path, thread_local=False)
     try:
-        lock.acquire(timeout=patience, blocking=patience > 0.0)
+        lock.acquire(blocking=False)
     except Timeout:
         return None
     except OSError as error:

@@ -16,39 +16,17 @@ from typing import Any, cast, get_args, get_type_hints
 import msgspec
 import numpy as np
 
-from explorer.app.session.drawable import check_drawable
+from explorer.app.session.gestures import check_drawable
 from explorer.app.state.actions import SetJoint
 from explorer.app.state.parts import saved_fields
 from explorer.app.state.state import State, joints_of
 from explorer.errors import InputError, StorageError
-from explorer.measures.catalogue import FORMER_NAMES
-from explorer.mechanism.design_file import MIGRATIONS as MIGRATIONS_OF_DESIGNS, migrate
 
 REFERENCE = "#"
 
 # Largest difference of saved joints and those of the pose, over the reach: the joints are as the
 # user typed them, the pose is computed from them.
 JOINT_TOLERANCE = 1e-4
-
-# Fields that a design of any schema has.
-_DESIGN_FIELDS = frozenset({"schema", "unit_mm"})
-
-# Fields of the paths of an older explorer, and what it called the kinds of a path.
-_FORMER_PATHS = frozenset({"modes", "seconds"})
-_FORMER_KINDS = {"modes": "straight", "plan": "planned"}
-
-# Fields of the view of an older explorer.
-_FORMER_VIEW = frozenset({"twin", "prototype"})
-
-# Fields of an older explorer of which nothing is left.
-_FORMER_FIELDS = frozenset({"jog", "arrows"})
-
-# Present words of fields by those in files of older explorers.
-_FORMER_WORDS: dict[str, Mapping[str, str]] = {
-    "region": {"reachable": "accessible"},
-    "over": {"reachable": "inclusive", "dexterous": "total"},
-    **dict.fromkeys(("measures", "objectives", "axis", "across", "up", "colour"), FORMER_NAMES),
-}
 
 
 class Packer:
@@ -116,24 +94,24 @@ class Unpacker:
             msgspec.ValidationError: a value has the wrong type.
             TypeError: a field is missing.
         """
-        return self._read(fields, State, "state")
+        return self._read(fields, State)
 
-    def _read(self, raw: Any, kind: Any, where: str) -> Any:
+    def _read(self, raw: Any, kind: Any) -> Any:
         if not isinstance(raw, dict):
-            return _convert(raw, kind, where)
+            return msgspec.convert(raw, kind)
         fields = cast("dict[str, Any]", raw)
         key = id(fields), kind
         if key not in self._values:
-            part = next((each for each in (kind, *get_args(kind)) if is_dataclass(each)), None)
+            kinds = (each for each in (kind, *get_args(kind)) if is_dataclass(each))
+            part: Any = next(kinds, None)
             if part is None:
-                value = _convert(raw, kind, where)
+                value = msgspec.convert(raw, kind)
             else:
                 types = _types_of(part)
-                present = {n: v for n, v in fields.items() if n not in _FORMER_FIELDS}
-                for name in present:
-                    _check_known(name, types, where)
-                read = {n: self._read(v, types[n], f"{where}.{n}") for n, v in present.items()}
-                value = cast("Callable[..., Any]", part)(**read)
+                for name in {*fields} - {*types}:
+                    raise InputError(f"{part.__name__} has no field {name!r}")
+                read = {name: self._read(each, types[name]) for name, each in fields.items()}
+                value = part(**read)
                 if isinstance(value, State):
                     value = _restore(value)
             self._values[key] = value, fields
@@ -142,9 +120,6 @@ class Unpacker:
 
 def resolve(objects: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return objects with those that they refer to in place of the references.
-
-    Designs of an older schema become designs of the present one, paths, views and words of an
-    older explorer those of the present one.
 
     Raises:
         InputError: a reference to an object that does not come before.
@@ -165,60 +140,8 @@ def resolve(objects: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
     for each in objects:
         fields = {name: value_of(raw) for name, raw in each.items()}
-        resolved.append(present_view(present_paths(present_design(present_words(fields)))))
+        resolved.append(fields)
     return resolved
-
-
-def present_design(fields: dict[str, Any]) -> dict[str, Any]:
-    """Return an object; a design of an older schema as one of the present schema."""
-    if {*fields} >= _DESIGN_FIELDS and fields["schema"] in MIGRATIONS_OF_DESIGNS:
-        return migrate(fields)
-    return fields
-
-
-def present_paths(fields: dict[str, Any]) -> dict[str, Any]:
-    """Return an object; the paths of an older explorer as those of the present one.
-
-    Modes and poses were chosen apart from one another; where both were, the poses count.
-    """
-    kind = fields.get("kind")
-    if "poses" in fields and kind in _FORMER_KINDS:
-        return fields | {"kind": _FORMER_KINDS[kind]}
-    if not {*fields} >= _FORMER_PATHS:
-        return fields
-    present = {name: value for name, value in fields.items() if name != "modes"}
-    for end, mode in zip(("start", "goal"), fields["modes"], strict=True):
-        if present.get(end) is None:
-            present[end] = mode
-    return present
-
-
-def present_view(fields: dict[str, Any]) -> dict[str, Any]:
-    """Return an object; the view of an older explorer as that of the present one.
-
-    The twin and the parts were switched apart from one another; the twin came first.
-    """
-    if not {*fields} >= _FORMER_VIEW:
-        return fields
-    present = {name: value for name, value in fields.items() if name != "twin"}
-    prototype = dict(fields["prototype"])
-    is_prototype = prototype.pop("shown", False)
-    drawn_as = "6-4 twin" if fields["twin"] else "prototype" if is_prototype else "schematic"
-    return present | {"prototype": prototype, "drawn_as": drawn_as}
-
-
-def present_words(fields: dict[str, Any]) -> dict[str, Any]:
-    """Return an object with the present words and names of measures in place of former ones."""
-
-    def present(value: Any, former: Mapping[str, str]) -> Any:
-        if isinstance(value, list):
-            return [present(each, former) for each in cast("list[Any]", value)]
-        return former.get(value, value) if isinstance(value, str) else value
-
-    words = _FORMER_WORDS.items()
-    return fields | {
-        name: present(fields[name], former) for name, former in words if name in fields
-    }
 
 
 def _restore(state: State) -> State:
@@ -241,29 +164,3 @@ def _restore(state: State) -> State:
 def _types_of(part: Any) -> dict[str, Any]:
     types = get_type_hints(part, include_extras=True)
     return {field.name: types[field.name] for field in saved_fields(part)}
-
-
-def _convert(raw: Any, kind: Any, where: str) -> Any:
-    value = msgspec.convert(raw, kind)
-    _refuse_unknown(raw, msgspec.to_builtins(value), where)
-    return value
-
-
-def _refuse_unknown(given: Any, known: Any, where: str) -> None:
-    """Refuse fields that msgspec passes over, as it does where a dataclass lacks them.
-
-    Raises:
-        InputError: there is one.
-    """
-    if isinstance(given, dict):
-        for name, value in cast("dict[str, Any]", given).items():
-            _check_known(name, known, where)
-            _refuse_unknown(value, known[name], f"{where}.{name}")
-    elif isinstance(given, list):
-        for value, other in zip(cast("list[Any]", given), known, strict=True):
-            _refuse_unknown(value, other, where)
-
-
-def _check_known(name: str, known: Any, where: str) -> None:
-    if name not in known:
-        raise InputError(f"{where} has no field {name!r}")

@@ -2,7 +2,7 @@
 
 A file belongs to the process that holds the lock beside it; the system releases the lock when the
 process ends, however it does. The next explorer that starts goes on with the newest session
-without a process. The newest is the one of the highest generation: clocks may be set back.
+without a process.
 """
 
 from __future__ import annotations
@@ -10,18 +10,19 @@ from __future__ import annotations
 import contextlib
 import secrets
 import threading
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from filelock import FileLock
 
 from explorer.app.session.history import History
-from explorer.app.storage.folder import LOCK, data_folder, lock_folder, try_lock
+from explorer.app.storage.folder import data_folder, make_data_folder, try_lock
 from explorer.app.storage.session_format import (
     LARGEST_FILE,
     LARGEST_GENERATION,
     LARGEST_HEADER,
-    SchemaError,
+    DamagedError,
     decode_header,
     decode_session,
     encode_session,
@@ -36,7 +37,7 @@ BROKEN = ".broken"
 """Suffix added to the name of a file that cannot be used."""
 
 MOST_ORPHANS = 10
-"""Largest number of sessions kept of explorers that have ended; the newest are kept."""
+"""Largest number of other sessions kept of explorers that have ended; the newest are kept."""
 
 
 @dataclass(frozen=True)
@@ -52,21 +53,6 @@ class Resumed:
     messages: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Orphan:
-    """A session without an explorer, and the lock of its file; None if it is only read."""
-
-    path: Path
-    generation: int
-    history: History
-    lock: FileLock | None
-
-    @property
-    def age(self) -> tuple[int, str]:
-        """A key that sorts the oldest first."""
-        return self.generation, self.path.name
-
-
 class SessionFile:
     """The file of this explorer's session.
 
@@ -76,37 +62,31 @@ class SessionFile:
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = data_folder() / SESSIONS if folder is None else folder
-        self._path: Path | None = None
+        self.path: Path | None = None
         self._lock: FileLock | None = None
         self._generation = 0
         # Only one thread at a time writes.
         self._writing = threading.Lock()
 
-    @property
-    def path(self) -> Path | None:
-        """The file; None until this explorer has one."""
-        return self._path
-
     def resume(self) -> Resumed:
         """Take over the newest session of an explorer that has ended.
 
         Its file becomes that of this explorer; without one, the first `save` makes one.
-        Damaged files are renamed and never removed, those of newer explorers left alone.
+        Damaged files are renamed and never removed, those of other versions left alone.
         Where nothing can be written, the session is only read.
         """
+        messages: list[str] = []
         with self._writing:
-            self._release()
-            try:
-                with lock_folder(self.folder):
-                    return self._take_over()
-            except StorageError as error:
-                orphans, messages = self._orphans(locked=False)
-                newest = max(orphans, key=lambda each: each.age, default=None)
-                history = None if newest is None else newest.history
-                return Resumed(history, (*messages, str(error)))
+            paths = sorted(self._files(), key=_generation_of, reverse=True)
+            histories = (self._take_over(path, messages) for path in paths)
+            history = next((each for each in histories if each is not None), None)
+            others = [path for path in paths if path != self.path]
+            for path in others[MOST_ORPHANS:]:
+                _remove_orphan(path)
+        return Resumed(history, tuple(messages))
 
-    def save(self, history: History) -> int:
-        """Write the session; return the generation of the file.
+    def save(self, history: History) -> None:
+        """Write the session.
 
         Once this returns, the session outlasts a kill and a power failure. Until then the
         file holds the session that was saved before.
@@ -115,155 +95,79 @@ class SessionFile:
             StorageError: it cannot be written now; a later call may succeed.
         """
         with self._writing:
-            path = self._path
-            if path is None or not _lock_of(path).exists():
-                # Without its lock, which somebody has removed, the file has no owner.
-                self._release()
-                path = self._create()
-            newest = max(self._generation, self._newest_generation())
-            # A file that says so much was written by no explorer; what is beyond cannot be read.
-            generation = min(1 + newest, LARGEST_GENERATION)
-            write_whole(path, encode_session(history, generation))
-            self._generation = generation
-            return generation
+            path = self.path or self._create()
+            self._generation = max(self._generation + 1, time.time_ns())
+            write_whole(path, encode_session(history, self._generation))
 
     def close(self) -> None:
         """Leave the session to the next explorer that starts."""
         with self._writing:
-            self._release()
-
-    def _release(self) -> None:
-        _release(self._lock)
-        self._path = self._lock = None
+            _release(self._lock)
+            self.path = self._lock = None
 
     def _create(self) -> Path:
-        with lock_folder(self.folder):
-            path = self.folder / f"{secrets.token_hex(8)}.json"
-            lock = try_lock(_lock_of(path))
-        if lock is None:
-            raise StorageError(f"{str(path)!r} is in use by another explorer; try again")
-        self._path, self._lock = path, lock
+        path = make_data_folder(self.folder) / f"{secrets.token_hex(8)}.json"
+        self._lock = try_lock(_lock_of(path))
+        self.path = path
         return path
 
-    def _take_over(self) -> Resumed:
-        orphans, messages = self._orphans(locked=True)
-        orphans.sort(key=lambda each: each.age, reverse=True)
-        for old in orphans[1 + MOST_ORPHANS :]:
-            _unlink(old.path)
-        self._remove_leftovers({each.path.name for each in orphans})
-        for other in orphans[1:]:
-            _release(other.lock)
-        if not orphans:
-            return Resumed(None, messages)
-        newest = orphans[0]
-        self._path, self._lock, self._generation = newest.path, newest.lock, newest.generation
-        return Resumed(newest.history, messages)
-
-    def _orphans(self, *, locked: bool) -> tuple[list[_Orphan], tuple[str, ...]]:
-        """Return the sessions without an explorer, and messages about unusable files.
-
-        Args:
-            locked: Whether to lock their files and rename damaged ones; else all are only read.
-        """
-        orphans: list[_Orphan] = []
-        messages: list[str] = []
-        for path in self._files():
-            lock = None
-            try:
-                if locked:
-                    lock = try_lock(_lock_of(path))
-                    if lock is None:
-                        continue
-                orphans.append(_read(path, lock))
-            except _DamagedError as error:
-                messages.append(_set_aside(path, error) if locked else str(error))
-                _release(lock)
-            except StorageError as error:
-                messages.append(f"{error}; it is left as it is")
-                _release(lock)
-        return orphans, tuple(messages)
-
-    def _remove_leftovers(self, own: set[str]) -> None:
-        """Remove scratch files of writers that were killed, and locks without a session.
-
-        Args:
-            own: Names of files whose locks this explorer has. While this runs, no other explorer
-                creates a file, and one that writes a file has its lock.
-        """
-        for scratch in self._paths(".part"):
-            name = scratch.name[1:].partition(".json.")[0] + ".json"
-            if name in own or _is_free(self.folder / name):
-                _unlink(scratch)
-        for path in self._paths(".lock"):
-            session = path.with_suffix(".json")
-            if path.name != LOCK and not session.exists() and _is_free(session):
-                _unlink(path)
-
-    def _newest_generation(self) -> int:
-        """Return the largest generation of all files; 0 without any."""
-        largest = 0
-        for path in self._files():
-            with contextlib.suppress(StorageError, OSError), path.open("rb") as file:
-                largest = max(largest, decode_header(file.read(LARGEST_HEADER), "").generation)
-        return largest
+    def _take_over(self, path: Path, messages: list[str]) -> History | None:
+        """Return the session in a file that no explorer has; extend the messages if it has none."""
+        lock = None
+        try:
+            lock = try_lock(_lock_of(path))
+            if lock is None:
+                return None
+        except StorageError as error:
+            messages.append(str(error))
+        try:
+            history = decode_session(read_at_most(path, LARGEST_FILE), repr(str(path)))
+        except StorageError as error:
+            messages.append(_set_aside(path, error))
+            _release(lock)
+            return None
+        if lock is not None:
+            self.path, self._lock, self._generation = path, lock, _generation_of(path)
+        return history
 
     def _files(self) -> list[Path]:
-        return [path for path in self._paths(".json") if path.is_file()]
-
-    def _paths(self, ending: str) -> list[Path]:
         try:
-            return sorted(path for path in self.folder.iterdir() if path.name.endswith(ending))
+            return [path for path in self.folder.glob("*.json") if path.is_file()]
         except OSError:
             return []
 
 
-class _DamagedError(StorageError):
-    """A file that no explorer can use."""
-
-
-def _read(path: Path, lock: FileLock | None) -> _Orphan:
-    data = read_at_most(path, LARGEST_FILE)
-    try:
-        generation = decode_header(data, repr(str(path))).generation
-        return _Orphan(path, generation, decode_session(data, repr(str(path))), lock)
-    except SchemaError:
-        raise
-    except StorageError as error:
-        raise _DamagedError(str(error)) from None
+def _generation_of(path: Path) -> int:
+    """Return the generation of a file; the largest if it cannot be read, so that this is told."""
+    with contextlib.suppress(StorageError, OSError), path.open("rb") as file:
+        return decode_header(file.read(LARGEST_HEADER), "").generation
+    return LARGEST_GENERATION
 
 
 def _set_aside(path: Path, error: StorageError) -> str:
-    """Rename a file that cannot be used; return a message for people."""
-    for number in range(1, 1000):
-        aside = path.with_name(path.name + BROKEN + ("" if number == 1 else str(number)))
-        if not aside.exists():
-            with contextlib.suppress(StorageError):
-                move(path, aside)
-                return f"{error}; it is kept as {aside.name!r}"
-            break
+    """Rename a damaged file; return a message for people on a file that cannot be used."""
+    if isinstance(error, DamagedError):
+        aside = path.with_name(path.name + BROKEN)
+        with contextlib.suppress(StorageError):
+            move(path, aside)
+            return f"{error}; it is kept as {aside.name!r}"
     return f"{error}; it is left as it is"
+
+
+def _remove_orphan(path: Path) -> None:
+    """Remove a session, unless an explorer has it or the folder cannot be changed."""
+    with contextlib.suppress(StorageError, OSError):
+        lock = try_lock(_lock_of(path))
+        if lock is not None:
+            path.unlink()
+            lock.release()
+            _lock_of(path).unlink()
 
 
 def _lock_of(path: Path) -> Path:
     return path.with_suffix(".lock")
 
 
-def _is_free(path: Path) -> bool:
-    """Whether no explorer has the file of a session."""
-    try:
-        lock = try_lock(_lock_of(path))
-    except StorageError:
-        return False
-    _release(lock)
-    return lock is not None
-
-
 def _release(lock: FileLock | None) -> None:
     if lock is not None:
         lock.release()
-
-
-def _unlink(path: Path) -> None:
-    # A file that cannot be removed now is removed at the next start.
-    with contextlib.suppress(OSError):
-        path.unlink()

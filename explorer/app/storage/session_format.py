@@ -6,20 +6,20 @@ rest, see `explorer.app.storage.packing`.
 
 from __future__ import annotations
 
+import contextlib
 import zlib
 from dataclasses import replace
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import msgspec
 
-from explorer.app.session.history import History, Step, start_history
-from explorer.app.storage import earlier
+from explorer.app.session.history import History, Step
 from explorer.app.storage.packing import Packer, Unpacker, resolve
 from explorer.errors import ExplorerError, InputError, StorageError
 from explorer.files.json_text import one_line
 
 SCHEMA = 3
-"""The schema of the files that are written; files of an older one are read too."""
+"""The schema of the files."""
 
 MOST_STEPS = 50
 """Largest number of steps in a file."""
@@ -31,27 +31,25 @@ MOST_BYTES = 300_000
 LARGEST_FILE, LARGEST_HEADER = 50_000_000, 200
 LARGEST_GENERATION = 2**62
 
+Index = Annotated[int, msgspec.Meta(ge=0)]
 
-class SchemaError(StorageError):
-    """A file that a newer explorer wrote."""
+
+class DamagedError(StorageError):
+    """A file that no explorer can use."""
 
 
 class Header(msgspec.Struct, frozen=True):
-    """The first line in every schema; its other fields are passed over.
+    """The first line, of which every schema has the first two fields.
 
     Attributes:
         schema: Schema of the rest.
-        generation: A number larger than that of all files that existed when it was written.
+        generation: A number larger than that of the files that were written before.
+        checksum: Checksum of the other fields and the rest.
     """
 
     schema: Annotated[int, msgspec.Meta(ge=1, le=2**31)]
     generation: Annotated[int, msgspec.Meta(ge=0, le=LARGEST_GENERATION)]
-
-
-class _Signed(Header, frozen=True, forbid_unknown_fields=True):
-    """The first line of this schema, with a checksum of it and the rest."""
-
-    checksum: int
+    checksum: int = 0
 
 
 class _Body(msgspec.Struct, forbid_unknown_fields=True):
@@ -66,10 +64,10 @@ class _Body(msgspec.Struct, forbid_unknown_fields=True):
     """
 
     words: list[str]
-    at: earlier.Index
-    first: earlier.Index
+    at: Index
+    first: Index
     objects: list[dict[str, Any]]
-    states: list[earlier.Index]
+    states: list[Index]
 
 
 def encode_session(history: History, generation: int) -> bytes:
@@ -82,7 +80,7 @@ def encode_session(history: History, generation: int) -> bytes:
     """
     most = MOST_STEPS
     while True:
-        saved = shorten(history, most)
+        saved = _shorten(history, most)
         packer = Packer()
         body = {
             "words": [step.words for step in saved.steps],
@@ -95,7 +93,7 @@ def encode_session(history: History, generation: int) -> bytes:
         most = len(saved.steps) // 2
         if len(data) <= MOST_BYTES or most == 0:
             break
-    header = _Signed(SCHEMA, generation, _checksum(SCHEMA, generation, data))
+    header = Header(SCHEMA, generation, _checksum(generation, data))
     return msgspec.json.encode(header) + b"\n" + data
 
 
@@ -103,31 +101,34 @@ def decode_header(data: bytes, source: str) -> Header:
     """Return the first line of a file, of whose contents this is at least the beginning.
 
     Raises:
-        StorageError: it is no file of a session.
+        DamagedError: it is no file of a session.
     """
-    return _decode_line(data, Header, source)
+    line, newline, _ = data[:LARGEST_HEADER].partition(b"\n")
+    with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        if newline:
+            return msgspec.json.decode(line, type=Header)
+    raise DamagedError(f"{source} is not the file of a session")
 
 
 def decode_session(data: bytes, source: str) -> History:
     """Return the history in the file of a session.
 
     Raises:
-        SchemaError: a newer explorer wrote it.
-        StorageError: it is damaged, not the file of a session, or holds a state that no page
+        StorageError: another version of the explorer wrote it.
+        DamagedError: it is damaged, not the file of a session, or holds a state that no page
             shows.
     """
     header = decode_header(data, source)
-    if header.schema > SCHEMA:
-        raise SchemaError(
-            f"{source} has schema {header.schema}, of a newer explorer; this one reads up to "
-            f"{SCHEMA}"
+    if header.schema != SCHEMA:
+        raise StorageError(
+            f"{source} is a session of another version of the explorer: it has schema "
+            f"{header.schema}, and this version reads schema {SCHEMA}"
         )
     body = data.partition(b"\n")[2]
-    signed = _decode_line(data, _Signed, source)
-    if signed.checksum != _checksum(header.schema, header.generation, body):
-        raise StorageError(f"{source} is damaged: its checksum is wrong")
+    if header.checksum != _checksum(header.generation, body):
+        raise DamagedError(f"{source} is damaged: its checksum is wrong")
     try:
-        return _history_of(body) if header.schema == SCHEMA else _earlier(body, header.schema)
+        return _history_of(body)
     except (
         ExplorerError,
         msgspec.MsgspecError,
@@ -138,10 +139,10 @@ def decode_session(data: bytes, source: str) -> History:
         TypeError,
         AttributeError,
     ) as error:
-        raise StorageError(one_line(f"{source} cannot be used: {error}")) from None
+        raise DamagedError(one_line(f"{source} cannot be used: {error}")) from None
 
 
-def shorten(history: History, most: int) -> History:
+def _shorten(history: History, most: int) -> History:
     """Return a history with at most `most` steps, those nearest to the present one."""
     start = max(0, min(len(history.steps) - most, history.at - most // 2))
     return replace(
@@ -149,45 +150,19 @@ def shorten(history: History, most: int) -> History:
     )
 
 
-_Line = TypeVar("_Line", bound=Header)
-
-
-def _decode_line(data: bytes, kind: type[_Line], source: str) -> _Line:
-    line, newline, _ = data[:LARGEST_HEADER].partition(b"\n")
-    try:
-        header = msgspec.json.decode(line, type=kind)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
-        header = None
-    if header is None or not newline:
-        raise StorageError(f"{source} is not the file of a session")
-    return header
-
-
 def _history_of(data: bytes) -> History:
     body = msgspec.json.decode(data, type=_Body)
-    objects = resolve(body.objects)
-    return _history(body, [objects[number] for number in body.states])
-
-
-def _earlier(data: bytes, schema: int) -> History:
-    body = msgspec.json.decode(data, type=earlier.Body)
-    *states, present = earlier.states_of(body, schema)
-    if states:
-        return _history(body, states)
-    # The steps of a session that was too large were left out.
-    return start_history(Unpacker().state(present))
-
-
-def _history(body: _Body | earlier.Body, states: list[dict[str, Any]]) -> History:
-    if not body.at < len(states):
+    if not body.at < len(body.states):
         raise InputError(f"there is no step {body.at}")
-    unpacker = Unpacker()
+    objects, unpacker = resolve(body.objects), Unpacker()
     steps = (
-        Step(number, words, unpacker.state(state))
-        for number, (words, state) in enumerate(zip(body.words, states, strict=True), body.first)
+        Step(number, words, unpacker.state(objects[state]))
+        for number, (words, state) in enumerate(
+            zip(body.words, body.states, strict=True), body.first
+        )
     )
     return History(tuple(steps), body.at)
 
 
-def _checksum(schema: int, generation: int, body: bytes) -> int:
-    return zlib.crc32(body, zlib.crc32(b"%d %d " % (schema, generation)))
+def _checksum(generation: int, body: bytes) -> int:
+    return zlib.crc32(body, zlib.crc32(b"%d %d " % (SCHEMA, generation)))

@@ -1,34 +1,44 @@
-"""What an explorer uses of the user's data folder."""
+"""What an explorer keeps in the user's data folder: designs, session, preferences and a log.
+
+The preferences belong neither to a design nor to the history, so that no undo changes them.
+Several explorers may share the folder.
+"""
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
+from pathlib import Path
 
-from explorer.app.session.faults import FAULTS_FOLDER, Faults
+import msgspec
+
 from explorer.app.session.history import History
-from explorer.app.storage.autosaver import Store
-from explorer.app.storage.folder import data_folder
+from explorer.app.storage.folder import data_folder, make_data_folder, remove_scratch
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
+from explorer.errors import StorageError
+from explorer.files.writing import read_at_most, write_whole
+
+PREFERENCES = "preferences.json"
+# Size in bytes beyond which no explorer wrote the file.
+LARGEST_PREFERENCES = 10_000
 
 
 @dataclass(frozen=True)
 class UserData:
-    """What an explorer uses of the user's data folder.
+    """The designs and the session of the user.
 
     Attributes:
         library: The named designs.
         store: Where the session is saved.
         history: History of the session to go on with; None to begin a new one.
         messages: Messages for people about files that could not be used.
-        faults: Where requests are saved that failed unexpectedly; None to save none.
     """
 
     library: Library
-    store: Store
+    store: SessionFile
     history: History | None = None
     messages: tuple[str, ...] = ()
-    faults: Faults | None = None
 
 
 def open_user_data(*, resume: bool) -> UserData:
@@ -37,8 +47,59 @@ def open_user_data(*, resume: bool) -> UserData:
     Args:
         resume: Whether to go on with the newest session.
     """
-    store, faults = SessionFile(), Faults(data_folder() / FAULTS_FOLDER)
+    library, store = Library(), SessionFile()
+    for folder in (data_folder(), library.folder, store.folder):
+        remove_scratch(folder)
     if not resume:
-        return UserData(Library(), store, faults=faults)
+        return UserData(library, store)
     resumed = store.resume()
-    return UserData(Library(), store, resumed.history, resumed.messages, faults)
+    return UserData(library, store, resumed.history, resumed.messages)
+
+
+class Preferences(msgspec.Struct, frozen=True):
+    """The preferences.
+
+    Attributes:
+        dark: Whether the page is dark; None until the user chose.
+        tour_seen: Whether the tour was seen to its end, or skipped.
+    """
+
+    dark: bool | None = None
+    tour_seen: bool = False
+
+
+class PreferenceFile:
+    """The file of the preferences; one that cannot be read gives the defaults.
+
+    Args:
+        folder: The folder of the file, made at the first choice.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / PREFERENCES
+        self._lock = threading.Lock()
+        self.chosen = self._read()
+
+    def choose(self, *, dark: bool | None = None, tour_seen: bool | None = None) -> None:
+        """Set the preferences that are given; those that are None stay.
+
+        Raises:
+            StorageError: the file cannot be written; the choice holds until this process ends.
+        """
+        with self._lock:
+            # Another explorer may have written the file meanwhile.
+            last = self._read()
+            self.chosen = Preferences(
+                last.dark if dark is None else dark,
+                last.tour_seen if tour_seen is None else tour_seen,
+            )
+            make_data_folder(self._path.parent)
+            write_whole(self._path, msgspec.json.encode(self.chosen))
+
+    def _read(self) -> Preferences:
+        try:
+            return msgspec.json.decode(
+                read_at_most(self._path, LARGEST_PREFERENCES), type=Preferences
+            )
+        except (StorageError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+            return Preferences()

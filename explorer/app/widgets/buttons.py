@@ -1,9 +1,9 @@
 """Buttons in the page's own markup: HTML, and functions that handle presses, by name.
 
 viser's HTML reports no clicks. A script of the page sends each press on an element with
-`data-press` to one hidden text control, through the guard for all messages of clients; of an
-element with `data-hover` it sends, as a press of that name, that the pointer rests on it or has
-left it. It is decoded strictly here; presses on names that are not registered are dropped.
+`data-press` to one hidden text control; of an element with `data-hover` it sends, as a press of
+that name, that the pointer rests on it or has left it. It is decoded strictly here; presses on
+names that are not registered are dropped.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from typing import Annotated
 import msgspec
 import viser
 
+from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import element_id, run_script
 from explorer.app.look import read_script
-from explorer.app.security.client_messages import decode_text
 from explorer.app.widgets.commands import Key
 from explorer.app.widgets.markup import meter
 from explorer.app.widgets.palette import Command

@@ -74,7 +74,7 @@ class DesignsPanel:
             "Design",
             tuple(actions),
             hint="Save the design under its name or as a copy, give the saved one the name above, "
-            "or download it as a file. A design that is replaced goes to the trash.",
+            "or download it as a file. A design that is replaced can be brought back.",
         )
         self._buttons.on_click(lambda event: actions[self._buttons.value](event.client_id))
         self.status = gui.add_html("")
@@ -99,7 +99,9 @@ class DesignsPanel:
         self.restore.on_click(lambda event: saved.restore(event.client_id))
         buttons.on("designs.open", self._for_row(self._open))
         buttons.on("designs.duplicate", self._for_row(self._duplicate))
-        buttons.on("designs.delete", self._for_row(self._delete))
+        buttons.on("designs.delete", self._for_row(self._ask))
+        buttons.on("designs.confirm", self._for_row(self._delete))
+        buttons.on("designs.keep", self._for_row(lambda _, __: self._set_asked(None)))
         buttons.on("designs.turn", self._turn, values=TURNS)
         for way, (label, hint) in TURNS.items():
             buttons.offer(
@@ -112,6 +114,8 @@ class DesignsPanel:
         # Rows of the present page, index of its first row, and number of all rows.
         self.rows: tuple[Row, ...] = ()
         self.first = self._total = 0
+        # Name of the design that the page asks whether to delete.
+        self.asked: str | None = None
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame and the saved designs."""
@@ -125,11 +129,11 @@ class DesignsPanel:
         self.first, self._total, self.rows = first, len(rows), rows[first : first + ROWS]
         ways = [way for way in TURNS if self._can_turn(way)]
         foot = _foot(first, len(self.rows), len(rows), ways) if len(rows) > ROWS else ""
-        yield self.list, "content", list_designs(self.rows, base.name, foot)
-        deleted = self._saved.deleted
-        yield self.restore, "visible", bool(deleted)
-        if deleted:
-            yield self.restore, "label", f"Bring back {deleted[0].name}"
+        yield self.list, "content", list_designs(self.rows, base.name, self.asked, foot)
+        deleted = self._saved.last_deleted
+        yield self.restore, "visible", deleted is not None
+        if deleted is not None:
+            yield self.restore, "label", f"Bring back {deleted}"
 
     def _rename(self, who: Who) -> None:
         state = self._session.settled()
@@ -147,9 +151,18 @@ class DesignsPanel:
         else:
             self._saved.duplicate(row.name, who)
 
-    def _delete(self, row: Row, who: Who) -> None:
+    def _ask(self, row: Row, _: Who) -> None:
         if not row.is_preset:
+            self._set_asked(row.name)
+
+    def _delete(self, row: Row, who: Who) -> None:
+        if row.name == self.asked:
+            self._set_asked(None)
             self._saved.delete(row.name, who)
+
+    def _set_asked(self, name: str | None) -> None:
+        self.asked = name
+        self._session.redraw()
 
     def _can_turn(self, way: str) -> bool:
         return self.first > 0 if way == "newer" else self.first + ROWS < self._total
@@ -175,13 +188,22 @@ def rows_of(entries: Sequence[Entry]) -> tuple[Row, ...]:
     return (*own, *presets)
 
 
-def list_designs(rows: Sequence[Row], current: str, foot: str = "") -> str:
-    """Return the list in HTML, with the buttons of each row."""
+def list_designs(rows: Sequence[Row], current: str, asked: str | None, foot: str = "") -> str:
+    """Return the list in HTML, with the buttons of each row.
+
+    Args:
+        rows: The rows.
+        current: Name of the design that is open.
+        asked: Name of the design whose row asks whether to delete it; None for no question.
+        foot: Line below the list, HTML.
+    """
     head = (
         '<div class="ex-row ex-dim ex-small"><span class="ex-fill">Designs, the last saved on top'
         '</span><span class="ex-reach">reach |a3|</span><span class="ex-acts"></span></div>'
     )
-    lines = "".join(_line(row, row.name == current) for row in rows)
+    lines = "".join(
+        _line(row, is_current=row.name == current, is_asked=row.name == asked) for row in rows
+    )
     return box(head, lines, foot)
 
 
@@ -197,7 +219,7 @@ def _foot(first: int, count: int, total: int, ways: Iterable[str]) -> str:
     )
 
 
-def _line(row: Row, is_current: bool) -> str:
+def _line(row: Row, *, is_current: bool, is_asked: bool) -> str:
     if row.design is None:
         problem = escape(row.problem or "")
         name = (
@@ -219,8 +241,11 @@ def _line(row: Row, is_current: bool) -> str:
             f'{format_number(length)} units <span class="ex-dim">= '
             f"{format_number(length * row.design.unit_mm)} mm</span>"
         )
-        copy = _link("duplicate", row.name)
-    delete = "" if row.is_preset else _link("delete", row.name)
+        copy = _link("duplicate", row.name, "Duplicate")
+    delete = "" if row.is_preset else _link("delete", row.name, "Delete")
+    if is_asked:
+        reach = "Delete it?"
+        copy, delete = _link("confirm", row.name, "Delete"), _link("keep", row.name, "Keep")
     here = " is-here" if is_current else ""
     return (
         f'<div class="ex-row{here}">{name}<span class="ex-reach">{reach}</span>'
@@ -228,7 +253,6 @@ def _line(row: Row, is_current: bool) -> str:
     )
 
 
-def _link(act: str, name: str) -> str:
-    words = act.capitalize()
+def _link(act: str, name: str, words: str) -> str:
     hint = f"{words} {name}"
     return press_button(f"designs.{act}", name, words, hint=hint, label=hint, class_name="ex-link")

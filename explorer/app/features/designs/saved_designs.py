@@ -17,7 +17,7 @@ from explorer.app.features.feature import Services
 from explorer.app.session.latest import LatestWins
 from explorer.app.session.session import Who
 from explorer.app.state.actions import MarkSaved, Open
-from explorer.app.storage.library import Deleted, Entry, copy_name
+from explorer.app.storage.library import Entry, copy_name
 from explorer.app.widgets.palette import Command
 from explorer.errors import ExplorerError, InputError
 from explorer.mechanism.design import Design
@@ -41,7 +41,7 @@ class SavedDesigns:
     Attributes:
         entries: The saved designs, the last saved first.
         commands: Those that open them.
-        deleted: What is in the trash, the last deleted first.
+        last_deleted: Name of the design that can be brought back; None if there is none.
     """
 
     def __init__(self, services: Services) -> None:
@@ -54,7 +54,7 @@ class SavedDesigns:
         self._stamp: int | None = None
         self.entries: tuple[Entry, ...] = ()
         self.commands: tuple[Command, ...] = ()
-        self.deleted: tuple[Deleted, ...] = ()
+        self.last_deleted: str | None = None
         self._requests: LatestWins[_Request] = LatestWins(self._do_all, "designs")
         services.at_end(self.stop)
         self.look()
@@ -79,14 +79,14 @@ class SavedDesigns:
         self._post("look", lambda: None, None)
 
     def save(self, design: Design, who: Who = None) -> None:
-        """Save a design under its name; another one of that name goes to the trash."""
+        """Save a design under its name; `restore` brings another one of that name back."""
 
         def work() -> None:
             if design.name in PRESETS:
                 raise InputError(
                     f"{design.name!r} is a preset and stays as it is; give yours another name"
                 )
-            self._mark_saved(self._library.save(design.name, design, replace=True))
+            self._mark_saved(self._library.save(design.name, design))
 
         self._post(object(), work, who)
 
@@ -114,26 +114,15 @@ class SavedDesigns:
 
     def duplicate(self, name: str, who: Who = None) -> None:
         """Save a saved design again under a new name."""
-        self._post(object(), lambda: self._library.duplicate(name), who)
+        self._post(object(), lambda: self._copy(self._library.open(name)), who)
 
     def delete(self, name: str, who: Who = None) -> None:
-        """Move a saved design to the trash."""
+        """Delete a saved design; `restore` brings it back."""
         self._post(object(), lambda: self._library.delete(name), who)
 
     def restore(self, who: Who = None) -> None:
         """Restore the design that was deleted or replaced last."""
-
-        def work() -> None:
-            deleted = self._library.deleted()
-            if not deleted:
-                raise InputError("nothing has been deleted")
-            taken = {entry.name for entry in self._library.list()}
-            name = deleted[0].name
-            self._library.restore(
-                deleted[0].file, copy_name(name, taken) if name in taken else None
-            )
-
-        self._post(object(), work, who)
+        self._post(object(), self._library.restore, who)
 
     def take(self, data: bytes, name: str, who: Who = None) -> None:
         """Open an uploaded design file."""
@@ -166,7 +155,7 @@ class SavedDesigns:
         self._stamp = self._folder_stamp()
         self.entries = self._library.list()
         self.commands = tuple(itertools.islice(self._commands(), MOST_COMMANDS))
-        self.deleted = self._library.deleted()
+        self.last_deleted = self._library.last_deleted
         self._session.redraw()
 
     def _commands(self) -> Iterator[Command]:

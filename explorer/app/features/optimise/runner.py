@@ -38,9 +38,7 @@ class Optimiser(Runner):
     """Runner that starts and cancels searches as the state requests, and shows their iterates."""
 
     def __init__(self, services: Services) -> None:
-        self.worker = Worker(
-            services.tell, preload=[tasks.__name__], died=DIED, faults=services.faults
-        )
+        self.worker = Worker(services.tell, preload=[tasks.__name__], died=DIED)
         self._session = services.session
         # The drawings tell whether the page shows all of the last iterate.
         self._drawings = services.get(WorkspaceFeed)

@@ -9,6 +9,7 @@ from typing import Annotated
 import msgspec
 import viser
 
+from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
 from explorer.app.features.orientation.actions import ANGLES, GoToTilt, SetTiltTorsion
@@ -20,7 +21,6 @@ from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.tracks import Span
 from explorer.app.look import read_script
-from explorer.app.security.client_messages import decode_text
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update

@@ -27,9 +27,7 @@ class PathRunner(Runner):
     """Plays and plans paths as the frames request."""
 
     def __init__(self, services: Services) -> None:
-        self.worker = Worker(
-            services.tell, preload=[tasks.__name__], died=DIED, faults=services.faults
-        )
+        self.worker = Worker(services.tell, preload=[tasks.__name__], died=DIED)
         self._session = services.session
         services.at_end(self.stop)
         self._stopped = threading.Event()

@@ -1,9 +1,9 @@
-"""The dialog of all files, and those of the view, the scene, the session and the report."""
+"""The dialog of all files, and those of the view, the scene and the report."""
 
 from __future__ import annotations
 
 from explorer.app.features.feature import Export, Feature, InBar, Tab
-from explorer.app.features.sharing.files import SessionRecorder, SharedFiles
+from explorer.app.features.sharing.files import SharedFiles
 from explorer.app.features.sharing.panel import ExportDialog, export_button
 from explorer.app.features.sharing.reporting import ReportFormat
 
@@ -42,12 +42,5 @@ SHARING = Feature(
             ("HTML",),
             lambda services: lambda _, who: services.get(SharedFiles).scene(who),
         ),
-        Export(
-            "Session",
-            "A table of all poses so far.",
-            ("CSV",),
-            lambda services: lambda _, who: services.get(SharedFiles).session(who),
-        ),
     ),
-    runners=(SessionRecorder,),
 )

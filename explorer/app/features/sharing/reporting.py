@@ -19,9 +19,9 @@ ReportFormat = Literal["html", "pdf"]
 def make_report(
     design: Design,
     pose: Pose | None = None,
-    *,
     record: Record | None = None,
     file_format: ReportFormat = "html",
+    *,
     date: dt.date | None = None,
 ) -> bytes:
     """Return the report of a design.

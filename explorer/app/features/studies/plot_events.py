@@ -10,8 +10,8 @@ from typing import Annotated
 
 import msgspec
 
+from explorer.app.browser.browser_facts import decode_text
 from explorer.app.features.studies.actions import MOST_RANGES
-from explorer.app.security.client_messages import decode_text
 from explorer.app.state.studies import Range
 
 Word = Annotated[str, msgspec.Meta(max_length=200)]

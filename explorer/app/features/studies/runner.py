@@ -12,7 +12,6 @@ from explorer.app.features.feature import Services
 from explorer.app.features.studies import tasks
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.features.studies.feed import StudyFeed
-from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Session, Who
 from explorer.app.state.studies import StudyPlan, study_around
@@ -72,7 +71,7 @@ def study_runner(services: Services) -> StudyRunner:
         RuntimeError: the page offers no studies.
     """
     feed = services.get(study_feed)
-    runner = StudyRunner(services.session, feed, services.complain, services.faults)
+    runner = StudyRunner(services.session, feed, services.complain)
     services.at_end(runner.stop)
     return runner
 
@@ -84,7 +83,6 @@ class StudyRunner:
         session: Session in which studies are opened.
         feed: Drawings of the studies, renewed with new results.
         complain: Called with a message and the client that it is for.
-        faults: Store of requests that failed unexpectedly; None to keep none.
     """
 
     def __init__(
@@ -92,13 +90,11 @@ class StudyRunner:
         session: Session,
         feed: StudyFeed,
         complain: Callable[[str, Who], None],
-        faults: Faults | None = None,
     ) -> None:
         self.worker = Worker(
             lambda message: complain(message, None),
             preload=[tasks.__name__],
             died=DIED,
-            faults=faults,
         )
         self._session = session
         self._feed = feed

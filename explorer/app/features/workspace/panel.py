@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
+from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
@@ -34,7 +35,6 @@ from explorer.app.inputs.ranges import coordinate_span, fine_step, round_up
 from explorer.app.inputs.tracks import Span
 from explorer.app.look import read_script
 from explorer.app.scene.bands import Measure
-from explorer.app.security.client_messages import decode_text
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set, SetPose, StartThere
