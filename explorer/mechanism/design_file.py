@@ -1,7 +1,8 @@
 """Design files: JSON, read strictly, and the presets.
 
 Unknown fields are refused, so that a misspelt limit is never silently ignored, and so are
-repeated fields. Schema 1 has a part of the fields of schema 2, and both are read. The presets are both rows of the paper's Table 1.
+repeated fields. Schema 1 has a part of the fields of schema 2, and both are read. The presets are
+both rows of the paper's Table 1.
 """
 
 from __future__ import annotations
