@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from explorer.measures.clearance import clearance_beyond, clearance_margin_of
+from explorer.measures.indices import PoseIndices
 from explorer.measures.statics import BoxStatics
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.compliance import is_elastic
 from explorer.statics.reactions import has_limits
 from explorer.workspace.extremes import extent_of, least_margins
@@ -86,13 +87,14 @@ class Case:
         )
 
     @cached_property
-    def conditions(self) -> tuple[float, float]:
-        """The smallest and the mean inverse condition over the nodes; NaN without a node."""
-        positions = self.at_nodes.positions
-        if not len(positions):
-            return math.nan, math.nan
-        conditions = self.inverse_conditions(positions)
-        return float(conditions.min()), float(conditions.mean())
+    def home_indices(self) -> PoseIndices:
+        """The indices of conditioning, manipulability and transmission at the case's pose."""
+        return PoseIndices(Configuration(self.design, self.at.position, self.rotation))
+
+    @cached_property
+    def node_indices(self) -> PoseIndices:
+        """The indices of conditioning, manipulability and transmission at the nodes."""
+        return PoseIndices(Configuration(self.design, self.at_nodes.positions, self.rotation))
 
     @cached_property
     def clearance(self) -> tuple[float, tuple[int, int]] | tuple[None, None]:
@@ -178,7 +180,3 @@ class Case:
         from explorer.workspace.held import held_workspace
 
         return held_workspace(self.design, self.rotation)
-
-    def inverse_conditions(self, positions: FloatArray) -> FloatArray:
-        """Return the inverse condition of the Jacobian at positions (n, 3), shape (n,)."""
-        return inverse_condition(jacobian(self.design, positions, self.rotation), self.design.reach)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -17,18 +17,14 @@ from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.case import Case
 from explorer.measures.loads import loads
-from explorer.measures.measure import Measure, Place
+from explorer.measures.measure import COMPARE, OPTIMISE, REPORT, STUDIES, WORKSPACE, Measure, Place
 from explorer.measures.size import box_margins, box_tilt, home_tilt, longest_leg
 from explorer.mechanism.design import LENGTHS, VARIABLES
 from explorer.mechanism.margins import MARGIN_KINDS, margins
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.numerics.arrays import FloatArray
 from explorer.workspace.orientations.share import orientation_share
 
-COMPARE: frozenset[Place] = frozenset({"compare"})
-OPTIMISE: frozenset[Place] = frozenset({"optimise"})
-STUDIES: frozenset[Place] = frozenset({"studies"})
-WORKSPACE: frozenset[Place] = frozenset({"workspace"})
-REPORT: frozenset[Place] = frozenset({"report"})
 PAGE = COMPARE | OPTIMISE | STUDIES
 
 Length = partial(Measure, power=1)
@@ -285,33 +281,75 @@ def _clearances() -> Iterable[Measure]:
     )
 
 
-def _conditions() -> Iterable[Measure]:
-    yield Measure(
+class Index(NamedTuple):
+    """An attribute of `PoseIndices`, its label, its hint, and the name that its mean has if any."""
+
+    name: str
+    label: str
+    hint: str
+    mean: str = ""
+
+
+INDICES = (
+    Index(
         "inverse_condition",
-        "inverse condition at home",
-        "Inverse condition of the Jacobian in the home pose; 0 is singular, 1 the best",
-        lambda case: float(case.inverse_conditions(np.array([case.at.position]))[0]),
-        sense="more",
-        places=COMPARE | STUDIES,
-    )
-    yield AtNodes(
-        "worst_inverse_condition",
-        "worst inverse condition at nodes",
-        "Smallest inverse condition of the Jacobian over the nodes of the workspace",
-        lambda case: case.conditions[0],
-        sense="more",
-        cost="high",
-    )
-    yield AtNodes(
-        "mean_inverse_condition",
-        "mean inverse condition at nodes",
-        "Mean inverse condition of the Jacobian over the nodes of the workspace; 0 is singular, "
-        "1 the best",
-        lambda case: case.conditions[1],
-        sense="more",
-        cost="high",
-        places=COMPARE | STUDIES,
-    )
+        "inverse condition",
+        "inverse condition number 1/κ of the Jacobian, with lengths divided by the reach; 0 is "
+        "singular, 1 the best (Gosselin and Angeles 1991)",
+        mean="global conditioning index",
+    ),
+    Index(
+        "transmission_index",
+        "transmission index",
+        "output transmission index: the least cosine, over the actuators, of the angle between "
+        "the actuator's force on the platform and the velocity of its point while the others are "
+        "locked; 0 is singular, above 0.64 to 0.7 is called good (Wang, Wu and Liu 2010)",
+        mean="global transmission index",
+    ),
+    Index(
+        "smallest_singular_value",
+        "singular value",
+        "smallest singular value of the Jacobian, with lengths divided by the reach: errors of "
+        "actuators and loads grow at most by its inverse; 0 is singular",
+    ),
+    Index(
+        "manipulability",
+        "manipulability",
+        "manipulability |det J|, with lengths divided by the reach; 0 is singular (Yoshikawa 1985)",
+    ),
+)
+
+
+def _over_nodes(case: Case, name: str, reduce: Callable[[FloatArray], np.floating[Any]]) -> float:
+    values = getattr(case.node_indices, name)
+    return float(reduce(values)) if len(values) else math.nan
+
+
+def _indices() -> Iterable[Measure]:
+    for name, label, hint, mean in INDICES:
+        yield Measure(
+            name,
+            f"{label} at home",
+            f"In the home pose, the {hint}",
+            lambda case, name=name: float(getattr(case.home_indices, name)),
+            sense="more",
+            places=COMPARE | STUDIES,
+        )
+        at_nodes = partial(Measure, sense="more", cost="high", reason=_no_node)
+        yield at_nodes(
+            f"worst_{name}",
+            f"worst {label} at nodes",
+            f"Least value at the nodes of the workspace of the {hint}",
+            lambda case, name=name: _over_nodes(case, name, np.min),
+            places=STUDIES,
+        )
+        if mean:
+            yield at_nodes(
+                f"mean_{name}",
+                mean,
+                f"Mean over the nodes of the workspace of the {hint}",
+                lambda case, name=name: _over_nodes(case, name, np.mean),
+            )
 
 
 def _orientations() -> Iterable[Measure]:
@@ -373,7 +411,7 @@ CATALOGUE: Mapping[str, Measure] = {
         _sizes(),
         _margins(),
         _clearances(),
-        _conditions(),
+        _indices(),
         _orientations(),
         loads(),
         _coordinates(),

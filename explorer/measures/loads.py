@@ -7,19 +7,27 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from explorer.measures.case import Case
-from explorer.measures.measure import Measure, Need, Place, Sense, Unit
+from explorer.measures.measure import (
+    COMPARE,
+    OPTIMISE,
+    REPORT,
+    STUDIES,
+    WORKSPACE,
+    Measure,
+    Need,
+    Place,
+    Sense,
+    Unit,
+)
 from explorer.measures.size import BOX_NODES
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import JOINTS
 
-OPTIMISE: frozenset[Place] = frozenset({"optimise"})
-WORKSPACE: frozenset[Place] = frozenset({"workspace"})
-REPORT: frozenset[Place] = frozenset({"report"})
-ELSEWHERE: frozenset[Place] = frozenset({"compare", "studies", "report"})
+ELSEWHERE = COMPARE | STUDIES | REPORT
 
 
 @dataclass(frozen=True)
-class Site:
+class LoadLocation:
     """Where loads, errors and compliance are measured.
 
     Attributes:
@@ -39,9 +47,9 @@ class Site:
     of: Callable[[Case], BoxStatics | None]
 
 
-SITES = (
-    Site("home_", "at home", "at home", (), ELSEWHERE, lambda case: case.home_statics),
-    Site(
+LOAD_LOCATIONS = (
+    LoadLocation("home_", "at home", "at home", (), ELSEWHERE, lambda case: case.home_statics),
+    LoadLocation(
         "",
         "over the box",
         f"at {BOX_NODES} nodes an axis of the required box",
@@ -53,16 +61,16 @@ SITES = (
 
 
 @dataclass(frozen=True)
-class Kind:
+class LoadMeasure:
     """A measure of loads, errors or compliance, wherever it is measured.
 
     Attributes:
-        name, label, hint: As in `Measure`, without the site.
-        value: Value of the statics at a site.
+        name, label, hint: As in `Measure`, without the location.
+        value: Value of the statics at a location.
         needs: What it needs of the machine.
-        title: As in `Measure`, without the site; the label if empty.
+        title: As in `Measure`, without the location; the label if empty.
         power, unit, sense, names: As in `Measure`.
-        gradient: Derivatives of the statics at a site, as in `Measure`.
+        gradient: Derivatives of the statics at a location, as in `Measure`.
         in_report: Whether the report lists it among its headlines, rather than in a table.
     """
 
@@ -80,8 +88,8 @@ class Kind:
     in_report: bool = True
 
 
-KINDS = (
-    Kind(
+LOAD_MEASURES = (
+    LoadMeasure(
         "load_share",
         "load share",
         "The largest share of a limit of actuators, struts or guide under the payload's weight and "
@@ -92,7 +100,7 @@ KINDS = (
         unit="share",
         gradient=lambda statics: statics.share_gradient,
     ),
-    Kind(
+    LoadMeasure(
         "worst_actuator",
         "worst actuator",
         "The actuator with the largest share of its limit under the payload's weight and force; 1 "
@@ -103,7 +111,7 @@ KINDS = (
         names=JOINTS,
         in_report=False,
     ),
-    Kind(
+    LoadMeasure(
         "largest_payload",
         "largest payload",
         "The largest mass in place of the payload that keeps all limits",
@@ -112,7 +120,7 @@ KINDS = (
         unit="kg",
         sense="more",
     ),
-    Kind(
+    LoadMeasure(
         "largest_bending",
         "largest bending",
         "The largest bending moment of struts 2 and 3 under the payload's weight and force",
@@ -122,7 +130,7 @@ KINDS = (
         gradient=lambda statics: statics.bending_gradient,
         in_report=False,
     ),
-    Kind(
+    LoadMeasure(
         "worst_error",
         "worst error",
         "The largest displacement of the tool by the errors of the actuators",
@@ -131,7 +139,7 @@ KINDS = (
         power=1,
         gradient=lambda statics: statics.error_gradient,
     ),
-    Kind(
+    LoadMeasure(
         "worst_turn",
         "worst turn",
         "The largest turn of the tool by the errors of the actuators",
@@ -141,7 +149,7 @@ KINDS = (
         gradient=lambda statics: statics.turn_gradient,
         in_report=False,
     ),
-    Kind(
+    LoadMeasure(
         "softest_compliance",
         "softest compliance",
         "The largest displacement of the tool per force at it",
@@ -150,7 +158,7 @@ KINDS = (
         unit="mm/N",
         gradient=lambda statics: statics.compliance_gradient,
     ),
-    Kind(
+    LoadMeasure(
         "deflection",
         "deflection",
         "The largest displacement of the tool under the payload's weight and force",
@@ -164,9 +172,9 @@ KINDS = (
 
 def loads() -> Iterable[Measure]:
     """Yield the measures of loads, errors and compliance."""
-    for site in SITES:
-        for kind in KINDS:
-            yield _measure(kind, site)
+    for location in LOAD_LOCATIONS:
+        for load in LOAD_MEASURES:
+            yield _measure(load, location)
     yield Measure(
         "held_volume",
         "held volume",
@@ -182,37 +190,37 @@ def loads() -> Iterable[Measure]:
     )
 
 
-def _measure(kind: Kind, site: Site) -> Measure:
+def _measure(load: LoadMeasure, location: LoadLocation) -> Measure:
     def function(case: Case) -> float:
-        statics = site.of(case)
-        return math.nan if statics is None else kind.value(statics)
+        statics = location.of(case)
+        return math.nan if statics is None else load.value(statics)
 
     def reason(case: Case) -> str:
-        statics = site.of(case)
+        statics = location.of(case)
         if statics is None or statics.is_regular:
             return ""
-        where = "the required box has singular positions" if site.needs else "home is singular"
+        where = "the required box has singular positions" if location.needs else "home is singular"
         return f"{where}, where forces and errors are infinite"
 
-    slopes = kind.gradient
+    slopes = load.gradient
 
     def gradient(case: Case) -> Mapping[str, float]:
-        statics = site.of(case)
+        statics = location.of(case)
         return {} if statics is None or slopes is None else slopes(statics)
 
     return Measure(
-        f"{site.prefix}{kind.name}",
-        f"{kind.label} {site.label}",
-        f"{kind.hint}, {site.hint}",
+        f"{location.prefix}{load.name}",
+        f"{load.label} {location.label}",
+        f"{load.hint}, {location.hint}",
         function,
-        title=f"{kind.title or kind.label} {site.label}",
-        power=kind.power,
-        unit=kind.unit,
-        sense=kind.sense,
-        is_whole=bool(kind.names),
-        names=kind.names,
+        title=f"{load.title or load.label} {location.label}",
+        power=load.power,
+        unit=load.unit,
+        sense=load.sense,
+        is_whole=bool(load.names),
+        names=load.names,
         gradient=None if slopes is None else gradient,
-        needs=(*site.needs, *kind.needs),
+        needs=(*location.needs, *load.needs),
         reason=reason,
-        places=site.places if kind.in_report else site.places - REPORT,
+        places=location.places if load.in_report else location.places - REPORT,
     )

@@ -39,6 +39,11 @@ NEED_WORDS: Mapping[Need, str] = MappingProxyType(
 )
 """Words for what measures need, without an article."""
 
+COMPARE: frozenset[Place] = frozenset({"compare"})
+OPTIMISE: frozenset[Place] = frozenset({"optimise"})
+STUDIES: frozenset[Place] = frozenset({"studies"})
+WORKSPACE: frozenset[Place] = frozenset({"workspace"})
+REPORT: frozenset[Place] = frozenset({"report"})
 EVERYWHERE: frozenset[Place] = frozenset(get_args(Place))
 POWERS = {1: "", 2: "²", 3: "³"}
 

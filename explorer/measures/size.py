@@ -1,19 +1,26 @@
-"""The size of a design and of its required box: longest leg, corners, margins."""
+"""The size of a design, and the positions over which its measures are the worst."""
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
+from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.statics.equilibrium import SINGULAR
+from explorer.workspace.node_measures import node_measures
 from explorer.workspace.orientations.tilts import greatest_tilts
 
 BOX_NODES = 9
 """Number of nodes on each axis of the grid over a required box, its faces included."""
+
+PositionSet = Literal["pose", "box", "workspace"]
+"""The position of a pose, the nodes of a box, or nodes of the workspace."""
 
 
 def longest_leg(design: Design) -> float:
@@ -40,6 +47,36 @@ def box_nodes(box: tuple[Triple, Triple]) -> FloatArray:
         for low, high in zip(*box, strict=True)
     ]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def positions_over(
+    design: Design, over: PositionSet, pose: Pose, box: tuple[Triple, Triple] | None
+) -> FloatArray:
+    """Return positions of b4 in the base frame, shape (n, 3), in design units.
+
+    Those of the workspace are the centres of 20 × 20 × 20 cells about it that lie within the
+    limits.
+
+    Args:
+        design: The manipulator.
+        over: Kind of the set.
+        pose: Pose with the one position, and with the orientation of the workspace.
+        box: Lows and highs of the box; None for none.
+
+    Raises:
+        InputError: Positions over a box are meant, and there is none.
+        NoAnswerError: No node is within the limits.
+    """
+    if over == "pose":
+        return np.array([pose.position])
+    if over == "box":
+        if box is None:
+            raise InputError("positions over a box need a box, and the design has none")
+        return box_nodes(box)
+    nodes = node_measures(design, pose.rotation).positions
+    if not len(nodes):
+        raise NoAnswerError("no position of a grid of 20 × 20 × 20 nodes is within the limits")
+    return nodes
 
 
 def box_margins(box: tuple[Triple, Triple], rotation: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from explorer.legs.clearance import LegClearances, leg_clearances
+from explorer.measures.indices import PoseIndices
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.feasible_intervals import Interval, feasible_intervals
@@ -25,9 +26,7 @@ from explorer.singularity.freedoms import Freedoms, freedoms
 from explorer.singularity.gaps import FlagGaps, flag_gaps
 from explorer.singularity.jacobian import (
     determinant,
-    jacobian,
     scaled_margins,
-    singular_values,
     tetrahedron_volumes,
 )
 from explorer.singularity.nearest import (
@@ -81,22 +80,34 @@ class Snapshot(Configuration):
         return abs(float(determinant(self.design, self.joints, enlarged)))
 
     @cached_property
-    def _singular_values(self) -> FloatArray:
-        matrix = jacobian(self.design, self.position, self.rotation)
-        return singular_values(matrix, self.design.reach)
+    def indices(self) -> PoseIndices:
+        """The indices of conditioning, manipulability and transmission."""
+        return PoseIndices(self)
 
     @property
     def inverse_condition(self) -> float:
         """The inverse condition number of J, made homogeneous by the reach, 0 (singular) to 1."""
-        return float(self._singular_values[-1] / self._singular_values[0])
+        return float(self.indices.inverse_condition)
 
     @property
     def smallest_singular_value(self) -> float:
-        """The smallest singular value σ of J, made homogeneous by the reach; 0 if singular.
+        """The smallest singular value σ of J, made homogeneous by the reach; 0 if singular."""
+        return float(self.indices.smallest_singular_value)
 
-        Errors of actuators and loads are enlarged at most 1/σ times, see `singular_values`.
-        """
-        return float(self._singular_values[-1])
+    @property
+    def manipulability(self) -> float:
+        """The manipulability |det J| of J, made homogeneous by the reach; 0 if singular."""
+        return float(self.indices.manipulability)
+
+    @property
+    def transmissions(self) -> FloatArray:
+        """The output transmission index of each actuator, from 0 (singular) to 1, shape (6,)."""
+        return self.indices.transmissions
+
+    @property
+    def transmission_index(self) -> float:
+        """The output transmission index, the least of `transmissions`."""
+        return float(self.indices.transmission_index)
 
     @cached_property
     def least_turns(self) -> tuple[float, float, float]:

@@ -18,18 +18,20 @@ from client import wait_for
 
 import explorer
 from explorer import InputError, Pose
+from explorer.app.notebook import Shown
+from explorer.errors import DesignError
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 
 
 @pytest.fixture(scope="module")
-def started() -> Iterator[explorer.Shown]:
+def started() -> Iterator[Shown]:
     with explorer.show(OPTIMAL) as shown:
         yield shown
 
 
 @pytest.fixture
-def shown(started: explorer.Shown) -> explorer.Shown:
+def shown(started: Shown) -> Shown:
     """An explorer that shows the paper's optimum at home."""
     started.design = OPTIMAL
     return started
@@ -57,7 +59,7 @@ def ends(threads: set[threading.Thread]) -> bool:
 
 
 def test_notebook_gets_the_page_in_a_frame_and_a_shell_its_address(
-    shown: explorer.Shown,
+    shown: Shown,
 ) -> None:
     assert answers(shown.url)
     bundle = displayed(shown)
@@ -70,7 +72,7 @@ def test_notebook_gets_the_page_in_a_frame_and_a_shell_its_address(
     assert repr(shown) == f"Flagged 4-4 explorer of 'paper-optimal': {shown.url}"
 
 
-def test_design_and_pose_are_read_and_set_live(shown: explorer.Shown) -> None:
+def test_design_and_pose_are_read_and_set_live(shown: Shown) -> None:
     home = OPTIMAL.home_pose
     assert (shown.design, shown.pose) == (OPTIMAL, home)
     pose = Pose.of_yaw_pitch_roll((9.0, 4.0, 8.0), (-60.0, 10.0, 5.0))
@@ -85,14 +87,14 @@ def test_design_and_pose_are_read_and_set_live(shown: explorer.Shown) -> None:
 
 
 def test_value_that_cannot_be_set_is_refused_in_one_line_and_changes_nothing(
-    shown: explorer.Shown,
+    shown: Shown,
 ) -> None:
     untyped: Any = 3
     with pytest.raises(InputError, match=r"^a design is an explorer\.Design, [^\n]*got 3$"):
         shown.design = untyped
     with pytest.raises(InputError, match=r"^a pose is an explorer\.Pose; got 3$"):
         shown.pose = untyped
-    with pytest.raises(explorer.DesignError, match=r"^[^\n]*no-such-design[^\n]*$"):
+    with pytest.raises(DesignError, match=r"^[^\n]*no-such-design[^\n]*$"):
         shown.design = "no-such-design"
     assert (shown.design, shown.pose) == (OPTIMAL, OPTIMAL.home_pose)
     with pytest.raises(InputError, match=r"^the height must be 100 pixels at least; got 5$"):
@@ -102,7 +104,7 @@ def test_value_that_cannot_be_set_is_refused_in_one_line_and_changes_nothing(
         explorer.show(port=port)
 
 
-def test_explorers_shown_at_once_have_a_state_each(shown: explorer.Shown) -> None:
+def test_explorers_shown_at_once_have_a_state_each(shown: Shown) -> None:
     with explorer.show("paper-initial", height=300) as other:
         assert other.url != shown.url
         assert answers(other.url)

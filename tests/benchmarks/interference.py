@@ -11,7 +11,8 @@ import numpy as np
 from benchmarks.samples import DESIGN, SIZE, around_home
 from benchmarks.table import Row, per_second, seconds, times
 from benchmarks.timing import best_of
-from explorer import accessible_workspace, leg_clearances, moves_are_clear, tetrahedra_overlap
+from explorer import accessible_workspace, leg_clearances, tetrahedra_overlap
+from explorer.legs.moves import moves_are_clear
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import warm

@@ -11,10 +11,11 @@ from scipy.spatial.transform import Rotation
 from benchmarks.samples import DESIGN, SIZE, around_home
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
-from explorer import Pose, nearest_singular_poses, nearest_singularities
+from explorer import Pose, nearest_singularities
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.compiled import warm
 from explorer.paths.crossings import path_margins
+from explorer.singularity.nearest import nearest_singular_poses
 from explorer.singularity.nearest_stratum import nearest_in_strata
 
 CALLS, POSES, SEARCHES, MOVES = 200, 5_000, 10, 100

@@ -10,9 +10,11 @@ from scipy.spatial.transform import Rotation
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
-from explorer import greatest_tilts, inverse, margins, orientation_share, tilt_map
+from explorer import inverse, margins
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
+from explorer.workspace.orientations.share import orientation_share
+from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map
 
 ORIENTATIONS, NODES = 100_000, 20
 # Samples in each azimuth that give a tilt to 0.1°.

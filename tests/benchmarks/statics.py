@@ -15,23 +15,24 @@ from explorer import (
     Struts,
     Tolerances,
     actuator_forces,
-    compliance_shares,
     deflection,
     inverse,
     jacobian,
-    largest_error,
     largest_force,
-    principal_compliances,
-    source_errors,
     strut_bending,
 )
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.statics.accuracy import actuator_errors, tool_errors
-from explorer.statics.compliance import compliance_of, stiffness_of
+from explorer.statics.compliance import (
+    compliance_of,
+    compliance_shares,
+    principal_compliances,
+    stiffness_of,
+)
 from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.error_sources import error_by_source
+from explorer.statics.error_sources import error_by_source, largest_error, source_errors
 from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS
 
 FORCE_POSES, POSES, ROUNDS = 100_000, 10_000, 10

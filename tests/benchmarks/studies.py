@@ -17,21 +17,13 @@ from sweep_faults import HereWorkers
 
 from benchmarks.table import Row, per_second, times
 from benchmarks.timing import ROOT, best_of, elapsed
-from explorer import (
-    Design,
-    LocalWorkers,
-    leg_clearances,
-    margins,
-    poses_are_valid,
-    run_study,
-    workspace_volume,
-)
+from explorer import Design, leg_clearances, margins, poses_are_valid, run_study, workspace_volume
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.compiled import warm
 from explorer.sweep import rows, run as runs
 from explorer.sweep.sampling import samples
 from explorer.sweep.study import STUDIES, Sampling, Study, encode_study
-from explorer.sweep.workers import Workers
+from explorer.sweep.workers import LocalWorkers, Workers
 
 NODES, DESIGNS, BY_HAND, SHARED, ROUNDS = 20, 256, 32, 3072, 3
 CHUNK, SIZES = 1024, (1_000, 50_000, 1_000_000)

@@ -18,11 +18,13 @@ import pytest
 from command_line import CommandLine
 
 import explorer
-from explorer import InputError, NoAnswerError
+from explorer import InputError, NoAnswerError, __version__
 from explorer.cli import COMMANDS, main, run
 from explorer.cli.commands.sweep import Sweep
 from explorer.cli.parsing import load_command
 from explorer.mechanism.feasible_intervals import feasible_intervals
+from explorer.mechanism.kinematics import discriminants
+from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.sweep.run import RunError
 
@@ -81,6 +83,9 @@ def test_singularity_json_has_the_snapshot(cli: CommandLine) -> None:
         "determinant": expected.determinant,
         "inverse_condition": expected.inverse_condition,
         "smallest_singular_value": expected.smallest_singular_value,
+        "manipulability": expected.manipulability,
+        "transmissions": expected.transmissions.tolist(),
+        "transmission_index": expected.transmission_index,
         "stratum": list(expected.stratum),
         "stratum_dimension": expected.stratum_dimension,
         "mode": expected.mode,
@@ -113,7 +118,7 @@ def test_singularity_singular_pose_has_status_0_and_names_its_incidence(cli: Com
     text = cli.text(*argv)
     (row,) = [line for line in text.splitlines() if line.startswith("singular ")]
     assert row.split(maxsplit=1)[1] == "b4 on the base plane"
-    assert "stratum            4 3 1 2, dimension 5: b4 on the base plane" in text
+    assert "stratum             4 3 1 2, dimension 5: b4 on the base plane" in text
     (row,) = [line for line in text.splitlines() if line.startswith("δ3 = 0")]
     assert [float(word) for word in row.split()[3:7]] == [0.0, 0.0, 10.0, 5.0]
 
@@ -187,7 +192,7 @@ def test_forward_infeasible_joints_have_status_1_and_name_the_tetrahedron(cli: C
     joints = snapshot().joints.copy()
     joints[5] = 60.0
     argv = ["forward", "--joints", *map(repr, joints.tolist())]
-    squares = explorer.discriminants(PRESET, joints)
+    squares = discriminants(PRESET, joints)
     assert [square < 0 for square in squares.tolist()] == [False, False, True]
     found = cli.answer(*argv, status=1)
     assert (found["feasible"], found["modes"]) == (False, [])
@@ -203,7 +208,7 @@ def test_pose_options_are_completed_from_the_home_pose(cli: CommandLine) -> None
     home = PRESET.home_pose
     rotation = explorer.rotation_from_yaw_pitch_roll(ANGLES)
     # Of any length, and -q is the same rotation as q.
-    quaternion = (-3.0 * explorer.quaternion_from_rotation(rotation)).tolist()
+    quaternion = (-3.0 * quaternion_from_rotation(rotation)).tolist()
     for argv, *pose in (
         ([], home.position, home.rotation),
         (POSE[:4], POSITION, home.rotation),
@@ -417,11 +422,11 @@ def test_installed_script_runs_the_module() -> None:
     if not script.exists():
         pytest.skip("the project is not installed here")
     done = subprocess.run([script, "--version"], capture_output=True, text=True, check=True)
-    assert done.stdout == f"explorer {explorer.__version__}\n"
+    assert done.stdout == f"explorer {__version__}\n"
 
 
 def test_version_and_help_are_those_of_the_package(cli: CommandLine) -> None:
-    assert cli.text("--version") == f"explorer {explorer.__version__}\n"
+    assert cli.text("--version") == f"explorer {__version__}\n"
     listed = cli.text("--help")
     assert cli.text("-h") == listed
     for name, summary in COMMANDS.items():

@@ -15,10 +15,13 @@ from command_line import CommandLine
 
 import explorer
 from explorer.cli import run
+from explorer.export.imperfect import ImperfectMachine
 from explorer.export.mesh import FORMATS
+from explorer.export.simulation import simulation_mjcf
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Actuators, Payload
 from explorer.mechanism.typical import STIFFNESSES, typical_machine
+from explorer.statics.error_sources import SOURCES
 from explorer.workspace.held import held_workspace
 from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
@@ -166,11 +169,11 @@ def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is
     file.write_bytes(encode_design(design))
     words = ("simulation", "--design", file, "--out", out, "--errors", 7)
     answer = cli.answer(*words)
-    machine = explorer.ImperfectMachine.draw(design, 7)
-    assert out.read_text(encoding="utf-8") == explorer.simulation_mjcf(machine)
+    machine = ImperfectMachine.draw(design, 7)
+    assert out.read_text(encoding="utf-8") == simulation_mjcf(machine)
     assert (answer["seed"], len(answer["bodies"])) == (7, 13)
     rows = {row["name"]: row for row in answer["deviations"]}
-    assert list(rows) == list(explorer.SOURCES)
+    assert list(rows) == list(SOURCES)
     assert {name for name, row in rows.items() if row["deviation"]} == {
         *("l1", "a3x", "a3y", "guide tilt z")
     }
@@ -206,8 +209,8 @@ def test_export_simulation_with_errors_assumes_typical_values_only_if_asked(
     answer = cli.answer(*words, "--typical")
     typical, assumed = typical_machine(OPTIMAL)
     assert answer["assumed"] == list(assumed)
-    machine = explorer.ImperfectMachine.draw(typical, 3)
-    assert out.read_text(encoding="utf-8") == explorer.simulation_mjcf(machine)
+    machine = ImperfectMachine.draw(typical, 3)
+    assert out.read_text(encoding="utf-8") == simulation_mjcf(machine)
     assert "assumed, since the design states none: errors" in cli.text(*words, "--typical")
 
 

@@ -11,7 +11,8 @@ import pytest
 from command_line import CommandLine
 
 import explorer
-from explorer.legs.clearance import leg_axes
+from explorer.legs.clearance import PAIRS, leg_axes
+from explorer.legs.moves import move_clearance, poses_between
 from explorer.mechanism.configuration import Configuration
 
 COMMAND = ("interference",)
@@ -51,13 +52,13 @@ def test_interference_pose_has_clearances_of_pairs(cli: CommandLine) -> None:
     )
     legs = expected.clearances
     assert set(found) == {*("pairs", "closest", "is_clear", "radii", "within_limits", "violations")}
-    assert column(found, "legs") == [list(pair) for pair in explorer.PAIRS]
+    assert column(found, "legs") == [list(pair) for pair in PAIRS]
     assert column(found, "distance") == legs.distance.tolist()
     assert column(found, "clearance") == legs.clearance.tolist()
     assert column(found, "points") == legs.points.tolist()
     assert column(found, "collides") == (legs.clearance < 0.0).tolist()
     assert found["is_clear"] is not any(column(found, "collides"))
-    assert found["closest"] == list(explorer.PAIRS[int(legs.clearance.argmin())])
+    assert found["closest"] == list(PAIRS[int(legs.clearance.argmin())])
     assert found["radii"] == list(RADII)
     assert found["within_limits"] is (not expected.violations)
 
@@ -101,10 +102,10 @@ def test_interference_move_to_folds_is_the_move_to_their_pose(cli: CommandLine) 
 
 def test_interference_move_has_exact_and_swept_tests(cli: CommandLine) -> None:
     found = cli.answer(*MOVE, "--steps", "3", "--radii", *map(str, RADII))
-    expected = explorer.move_clearance(with_radii(RADII), HOME, END, steps=3)
+    expected = move_clearance(with_radii(RADII), HOME, END, steps=3)
     for key in ("clearance", "bound", "share", "points", "overlaps"):
         np.testing.assert_allclose(column(found, key), getattr(expected, key), atol=1e-12)
-    assert found["closest"] == list(explorer.PAIRS[expected.closest])
+    assert found["closest"] == list(PAIRS[expected.closest])
     assert (found["is_clear"], found["is_free"]) == (expected.is_clear, expected.is_free)
     assert (found["steps"], found["tolerance"]) == (3, expected.tolerance)
     assert found["within_limits"] is True
@@ -126,7 +127,7 @@ def test_interference_default_steps_are_within_the_node_step(
 
     def farthest(steps: int) -> float:
         shares = np.linspace(0.0, 1.0, steps + 1)
-        axes = leg_axes(Configuration(design, *explorer.poses_between(start, end, shares)))
+        axes = leg_axes(Configuration(design, *poses_between(start, end, shares)))
         return float(np.linalg.norm(np.diff(axes, axis=0), axis=-1).max())
 
     assert farthest(found["steps"]) <= step * (1.0 + 1e-9)
@@ -148,7 +149,7 @@ def test_interference_move_keeps_what_is_not_given(cli: CommandLine) -> None:
 
 
 def test_interference_joined_legs_are_null_and_in_words(cli: CommandLine, joined: str) -> None:
-    index = explorer.PAIRS.index((2, 4))
+    index = PAIRS.index((2, 4))
     pair = cli.answer("--design", joined)["pairs"][index]
     assert pair["distance"] is pair["clearance"] is None
     assert pair["collides"] is False
@@ -173,7 +174,7 @@ def test_interference_text_has_a_row_per_pair(cli: CommandLine) -> None:
             for line in cli.text("--radii", "0.4", *words).splitlines()
             if line[1:2] == "–"
         ]
-        assert [row[0] for row in rows] == [f"{i}–{j}" for i, j in explorer.PAIRS]
+        assert [row[0] for row in rows] == [f"{i}–{j}" for i, j in PAIRS]
         at = 1 if words else 2
         for row, clearance in zip(rows, column(found, "clearance"), strict=True):
             assert float(row[at]) == pytest.approx(clearance, rel=1e-5)

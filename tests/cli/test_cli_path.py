@@ -14,6 +14,7 @@ from machines import PRESS
 import explorer
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
+from explorer.paths.loads import path_loads
 from explorer.statics.reactions import LIMITED
 
 COMMAND = ("path",)
@@ -147,7 +148,7 @@ def test_path_with_load_holds_it_and_tells_the_largest_share(
             explorer.Pose(tuple(each["position"]), tuple(each["quaternion"]))
             for each in answer["poses"]
         ]
-        largest = explorer.path_loads(design, poses, load)
+        largest = path_loads(design, poses, load)
         assert (largest.share <= 1.0 + 1e-4) == holds
     assert found["largest_share"] == pytest.approx(largest.share, abs=1e-6)
     assert found["largest_share_bound"] == pytest.approx(largest.bound, rel=0.02)

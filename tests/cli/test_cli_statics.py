@@ -11,15 +11,21 @@ from command_line import CommandLine
 from numpy.testing import assert_allclose
 
 import explorer
-from explorer.measures.positions import positions_over
+from explorer.measures.size import positions_over
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.typical import typical_machine
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.weights import machine_weights
 from explorer.statics.accuracy import actuator_errors
-from explorer.statics.budget.costs import stated_tolerances
+from explorer.statics.budget.costs import source_costs, stated_tolerances
 from explorer.statics.compliance import deflection, stiffness_of
-from explorer.statics.error_sources import error_by_source
+from explorer.statics.error_sources import (
+    SOURCES,
+    error_by_source,
+    largest_error,
+    rms_of_sources,
+    source_errors,
+)
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.weights import carry, payload_wrench
 
@@ -238,9 +244,9 @@ def stated(tmp_path: Path) -> Path:
 
 def test_budget_without_wanted_precision_ranks_the_costs(cli: CommandLine, stated: Path) -> None:
     found = cli.answer("budget", "--design", stated, *OVER_BOX, "--at", "tool")
-    costs = explorer.source_costs(STATED, POSITIONS, HOME.rotation, STATED.tool.position)
+    costs = source_costs(STATED, POSITIONS, HOME.rotation, STATED.tool.position)
     assert found["count"] == 729
-    assert found["ranking"] == [explorer.SOURCES[k] for k in costs.ranking]
+    assert found["ranking"] == [SOURCES[k] for k in costs.ranking]
     assert_allclose(found["displacement"], costs.displacement)
     assert_allclose(found["turn_within"], costs.turn_within)
     assert_allclose(found["stated"], stated_tolerances(STATED))
@@ -249,7 +255,7 @@ def test_budget_without_wanted_precision_ranks_the_costs(cli: CommandLine, state
     assert found["assumed"] == []
     text = cli.text("budget", "--design", stated, *OVER_BOX)
     assert "worst over 729 nodes of a grid over the box" in text
-    rows = [line for line in text.splitlines() if line.split(" ")[0] in explorer.SOURCES]
+    rows = [line for line in text.splitlines() if line.split(" ")[0] in SOURCES]
     rows += [line for line in text.splitlines() if line.startswith("guide ")]
     assert len(rows) == 29
     assert "found" not in text
@@ -260,7 +266,7 @@ def test_budget_of_a_pose_is_that_of_the_pose(cli: CommandLine) -> None:
         "budget", "--position", "8", "-2.5", "11", "--yaw-pitch-roll", "-60", "9", "-7"
     )
     rotation = explorer.rotation_from_yaw_pitch_roll((-60.0, 9.0, -7.0))
-    costs = explorer.source_costs(OPTIMAL, [8.0, -2.5, 11.0], rotation)
+    costs = source_costs(OPTIMAL, [8.0, -2.5, 11.0], rotation)
     assert (found["over"], found["count"]) == ("pose", 1)
     assert_allclose(found["displacement"], costs.displacement)
     assert cli.answer("budget")["position"] == list(HOME.position)
@@ -275,7 +281,7 @@ def test_budget_writes_the_design_that_keeps_what_is_wanted(
     better = explorer.load_design(str(out))
     assert found["out"] == str(out)
     assert_allclose(stated_tolerances(better), found["tolerances"])
-    costs = explorer.source_costs(better, POSITIONS, HOME.rotation)
+    costs = source_costs(better, POSITIONS, HOME.rotation)
     assert found["worst_displacement"] == costs.worst_displacement <= 0.05
     assert found["worst_turn"] == costs.worst_turn <= 0.04
     assert found["effort"] >= found["least_effort"] > 0.0
@@ -334,7 +340,7 @@ def test_typical_values_are_told(cli: CommandLine, stated: Path) -> None:
         # Stated values stay.
         own = cli.answer(command, "--typical", "--design", stated)["assumed"]
         assert len(own) == 2
-    costs = explorer.source_costs(typical, [HOME.position], HOME.rotation)
+    costs = source_costs(typical, [HOME.position], HOME.rotation)
     found = cli.answer("budget", "--typical")
     assert found["worst_displacement"] == pytest.approx(costs.worst_displacement)
     # Given errors are not assumed.
@@ -347,10 +353,10 @@ def test_accuracy_has_totals_of_dimensions_and_of_all_sources(
 ) -> None:
     found = cli.answer("accuracy", "--design", stated)
     by_source = error_by_source(explorer.Configuration(STATED, HOME.position, HOME.rotation))
-    bounds = explorer.source_errors(STATED)
+    bounds = source_errors(STATED)
     for name, sources in (("dimensions", slice(6, 29)), ("all", slice(0, 29))):
-        worst = explorer.largest_error(by_source[:, sources], bounds[sources])
-        rms = explorer.rms_of_sources(by_source[:, sources], bounds[sources])
+        worst = largest_error(by_source[:, sources], bounds[sources])
+        rms = rms_of_sources(by_source[:, sources], bounds[sources])
         for kind in ("displacement", "turn"):
             assert found[f"worst_{kind}_of_{name}"] == pytest.approx(float(getattr(worst, kind)))
             assert found[f"rms_{kind}_of_{name}"] == pytest.approx(float(getattr(rms, kind)))

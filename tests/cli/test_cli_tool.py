@@ -20,9 +20,13 @@ from tool_moves import tool_move
 import explorer
 from explorer.cli import COMMANDS
 from explorer.cli.parsing import load_command
+from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.mechanism.tool_point import pose_with, position_of
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import performance
+from explorer.workspace.orientations.share import orientation_share
+from explorer.workspace.orientations.tilts import tilt_map
+from explorer.workspace.orientations.torsions import tilt_by_torsion, torsion_range
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 TOOL = (1.0, -0.5, 3.0)
@@ -256,7 +260,7 @@ def test_capability_and_orientations_are_those_of_the_tool(
     assert found["tool_position"] == list(PLACE)
     assert "position" not in found
     assert found["greatest_tilt"] == explorer.greatest_tilt(TOOLED, PLACE, tool=TOOL).tilt
-    assert found["tilts"] == explorer.tilt_map(TOOLED, PLACE, tool=TOOL).tilts.tolist()
+    assert found["tilts"] == tilt_map(TOOLED, PLACE, tool=TOOL).tilts.tolist()
     home = TOOLED.home_pose
     default = cli.answer("orientation", "--samples", "10", *tooled)
     assert_allclose(default["tool_position"], position_of(TOOLED, home, "tool"))
@@ -333,19 +337,19 @@ AT = ("orientation", "--position", "10", "5", "9")
 
 def test_orientation_json_has_share_tilts_and_torsions(cli: CommandLine) -> None:
     found = cli.answer(*AT, "--torsion", "-60", "--samples", "5000")
-    share = explorer.orientation_share(PRESET, POSITION, 5000)
+    share = orientation_share(PRESET, POSITION, 5000)
     assert (found["share"], found["standard_error"]) == (share.share, share.standard_error)
     assert found["orientations"] == 5000
     least = explorer.greatest_tilt(PRESET, POSITION, -60.0)
     assert (found["greatest_tilt"], found["azimuth"]) == (least.tilt, least.azimuth)
     assert (found["torsion"], found["limit"]) == (-60.0, least.limit)
-    tilts = explorer.tilt_map(PRESET, POSITION, -60.0)
+    tilts = tilt_map(PRESET, POSITION, -60.0)
     assert found["tilts"] == tilts.tilts.tolist()
     assert found["limits"] == list(tilts.limits)
-    torsions = explorer.torsion_range(PRESET, POSITION, -60.0)
+    torsions = torsion_range(PRESET, POSITION, -60.0)
     assert found["torsion_range"] == [torsions.low, torsions.high]
     assert found["torsion_limits"] == [torsions.low_limit, torsions.high_limit]
-    by_torsion = explorer.tilt_by_torsion(PRESET, POSITION)
+    by_torsion = tilt_by_torsion(PRESET, POSITION)
     assert found["torsions"] == by_torsion.torsions.tolist()
     assert found["tilts_by_torsion"] == [
         None if np.isnan(tilt) else tilt for tilt in by_torsion.tilts.tolist()
@@ -383,7 +387,7 @@ def test_orientation_where_tilt_zero_violates_a_limit_says_so(cli: CommandLine) 
 
 def test_tilt_torsion_gives_the_orientation(cli: CommandLine) -> None:
     found = cli.answer("inverse", "--position", "10", "5", "9", "--tilt-torsion", "30", "15", "-70")
-    rotation = explorer.rotation_from_tilt_torsion([30.0, 15.0, -70.0])
+    rotation = rotation_from_tilt_torsion([30.0, 15.0, -70.0])
     np.testing.assert_allclose(
         found["joints"], explorer.inverse(PRESET, POSITION, rotation), rtol=1e-12
     )

@@ -18,7 +18,6 @@ from explorer import (
     PRESETS,
     Actuators,
     Design,
-    ImperfectMachine,
     InputError,
     NoAnswerError,
     Pose,
@@ -27,11 +26,9 @@ from explorer import (
     Tool,
     compliance,
     deflection,
-    draw_deviations,
     inverse,
-    rms_of_sources,
-    source_costs,
 )
+from explorer.export.imperfect import ImperfectMachine, draw_deviations
 from explorer.export.servos import joint_inertia
 from explorer.export.simulation import DENSITY, simulation_joints, simulation_mjcf
 from explorer.mechanism.configuration import Configuration
@@ -41,9 +38,10 @@ from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED
 from explorer.prototype.weights import bar_masses
 from explorer.statics.accuracy import tool_errors
+from explorer.statics.budget.costs import source_costs
 from explorer.statics.compliance import stiffness_of
 from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.error_sources import SOURCES, error_by_source, source_errors
+from explorer.statics.error_sources import SOURCES, error_by_source, rms_of_sources, source_errors
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.tool_precision import ToolPrecision
 

@@ -16,14 +16,7 @@ import pytest
 import trimesh
 from mesh_files import glb_json, mesh_of, metadata_of, read_3mf
 
-from explorer import (
-    PRESETS,
-    Design,
-    ExplorerError,
-    InputError,
-    NoAnswerError,
-    decode_design,
-)
+from explorer import PRESETS, Design, ExplorerError, InputError, NoAnswerError, decode_design
 from explorer.export.assembly import COLOURS, FORMATS as ASSEMBLY_FORMATS, assembly_bytes
 from explorer.export.mesh import FORMATS, colour_of, mesh_bytes
 from explorer.numerics.arrays import FloatArray

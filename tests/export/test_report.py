@@ -20,7 +20,7 @@ from limited_designs import limited, ordinary_case, troubled_case
 from report_page import Node, read, table_of
 
 import explorer
-from explorer import Design, Pose
+from explorer import Design, Pose, __version__
 from explorer.app.features.sharing.reporting import make_report
 from explorer.export.report.data import Missing, gather_report_data
 from explorer.export.report.document import report_html
@@ -40,6 +40,7 @@ from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.accessible.workspace import accessible_workspace
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.slices.outline import slice_outline
+from explorer.workspace.slices.volume import workspace_nodes
 from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -101,7 +102,7 @@ def test_report_title_block_names_design_unit_and_hash() -> None:
     assert next(page.all("time")).text == "2026-03-09"
     block = page.one(**{"class": "particulars"})
     assert "1 unit = 10 mm" in block.text
-    assert explorer.__version__ in block.text
+    assert __version__ in block.text
     data = page.one(id="design").text.encode()
     assert data == encode_design(OPTIMAL)
     assert decode_design(data, "report") == OPTIMAL
@@ -147,7 +148,7 @@ def test_report_workspace_tables_hold_public_measures(seed: int) -> None:
     rotation = design.home_pose.rotation
     page, cubic = ordinary_page(seed), (0.1 * design.unit_mm) ** 3
     volume = explorer.workspace_volume(design, rotation)
-    nodes = explorer.workspace_nodes(design, rotation)
+    nodes = workspace_nodes(design, rotation)
     solid = workspace_solid(design, rotation)
     rows = table_of(page, "Volumes")
     assert rows["exact volume"].values == [volume.volume, volume.volume * cubic]
@@ -179,6 +180,9 @@ def test_report_singularity_and_leg_tables_hold_snapshot(seed: int) -> None:
     assert measures["determinant of the Jacobian"].values == [snapshot.determinant]
     condition = measures["inverse condition number, with the reach"]
     assert condition.values == [snapshot.inverse_condition]
+    manipulability = measures["manipulability |det J|, with the reach"]
+    assert manipulability.values == [snapshot.manipulability]
+    assert measures["output transmission index"].values[0] == snapshot.transmission_index
     assert measures["proximity: smallest |δ| over the reach"].values == [snapshot.proximity]
     assert measures["assembly mode"].values == [snapshot.mode]
     radius = singularity_free_ball(home).radius

@@ -20,9 +20,20 @@ from explorer.measures.case import Case
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.compliance import compliance_shares, largest_deflection, stiffness_of
-from explorer.statics.error_sources import error_by_source
-from explorer.statics.reactions import PART_NAMES
+from explorer.statics.compliance import (
+    compliance_shares,
+    largest_deflection,
+    principal_compliances,
+    stiffness_of,
+)
+from explorer.statics.error_sources import (
+    SOURCES,
+    error_by_source,
+    largest_error,
+    rms_of_sources,
+    source_errors,
+)
+from explorer.statics.reactions import PART_NAMES, Reactions, limit_shares
 from explorer.statics.weights import design_weights, payload_wrench
 from explorer.workspace.held import held_workspace
 
@@ -75,7 +86,7 @@ def loaded_page(seed: int) -> Node:
     return page_of(loaded_case(seed))
 
 
-def reactions_at_home(design: Design) -> explorer.Reactions:
+def reactions_at_home(design: Design) -> Reactions:
     home = design.home_pose
     weights = design_weights(design)
     tool = design.tool.position
@@ -105,7 +116,7 @@ def given(design: Design) -> tuple[Design, Triple, FloatArray]:
 def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
     design = loaded_case(seed)
     page, held = loaded_page(seed), reactions_at_home(design)
-    shares = explorer.limit_shares(design, held)
+    shares = limit_shares(design, held)
     push, pull = design.actuators.limits
     actuators = table_of(page, "Forces of the actuators")
     assert list(actuators) == list(JOINTS)
@@ -229,20 +240,20 @@ def test_report_precision_tells_the_errors_of_the_pose_and_ranks_their_sources()
     design = design_with(actuators=ERRORS, tolerances=TOLERANCES)
     section, tool = precision_of(design), design.tool.position
     by = error_by_source(explorer.Configuration(*given(design), tool))
-    bounds = explorer.source_errors(design)
+    bounds = source_errors(design)
     rows = table_of(section, "Errors of the tool")
     for name, part in (("actuators", slice(6)), ("dimensions", slice(6, 29)), ("all", slice(29))):
-        worst = explorer.largest_error(by[:, part], bounds[part])
-        rms = explorer.rms_of_sources(by[:, part], bounds[part])
+        worst = largest_error(by[:, part], bounds[part])
+        rms = rms_of_sources(by[:, part], bounds[part])
         moved = [float(each.displacement) * design.unit_mm for each in (worst, rms)]
         turned = [float(np.degrees(each.turn)) for each in (worst, rms)]
         assert rows[name].values == pytest.approx([*moved, *turned], rel=1e-12)
     alone = np.linalg.norm((by * bounds)[:3], axis=0) * design.unit_mm
     ranked = table_of(section, "The largest 10 of 29")
-    assert list(ranked) == [explorer.SOURCES[k] for k in np.argsort(-alone)[:10]]
+    assert list(ranked) == [SOURCES[k] for k in np.argsort(-alone)[:10]]
     for name, row in ranked.items():
         bound, moved, _ = row.values
-        index = explorer.SOURCES.index(name)
+        index = SOURCES.index(name)
         assert moved == pytest.approx(alone[index], rel=1e-12)
         size = np.degrees(bounds[index]) if "tilt" in name else bounds[index] * design.unit_mm
         assert bound == pytest.approx(size, rel=1e-12)
@@ -263,7 +274,7 @@ def test_report_precision_tells_what_the_payload_bends(payload: Payload) -> None
     design = design_with(actuators=SOFT, struts=BENDS, payload=payload)
     section, tool = precision_of(design), design.tool.position
     soft = explorer.compliance(*given(design), *stiffness_of(design), tool)
-    principal = explorer.principal_compliances(soft)
+    principal = principal_compliances(soft)
     rows = [row.values for row in section.all("tr") if "mm/N" in row.text]
     found = [values for values in rows if len(values) == 4]
     assert [values[0] for values in found] == pytest.approx(

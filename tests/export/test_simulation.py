@@ -13,17 +13,7 @@ from mujoco_models import at_home, engine, loops_of
 from scipy.spatial.transform import Rotation
 from strategies import WAYS
 
-from explorer import (
-    JOINTS,
-    PRESETS,
-    Design,
-    InputError,
-    Pose,
-    evaluate,
-    forward,
-    inverse,
-    margins,
-)
+from explorer import JOINTS, PRESETS, Design, InputError, Pose, evaluate, forward, inverse, margins
 from explorer.export.simulation import (
     SIMULATION_BODIES,
     SIMULATION_JOINTS,

@@ -20,7 +20,6 @@ from explorer import (
     PRESETS,
     Actuators,
     Design,
-    ImperfectMachine,
     NoAnswerError,
     Payload,
     Pose,
@@ -28,6 +27,7 @@ from explorer import (
     actuator_forces,
     tool_position,
 )
+from explorer.export.imperfect import ImperfectMachine
 from explorer.export.simulation import DENSITY, SimulationModel, simulation_mjcf
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DOWN, LENGTHS, Swing

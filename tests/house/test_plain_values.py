@@ -11,21 +11,12 @@ import pytest
 from drawn_designs import complete_designs, poses
 from hypothesis import given, strategies as st
 
-from explorer import (
-    PRESETS,
-    Demands,
-    Design,
-    InputError,
-    Pose,
-    Problem,
-    Study,
-    Variable,
-    Weights,
-)
+from explorer import PRESETS, Design, InputError, Pose
 from explorer.mechanism.design import Swing
 from explorer.mechanism.design_file import decode_design, encode_design
-from explorer.optimise.problem import OBJECTIVES
-from explorer.sweep.study import Objective, Polish, Sampling, decode_study, encode_study
+from explorer.optimise.problem import OBJECTIVES, Demands, Problem, Variable
+from explorer.statics.weights import Weights
+from explorer.sweep.study import Objective, Polish, Sampling, Study, decode_study, encode_study
 
 OPTIMAL = PRESETS["paper-optimal"]
 BOX = ((8.0, 3.0, 6.0), (12.0, 7.0, 10.0))

@@ -11,8 +11,8 @@ from limited_designs import limited
 from reference import read_reference
 from strategies import Case, ordinary_cases, uniform_rotations
 
-from explorer import PAIRS, Design, leg_clearances
-from explorer.legs.clearance import joined_pairs, leg_axes, pair_rows
+from explorer import Design, leg_clearances
+from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes, pair_rows
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS

@@ -17,23 +17,17 @@ from strategies import ordinary_designs, positions, rotations
 from tool_moves import tool_move
 
 from explorer import (
-    PAIRS,
     PRESETS,
     Design,
     Pose,
     leg_clearances,
-    move_clearance,
-    move_clearances,
-    moves_are_clear,
-    poses_between,
     rotation_from_quaternion,
     rotation_from_yaw_pitch_roll,
-    step_is_free,
-    step_overlaps,
-    swept_tetrahedra,
     tetrahedra_overlap,
 )
-from explorer.legs.clearance import joined_pairs, leg_axes
+from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes
+from explorer.legs.interference import step_is_free, step_overlaps, swept_tetrahedra
+from explorer.legs.moves import move_clearance, move_clearances, moves_are_clear, poses_between
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 

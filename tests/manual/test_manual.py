@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import io
 import itertools
 import re
@@ -21,6 +22,7 @@ import pytest
 from sweep_faults import HereWorkers
 
 import explorer
+from explorer import __version__
 from explorer.cli import COMMANDS, run
 from explorer.cli.parsing import load_command, parse
 from explorer.errors import InputError
@@ -58,6 +60,19 @@ def test_manual_pages_are_all_listed_glossary_first() -> None:
         assert f"(assets/manual/{page.file})" in read("README.md")
 
 
+def test_manual_lists_the_public_names_with_their_rooms() -> None:
+    stub = Path(explorer.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    public = [
+        (each.module.split(".")[0], name.name)
+        for each in ast.parse(stub).body
+        if isinstance(each, ast.ImportFrom) and each.module
+        for name in each.names
+    ]
+    listed = re.findall(r"^\| (\w+) \| `(\w+)` \| .+ \|$", read("python.md"), re.MULTILINE)
+    assert sorted(listed) == sorted(public)
+    assert {name for _, name in public} == {*explorer.__all__}
+
+
 def test_manual_counts_the_objectives_of_the_optimiser() -> None:
     count = ("five", "six", "seven", "eight", "nine")[len(OBJECTIVES) - 5]
     assert f"The objective is one of {count}:" in read("optimise.md")
@@ -77,7 +92,7 @@ def test_readme_is_short_and_names_the_test_command_and_the_contributors_page() 
 
 def test_citation_names_the_project_as_it_is() -> None:
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert f"\nversion: {explorer.__version__}\n" in citation
+    assert f"\nversion: {__version__}\n" in citation
     assert f"\nlicense: {PROJECT['license']}\n" in citation
     assert f"\nauthors:\n  - name: {PROJECT['authors'][0]['name']}\n" in citation
 

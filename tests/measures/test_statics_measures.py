@@ -19,7 +19,6 @@ from explorer import (
     Struts,
     Tool,
     deflection,
-    limit_shares,
     reactions,
 )
 from explorer.measures.case import Case
@@ -29,6 +28,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
 from explorer.statics.accuracy import actuator_errors, tool_errors
 from explorer.statics.compliance import compliance_of, stiffness_of
+from explorer.statics.reactions import limit_shares
 from explorer.statics.weights import design_weights, payload_wrench
 
 OPTIMAL = PRESETS["paper-optimal"]

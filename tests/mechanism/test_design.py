@@ -14,17 +14,9 @@ from numpy.testing import assert_allclose
 from refusals import refusal
 from strategies import designs
 
-from explorer import (
-    PRESETS,
-    VARIABLES,
-    Design,
-    DesignError,
-    Limits,
-    evaluate,
-    load_design,
-    margins,
-)
-from explorer.mechanism.design import LENGTHS
+from explorer import PRESETS, Design, Limits, evaluate, load_design, margins
+from explorer.errors import DesignError
+from explorer.mechanism.design import LENGTHS, VARIABLES
 from explorer.numerics.checks import LARGEST_NUMBER
 
 NUMBERS: dict[str, Any] = {"a3": (8.0, 5.0), "b1": (3.0, -2.5), "b2": 2.0, "b3": 5.0}

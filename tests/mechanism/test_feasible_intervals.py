@@ -12,9 +12,10 @@ from hypothesis import assume, given, strategies as st
 from refusals import refusal
 from strategies import Case, cases, designs, ordinary_cases, ordinary_designs, singular_cases
 
-from explorer import JOINTS, PRESETS, Design, discriminants, forward, inverse
+from explorer import JOINTS, PRESETS, Design, forward, inverse
 from explorer.mechanism.design import LENGTHS, Limits
 from explorer.mechanism.feasible_intervals import Interval, feasible_intervals, nearest_feasible
+from explorer.mechanism.kinematics import discriminants
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
 from explorer.numerics.arrays import BoolArray, FloatArray

@@ -26,17 +26,13 @@ from strategies import (
     span_amplification,
 )
 
-from explorer import (
-    PRESETS,
-    Design,
+from explorer import PRESETS, Design, forward, inverse, margins, rotation_from_quaternion, stratum
+from explorer.mechanism.kinematics import (
+    LARGEST_RATIO,
+    ForwardKinematics,
+    checked_joints,
     discriminants,
-    forward,
-    inverse,
-    margins,
-    rotation_from_quaternion,
-    stratum,
 )
-from explorer.mechanism.kinematics import LARGEST_RATIO, ForwardKinematics, checked_joints
 from explorer.mechanism.margins import mode_of, signs_of
 from explorer.mechanism.trilateration import solve_rows
 from explorer.numerics.arrays import FloatArray

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from refusals import refusal
 
-from explorer import PRESETS, Design, DesignError, decode_design, encode_design
+from explorer import PRESETS, Design, decode_design, encode_design
+from explorer.errors import DesignError
 from explorer.mechanism.machine import DIMENSIONS, Guide, Payload, Struts, Tolerances, Tool
 
 OPTIMAL = PRESETS["paper-optimal"]

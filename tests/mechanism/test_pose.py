@@ -16,16 +16,21 @@ from strategies import QUARTER_TURNS, rotations, small_rotations
 from explorer import (
     InputError,
     Pose,
-    pose_of_tilt_torsion,
-    quaternion_from_rotation,
     rotation_from_quaternion,
-    rotation_from_tilt_torsion,
     rotation_from_yaw_pitch_roll,
-    tilt_torsion_from_rotation,
     yaw_pitch_roll_from_rotation,
 )
-from explorer.mechanism.pose import ORTHONORMAL_TOLERANCE, checked_rotation
-from explorer.mechanism.tilt_torsion import tilt_torsion_of
+from explorer.mechanism.pose import (
+    ORTHONORMAL_TOLERANCE,
+    checked_rotation,
+    quaternion_from_rotation,
+)
+from explorer.mechanism.tilt_torsion import (
+    pose_of_tilt_torsion,
+    rotation_from_tilt_torsion,
+    tilt_torsion_from_rotation,
+    tilt_torsion_of,
+)
 from explorer.numerics.arrays import FloatArray
 
 ROUNDING = 4e-15

@@ -21,14 +21,15 @@ from explorer import (
     jacobian,
     leg_clearances,
     margins,
-    nearest_singular_poses,
     rotation_from_quaternion,
     stratum,
 )
+from explorer.measures.indices import PoseIndices
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import singular_plane_distances
 from explorer.singularity.jacobian import determinant, inverse_condition, tetrahedron_volumes
+from explorer.singularity.nearest import nearest_singular_poses
 
 EYE = np.eye(3)
 
@@ -59,6 +60,12 @@ FUNCTIONS = (
         lambda d, p, r: inverse_condition(jacobian(d, p, r), d.reach),
         (),
         0,
+    ),
+    PoseFunction(
+        "transmissions", lambda d, p, r: PoseIndices(Configuration(d, p, r)).transmissions, (6,), 0
+    ),
+    PoseFunction(
+        "manipulability", lambda d, p, r: PoseIndices(Configuration(d, p, r)).manipulability, (), 0
     ),
     PoseFunction(
         "determinant", lambda d, p, r: determinant(d, inverse(d, p, r), margins(p, r)), (), 3

@@ -17,21 +17,16 @@ from explorer import (
     PRESETS,
     Actuators,
     Design,
-    DesignError,
     InputError,
-    Iterate,
-    Outcome,
     Payload,
-    Problem,
     Struts,
-    Variable,
     leg_clearances,
     make_problem,
     margins,
     optimise_design,
-    tilt_map,
     workspace_volume,
 )
+from explorer.errors import DesignError
 from explorer.measures.case import Case
 from explorer.measures.size import corners_of, longest_leg
 from explorer.measures.statics import BoxStatics
@@ -41,7 +36,8 @@ from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.optimise.defaults import paper_problem, paper_start, reach_problem
 from explorer.optimise.demands import AZIMUTHS
-from explorer.optimise.problem import DISTANCES, ObjectiveName, distance_of
+from explorer.optimise.outcome import Iterate, Outcome
+from explorer.optimise.problem import DISTANCES, ObjectiveName, Problem, Variable, distance_of
 from explorer.optimise.record import (
     Settings,
     decode_record,
@@ -53,6 +49,7 @@ from explorer.optimise.search.model import Model
 from explorer.optimise.search.optimality import optimality
 from explorer.optimise.search.starts import more_starts
 from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.orientations.tilts import tilt_map
 
 OPTIMAL = PRESETS["paper-optimal"]
 

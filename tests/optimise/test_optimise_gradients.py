@@ -11,16 +11,7 @@ from hypothesis import settings
 from limited_designs import limited
 from numpy.testing import assert_allclose
 
-from explorer import (
-    PRESETS,
-    Actuators,
-    Design,
-    Guide,
-    Payload,
-    Struts,
-    Tool,
-    make_problem,
-)
+from explorer import PRESETS, Actuators, Design, Guide, Payload, Struts, Tool, make_problem
 from explorer.errors import DesignError
 from explorer.mechanism.design import Range
 from explorer.mechanism.pose import Pose

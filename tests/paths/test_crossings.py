@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from strategies import WAYS, Case, cases, singular_cases
 from tool_moves import tool_move
 
-from explorer import PRESETS, InputError, Pose, forward, inverse, margins, poses_between
+from explorer import PRESETS, InputError, Pose, forward, inverse, margins
+from explorer.legs.moves import poses_between
 from explorer.mechanism.margins import mode_of
 from explorer.paths.crossings import path_margins
 

@@ -26,11 +26,9 @@ from explorer import (
     evaluate,
     forward,
     inverse,
-    move_clearances,
-    moves_are_clear,
-    poses_between,
     to_folds,
 )
+from explorer.legs.moves import move_clearances, moves_are_clear, poses_between
 from explorer.mechanism.displacement import displacement
 from explorer.paths.crossings import path_margins
 from explorer.paths.planning import EndError, NoPathError, PlannedPath, plan_path

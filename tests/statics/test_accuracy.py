@@ -14,18 +14,13 @@ from statics_cases import CASES, random_poses
 
 from explorer import (
     PRESETS,
-    SOURCES,
     Actuators,
     InputError,
     Tolerances,
-    errors_alone,
     forward,
     inverse,
-    largest_error,
     margins,
     pose_error_by_geometry,
-    rms_of_sources,
-    source_errors,
     worst_error,
 )
 from explorer.mechanism.configuration import Configuration
@@ -34,7 +29,14 @@ from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.accuracy import actuator_errors, tool_errors
 from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.error_sources import error_by_source
+from explorer.statics.error_sources import (
+    SOURCES,
+    error_by_source,
+    errors_alone,
+    largest_error,
+    rms_of_sources,
+    source_errors,
+)
 
 OPTIMAL = PRESETS["paper-optimal"]
 ERRORS = np.array([0.01, 0.02, 0.015, 0.005, 0.02, 0.01])

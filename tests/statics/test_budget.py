@@ -15,7 +15,6 @@ from statics_cases import random_poses
 
 from explorer import (
     PRESETS,
-    SOURCES,
     Actuators,
     Design,
     InputError,
@@ -23,26 +22,29 @@ from explorer import (
     Tolerances,
     decode_design,
     encode_design,
-    largest_error,
     make_prototype,
-    rms_of_sources,
-    source_costs,
-    source_errors,
-    tolerance_budget,
-    with_tolerances,
 )
-from explorer.measures.positions import positions_over
+from explorer.measures.size import positions_over
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
+from explorer.statics.budget.allocation import tolerance_budget
 from explorer.statics.budget.costs import (
     IS_TILT,
     PARTS,
     error_lengths,
+    source_costs,
     source_influences,
     stated_tolerances,
+    with_tolerances,
 )
-from explorer.statics.error_sources import error_by_source
+from explorer.statics.error_sources import (
+    SOURCES,
+    error_by_source,
+    largest_error,
+    rms_of_sources,
+    source_errors,
+)
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose

@@ -13,21 +13,15 @@ from Pynite import FEModel3D  # pyright: ignore[reportMissingTypeStubs]
 from refusals import refusal
 from statics_cases import CASES, random_poses
 
-from explorer import (
-    PRESETS,
-    Actuators,
-    Design,
-    InputError,
-    Struts,
-    compliance,
-    compliance_shares,
-    deflection,
-    inverse,
-    principal_compliances,
-)
+from explorer import PRESETS, Actuators, Design, InputError, Struts, compliance, deflection, inverse
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.compliance import largest_deflection, stiffness_of
+from explorer.statics.compliance import (
+    compliance_shares,
+    largest_deflection,
+    principal_compliances,
+    stiffness_of,
+)
 
 OPTIMAL = PRESETS["paper-optimal"]
 STIFFNESS = np.array([900.0, 1100.0, 700.0, 1300.0, 800.0, 1000.0])

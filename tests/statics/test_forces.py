@@ -22,16 +22,13 @@ from explorer import (
     Payload,
     Struts,
     Tool,
-    Weights,
     actuator_forces,
     inverse,
     jacobian,
     largest_force,
     largest_payload,
-    limit_shares,
     reactions,
     strut_bending,
-    worst_direction,
 )
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.machine import STANDARD_GRAVITY
@@ -39,8 +36,10 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 from explorer.statics.equilibrium import twists_of_actuators
+from explorer.statics.forces import worst_direction
+from explorer.statics.reactions import limit_shares
 from explorer.statics.slopes import PARAMETERS, twist_slopes
-from explorer.statics.weights import carry
+from explorer.statics.weights import Weights, carry
 
 OPTIMAL = PRESETS["paper-optimal"]
 LIMITED = msgspec.structs.replace(

@@ -17,7 +17,6 @@ from explorer import (
     Struts,
     Tolerances,
     Tool,
-    Weights,
     rotation_from_yaw_pitch_roll,
 )
 from explorer.mechanism.configuration import Configuration
@@ -31,7 +30,7 @@ from explorer.statics.held import largest_shares, limit_values, load_case
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, part_limits, reactions
 from explorer.statics.tool_precision import ToolPrecision
-from explorer.statics.weights import design_weights
+from explorer.statics.weights import Weights, design_weights
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose

@@ -14,30 +14,27 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order
 
 from explorer import (
-    PAIRS,
     PRESETS,
     Design,
     InputError,
     Pose,
     accessible_workspace,
     leg_clearances,
-    moves_are_clear,
-    radius_curve,
     rotation_from_yaw_pitch_roll,
-    workspace_nodes,
     workspace_solid,
     workspace_volume,
 )
-from explorer.legs.clearance import distance_gradients
+from explorer.legs.clearance import PAIRS, distance_gradients
+from explorer.legs.moves import moves_are_clear
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.accessible.nodes import Grid, survey
-from explorer.workspace.accessible.radii import with_radius
+from explorer.workspace.accessible.radii import radius_curve, with_radius
 from explorer.workspace.accessible.start import check_start, nearest_clear_position
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks
-from explorer.workspace.slices.volume import home_rotation
+from explorer.workspace.slices.volume import home_rotation, workspace_nodes
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
 ROWS = (OPTIMAL, INITIAL)

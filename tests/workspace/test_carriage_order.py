@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 from explorer import (
     PRESETS,
     Design,
-    DesignError,
     Limits,
     Pose,
     decode_design,
@@ -24,12 +23,13 @@ from explorer import (
     evaluate,
     inverse,
     poses_are_valid,
-    workspace_nodes,
     workspace_volume,
 )
+from explorer.errors import DesignError
 from explorer.mechanism.design import LENGTHS
 from explorer.workspace.limits.constraints import CARRIAGE_ORDER, Never, constraints
 from explorer.workspace.orientations.share import orientations_within
+from explorer.workspace.slices.volume import workspace_nodes
 from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")

@@ -26,7 +26,6 @@ from explorer import (
     Payload,
     Pose,
     Struts,
-    limit_shares,
     reactions,
     workspace_solid,
 )
@@ -35,7 +34,7 @@ from explorer.mechanism.design_file import decode_design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.held import largest_shares as shares_of_case, load_case
-from explorer.statics.reactions import PART_NAMES
+from explorer.statics.reactions import PART_NAMES, limit_shares
 from explorer.statics.weights import design_weights
 from explorer.workspace.held import held_workspace
 from explorer.workspace.limits.constraints import constraints, satisfies, slacks

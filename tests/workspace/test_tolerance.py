@@ -22,7 +22,6 @@ from scipy.spatial.transform import Rotation
 from explorer import (
     Design,
     Limits,
-    Outcome,
     Pose,
     decode_design,
     encode_design,
@@ -32,17 +31,18 @@ from explorer import (
     margins,
     optimise_design,
     poses_are_valid,
-    workspace_nodes,
     workspace_volume,
 )
 from explorer.measures.size import corners_of
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.demands import Box
+from explorer.optimise.outcome import Outcome
 from explorer.optimise.problem import SHIFTS
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.joint_cones import angle_between, legs
 from explorer.workspace.orientations.share import orientations_within
+from explorer.workspace.slices.volume import workspace_nodes
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 

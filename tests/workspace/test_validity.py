@@ -12,16 +12,8 @@ from limited_designs import limited, ordinary_case, troubled_case
 from scipy.spatial.transform import Rotation
 from tool_moves import tool_move
 
-from explorer import (
-    JOINTS,
-    PRESETS,
-    Design,
-    InputError,
-    Pose,
-    evaluate,
-    moves_are_clear,
-    poses_between,
-)
+from explorer import JOINTS, PRESETS, Design, InputError, Pose, evaluate
+from explorer.legs.moves import moves_are_clear, poses_between
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import MANY_ROWS

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from explorer.errors import InputError
-from explorer.measures.positions import PositionSet
+from explorer.measures.size import PositionSet
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import Point
 from explorer.numerics.checks import LARGEST_NUMBER, SMALLEST_POSITIVE

@@ -28,7 +28,7 @@ from explorer.cli.output import (
 from explorer.cli.usage import UsageError
 from explorer.cli.values import FILE, OPTIONAL, Flag, hint, numbers, positive
 from explorer.files.writing import check_writable
-from explorer.measures.positions import PositionSet, positions_over
+from explorer.measures.size import PositionSet, positions_over
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six

@@ -23,6 +23,7 @@ from explorer.cli.output import (
 )
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.measures.verdict import verdict
+from explorer.mechanism.design import JOINTS
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, describe_modes
 from explorer.mechanism.pose import Triple, yaw_pitch_roll_from_rotation
 from explorer.singularity.bruhat import describe_stratum, incidences
@@ -49,7 +50,8 @@ class Singularity(JsonOptions, PoseOptions, DesignOptions):
 
 
 def _as_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
-    names = "margins volumes determinant inverse_condition smallest_singular_value proximity"
+    indices = "inverse_condition smallest_singular_value manipulability transmissions"
+    names = f"margins volumes determinant {indices} transmission_index proximity"
     return {
         **attributes(snapshot, f"{names} stratum stratum_dimension mode signs"),
         "folds": folds_in_degrees(snapshot.pose.position, snapshot.rotation),
@@ -128,8 +130,16 @@ def _measures(snapshot: Snapshot) -> str:
     stratum = f"{numbers}, dimension {snapshot.stratum_dimension}"
     names = [INCIDENCES[index - 1] for index in incidences(snapshot.stratum)]
     here = verdict(snapshot)
-    condition = figure(snapshot.inverse_condition, 1.0)
-    least = figure(snapshot.smallest_singular_value, 1.0)
+    condition, least, manipulability, transmission = (
+        figure(value, 1.0)
+        for value in (
+            snapshot.inverse_condition,
+            snapshot.smallest_singular_value,
+            snapshot.manipulability,
+            snapshot.transmission_index,
+        )
+    )
+    worst = JOINTS[snapshot.transmissions.argmin()]
     rows = [
         ("verdict", f"{here.title.lower()}: {here.reason(snapshot.design.unit_mm)}"),
         ("singular", " and ".join(names) or "no"),
@@ -138,6 +148,8 @@ def _measures(snapshot: Snapshot) -> str:
         ("det J", figure(snapshot.determinant, snapshot.determinant_size)),
         ("inverse condition", f"{condition} (0 singular, 1 best)"),
         ("least σ of J", f"{least} (errors and loads grow at most 1/σ times)"),
+        ("manipulability", f"{manipulability} (|det J| over the cubed reach)"),
+        ("transmission index", f"{transmission}, of {worst} (good above 0.64 to 0.7)"),
         ("proximity", f"{figure(snapshot.proximity, 1.0)} (least |δ| over the reach)"),
     ]
     return table(rows, "<<")

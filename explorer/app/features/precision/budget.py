@@ -27,7 +27,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import box, dim, meter, note, row, swatch, table
 from explorer.app.widgets.under_way import problem
-from explorer.measures.positions import PositionSet
+from explorer.measures.size import PositionSet
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import format_number

@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element
 from explorer.export.report.data import ReportData
 from explorer.export.report.markup import Cell, Piece, element, number, paragraph, table, whole
 from explorer.measures.verdict import verdict
+from explorer.mechanism.design import JOINTS
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, describe_modes
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.number_text import format_number
@@ -60,6 +61,12 @@ def singularity_section(data: ReportData) -> Iterator[Element]:
                 "smallest singular value σ of J, with the reach",
                 snapshot.smallest_singular_value,
                 "errors and loads grow at most 1/σ times",
+            ),
+            ("manipulability |det J|, with the reach", snapshot.manipulability, ""),
+            (
+                "output transmission index",
+                snapshot.transmission_index,
+                f"of {JOINTS[snapshot.transmissions.argmin()]}; 0 singular, good above 0.64 to 0.7",
             ),
             ("proximity: smallest |δ| over the reach", snapshot.proximity, ""),
             ("assembly mode", _mode_figure(snapshot.bordering_modes), snapshot.sign_words),
