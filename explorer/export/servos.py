@@ -26,6 +26,7 @@ from explorer.statics.compliance import stiffness_of
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import actuator_forces
 from explorer.statics.weights import carry
+from explorer.workspace.limits.table import joint_ranges
 
 FREQUENCY = 200.0
 """Largest natural frequency of a servo and its rotor, in rad/s."""
@@ -83,13 +84,13 @@ class Strokes(NamedTuple):
 
 def strokes_of(design: Design, joints: FloatArray) -> Strokes:
     """Return the ranges of the actuated joints of a design, given their values at home (6,)."""
-    metres, limits = 1e-3 * design.unit_mm, design.limits
+    metres, limits, stated_ranges = 1e-3 * design.unit_mm, design.limits, joint_ranges(design)
     at_home = dict(zip(JOINTS, joints.tolist(), strict=True))
     gap = min(limits.gap, abs(at_home["d1"] - at_home["d3"]))
     exceeded = gap < limits.gap
     ranges: dict[str, tuple[float, float]] = {}
     for name, value in at_home.items():
-        stated = limits.guide if name in ("d1", "d3") else design.length_range(name)
+        stated = stated_ranges.get(name)
         if stated is not None:
             low, high = min(stated[0], value), max(stated[1], value)
             exceeded |= (low, high) != stated

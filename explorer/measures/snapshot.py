@@ -18,7 +18,7 @@ from explorer.mechanism.kinematics import (
     ForwardKinematics,
     forward,
 )
-from explorer.mechanism.margins import describe_modes, margins, mode_name, mode_of, signs_of
+from explorer.mechanism.margins import describe_modes, mode_name, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.bruhat import incidences
@@ -180,23 +180,13 @@ class Snapshot(Configuration):
     @cached_property
     def violations(self) -> tuple[Violation, ...]:
         """The limits that the pose breaks."""
-        return self._violations(self.position, self.rotation, self.margins)
+        return violations(self)[0]
 
     @cached_property
     def mode_violations(self) -> tuple[tuple[Violation, ...], ...]:
         """The limits that each of the eight assembly modes breaks."""
-        positions, rotations = self.modes.position, self.modes.rotation
-        return tuple(
-            self._violations(*mode)
-            for mode in zip(positions, rotations, margins(positions, rotations), strict=True)
-        )
-
-    def _violations(
-        self, position: FloatArray, rotation: FloatArray, margin: FloatArray
-    ) -> tuple[Violation, ...]:
-        """Return the limits that the joints break in a pose in which they are assembled."""
-        signs = self.design.home_signs
-        return violations(self.design, position, rotation, self.joints, margin, signs)
+        modes = Configuration(self.design, self.modes.position, self.modes.rotation)
+        return tuple(violations(modes))
 
     @cached_property
     def clearances(self) -> LegClearances:

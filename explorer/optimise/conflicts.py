@@ -32,7 +32,7 @@ from explorer.optimise.problem import (
 )
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.equilibrium import SINGULAR
-from explorer.workspace.limits.constraints import GAP
+from explorer.workspace.limits.table import GAP
 
 # Excess over its bound that makes a demand impossible, as a share: searches have tolerances.
 SPARE, ROUNDING = 1e-6, 1e-9

@@ -14,12 +14,13 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.measures.size import longest_leg
-from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Swing
+from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design
 from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
 from explorer.numerics.checks import number
 from explorer.optimise.demands import MOST_TILT, Box, Demands
 from explorer.statics.compliance import is_elastic
 from explorer.statics.reactions import part_limits
+from explorer.workspace.limits.table import bounds_angles
 
 ObjectiveName = Literal[
     "match-volume",
@@ -122,7 +123,7 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
             raise InputError(f"no objective {self.objective!r}; there are {', '.join(OBJECTIVES)}")
         msgspec.structs.force_setattr(self, "objective", str(self.objective))
         msgspec.structs.force_setattr(self, "variables", tuple(self.variables))
-        if self.start.limits.swing != Swing():
+        if bounds_angles(self.start):
             raise StartError(
                 "the volume has no gradient while joints bound the swing of legs: take these "
                 "bounds out of the design to optimise it",

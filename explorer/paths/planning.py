@@ -303,12 +303,8 @@ def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
 
 
 def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) -> None:
-    pose = np.array(snapshot.pose.position), snapshot.rotation
-    values = snapshot.joints, snapshot.margins
     # `_check_same_order` compares the order of the carriages at both ends.
-    broken = [
-        str(violation) for violation in violations(snapshot.design, *pose, *values, signs, order=0)
-    ]
+    broken = [str(violation) for violation in violations(snapshot, signs, order=0)[0]]
     clearances = snapshot.clearances.clearance.tolist()
     for (first, second), value in zip(PAIRS, clearances, strict=True):
         if not value > 0.0:

@@ -82,10 +82,10 @@ class Proofs:
         """
         tool = np.zeros(3) if self.tool is None else np.array(self.tool)
         shares, count = np.zeros(MOST_MOVES + 1), np.zeros(1, dtype=np.int64)
-        row, cones, tolerance = self.rules.row, self.rules.cones, self.tolerance
+        row, demands, tolerance = self.rules.row, self.rules.demands, self.tolerance
         if tolerance is None:
             tolerance = DEFAULT_TOLERANCE * self.design.reach
-        divide_line(ROWS_OF_LINE, row, cones, first, last, tool, tolerance, shares[1:], count)
+        divide_line(ROWS_OF_LINE, row, demands, first, last, tool, tolerance, shares[1:], count)
         if not count[0]:
             return None
         share = shares[: count[0] + 1, None]
@@ -106,7 +106,7 @@ def positions_and_rotations(poses: Sequence[Pose]) -> tuple[FloatArray, FloatArr
 @kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], i8[::1])")
 def divide_line(
     row: FloatArray,
-    cones: FloatArray,
+    demands: FloatArray,
     first: FloatArray,
     last: FloatArray,
     tool: FloatArray,
@@ -118,7 +118,7 @@ def divide_line(
 
     Args:
         row: Row of the rules.
-        cones: Cones of the rules.
+        demands: Demands of the rules.
         first: Fold coordinates at the start, shape (6,).
         last: Fold coordinates at the end, shape (6,).
         tool: Point that moves straight, in platform coordinates, shape (3,).
@@ -137,7 +137,7 @@ def divide_line(
         for i in range(6):
             corner[i] = (1.0 - high) * first[i] + high * last[i]
         write_pose(corner, q, s)
-        steps = count_steps(row, cones, p, r, q, s, tool, tolerance, left, scratch)
+        steps = count_steps(row, demands, p, r, q, s, tool, tolerance, left, scratch)
         left -= abs(steps)
         if steps > 0:
             if pieces == shares.shape[0]:

@@ -119,7 +119,7 @@ class TreeSearch:
     def _state_is_valid(self, state: Any) -> bool:
         p, r, valid = np.empty((1, 3)), np.empty((1, 3, 3)), np.empty(1, dtype=np.bool_)
         write_poses(1, self._folds(state)[None], p, r)
-        valid_rows(1, self._proofs.rules.row, self._proofs.rules.cones, p, r, valid)
+        valid_rows(1, self._proofs.rules.row, self._proofs.rules.demands, p, r, valid)
         return bool(valid[0])
 
     def _line_is_valid(self, start: Any, end: Any) -> bool:

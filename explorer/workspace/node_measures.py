@@ -23,8 +23,8 @@ from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import kernel
 from explorer.numerics.vectors import minus, vector
 from explorer.workspace.limits.constraints import constraints
+from explorer.workspace.limits.quantities import RADII, write_ends
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.limits.valid_poses import LENGTH_LOWS, write_ends
 from explorer.workspace.slices.nodes import is_within
 from explorer.workspace.slices.volume import bounds, home_rotation
 
@@ -91,7 +91,7 @@ def node_measures(
     step = (highs - lows) / nodes
     is_empty = region.is_empty or not (lows < highs).all()
     if not is_empty:
-        row = np.zeros(LENGTH_LOWS)
+        row = np.zeros(RADII)
         row[:] = design.variables
         radii = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design))
         grid, pose = (lows + 0.5 * step, step), (row, np.array(r))

@@ -14,15 +14,12 @@ from hypothesis import given, strategies as st
 
 from explorer.app.features.feature import Services
 from explorer.app.features.machine.panel import MachinePanel
-from explorer.app.features.mechanism.design_panel import DesignPanel, pushed
+from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.pose_panel import MovePanel
+from explorer.app.inputs.limits import limit_span, pushed
 from explorer.app.inputs.ranges import (
-    box_span,
     coordinate_span,
-    gap_span,
-    guide_span,
     joint_span,
-    length_limit_span,
     length_span,
     position_span,
     variable_span,
@@ -36,6 +33,7 @@ from explorer.app.state.state import opened
 from explorer.errors import DesignError
 from explorer.mechanism.design import JOINTS, VARIABLES, Design, Limits
 from explorer.mechanism.design_file import PRESETS, decode_design
+from explorer.workspace.limits.table import LIMITS
 
 OPTIMAL = PRESETS["paper-optimal"]
 
@@ -49,11 +47,13 @@ def test_ranges_are_round_and_hold_the_design_whatever_its_size(size: float) -> 
     spans = {
         **{name: joint_span(state, i) for i, name in enumerate(JOINTS)},
         **{name: position_span(state, i) for i, name in enumerate("xyz")},
-        **{f"box {name}": box_span(state, i) for i, name in enumerate("xyz")},
         **{f"variable {name}": variable_span(state, i) for i, name in enumerate(VARIABLES)},
-        "guide": guide_span(state),
-        "gap": gap_span(state),
-        "length limit": length_limit_span(state),
+        **{
+            f"limit {entry.label}": limit_span(design, entry)
+            for limit in LIMITS
+            for entry in limit.entries
+            if not entry.is_angle
+        },
         "length": length_span(state),
         "coordinate": coordinate_span(state),
     }

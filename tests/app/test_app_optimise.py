@@ -76,7 +76,8 @@ from explorer.optimise.defaults import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
 from explorer.optimise.search.trail import Trail
-from explorer.workspace.limits.constraints import GAP, constraints, slacks
+from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.table import GAP
 from explorer.workspace.slices.volume import workspace_volume
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
@@ -517,11 +518,11 @@ def test_limits_in_force_are_listed_and_no_others() -> None:
     )
     assert dict(limit_rows(design)) == {
         "l1": "1.5 to 12",
-        "d2, d4, l4": f"at most the reach |a3| = {design.reach:.5g}",
+        "d2, d4, l4": f"at most {design.reach:.5g} (the reach)",
         "d1, d3": "−3 to 20",
-        "|d1 − d3|": "at least 0.25",
-        "|δ1|, |δ2|, |δ3|": "at least 0.5, signs of home",
-        "swing": "at most b4 40°",
+        "gap |d1 − d3|": "at least 0.25",
+        "δ1, δ2, δ3": "sign as at home, magnitude at least 0.5",
+        "swing b4": "at most 40°",
         "leg radii": "0.1 to 0.3",
     }
     free = limited(OPTIMAL, box=None, carriage_order="any", margin=None)

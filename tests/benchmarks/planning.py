@@ -17,19 +17,14 @@ from explorer.numerics.compiled import warm
 from explorer.paths.planning import NoPathError, plan_path
 from explorer.paths.proofs import Proofs
 from explorer.workspace.accessible.radii import with_radius
+from explorer.workspace.limits.quantities import DELTA1, DELTA2, DELTA3, QUANTITY
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import (
-    BOX_HIGHS,
-    BOX_LOWS,
-    CONE_COLUMNS,
-    GUIDE_LOW,
-    LENGTH_HIGHS,
-    LENGTH_LOWS,
-    MARGIN,
     Rules,
     poses_are_valid,
 )
 
+MARGINS = (DELTA1, DELTA2, DELTA3)
 LINES, PAIRS, MODE = 10_000, 8_805, 5
 # Standard deviation of positions, in design units.
 SPREAD = 10.0
@@ -101,11 +96,8 @@ def lines_within_limits() -> Iterator[Row]:
 
 def free_rules(signs: tuple[int, int, int]) -> Rules:
     """Return rules that demand the signs of a mode and nothing else."""
-    row = Rules.of(DESIGN, signs, 0).without_clearances().row
-    row[LENGTH_LOWS:LENGTH_HIGHS], row[LENGTH_HIGHS:GUIDE_LOW] = 0.0, np.inf
-    row[BOX_LOWS:BOX_HIGHS], row[BOX_HIGHS:MARGIN] = -np.inf, np.inf
-    row[MARGIN] = 0.0
-    return Rules(row, np.empty((0, CONE_COLUMNS)))
+    rules = Rules.of(DESIGN, signs, 0).without_clearances().tighten(0.0, 0.0)
+    return Rules(rules.row, rules.demands[np.isin(rules.demands[:, QUANTITY], MARGINS)])
 
 
 def run() -> Iterator[Row]:

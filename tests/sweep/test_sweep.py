@@ -18,7 +18,6 @@ from explorer import (
     InputError,
     Limits,
     accessible_workspace,
-    inverse,
     leg_clearances,
     margins,
     workspace_volume,
@@ -309,14 +308,11 @@ def test_node_measures_match_each_position(seed: int) -> None:
     )
     margin = 0.5
     found = node_measures(design, rotation, nodes=9, clearance_margin=margin)
-    signs = design.home_signs
     kept = np.array(
         [
             p
             for p in nodes_of(design, rotation, 9)
-            if not violations(
-                design, p, rotation, inverse(design, p, rotation), margins(p, rotation), signs
-            )
+            if not violations(Configuration(design, p, rotation))[0]
         ]
     )
     assert len(kept)

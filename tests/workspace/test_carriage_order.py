@@ -27,7 +27,8 @@ from explorer import (
 )
 from explorer.errors import DesignError
 from explorer.mechanism.design import LENGTHS
-from explorer.workspace.limits.constraints import CARRIAGE_ORDER, Never, constraints
+from explorer.workspace.limits.constraints import Never, constraints
+from explorer.workspace.limits.table import CARRIAGE_ORDER
 from explorer.workspace.orientations.share import orientations_within
 from explorer.workspace.slices.volume import workspace_nodes
 from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid

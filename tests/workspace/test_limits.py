@@ -9,13 +9,24 @@ import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from limited_designs import (
+    limited as with_limits,
+    ordinary_case,
+    shell_case,
+    thin_case,
+    troubled_case,
+)
+from scipy.spatial.transform import Rotation
 from strategies import Case, ordinary_cases
 
 from explorer import JOINTS, PRESETS, Design, Limits, inverse, margins
-from explorer.mechanism.design import LENGTHS
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.margins import mode_of, signs_of
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.broken import Violation, violations
+from explorer.workspace.limits.constraints import Cone, constraints, slacks
+from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 Signs = tuple[int, int, int]
 ANY: dict[str, Any] = dict.fromkeys(LENGTHS, (0.0, 1e6))
@@ -28,10 +39,10 @@ def limited(design: Design, **limits: Any) -> Design:
 
 
 def broken(
-    design: Design, position: FloatArray, rotation: FloatArray, signs: Signs = (1, 1, 1)
+    design: Design, position: FloatArray, rotation: FloatArray, signs: Signs | None = None
 ) -> tuple[Violation, ...]:
-    joints = inverse(design, position, rotation)
-    return violations(design, position, rotation, joints, margins(position, rotation), signs)
+    (found,) = violations(Configuration(design, position, rotation), signs)
+    return found
 
 
 def ranges(low: float, high: float) -> st.SearchStrategy[tuple[float, float]]:
@@ -65,7 +76,9 @@ def test_length_carriage_or_coordinate_outside_its_range_is_a_violation(
         value = values[name]
         if not low - 1e-9 <= value <= high + 1e-9:
             above = value > high
-            assert found[name] == Violation(name, value, high if above else low, above)
+            violation = found[name]
+            assert (violation.value, violation.above) == (pytest.approx(value), above)
+            assert violation.bound == (high if above else low)
         elif low <= value <= high:
             assert name not in found
 
@@ -75,10 +88,9 @@ def test_maximum_of_none_is_the_reach_and_a_margin_of_none_demands_nothing(case:
     design = limited(case.design, l1=(0.0, None))
     reach = math.hypot(*case.design.a3)
     l1 = float(inverse(design, case.position, case.rotation)[0])
-    for mode in (0, 7):
-        found = broken(design, case.position, case.rotation, signs_of(mode))
-        assert [v.limit for v in found] == (["l1"] if l1 > reach * (1.0 + 1e-12) else [])
-        assert all(v.bound == reach for v in found)
+    found = broken(design, case.position, case.rotation)
+    assert [v.limit for v in found] == (["l1"] if l1 > reach * (1.0 + 1e-12) else [])
+    assert all(v.bound == reach for v in found)
 
 
 @given(ordinary_cases(), st.floats(0.0, 20.0))
@@ -106,7 +118,9 @@ def test_margin_of_another_sign_or_too_small_is_a_violation(
     for index, (value, sign) in enumerate(zip(margin, signs, strict=True), 1):
         name = f"margin δ{index}"
         if sign * value < least - 1e-9:
-            assert found[name] == Violation(name, value, sign * least, sign < 0)
+            violation = found[name]
+            assert (violation.value, violation.above) == (pytest.approx(value), sign < 0)
+            assert violation.bound == sign * least
         elif sign * value >= least:
             assert name not in found
 
@@ -158,3 +172,27 @@ def test_violations_are_in_the_order_of_the_design_file() -> None:
         *("box x", "box y", "box z"),
         *("margin δ1", "margin δ2", "margin δ3"),
     ]
+
+
+@given(st.integers(0, 2**32))
+def test_violated_limits_are_those_of_the_solids_and_of_validity(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    case = (ordinary_case, shell_case, thin_case, troubled_case)[seed % 4]
+    design = case(seed)[0]
+    angles = {name: float(rng.uniform(1.0, 180.0)) for name in ("a1", "a3", "b2", "b4")}
+    design = with_limits(design, swing=Swing(**angles), gap=0.1 * design.reach)
+    home = design.home_pose
+    spread = float(rng.choice([1e-9, 1e-3, 0.1, 1.0]))
+    turn = Rotation.from_rotvec(spread * rng.normal(size=3)).as_matrix()
+    rotation = turn @ home.rotation
+    position = np.array(home.position) + spread * design.reach * rng.normal(size=3)
+    solids = constraints(design, rotation)
+    slack, size = slacks(solids, position), max(design.reach, float(np.abs(position).max()))
+    # Close to a surface rounding decides.
+    if (np.abs(slack) <= 1e-9 * np.where([isinstance(s, Cone) for s in solids], 1.0, size)).any():
+        return
+    beyond = {solid.name for solid, value in zip(solids, slack, strict=True) if value < 0.0}
+    found = broken(design, position, rotation)
+    assert {violation.demand.end_names()[int(violation.above)] for violation in found} == beyond
+    rules = Rules.of(design).without_clearances()
+    assert poses_are_valid(design, position, rotation, rules=rules) == (not found)

@@ -16,7 +16,7 @@ from explorer import PRESETS, Design, InputError, evaluate, inverse
 from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.constraints import CARRIAGE_ORDER
+from explorer.workspace.limits.table import CARRIAGE_ORDER
 from explorer.workspace.orientations.connected import is_connected
 from explorer.workspace.orientations.share import (
     orientation_capability,

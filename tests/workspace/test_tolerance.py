@@ -34,13 +34,13 @@ from explorer import (
     workspace_volume,
 )
 from explorer.measures.size import corners_of
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.demands import Box
 from explorer.optimise.outcome import Outcome
 from explorer.optimise.problem import SHIFTS
-from explorer.workspace.limits.constraints import constraints, slacks
-from explorer.workspace.limits.joint_cones import angle_between, legs
+from explorer.workspace.limits.constraints import angle_between, constraints, slacks
 from explorer.workspace.orientations.share import orientations_within
 from explorer.workspace.slices.volume import workspace_nodes
 
@@ -104,7 +104,7 @@ def touching(design: Design, pose: Pose, little: float) -> Iterator[tuple[str, D
     least = float(np.abs(margins(pose.position, pose.rotation)).min())
     yield "margin", limited(design, margin=least + little)
     home = design.home_pose
-    at_home, here = (legs(design, np.array(each.position), each.rotation) for each in (home, pose))
+    at_home, here = (Configuration.at(design, each).legs for each in (home, pose))
     for leg in range(4):
         names = [f"b{leg + 1}", *({0: ["a1"], 3: ["a3"]}.get(leg, []))]
         for name in names:

@@ -12,7 +12,7 @@ import math
 from explorer.app.inputs.tracks import Span, round_span
 from explorer.app.state.state import State
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
-from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
+from explorer.mechanism.possible_ranges import possible_ranges
 from explorer.mechanism.tool_point import Point, point_of
 
 # Ends of sliders over the size of what they change, so that users run into limits.
@@ -35,7 +35,7 @@ def joint_span(state: State, joint: int) -> Span:
 def _joint_spans(design: Design) -> tuple[Span, ...]:
     ranges = possible_ranges(design).joints
     return tuple(
-        _around(ends, design.reach, least=0.0 if name in LENGTHS else -math.inf)
+        span_around(ends, design.reach, least=0.0 if name in LENGTHS else -math.inf)
         for name, ends in zip(JOINTS, ranges, strict=True)
     )
 
@@ -49,48 +49,9 @@ def position_span(state: State, axis: int) -> Span:
 def _position_spans(design: Design, at: Point) -> tuple[Span, ...]:
     room = math.hypot(*point_of(design, at))
     return tuple(
-        _around((low - room, high + room), design.reach)
+        span_around((low - room, high + room), design.reach)
         for low, high in possible_ranges(design).position
     )
-
-
-def length_limit_span(state: State) -> Span:
-    """Return the range for the limits of a length."""
-    longest = max(state.base.length_range(name)[1] for name in LENGTHS)
-    return _around((0.0, max(longest, state.base.reach)), state.base.reach, least=0.0)
-
-
-def guide_span(state: State) -> Span:
-    """Return the range for the ends of the guide."""
-    return _guide_span(state.base)
-
-
-@functools.lru_cache(64)
-def _guide_span(base: Design) -> Span:
-    joints = possible_ranges(without_guide(base)).joints
-    own = () if base.limits.guide is None else (base.limits.guide,)
-    return _around(_hull(joints[1], joints[3], *own), base.reach)
-
-
-def box_span(state: State, axis: int) -> Span:
-    """Return the range for the faces of the box across an axis."""
-    return _box_spans(state.base)[axis]
-
-
-@functools.lru_cache(64)
-def _box_spans(base: Design) -> tuple[Span, ...]:
-    own = base.limits.box
-    free = possible_ranges(without_box(base)).position
-    faces = [() if own is None else ((own[0][axis], own[1][axis]),) for axis in range(3)]
-    return tuple(
-        _around(_hull(ends, *more), base.reach) for ends, more in zip(free, faces, strict=True)
-    )
-
-
-def gap_span(state: State) -> Span:
-    """Return the range of the gap; the carriages are never farther apart than b2 and b3."""
-    base = state.base
-    return _around((0.0, max(abs(base.b3 - base.b2), base.limits.gap)), base.reach, least=0.0)
 
 
 def length_span(state: State) -> Span:
@@ -142,11 +103,7 @@ def _variable_span(variables: tuple[float, ...], *, in_base: bool) -> Span:
     return Span(-edge, edge, fine_step(max(sizes), 1e5))
 
 
-def _hull(*ranges: Pair) -> Pair:
-    return min(low for low, _ in ranges), max(high for _, high in ranges)
-
-
-def _around(ends: Pair, reach: float, least: float = -math.inf) -> Span:
+def span_around(ends: Pair, reach: float, least: float = -math.inf) -> Span:
     """Return a range with round ends around what is possible, also if that is nothing."""
     low, high = sorted(ends)
     room = max(ROOM * (high - low), 1e-3 * reach)

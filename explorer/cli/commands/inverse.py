@@ -17,8 +17,9 @@ from explorer.cli.output import (
     table,
 )
 from explorer.measures.snapshot import Snapshot, evaluate
-from explorer.mechanism.design import JOINTS, LENGTHS
+from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Triple
+from explorer.workspace.limits.table import joint_ranges
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,10 +43,10 @@ def _as_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
 
 
 def _lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
-    design = snapshot.design
+    design, ranges = snapshot.design, joint_ranges(snapshot.design)
     rows = [("joint", "units", "mm", "limits")]
     for name, value in zip(JOINTS, snapshot.joints.tolist(), strict=True):
-        bounds = design.length_range(name) if name in LENGTHS else design.limits.guide
+        bounds = ranges.get(name)
         allowed = f"{bounds[0]:.6g} to {bounds[1]:.6g}" if bounds else "none"
         rows.append((name, *lengths(design, value, design.reach), allowed))
     pose = pose_table(design, snapshot.pose, tool)

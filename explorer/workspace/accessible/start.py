@@ -8,8 +8,6 @@ from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import inverse
-from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.descent import descend
 from explorer.workspace.accessible.nodes import make_cell_grid
@@ -58,9 +56,9 @@ def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> N
 
 def start_faults(design: Design, rotation: FloatArray, position: FloatArray) -> list[str]:
     """Return the limits that a position breaks and the pairs of legs that touch there."""
-    joints, delta = inverse(design, position, rotation), margins(position, rotation)
-    broken = violations(design, position, rotation, joints, delta, design.home_signs)
-    clearance = leg_clearances(Configuration(design, position, rotation)).clearance
+    configuration = Configuration(design, position, rotation)
+    (broken,) = violations(configuration)
+    clearance = leg_clearances(configuration).clearance
     faults = [str(violation) for violation in broken]
     for (i, j), depth in zip(PAIRS, (-clearance).tolist(), strict=True):
         if depth >= 0.0:

@@ -21,7 +21,21 @@ from explorer.mechanism.design import TOLERANCE, Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, finite_array
-from explorer.workspace.limits.joint_cones import angle_between, joint_cones
+from explorer.workspace.limits.limit import Bound, Demand, LegAngle
+from explorer.workspace.limits.quantities import (
+    D1,
+    D2,
+    D3,
+    D4,
+    DELTA1,
+    DELTA2,
+    L1,
+    L4,
+    ORDER,
+    X,
+    Z,
+)
+from explorer.workspace.limits.table import demands_of
 
 YAW = "yaw"
 """The name of the platform's rotation about the base's z-axis, in radians, as a parameter."""
@@ -29,9 +43,8 @@ YAW = "yaw"
 Rates: TypeAlias = Mapping[str, FloatArray]
 """Derivatives of a primitive's centre and radius, or normal and offset, by parameter, (4,) each."""
 
-X, Y, Z = np.eye(3)
-GAP = "gap |d1 − d3|"
-CARRIAGE_ORDER = "carriage order"
+AXES = np.eye(3)
+ACROSS = np.array([0.0, 1.0, 1.0])
 # Lines at an angle with a smaller sine are parallel but for rounding.
 PARALLEL = 1e-15
 
@@ -176,12 +189,8 @@ def constraints(
         InputError: not a rotation.
     """
     r = checked_rotation(rotation)
-    return (
-        *_lengths(design, r),
-        *_guide(design, r),
-        *_box(design),
-        *_margins(design, r, signs),
-        *_swings(design, r),
+    return tuple(
+        solid for demand in demands_of(design, signs) for solid in _solids(design, r, demand)
     )
 
 
@@ -226,118 +235,115 @@ def satisfies(design: Design, limits: tuple[Constraint, ...], position: ArrayLik
     return slacks(limits, position) >= -np.array(tolerances)
 
 
+def angle_between(vector: FloatArray, axis: FloatArray) -> FloatArray:
+    """Return the angles (...) of vectors (..., 3) and an axis (3,), in radians."""
+    across = np.linalg.norm(np.cross(vector, axis), axis=-1)
+    return np.asarray(np.arctan2(across, vector @ axis))
+
+
+def _solids(design: Design, r: FloatArray, demand: Demand) -> Iterator[Constraint]:
+    """Yield the solids of a demand: its quantity is of one of four forms at a rotation."""
+    kind = demand.quantity
+    if kind <= D3:
+        yield from _half_spaces(demand, *_line(design, r, kind))
+    elif L1 <= kind <= L4:
+        yield from _balls(demand, *_apex(design, r, kind - L1), is_ball=kind not in (D2, D4))
+    elif kind <= ORDER:
+        # d3 − d1 is the same at every position.
+        apart = (design.b3 - design.b2) * float(r[0, 0])
+        value = apart if kind == ORDER else abs(apart)
+        _, low, high, *_ = demand.row(design)
+        if not low <= value <= high:
+            yield Never(demand.name)
+    elif demand.angle is not None:
+        yield _cone(design, r, demand, demand.angle)
+
+
+def _apex(design: Design, r: FloatArray, leg: int) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Return the position at which a leg has no length, and its derivatives by parameter."""
+    u, v = r[:, 0], r[:, 1]
+    if leg == 3:
+        return np.array([*design.a3, 0.0]), {"a3x": AXES[0], "a3y": AXES[1]}
+    if leg == 0:
+        b1x, b1y = design.b1
+        arm = b1x * u + b1y * v
+        return -arm, {"b1x": -u, "b1y": -v, YAW: -_turning(arm)}
+    name, b = ("b2", design.b2) if leg == 1 else ("b3", design.b3)
+    return -b * u * ACROSS, {name: -u * ACROSS, YAW: -b * _turning(u) * ACROSS}
+
+
+def _balls(
+    demand: Demand, centre: FloatArray, centre_rates: dict[str, FloatArray], *, is_ball: bool
+) -> Iterator[Constraint]:
+    """Yield the balls, or the cylinders, of a demand on the distance from a centre."""
+    for bound, name, inside in zip(
+        (demand.low, demand.high), demand.end_names(), (False, True), strict=True
+    ):
+        if math.isfinite(bound.value) and (inside or bound.value > 0.0):
+            rates = {key: np.array([*rate, 0.0]) for key, rate in centre_rates.items()}
+            _add_rates(rates, bound, 1.0)
+            yield BallOrCylinder(name, centre, bound.value, is_ball, inside, rates)
+
+
+def _line(
+    design: Design, r: FloatArray, kind: int
+) -> tuple[FloatArray, float, dict[str, FloatArray]]:
+    """Return k, c and the derivatives of (k, c) by parameter of a quantity k·p + c."""
+    u, n = r[:, 0], r[:, 2]
+    if kind in (D1, D3):
+        name, b = ("b2", design.b2) if kind == D1 else ("b3", design.b3)
+        rates = {name: _scalar_rate(float(u[0])), YAW: _scalar_rate(b * float(_turning(u)[0]))}
+        return AXES[0], b * float(u[0]), rates
+    if kind <= Z:
+        return AXES[kind - X], 0.0, {}
+    if kind == DELTA1:
+        gradient, turning = -n, -_turning(n)
+    elif kind == DELTA2:
+        gradient, turning = (np.array([0.0, -v[2], v[1]]) for v in (u, _turning(u)))
+    else:
+        gradient, turning = AXES[2], np.zeros(3)
+    return gradient, 0.0, {YAW: np.array([*turning, 0.0])}
+
+
+def _half_spaces(
+    demand: Demand, k: FloatArray, c: float, line_rates: dict[str, FloatArray]
+) -> Iterator[Constraint]:
+    """Yield the half-spaces of a demand on k·p + c."""
+    names = demand.end_names()
+    if float(np.linalg.norm(k)) <= PARALLEL:
+        # Lines are parallel, and their margin is zero at every position.
+        yield Never(demand.name)
+        return
+    for bound, name, side in zip((demand.low, demand.high), names, (-1.0, 1.0), strict=True):
+        if math.isfinite(bound.value):
+            # The offset shrinks where c grows.
+            rates = {
+                key: side * rate * np.array([1.0, 1.0, 1.0, -1.0])
+                for key, rate in line_rates.items()
+            }
+            _add_rates(rates, bound, side)
+            yield HalfSpace(name, side * k, side * (bound.value - c), rates)
+
+
+def _cone(design: Design, r: FloatArray, demand: Demand, angle: LegAngle) -> Constraint:
+    if angle.axis is None:
+        return Never(demand.name)
+    axis = r @ angle.axis if angle.in_platform else angle.axis
+    apex, on_guide = _apex(design, r, angle.leg)[0], angle.leg in (1, 2)
+    return Cone(demand.name, apex, axis, math.radians(demand.high.value), on_guide)
+
+
+def _add_rates(rates: dict[str, FloatArray], bound: Bound, sign: float) -> None:
+    """Add the derivatives of a bound, which is a radius or an offset."""
+    for key, rate in bound.rates.items():
+        rates[key] = rates.get(key, np.zeros(4)) + _scalar_rate(sign * rate)
+
+
 def _turning(vector: FloatArray) -> FloatArray:
     """Return the derivative by the yaw of a vector that turns about z with the platform."""
     return np.array([-vector[1], vector[0], 0.0])
 
 
-def _vector_rate(vector: FloatArray) -> FloatArray:
-    """Return the derivative of a primitive whose centre or normal alone changes."""
-    return np.array([*vector, 0.0])
-
-
 def _scalar_rate(rate: float) -> FloatArray:
     """Return the derivative of a primitive whose radius or offset alone changes."""
     return np.array([0.0, 0.0, 0.0, rate])
-
-
-def _lengths(design: Design, r: FloatArray) -> Iterator[Constraint]:
-    u, v = r[:, 0], r[:, 1]
-    b1x, b1y = design.b1
-    arm = b1x * u + b1y * v
-    a3 = np.array([*design.a3, 0.0])
-    yz = np.array([0.0, 1.0, 1.0])
-    legs: tuple[tuple[str, FloatArray, bool, dict[str, FloatArray]], ...] = (
-        ("l1", -arm, True, {"b1x": -u, "b1y": -v, YAW: -_turning(arm)}),
-        ("d2", -design.b2 * u * yz, False, {"b2": -u * yz, YAW: -design.b2 * _turning(u) * yz}),
-        ("d4", -design.b3 * u * yz, False, {"b3": -u * yz, YAW: -design.b3 * _turning(u) * yz}),
-        ("l4", a3, True, {"a3x": X, "a3y": Y}),
-    )
-    for name, centre, is_ball, centre_rates in legs:
-        low, high = design.length_range(name)
-        minimum, maximum = f"{name} minimum", f"{name} maximum"
-        rates = {key: _vector_rate(rate) for key, rate in centre_rates.items()}
-        if low > 0.0:
-            limit_rates = {**rates, minimum: _scalar_rate(1.0)}
-            yield BallOrCylinder(minimum, centre, low, is_ball, inside=False, rates=limit_rates)
-        limit_rates = {**rates, maximum: _scalar_rate(1.0)}
-        if getattr(design.limits, name)[1] is None:
-            # A maximum at the reach follows a3 and has no parameter of its own.
-            del limit_rates[maximum]
-            for key, share in zip(("a3x", "a3y"), a3 / design.reach, strict=False):
-                limit_rates[key] = limit_rates.get(key, np.zeros(4)) + _scalar_rate(float(share))
-        yield BallOrCylinder(maximum, centre, high, is_ball, inside=True, rates=limit_rates)
-
-
-def _guide(design: Design, r: FloatArray) -> Iterator[Constraint]:
-    u = r[:, 0]
-    if design.limits.guide is not None:
-        low, high = design.limits.guide
-        for joint, variable, b in (("d1", "b2", design.b2), ("d3", "b3", design.b3)):
-            shift, turning = b * float(u[0]), b * float(_turning(u)[0])
-            for end, side, offset in (
-                ("minimum", -1.0, shift - low),
-                ("maximum", 1.0, high - shift),
-            ):
-                rates = {
-                    variable: _scalar_rate(-side * float(u[0])),
-                    YAW: _scalar_rate(-side * turning),
-                    f"guide {end}": _scalar_rate(side),
-                }
-                yield HalfSpace(f"{joint} {end}", side * X, offset, rates)
-    # d3 - d1 is the same at every position.
-    difference = (design.b3 - design.b2) * float(u[0])
-    if abs(difference) < design.limits.gap - design.tolerance:
-        yield Never(GAP)
-    if design.demanded_order * difference < -design.tolerance:
-        yield Never(CARRIAGE_ORDER)
-
-
-def _box(design: Design) -> Iterator[Constraint]:
-    if design.limits.box is None:
-        return
-    for axis, name, low, high in zip((X, Y, Z), "xyz", *design.limits.box, strict=True):
-        minimum, maximum = f"box {name} minimum", f"box {name} maximum"
-        yield HalfSpace(minimum, -axis, -low, {minimum: _scalar_rate(-1.0)})
-        yield HalfSpace(maximum, axis, high, {maximum: _scalar_rate(1.0)})
-
-
-def _margins(
-    design: Design, r: FloatArray, signs: tuple[int, int, int] | None
-) -> Iterator[Constraint]:
-    least = design.limits.margin
-    if least is None and signs is None:
-        return
-    least = least or 0.0
-    u, n = r[:, 0], r[:, 2]
-    # δ = k·p, on the side of zero that the home's sign triple demands.
-    gradients = (
-        ("margin δ1", -n, -_turning(n)),
-        ("margin δ2", np.cross(X, u), np.cross(X, _turning(u))),
-        ("margin δ3", Z, np.zeros(3)),
-    )
-    for (name, k, turning), sign in zip(gradients, signs or design.home_signs, strict=True):
-        # The lines are parallel, and the margin is zero at every position.
-        if float(np.linalg.norm(k)) <= PARALLEL:
-            yield Never(name)
-        else:
-            rates = {YAW: _vector_rate(-sign * turning), "margin": _scalar_rate(-1.0)}
-            yield HalfSpace(name, -sign * k, -least, rates)
-
-
-def _swings(design: Design, r: FloatArray) -> Iterator[Constraint]:
-    b1x, b1y = design.b1
-    # The position p at which each leg has no length.
-    apexes = (
-        -(b1x * r[:, 0] + b1y * r[:, 1]),
-        -design.b2 * r[:, 0],
-        -design.b3 * r[:, 0],
-        np.array([*design.a3, 0.0]),
-    )
-    for cone in joint_cones(design):
-        name = f"swing {cone.joint}"
-        if cone.axis is None:
-            yield Never(name)
-            continue
-        axis = r @ cone.axis if cone.in_platform else cone.axis
-        yield Cone(name, apexes[cone.leg - 1], axis, cone.half_angle, cone.leg in (2, 3))

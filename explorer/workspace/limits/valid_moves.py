@@ -25,16 +25,19 @@ from explorer.numerics.arrays import (
     rows_for_kernel,
 )
 from explorer.numerics.compiled import helper, kernel
-from explorer.workspace.limits.safe_shares import (
-    LEAST_SHARE,
+from explorer.workspace.limits.quantities import (
+    A3,
     SPEEDS,
-    safe_share_of_clearances,
-    safe_share_of_cones,
-    safe_share_of_limits,
-    safe_share_of_margins,
+    write_ends,
     write_speeds,
 )
-from explorer.workspace.limits.valid_poses import Rules, is_valid, write_ends
+from explorer.workspace.limits.safe_shares import (
+    LEAST_SHARE,
+    rates_of_margins,
+    safe_share_of_clearances,
+    safe_share_of_limits,
+)
+from explorer.workspace.limits.valid_poses import Rules, is_valid
 
 # The share of the reach by which a limit may be exceeded between poses that satisfy it.
 DEFAULT_TOLERANCE = 1e-4
@@ -106,7 +109,7 @@ def moves_are_valid(
     valid_move_rows(
         20 * len(rows[0]),
         design_rules.row,
-        design_rules.cones,
+        design_rules.demands,
         rows[0],
         rows[1],
         rows[2],
@@ -251,7 +254,7 @@ def make_scratch() -> Scratch:
 @helper
 def count_steps(
     row: FloatArray,
-    cones: FloatArray,
+    demands: FloatArray,
     start: FloatArray,
     start_rotation: FloatArray,
     end: FloatArray,
@@ -268,26 +271,25 @@ def count_steps(
     the steps made, `most` at most.
     """
     base, ends, p, r, step, axis, first, velocity, speeds = scratch
-    if not is_valid(row, cones, end, end_rotation, base, ends):
+    if not is_valid(row, demands, end, end_rotation, base, ends):
         return 0
-    if not is_valid(row, cones, start, start_rotation, base, ends):
+    if not is_valid(row, demands, start, start_rotation, base, ends):
         return 0
     write_line(start, start_rotation, end, end_rotation, tool, first, step)
     angle = write_turn(start_rotation, end_rotation, axis)
     if angle > LARGEST_TURN:
         return 0
     write_speeds(row, first, start_rotation, step, axis, angle, tool, speeds)
-    t, reach = 0.0, math.hypot(row[0], row[1])
+    t, angle_tolerance = 0.0, tolerance / math.hypot(row[A3], row[A3 + 1])
     for step_number in range(1, most + 1):
         write_pose_at(t, first, start_rotation, step, axis, angle, p, r)
         move_by_arm(-1.0, r, tool, p)
         write_ends(row, p, r, base, ends)
         write_velocity(t, first, step, axis, angle, p, velocity)
-        share = safe_share_of_margins(row, p, r, velocity, axis, angle, speeds, tolerance)
-        if share > 0.0:
-            share = min(share, safe_share_of_limits(row, p, base, ends, speeds, tolerance))
-        if share > 0.0:
-            share = min(share, safe_share_of_cones(cones, r, base, ends, speeds, tolerance / reach))
+        rates = rates_of_margins(p, r, velocity, axis, angle)
+        share = safe_share_of_limits(
+            demands, p, r, base, ends, rates, speeds, tolerance, angle_tolerance
+        )
         if share > 0.0:
             least = LEAST_SHARE * tolerance
             share = min(share, safe_share_of_clearances(row, base, ends, speeds, least))
@@ -304,7 +306,7 @@ def count_steps(
 )
 def valid_move_rows(
     row: FloatArray,
-    cones: FloatArray,
+    demands: FloatArray,
     start: FloatArray,
     start_rotation: FloatArray,
     end: FloatArray,
@@ -317,5 +319,5 @@ def valid_move_rows(
     scratch = make_scratch()
     for index in range(start.shape[0]):
         first, last = (start[index], start_rotation[index]), (end[index], end_rotation[index])
-        steps = count_steps(row, cones, *first, *last, tool, tolerance, MOST_STEPS, scratch)
+        steps = count_steps(row, demands, *first, *last, tool, tolerance, MOST_STEPS, scratch)
         valid[index] = steps > 0

@@ -9,15 +9,7 @@ import numpy as np
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector
-from explorer.workspace.limits.valid_poses import (
-    A3,
-    BOX_HIGHS,
-    BOX_LOWS,
-    GUIDE_HIGH,
-    GUIDE_LOW,
-    LENGTH_HIGHS,
-    LENGTH_LOWS,
-)
+from explorer.workspace.limits.quantities import A3, D1, HIGH, L1, LOW, QUANTITY, X
 from explorer.workspace.orientations.turn_polynomials import SCRATCH, arm_of, write_tilt
 from explorer.workspace.orientations.turns import HALF_TURN, NO_LIMIT, first_limit
 
@@ -34,7 +26,7 @@ WORST = 20
 @helper
 def tilt_in(
     row: FloatArray,
-    cones: FloatArray,
+    demands: FloatArray,
     p: FloatArray,
     tool: FloatArray,
     azimuth: float,
@@ -44,13 +36,13 @@ def tilt_in(
 ) -> tuple[float, int]:
     """Return the greatest tilt of a position in one azimuth and its limit, in radians."""
     write_tilt(azimuth, torsion, turn)
-    return first_limit(row, cones, p, tool, turn, HALF_TURN, scratch)
+    return first_limit(row, demands, p, tool, turn, HALF_TURN, scratch)
 
 
 @helper
 def lowest_about(
     row: FloatArray,
-    cones: FloatArray,
+    demands: FloatArray,
     p: FloatArray,
     tool: FloatArray,
     torsion: float,
@@ -66,7 +58,7 @@ def lowest_about(
 
     Args:
         row: Row of `Rules`.
-        cones: Cones of `Rules`.
+        demands: Demands of `Rules`.
         p: Position of the tool, shape (3,).
         tool: Tool point in platform coordinates, shape (3,).
         torsion: Torsion in radians.
@@ -77,17 +69,17 @@ def lowest_about(
     """
     low, first, high = bracket
     second = first + (1.0 - GOLDEN_SECTION) * (high - first)
-    at_first, limit_first = tilt_in(row, cones, p, tool, first, torsion, turn, scratch)
-    at_second, limit_second = tilt_in(row, cones, p, tool, second, torsion, turn, scratch)
+    at_first, limit_first = tilt_in(row, demands, p, tool, first, torsion, turn, scratch)
+    at_second, limit_second = tilt_in(row, demands, p, tool, second, torsion, turn, scratch)
     while high - low > width:
         if at_first <= at_second:
             high, second, at_second, limit_second = second, first, at_first, limit_first
             first = GOLDEN_SECTION * second + (1.0 - GOLDEN_SECTION) * low
-            at_first, limit_first = tilt_in(row, cones, p, tool, first, torsion, turn, scratch)
+            at_first, limit_first = tilt_in(row, demands, p, tool, first, torsion, turn, scratch)
         else:
             low, first, at_first, limit_first = first, second, at_second, limit_second
             second = GOLDEN_SECTION * first + (1.0 - GOLDEN_SECTION) * high
-            at_second, limit_second = tilt_in(row, cones, p, tool, second, torsion, turn, scratch)
+            at_second, limit_second = tilt_in(row, demands, p, tool, second, torsion, turn, scratch)
     if at_first <= at_second:
         return at_first, first, limit_first
     return at_second, second, limit_second
@@ -110,8 +102,23 @@ def azimuth_towards(v: Vector, wx: float, wy: float, wz: float) -> float:
 
 
 @helper
+def bounds_of(demands: FloatArray, kind: int) -> tuple[float, float]:
+    """Return the least and the largest value that demands allow of a quantity."""
+    low, high = -math.inf, math.inf
+    for index in range(demands.shape[0]):
+        if int(demands[index, QUANTITY]) == kind:
+            low, high = max(low, demands[index, LOW]), min(high, demands[index, HIGH])
+    return low, high
+
+
+@helper
 def write_worst_azimuths(
-    row: FloatArray, p: FloatArray, tool: FloatArray, torsion: float, worst: FloatArray
+    row: FloatArray,
+    demands: FloatArray,
+    p: FloatArray,
+    tool: FloatArray,
+    torsion: float,
+    worst: FloatArray,
 ) -> int:
     """Write the azimuths of tilts to which lengths, carriages and b4 in the box are at extremes.
 
@@ -120,6 +127,7 @@ def write_worst_azimuths(
 
     Args:
         row: Row of `Rules`.
+        demands: Demands of `Rules`.
         p: Position of the tool, shape (3,).
         tool: Tool point in platform coordinates, shape (3,).
         torsion: Torsion in radians.
@@ -137,6 +145,7 @@ def write_worst_azimuths(
             continue
         v = (c * bx - s * by, s * bx + c * by, bz)
         on_guide = 0 < leg < 3
+        shortest, longest = bounds_of(demands, L1 + leg)
         # b1 turns to the line through a1, b4 to that through a3, b2 and b3 to the plane across the
         # guide.
         x = 0.0 if on_guide else p[0]
@@ -144,31 +153,34 @@ def write_worst_azimuths(
         if leg == 3:
             x, y = p[0] - row[A3], p[1] - row[A3 + 1]
         far = math.hypot(y, z) if on_guide else math.sqrt(x * x + y * y + z * z)
-        if far > 0.0 and far + arm > row[LENGTH_HIGHS + leg]:
+        if far > 0.0 and far + arm > longest:
             share = arm / far
             worst[count] = azimuth_towards(v, share * x, share * y, share * z)
             count += 1
-        if on_guide and arm > far and row[LENGTH_LOWS + leg] > 0.0:
+        if on_guide and arm > far and shortest > 0.0:
             # The leg's end can lie on the guide, at one of two places.
             along = math.sqrt(arm * arm - far * far)
             worst[count] = azimuth_towards(v, along, -p[1], -p[2])
             worst[count + 1] = azimuth_towards(v, -along, -p[1], -p[2])
             count += 2
-        elif far > 0.0 and abs(far - arm) < row[LENGTH_LOWS + leg]:
+        elif far > 0.0 and abs(far - arm) < shortest:
             share = -arm / far
             worst[count] = azimuth_towards(v, share * x, share * y, share * z)
             count += 1
-        if on_guide and p[0] + arm > row[GUIDE_HIGH]:
-            worst[count] = azimuth_towards(v, arm, 0.0, 0.0)
-            count += 1
-        if on_guide and p[0] - arm < row[GUIDE_LOW]:
-            worst[count] = azimuth_towards(v, -arm, 0.0, 0.0)
-            count += 1
+        if on_guide:
+            least, most = bounds_of(demands, D1 + leg - 1)
+            if p[0] + arm > most:
+                worst[count] = azimuth_towards(v, arm, 0.0, 0.0)
+                count += 1
+            if p[0] - arm < least:
+                worst[count] = azimuth_towards(v, -arm, 0.0, 0.0)
+                count += 1
         if leg < 3:
             continue
         for i in range(3):
+            least, most = bounds_of(demands, X + i)
             for sign in (-1.0, 1.0):
-                bound = row[BOX_HIGHS + i] if sign > 0.0 else -row[BOX_LOWS + i]
+                bound = most if sign > 0.0 else -least
                 if sign * p[i] + arm > bound:
                     end = sign * arm
                     worst[count] = azimuth_towards(
@@ -187,7 +199,7 @@ def write_worst_azimuths(
 )
 def least_tilt_rows(
     row: FloatArray,
-    cones: FloatArray,
+    demands: FloatArray,
     positions: FloatArray,
     tool: FloatArray,
     torsions: FloatArray,
@@ -201,7 +213,7 @@ def least_tilt_rows(
 
     Args:
         row: Row of `Rules`.
-        cones: Cones of `Rules`.
+        demands: Demands of `Rules`.
         positions: Positions of the tool, shape (n, 3).
         tool: Tool point in platform coordinates, shape (3,).
         torsions: Torsion of each position in radians, shape (n,).
@@ -218,7 +230,7 @@ def least_tilt_rows(
         p, torsion = positions[index], torsions[index]
         best, towards[index], limits[index] = HALF_TURN, 0.0, NO_LIMIT
         for k in range(count):
-            tilts[k], limit = tilt_in(row, cones, p, tool, azimuths[k], torsion, turn, scratch)
+            tilts[k], limit = tilt_in(row, demands, p, tool, azimuths[k], torsion, turn, scratch)
             if tilts[k] < best:
                 best, towards[index], limits[index] = tilts[k], azimuths[k], limit
             if best < 0.0:
@@ -237,20 +249,20 @@ def least_tilt_rows(
                 continue
             bracket = (azimuths[k] - step, azimuths[k], azimuths[k] + step)
             found, azimuth, limit = lowest_about(
-                row, cones, p, tool, torsion, bracket, AZIMUTH_WIDTH, turn, scratch
+                row, demands, p, tool, torsion, bracket, AZIMUTH_WIDTH, turn, scratch
             )
             if found < best:
                 best, towards[index], limits[index] = found, azimuth, limit
-        for k in range(write_worst_azimuths(row, p, tool, torsion, worst)):
+        for k in range(write_worst_azimuths(row, demands, p, tool, torsion, worst)):
             place = (worst[k] - azimuths[0]) % (2.0 * math.pi)
             left = int(place / step) % count
-            tilt, _ = tilt_in(row, cones, p, tool, worst[k], torsion, turn, scratch)
+            tilt, _ = tilt_in(row, demands, p, tool, worst[k], torsion, turn, scratch)
             if not (tilt < tilts[left] and tilt < tilts[(left + 1) % count]):
                 continue
             low = worst[k] - (place - left * step)
             bracket = (low, worst[k], low + step)
             found, azimuth, limit = lowest_about(
-                row, cones, p, tool, torsion, bracket, NARROW_WIDTH, turn, scratch
+                row, demands, p, tool, torsion, bracket, NARROW_WIDTH, turn, scratch
             )
             if found < best:
                 best, towards[index], limits[index] = found, azimuth, limit

@@ -62,7 +62,7 @@ def orientation_share(
     """Return the share of all orientations that a position can have within the limits.
 
     The limits are those of `explorer.workspace.limits.broken.violations`: lengths, guide, gap,
-    carriage order, box, margins with the home's sign triple, and swing cones.
+    carriage order, box, margins with the home's sign triple, and swing demands.
 
     Args:
         design: The manipulator.
@@ -86,7 +86,7 @@ def orientation_share(
     quaternions = for_kernel(turns.as_quat(scalar_first=True).reshape(sets, 4))
     counts = np.zeros(sets, dtype=np.int64)
     rules = Rules.of(design).without_clearances()
-    share_rows(n, rules.row, rules.cones, for_kernel(p), t, quaternions, sizes, counts)
+    share_rows(n, rules.row, rules.demands, for_kernel(p), t, quaternions, sizes, counts)
     share = float(counts.sum()) / n
     weights = sizes / n
     # The sets differ in size by one orientation at the most.
@@ -125,7 +125,7 @@ def orientations_within(
     """Return which orientations a position can have within all limits, shape (n,).
 
     The limits are those of `explorer.workspace.limits.broken.violations`: lengths, guide, gap,
-    carriage order, box, margins with the home's sign triple, and swing cones.
+    carriage order, box, margins with the home's sign triple, and swing demands.
 
     Args:
         design: The manipulator.
@@ -143,14 +143,14 @@ def orientations_within(
     within = np.empty(len(r), dtype=np.bool_)
     rules = Rules.of(design).without_clearances()
     positions = p - tool_offset(r, t)
-    valid_rows(len(r), rules.row, rules.cones, positions, for_kernel(r), within)
+    valid_rows(len(r), rules.row, rules.demands, positions, for_kernel(r), within)
     return within
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], i8[::1], i8[::1])")
 def share_rows(
     row: FloatArray,
-    cones: FloatArray,
+    demands: FloatArray,
     position: FloatArray,
     tool: FloatArray,
     turns: FloatArray,
@@ -161,7 +161,7 @@ def share_rows(
 
     Args:
         row: Row of `Rules`.
-        cones: Cones of `Rules`.
+        demands: Demands of `Rules`.
         position: Position of the tool, shape (3,).
         tool: Tool point in platform coordinates, shape (3,).
         turns: Unit quaternions (w, x, y, z) that turn the sets, shape (m, 4).
@@ -190,6 +190,6 @@ def share_rows(
             for i in range(3):
                 arm = r[i, 0] * tool[0] + r[i, 1] * tool[1] + r[i, 2] * tool[2]
                 p[i] = position[i] - arm
-            if is_valid(row, cones, p, r, base, ends):
+            if is_valid(row, demands, p, r, base, ends):
                 count += 1
         counts[index] = count

@@ -113,7 +113,7 @@ def tilt_map(
     tilt_rows(
         ROWS_OF_TURN * count,
         rules.row,
-        rules.cones,
+        rules.demands,
         for_kernel(p[None]),
         one_tool(tool),
         math.radians(sigma),
@@ -222,7 +222,7 @@ def _least_tilts(
     least_tilt_rows(
         ROWS_OF_TURN * n * count,
         rules.row,
-        rules.cones,
+        rules.demands,
         for_kernel(positions),
         one_tool(tool),
         np.radians(torsions),

@@ -159,7 +159,7 @@ def _end_of_turns(
     rules = Rules.of(design).without_clearances()
     positions = np.full((len(turns), 3), position)
     given = (positions, one_tool(tool), turns)
-    turn_rows(len(turns), rules.row, rules.cones, *given, angles, limits)
+    turn_rows(len(turns), rules.row, rules.demands, *given, angles, limits)
     return angles, limits.tolist()
 
 

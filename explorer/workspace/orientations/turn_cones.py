@@ -6,6 +6,8 @@ degree 4, so a leg is on the cone where one of degree 8 vanishes.
 
 from __future__ import annotations
 
+import math
+
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.bernstein import (
     MOST_DEGREE,
@@ -15,7 +17,7 @@ from explorer.numerics.bernstein import (
     keep_right,
 )
 from explorer.numerics.compiled import helper
-from explorer.workspace.limits.valid_poses import AXIS_X, COSINE, LEG, SINE, TURNS
+from explorer.workspace.limits.quantities import AXIS_X, HIGH, LEG, TURNS
 from explorer.workspace.orientations.turn_polynomials import (
     ALONG,
     BINOMIALS_2,
@@ -40,7 +42,7 @@ LEAST_PART = 1e-13
 @helper
 def end_in_cone(
     row: FloatArray,
-    cone: FloatArray,
+    demand: FloatArray,
     p: FloatArray,
     tool: FloatArray,
     turn: FloatArray,
@@ -52,11 +54,13 @@ def end_in_cone(
     Returns:
         As `nearer_end`.
     """
-    leg = int(cone[LEG]) - 1
-    if leg < 0:
+    leg, half_angle = int(demand[LEG]), demand[HIGH]
+    if half_angle < 0.0:
         return START_IS_INVALID
-    if cone[SINE] == 0.0:
+    # Half a turn is no bound.
+    if half_angle >= math.pi:
         return end
+    cosine = math.cos(half_angle)
     write_leg(row, leg, p, arm_of(row, leg, tool), turn, scratch)
     for index in range(ALONG, LEG_SQUARE + 1):
         for k in range(MOST_DEGREE + 1):
@@ -64,30 +68,30 @@ def end_in_cone(
     axis = scratch[POLYNOMIAL]
     for i in range(3):
         for k in range(3):
-            if cone[TURNS] > 0.0:
+            if demand[TURNS] > 0.0:
                 axis[k] = 0.0
                 for j in range(3):
-                    axis[k] += turn[i, j, k] * cone[AXIS_X + j]
+                    axis[k] += turn[i, j, k] * demand[AXIS_X + j]
             else:
-                axis[k] = 0.0 if k == 1 else cone[AXIS_X + i]
+                axis[k] = 0.0 if k == 1 else demand[AXIS_X + i]
         add_product(scratch[LEG_ROW + i], axis, 2, scratch[ALONG])
         add_product(scratch[LEG_ROW + i], scratch[LEG_ROW + i], 2, scratch[LEG_SQUARE])
     add_product(scratch[ALONG], scratch[ALONG], 4, scratch[SQUARE])
-    if cone[COSINE] > 0.0:
+    if cosine > 0.0:
         for k in range(5):
             scratch[POLYNOMIAL, k] = scratch[ALONG, k] / BINOMIALS_4[k]
         end = nearer_end(4, end, scratch)
         if end < 0.0:
             return end
     # The square of the leg has to have the same degree, so it is multiplied by 1.
-    share = cone[COSINE] * cone[COSINE]
+    share = cosine * cosine
     for k in range(MOST_DEGREE + 1):
         square = 0.0
         for j in range(3):
             if 0 <= k - 2 * j <= 4:
                 square += BINOMIALS_2[j] * scratch[LEG_SQUARE, k - 2 * j]
         scratch[POLYNOMIAL, k] = (scratch[SQUARE, k] - share * square) / BINOMIALS_8[k]
-    if cone[COSINE] > 0.0:
+    if cosine > 0.0:
         return nearer_end(8, end, scratch)
     return first_outside_wide_cone(end, scratch)
 

@@ -20,7 +20,7 @@ from explorer.numerics.bernstein import (
 )
 from explorer.numerics.compiled import helper
 from explorer.numerics.vectors import Vector
-from explorer.workspace.limits.valid_poses import A3, B1, B2, B3
+from explorer.workspace.limits.quantities import A3, B1, B2, B3
 
 START_IS_INVALID = -1.0
 """Angle or place that means that the start of the turn already violates a limit."""

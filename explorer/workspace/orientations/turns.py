@@ -12,27 +12,27 @@ import math
 
 import numpy as np
 
-from explorer.mechanism.design import LENGTHS, Design
+from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector
-from explorer.workspace.limits.constraints import CARRIAGE_ORDER, GAP as GAP_NAME
-from explorer.workspace.limits.joint_cones import joint_cones
-from explorer.workspace.limits.valid_poses import (
+from explorer.workspace.limits.quantities import (
     A3,
+    ANGLE,
     B2,
     B3,
-    BOX_HIGHS,
-    BOX_LOWS,
+    D1,
+    D3,
+    DELTA1,
+    DELTA3,
     GAP,
-    GUIDE_HIGH,
-    GUIDE_LOW,
-    LENGTH_HIGHS,
-    LENGTH_LOWS,
-    MARGIN,
-    ORDER,
-    SIGNS,
+    L1,
+    LOW,
+    QUANTITY,
+    X,
+    Z,
 )
+from explorer.workspace.limits.table import by_quantity, demands_of
 from explorer.workspace.orientations.turn_cones import end_in_cone
 from explorer.workspace.orientations.turn_polynomials import (
     BINOMIALS_4,
@@ -50,32 +50,15 @@ from explorer.workspace.orientations.turn_polynomials import (
     write_tilt,
 )
 
-# Numbers of the limits in the order of `limit_names`; those of the cones follow.
-LENGTH_LIMITS, GUIDE_LIMITS, GAP_LIMIT, ORDER_LIMIT, BOX_LIMITS, MARGIN_LIMITS, CONE_LIMITS = (
-    0,
-    8,
-    12,
-    13,
-    14,
-    20,
-    23,
-)
 NO_LIMIT = -1
 # Angle over which a turn is searched.
 HALF_TURN = math.pi
 
 
 def limit_names(design: Design) -> tuple[str, ...]:
-    """Return the names of the limits by their numbers here, as in the constraints of a region."""
-    return (
-        *(f"{name} {end}" for name in LENGTHS for end in ("minimum", "maximum")),
-        *(f"{name} {end}" for name in ("d1", "d3") for end in ("minimum", "maximum")),
-        GAP_NAME,
-        CARRIAGE_ORDER,
-        *(f"box {axis} {end}" for axis in "xyz" for end in ("minimum", "maximum")),
-        *(f"margin δ{index}" for index in (1, 2, 3)),
-        *(f"swing {cone.joint}" for cone in joint_cones(design)),
-    )
+    """Return the names of the limits by their numbers here: two for each demand of the rules."""
+    demands = by_quantity(demands_of(design))
+    return tuple(name for demand in demands for name in demand.end_names())
 
 
 @helper
@@ -138,136 +121,36 @@ def margin_at(index: int, k: int, p: FloatArray, tool: FloatArray, turn: FloatAr
 
 
 @helper
-def end_by_lengths(
-    row: FloatArray,
-    p: FloatArray,
-    tool: FloatArray,
-    turn: FloatArray,
-    end: float,
-    scratch: FloatArray,
-) -> tuple[float, int]:
-    """Return what `first_limit` does as a place, for the lengths alone."""
-    limit = NO_LIMIT
-    for leg in range(4):
-        low, high = row[LENGTH_LOWS + leg], row[LENGTH_HIGHS + leg]
-        for side in range(2):
-            if side == 0 and low <= 0.0:
-                continue
-            bound, sign = (high, 1.0) if side else (low, -1.0)
-            found = nearer_end_of_length(row, leg, p, tool, turn, bound, sign, end, scratch)
-            if found < end:
-                end, limit = found, LENGTH_LIMITS + 2 * leg + side
-            if found < 0.0:
-                return end, limit
-    return end, limit
-
-
-@helper
-def end_at_bound(
-    offset: float, i: int, side: int, arm: Vector, turn: FloatArray, end: float
-) -> float:
-    """Return what `nearer_linear_end` does for coordinate i of a point and one bound of it.
-
-    The offset is that of the tool from the bound, the arm leads from the tool to the point, and the
-    side is 0 for a lower bound and 1 for an upper one.
-    """
-    sign = -1.0 if side else 1.0
-    return nearer_linear_end(
-        sign * (offset + turned(turn, i, 0, arm)),
-        sign * turned(turn, i, 1, arm),
-        sign * (offset + turned(turn, i, 2, arm)),
-        end,
-    )
-
-
-@helper
-def end_by_guide(
-    row: FloatArray, p: FloatArray, tool: FloatArray, turn: FloatArray, end: float
-) -> tuple[float, int]:
-    """Return what `first_limit` does as a place, for the ends of the guide alone."""
-    limit = NO_LIMIT
-    for carriage in range(2):
-        arm = arm_of(row, 1 + carriage, tool)
-        for side in range(2):
-            bound = row[GUIDE_HIGH] if side else row[GUIDE_LOW]
-            if math.isinf(bound):
-                continue
-            found = end_at_bound(p[0] - bound, 0, side, arm, turn, end)
-            if found < end:
-                end, limit = found, GUIDE_LIMITS + 2 * carriage + side
-            if found < 0.0:
-                return end, limit
-    return end, limit
-
-
-@helper
-def end_by_carriages(row: FloatArray, turn: FloatArray, end: float) -> tuple[float, int]:
-    """Return what `first_limit` does as a place, for the gap and the order of the carriages."""
-    apart = row[B3] - row[B2]
-    order = row[ORDER]
-    if order == 0.0 and row[GAP] <= 0.0:
-        return end, NO_LIMIT
-    at_start = apart * turn[0, 0, 0]
-    if order == 0.0:
-        order = 1.0 if at_start >= 0.0 else -1.0
-    limit = GAP_LIMIT
-    if row[GAP] <= 0.0 or (order * at_start < 0.0 and abs(at_start) >= row[GAP]):
-        limit = ORDER_LIMIT
-    found = nearer_linear_end(
-        order * apart * turn[0, 0, 0] - row[GAP],
-        order * apart * turn[0, 0, 1],
-        order * apart * turn[0, 0, 2] - row[GAP],
-        end,
-    )
-    return (found, limit) if found < end else (end, NO_LIMIT)
-
-
-@helper
-def end_by_box(
-    row: FloatArray, p: FloatArray, tool: FloatArray, turn: FloatArray, end: float
-) -> tuple[float, int]:
-    """Return what `first_limit` does as a place, for the box alone."""
-    arm, limit = arm_of(row, 3, tool), NO_LIMIT
-    for i in range(3):
-        for side in range(2):
-            bound = row[BOX_HIGHS + i] if side else row[BOX_LOWS + i]
-            if math.isinf(bound):
-                continue
-            found = end_at_bound(p[i] - bound, i, side, arm, turn, end)
-            if found < end:
-                end, limit = found, BOX_LIMITS + 2 * i + side
-            if found < 0.0:
-                return end, limit
-    return end, limit
-
-
-@helper
-def end_by_margins(
-    row: FloatArray, p: FloatArray, tool: FloatArray, turn: FloatArray, end: float
-) -> tuple[float, int]:
-    """Return what `first_limit` does as a place, for the margins alone."""
-    least, limit = row[MARGIN], NO_LIMIT
-    if least == -math.inf:
-        return end, limit
-    for index in range(3):
-        sign = row[SIGNS + index]
-        found = nearer_linear_end(
-            sign * margin_at(index, 0, p, tool, turn) - least,
-            sign * margin_at(index, 1, p, tool, turn),
-            sign * margin_at(index, 2, p, tool, turn) - least,
-            end,
+def coefficients_of(
+    row: FloatArray, kind: int, p: FloatArray, tool: FloatArray, turn: FloatArray
+) -> Vector:
+    """Return the coefficients of the polynomial of a quantity that is of degree 2."""
+    if DELTA1 <= kind <= DELTA3:
+        index = kind - DELTA1
+        return (
+            margin_at(index, 0, p, tool, turn),
+            margin_at(index, 1, p, tool, turn),
+            margin_at(index, 2, p, tool, turn),
         )
-        if found < end:
-            end, limit = found, MARGIN_LIMITS + index
-        if found < 0.0:
-            return end, limit
-    return end, limit
+    if kind <= D3:
+        i, leg = (kind - X, 3) if kind <= Z else (0, kind - D1 + 1)
+        arm = arm_of(row, leg, tool)
+        return (
+            p[i] + turned(turn, i, 0, arm),
+            turned(turn, i, 1, arm),
+            p[i] + turned(turn, i, 2, arm),
+        )
+    apart = row[B3] - row[B2]
+    # The distance of the carriages cannot vanish before it is too small.
+    if kind == GAP and apart * turn[0, 0, 0] < 0.0:
+        apart = -apart
+    return (apart * turn[0, 0, 0], apart * turn[0, 0, 1], apart * turn[0, 0, 2])
 
 
 @helper
 def first_limit(
     row: FloatArray,
-    cones: FloatArray,
+    demands: FloatArray,
     p: FloatArray,
     tool: FloatArray,
     turn: FloatArray,
@@ -278,7 +161,7 @@ def first_limit(
 
     Args:
         row: Row of `Rules`.
-        cones: Cones of `Rules`.
+        demands: Demands of `Rules`.
         p: Position of the tool, shape (3,).
         tool: Tool point in platform coordinates, shape (3,).
         turn: Coefficients of the rotation, shape (3, 3, 3): those of (1 − u)², (1 − u) u and u².
@@ -289,35 +172,36 @@ def first_limit(
         The angle in radians and the limit: `most` and `NO_LIMIT` if the turn meets none, a
         negative angle and the first limit of the list if its start violates one.
     """
-    limit = NO_LIMIT
-    end, found = end_by_lengths(row, p, tool, turn, place_of(most), scratch)
-    limit = found if found >= 0 else limit
-    if end >= 0.0:
-        end, found = end_by_guide(row, p, tool, turn, end)
-        limit = found if found >= 0 else limit
-    if end >= 0.0:
-        end, found = end_by_carriages(row, turn, end)
-        limit = found if found >= 0 else limit
-    if end >= 0.0:
-        end, found = end_by_box(row, p, tool, turn, end)
-        limit = found if found >= 0 else limit
-    if end >= 0.0:
-        end, found = end_by_margins(row, p, tool, turn, end)
-        limit = found if found >= 0 else limit
-    for index in range(cones.shape[0]):
-        if end >= 0.0:
-            place = end_in_cone(row, cones[index], p, tool, turn, end, scratch)
-            if place < end:
-                end, limit = place, CONE_LIMITS + index
-    if end < 0.0:
-        return START_IS_INVALID, limit
+    limit, end = NO_LIMIT, place_of(most)
+    for index in range(demands.shape[0]):
+        kind = int(demands[index, QUANTITY])
+        a = b = c = 0.0
+        if kind < L1:
+            a, b, c = coefficients_of(row, kind, p, tool, turn)
+        for side in range(2):
+            bound, sign, found = demands[index, LOW + side], 1.0 - 2.0 * side, end
+            if kind == ANGLE:
+                if side == 1:
+                    found = end_in_cone(row, demands[index], p, tool, turn, end, scratch)
+            elif math.isinf(bound) or (kind >= L1 and side == 0 and bound <= 0.0):
+                continue
+            elif kind < L1:
+                found = nearer_linear_end(sign * (a - bound), sign * b, sign * (c - bound), end)
+            else:
+                found = nearer_end_of_length(
+                    row, kind - L1, p, tool, turn, bound, -sign, end, scratch
+                )
+            if found < end:
+                end, limit = found, 2 * index + side
+            if found < 0.0:
+                return START_IS_INVALID, limit
     return (most if limit == NO_LIMIT else angle_at(end)), limit
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,:,:,::1], f8[::1], i8[::1])")
 def turn_rows(
     row: FloatArray,
-    cones: FloatArray,
+    demands: FloatArray,
     positions: FloatArray,
     tool: FloatArray,
     turns: FloatArray,
@@ -328,14 +212,14 @@ def turn_rows(
     scratch = np.zeros(SCRATCH)
     for index in range(positions.shape[0]):
         angles[index], limits[index] = first_limit(
-            row, cones, positions[index], tool, turns[index], HALF_TURN, scratch
+            row, demands, positions[index], tool, turns[index], HALF_TURN, scratch
         )
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8, f8[::1], f8[:,::1], i8[:,::1])")
 def tilt_rows(
     row: FloatArray,
-    cones: FloatArray,
+    demands: FloatArray,
     positions: FloatArray,
     tool: FloatArray,
     torsion: float,
@@ -349,5 +233,5 @@ def tilt_rows(
         for k in range(azimuths.shape[0]):
             write_tilt(azimuths[k], torsion, turn)
             tilts[index, k], limits[index, k] = first_limit(
-                row, cones, positions[index], tool, turn, HALF_TURN, scratch
+                row, demands, positions[index], tool, turn, HALF_TURN, scratch
             )

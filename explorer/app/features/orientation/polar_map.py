@@ -39,16 +39,19 @@ COLOURS: dict[str, Rgb] = {
     "d1": (150, 120, 50),
     "d3": (205, 170, 80),
     "box": (90, 98, 110),
-    "swing": (120, 70, 40),
 }
 """Colours of limits by the beginning of their names; those of margins are theirs in the scene."""
+
+OTHER: Rgb = (120, 70, 40)
+"""Colour of other limits, such as those of swings."""
 
 
 def colour_of(limit: str | None) -> Rgb:
     """Return the colour of a limit; None for no limit."""
     if limit is None:
         return FREE
-    return next(colour for name, colour in COLOURS.items() if limit.startswith(name))
+    named = (colour for name, colour in COLOURS.items() if limit.startswith(name))
+    return next(named, OTHER)
 
 
 def edge_of(tilts: TiltMap, here: TiltTorsion, home: TiltTorsion) -> float:

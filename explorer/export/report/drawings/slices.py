@@ -20,13 +20,14 @@ from explorer.export.report.drawings.mechanism import path_of, round_length
 from explorer.export.report.markup import coordinate, element
 from explorer.legs.clearance import leg_clearances
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design, Swing
+from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import OUTLINE, WARN_SHARE, css
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import region_of
+from explorer.workspace.limits.table import bounds_angles
 from explorer.workspace.position_bands import PositionBands, position_bands
 from explorer.workspace.slices.axes import AXES
 from explorer.workspace.slices.level_loops import level_loops
@@ -96,7 +97,7 @@ class Slices:
     @property
     def are_exact(self) -> bool:
         """Whether outlines are arcs and lines, rather than those of a grid."""
-        return self.design.limits.swing == Swing()
+        return not bounds_angles(self.design)
 
     def area(self, axis: str, level: float) -> float | None:
         """Return the exact area of a slice, in squared design units; None with cones."""

@@ -5,24 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-import msgspec
-
 from explorer.export.report.data import ReportData
 from explorer.export.report.drawings.mechanism import three_views
 from explorer.export.report.markup import (
     Cell,
     Row,
     element,
-    ends,
     illustration,
     number,
     paragraph,
     table,
 )
-from explorer.mechanism.design import JOINTS, LENGTHS
+from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
-from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_SHARE
+from explorer.workspace.limits.table import joint_ranges, limits_in_force
 
 _MEANINGS = {
     "a3x": "a3 in the base, along the guide",
@@ -97,11 +94,11 @@ def _pose(data: ReportData) -> Element:
 
 
 def _joints(data: ReportData) -> Element:
-    design, unit = data.design, data.unit_mm
+    unit = data.unit_mm
+    ranges = joint_ranges(data.design)
     rows: list[Row] = []
     for name, value in zip(JOINTS, data.snapshot.joints.tolist(), strict=True):
-        limits = design.length_range(name) if name in LENGTHS else design.limits.guide
-        bounds = ("none", "none") if limits is None else (number(end * unit) for end in limits)
+        bounds = tuple(end * unit for end in ranges[name]) if name in ranges else ("none", "none")
         rows.append((*_lengths(data, (element("b", name), f" {_JOINTS[name]}"), value), *bounds))
     return table(
         ("joint", "units", "mm", "minimum, mm", "maximum, mm"),
@@ -112,23 +109,11 @@ def _joints(data: ReportData) -> Element:
 
 
 def _limits(data: ReportData) -> Element:
-    limits, unit = data.design.limits, data.unit_mm
     rows: list[Row] = []
-    if limits.box is None:
-        rows.append(("box of b4", "none", "none"))
-    else:
-        for axis, low, high in zip("xyz", *limits.box, strict=True):
-            rows.append((f"box of b4, {axis}", ends(low, high), ends(low * unit, high * unit)))
-    rows.append(_lengths(data, "gap |d1 − d3|, at least", limits.gap))
-    order = {"home": "as at home", "any": "no demand"}[limits.carriage_order]
-    rows.append(("order of the carriages", order, ""))
-    if limits.margin:
-        rows.append(_lengths(data, "|δ|, at least, signs as at home", limits.margin))
-    else:
-        rows.append(("margins", "no demand" if limits.margin is None else "signs as at home", ""))
-    for leg, radius in enumerate(limits.leg_radii, 1):
+    for symbols, demand in limits_in_force(data.design):
+        words, in_mm = demand.words(), demand.words(data.unit_mm)
+        # Signs and angles have no length.
+        rows.append((symbols, words, in_mm if demand.has_length else ""))
+    for leg, radius in enumerate(data.design.limits.leg_radii, 1):
         rows.append(_lengths(data, f"radius of leg {leg}", radius))
-    for name, angle in msgspec.structs.asdict(limits.swing).items():
-        if angle is not None:
-            rows.append((f"swing at {name}, at most", f"{format_number(angle, 6)}°", ""))
-    return table(("limit", "units", "mm"), rows, align="<>>", caption="Further limits")
+    return table(("limit", "units", "mm"), rows, align="<>>", caption="Limits in force")

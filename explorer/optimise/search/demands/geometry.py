@@ -20,13 +20,8 @@ from explorer.optimise.problem import DISTANCES, SHIFTS, distance_of
 from explorer.optimise.search.state import State
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.equilibrium import SINGULAR
-from explorer.workspace.limits.constraints import (
-    GAP,
-    YAW,
-    BallOrCylinder,
-    Constraint,
-    HalfSpace,
-)
+from explorer.workspace.limits.constraints import YAW, BallOrCylinder, Constraint, HalfSpace
+from explorer.workspace.limits.table import GAP
 
 # Tolerance of a demand that is no limit, dimensionless.
 MET = 1e-8

@@ -1,0 +1,286 @@
+"""The table of limits, in the order of the design file.
+
+Validity, messages, safe steps of moves, solids, lists of limits in force and the controls of the
+page all read it: a new limit is one row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache, partial
+from operator import attrgetter
+
+import numpy as np
+
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair, Swing
+from explorer.mechanism.margins import MARGIN_KINDS
+from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.limit import Bound, Demand, Entry, LegAngle, Limit, LimitCase, Switch
+from explorer.workspace.limits.quantities import (
+    ANGLE,
+    D1,
+    D3,
+    DELTA1,
+    DEMAND_COLUMNS,
+    GAP as GAP_QUANTITY,
+    L1,
+    ORDER,
+    X,
+)
+
+Number = partial(Entry, is_number=True)
+GAP, CARRIAGE_ORDER = "gap |d1 − d3|", "carriage order"
+
+
+def _length(name: str) -> Limit:
+    def demands(case: LimitCase) -> Iterator[Demand]:
+        low, high = case.value
+        most = Bound(high, {f"{name} maximum": 1.0}) if high is not None else _reach(case.design)
+        least = Bound(low, {f"{name} minimum": 1.0})
+        yield Demand(name, L1 + LENGTHS.index(name), least, most)
+
+    def track(design: Design) -> Pair:
+        longest = max(design.length_range(length)[1] for length in LENGTHS)
+        return 0.0, max(longest, design.reach)
+
+    subjects = {
+        "": f"The length {name}",
+        " minimum": f"The least length {name}",
+        " maximum": f"The greatest length {name}",
+    }
+    entry = Entry(name, f"Minimum and maximum of {name}.", track, least=0.0)
+    return Limit(name, subjects, demands, (entry,), AT_REACH)
+
+
+def _reach(design: Design) -> Bound:
+    """Return the maximum of a length without one of its own, which follows a3."""
+    x, y = design.a3
+    return Bound(design.reach, {"a3x": x / design.reach, "a3y": y / design.reach}, "the reach")
+
+
+AT_REACH = Switch(
+    "Maxima at the reach",
+    "Set the maximum length of every actuator to the reach |a3| of the design.",
+    lambda design, ends, on: (ends[0], None if on else max(ends[0], ends[1] or design.reach)),
+    lambda ends: ends[1] is None,
+)
+
+
+def _guide(case: LimitCase) -> Iterator[Demand]:
+    if case.value is not None:
+        low, high = case.value
+        ends = Bound(low, {"guide minimum": 1.0}), Bound(high, {"guide maximum": 1.0})
+        yield from (Demand("d1", D1, *ends), Demand("d3", D3, *ends))
+
+
+def _guide_track(design: Design) -> Pair:
+    _, d1, _, d3, _, _ = possible_ranges(without_guide(design)).joints
+    own = design.limits.guide or d1
+    return min(d1[0], d3[0], own[0]), max(d1[1], d3[1], own[1])
+
+
+def _gap(case: LimitCase) -> Iterator[Demand]:
+    if case.value > 0.0:
+        yield Demand(GAP, GAP_QUANTITY, Bound(case.value), has_ends=False)
+
+
+def _gap_track(design: Design) -> Pair:
+    # The carriages are never farther apart than b2 and b3.
+    return 0.0, max(abs(design.b3 - design.b2), design.limits.gap)
+
+
+def _order(case: LimitCase) -> Iterator[Demand]:
+    sign = case.design.demanded_order if case.order is None else case.order
+    if sign:
+        yield _sign_demand(CARRIAGE_ORDER, ORDER, sign, Bound(0.0), "d3 − d1")
+
+
+def _sign_demand(name: str, quantity: int, sign: int, least: Bound, symbol: str) -> Demand:
+    """Return the demand that a quantity has a sign and at least a magnitude."""
+    if sign > 0:
+        return Demand(name, quantity, least, symbol=symbol, has_ends=False, is_sign=True)
+    most = Bound(-least.value, {name: -rate for name, rate in least.rates.items()})
+    return Demand(name, quantity, high=most, symbol=symbol, has_ends=False, is_sign=True)
+
+
+def _box(case: LimitCase) -> Iterator[Demand]:
+    if case.value is not None:
+        for axis, (letter, low, high) in enumerate(zip("xyz", *case.value, strict=True)):
+            name = f"box {letter}"
+            ends = Bound(low, {f"{name} minimum": 1.0}), Bound(high, {f"{name} maximum": 1.0})
+            yield Demand(name, X + axis, *ends, symbol=f"b4 {letter}")
+
+
+def _box_track(design: Design, axis: int) -> Pair:
+    free = possible_ranges(without_box(design)).position[axis]
+    own = design.limits.box or ((free[0],) * 3, (free[1],) * 3)
+    return min(free[0], own[0][axis]), max(free[1], own[1][axis])
+
+
+def _margins(case: LimitCase) -> Iterator[Demand]:
+    if case.value is None and case.signs is None:
+        return
+    least = Bound(case.value or 0.0, {"margin": 1.0})
+    for index, sign in enumerate(case.signs or case.design.home_signs):
+        symbol = f"δ{index + 1}"
+        yield _sign_demand(f"margin {symbol}", DELTA1 + index, sign, least, symbol)
+
+
+def _swing(joint: str, kind: str) -> Limit:
+    leg = 3 if joint == "a3" else int(joint[1]) - 1
+
+    def demands(case: LimitCase) -> Iterator[Demand]:
+        if case.value is not None:
+            angle = angle_from_home(case.design, leg, in_platform=joint.startswith("b"))
+            name = f"swing {joint}"
+            yield Demand(name, ANGLE, high=Bound(case.value), has_ends=False, angle=angle)
+
+    hint = (
+        f"Maximum angle of leg {leg + 1} in this joint from its direction in the home pose; 180 "
+        "for no bound."
+    )
+    entry = Number(f"{joint} {kind}", hint, lambda _: (1.0, 180.0), is_angle=True, free=180.0)
+    return Limit(f"swing.{joint}", {"": f"The swing of the {joint} {kind}"}, demands, (entry,))
+
+
+def angle_from_home(design: Design, leg: int, *, in_platform: bool) -> LegAngle:
+    """Return the angle of a leg, 0 to 3, from its direction in the home pose."""
+    direction, rotation = _legs_at_home(design)[leg], design.home_pose.rotation
+    length = float(np.linalg.norm(direction))
+    if length == 0.0:
+        return LegAngle(leg, None, in_platform)
+    axis = direction / length
+    return LegAngle(leg, rotation.T @ axis if in_platform else axis, in_platform)
+
+
+@lru_cache(16)
+def _legs_at_home(design: Design) -> FloatArray:
+    return Configuration.at(design, design.home_pose).legs
+
+
+LIMITS: list[Limit] = [
+    *map(_length, LENGTHS),
+    Limit(
+        "guide",
+        {
+            "": "The guide",
+            " low": "The end of the guide, \u201cd least\u201d,",
+            " high": "The end of the guide, \u201cd most\u201d,",
+        },
+        _guide,
+        (Entry("d1, d3", "The ends of the guide, for both carriages.", _guide_track),),
+        Switch("Bounded guide", "Keep both carriages between two ends of the guide."),
+    ),
+    Limit(
+        "gap",
+        {"": "The gap of the carriages"},
+        _gap,
+        (Number("gap", "Minimum distance |d1 − d3| of the carriages.", _gap_track, least=0.0),),
+    ),
+    Limit(
+        "carriage_order",
+        {"": "The order of the carriages"},
+        _order,
+        switch=Switch(
+            "Carriages keep their order",
+            "Require that d3 − d1 keeps its sign of the home pose: at d1 = d3 legs 2 and 3 share a "
+            "point.",
+            lambda _, __, on: "home" if on else "any",
+            lambda value: value == "home",
+        ),
+    ),
+    Limit(
+        "box",
+        {
+            "": "The box for b4",
+            " lows": "The lower corner of the box for b4",
+            " highs": "The upper corner of the box for b4",
+            **{f" {axis}": f"The box for b4 along {axis}" for axis in "xyz"},
+        },
+        _box,
+        tuple(
+            Entry(
+                f"b4 {name}",
+                f"The faces of the box across {name}.",
+                lambda design, axis=axis: _box_track(design, axis),
+                axis,
+            )
+            for axis, name in enumerate("xyz")
+        ),
+        Switch("Box for b4", "Keep b4 within a box."),
+    ),
+    Limit(
+        "margin",
+        {"": "The margin"},
+        _margins,
+        (
+            Number(
+                "margin",
+                f"Minimum of |δ1|, |δ2| and |δ3|, in units; {MARGIN_KINDS}.",
+                lambda design: (0.0, design.reach),
+                free=0.0,
+                least=0.0,
+            ),
+        ),
+        Switch(
+            "Stay in the home mode",
+            "Require the sign triple of the home pose, and the margin below.",
+        ),
+    ),
+    *(_swing(joint, "U joint" if joint[0] == "a" else "ball") for joint in Swing.__struct_fields__),
+]
+"""The limits in the order of the design file."""
+
+
+@lru_cache(256)
+def demands_of(
+    design: Design, signs: tuple[int, int, int] | None = None, order: int | None = None
+) -> tuple[Demand, ...]:
+    """Return the demands of a design that are in force, in the order of the table.
+
+    Args:
+        design: The manipulator.
+        signs: Sign triple to demand instead of the home's, even if no margin is demanded.
+        order: Sign of d3 − d1 to demand, 0 for either; the design's if None.
+    """
+    return tuple(
+        demand
+        for limit in LIMITS
+        for demand in limit.demands(LimitCase(design, limit.value(design), signs, order))
+    )
+
+
+def bounds_angles(design: Design) -> bool:
+    """Return whether a limit of a design bounds an angle, so that cones bound its workspace."""
+    return any(demand.angle is not None for demand in demands_of(design))
+
+
+def joint_ranges(design: Design) -> dict[str, Pair]:
+    """Return the ranges of those joints that limits bound, by their names, in design units."""
+    return {
+        demand.name: (demand.low.value, demand.high.value)
+        for demand in demands_of(design)
+        if demand.name in JOINTS
+    }
+
+
+def by_quantity(demands: Iterable[Demand]) -> list[Demand]:
+    """Return demands in the order in which kernels take them, that of the quantities."""
+    return sorted(demands, key=attrgetter("quantity"))
+
+
+def rows_of(design: Design, demands: Sequence[Demand]) -> FloatArray:
+    """Return the rows of demands for kernels, shape (n, DEMAND_COLUMNS)."""
+    rows = [demand.row(design) for demand in demands]
+    return np.array(rows, dtype=np.float64).reshape(-1, DEMAND_COLUMNS)
+
+
+def limits_in_force(design: Design) -> Iterator[tuple[str, Demand]]:
+    """Yield the demands in force for a list: equal ones once, with all their symbols."""
+    rows: dict[str, list[Demand]] = {}
+    for demand in demands_of(design):
+        rows.setdefault(demand.words(), []).append(demand)
+    for demands in rows.values():
+        yield ", ".join(demand.symbol or demand.name for demand in demands), demands[0]
