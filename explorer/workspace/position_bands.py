@@ -15,10 +15,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.margins import margins
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.singularity.colours import (
     BAND_EDGES,
     CLEAR,
@@ -30,9 +31,9 @@ from explorer.singularity.colours import (
     mix,
     warning_condition,
 )
-from explorer.singularity.jacobian import inverse_condition, jacobian
-from explorer.statics.accuracy import actuator_errors, worst_error
-from explorer.statics.compliance import compliance, deflection, is_elastic, stiffness_of
+from explorer.singularity.jacobian import inverse_condition, jacobian_of
+from explorer.statics.accuracy import actuator_errors, tool_errors
+from explorer.statics.compliance import compliance_of, deflection, is_elastic, stiffness_of
 from explorer.statics.held import largest_shares, load_case
 from explorer.statics.reactions import has_limits
 from explorer.statics.weights import payload_wrench
@@ -83,8 +84,6 @@ class PositionBands:
         levels: The measure at each edge, in units for a margin; infinite at the first for the
             measures of `MEASURE_WORDS`.
         values: Function from positions (n, 3) to values (n,), which are zero in singular ones.
-        case: Row of numbers of a load, see `explorer.statics.held.load_case`; None for a measure
-            that no part of the machine has.
     """
 
     measure: PositionMeasure
@@ -92,7 +91,6 @@ class PositionBands:
     colours: tuple[Rgb, ...]
     levels: tuple[float, ...]
     values: Callable[[FloatArray], FloatArray]
-    case: FloatArray | None = None
 
 
 def position_bands(
@@ -114,43 +112,56 @@ def position_bands(
         load: (F; M) on the platform at the tool point besides the payload, base axes, shape (6,),
             in N and N × unit; None for none. Only measures of a load need it.
     """
+
+    def measured(points: FloatArray) -> FloatArray:
+        return measure_positions(design, rotation, measure, points, load)[0]
+
     if measure == "margin":
-
-        def smallest_margin(points: FloatArray) -> FloatArray:
-            return np.abs(margins(points, rotation)).min(axis=-1) / warn_below
-
-        return _proximity(measure, warn_below, smallest_margin)
+        return _proximity(measure, warn_below, measured)
     if measure == "condition":
-        warn = warning_condition(design.reach, warn_below)
+        return _proximity(measure, warning_condition(design.reach, warn_below), measured)
+    return _unbounded(design, rotation, measure, measured)
 
-        def condition(points: FloatArray) -> FloatArray:
-            rates = jacobian(design, points, rotation)
-            return inverse_condition(rates, design.reach) / warn
 
-        return _proximity(measure, warn, condition)
-    w = np.zeros(6) if load is None else load
-    if measure == "error":
-        errors, tool = actuator_errors(design), design.tool.position
+def measure_positions(
+    design: Design,
+    rotation: FloatArray,
+    measure: PositionMeasure,
+    positions: FloatArray,
+    load: ArrayLike | None = None,
+) -> tuple[FloatArray, IntArray]:
+    """Return a measure at positions, and the index of the margin or part that has it, (n,) each.
 
-        def worst(points: FloatArray) -> FloatArray:
-            error = worst_error(design, points, rotation, errors, tool)
-            return error.displacement * design.unit_mm
+    Parts are those of `explorer.statics.reactions.part_limits`; the index is 0 for a measure of the
+    whole machine.
 
-        return _unbounded(design, rotation, measure, worst)
-    if measure == "deflection":
-        wrench, stiffness = payload_wrench(design, rotation) + w, stiffness_of(design)
-
-        def deflected(points: FloatArray) -> FloatArray:
-            soft = compliance(design, points, rotation, *stiffness, design.tool.position)
-            return np.linalg.norm(deflection(soft, wrench)[:, :3], axis=-1) * design.unit_mm
-
-        return _unbounded(design, rotation, measure, deflected)
-    case = load_case(design, rotation, w, measured_limits(design, measure))
-
-    def asked(points: FloatArray) -> FloatArray:
-        return largest_shares(case, rotation, points)[0]
-
-    return _unbounded(design, rotation, measure, asked, case)
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+        measure: The measure, in design units for a margin, else as in `MEASURE_WORDS`.
+        positions: b4 in the base frame, shape (n, 3), in design units.
+        load: As in `position_bands`, shape (6,).
+    """
+    at = Configuration(design, positions, rotation, design.tool.position)
+    whole = np.zeros(len(positions), dtype=np.int64)
+    w = np.zeros(6) if load is None else np.asarray(load, dtype=np.float64)
+    match measure:
+        case "margin":
+            sizes = np.abs(at.margins)
+            return sizes.min(axis=-1), sizes.argmin(axis=-1)
+        case "condition":
+            rates = jacobian_of(at.with_tool(np.zeros(3)))
+            return inverse_condition(rates, design.reach), whole
+        case "error":
+            moved = tool_errors(at, actuator_errors(design)).worst.displacement
+            return moved * design.unit_mm, whole
+        case "deflection":
+            wrench = payload_wrench(design, rotation) + w
+            moved = deflection(compliance_of(at, *stiffness_of(design)), wrench)[..., :3]
+            return np.linalg.norm(moved, axis=-1) * design.unit_mm, whole
+        case _:
+            loaded = load_case(design, rotation, w, measured_limits(design, measure))
+            return largest_shares(loaded, rotation, positions)
 
 
 def is_unstated(design: Design, measure: PositionMeasure) -> bool:
@@ -187,10 +198,14 @@ def measured_limits(design: Design, measure: PartMeasure) -> FloatArray | None:
 
 
 def _proximity(
-    measure: PositionMeasure, unit: float, values: Callable[[FloatArray], FloatArray]
+    measure: PositionMeasure, unit: float, measured: Callable[[FloatArray], FloatArray]
 ) -> PositionBands:
     """Return the bands of the proximity to singularities."""
     levels = tuple(unit * edge for edge in BAND_EDGES)
+
+    def values(points: FloatArray) -> FloatArray:
+        return measured(points) / unit
+
     return PositionBands(measure, BAND_EDGES, band_colours(), levels, values)
 
 
@@ -199,7 +214,6 @@ def _unbounded(
     rotation: FloatArray,
     measure: PositionMeasure,
     measured: Callable[[FloatArray], FloatArray],
-    case: FloatArray | None = None,
 ) -> PositionBands:
     """Return the bands of what is infinite in singular positions.
 
@@ -216,7 +230,7 @@ def _unbounded(
         return highest / np.maximum(measured(points), highest / (FARTHEST * edges[-1]))
 
     ends = (math.inf, *reversed(levels))
-    return PositionBands(measure, edges, colours[::-1], ends, values, case)
+    return PositionBands(measure, edges, colours[::-1], ends, values)
 
 
 def _round_levels(

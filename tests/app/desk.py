@@ -32,6 +32,18 @@ class Browser:
 
 CLIENT: Any = Browser()
 
+
+class ScriptedBrowser(Browser):
+    """A browser that keeps the scripts that are sent to it alone."""
+
+    def __init__(self) -> None:
+        self.scripts: list[str] = []
+        self._websock_connection = self
+
+    def queue_message(self, message: Any) -> None:
+        self.scripts.append(message.source)
+
+
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 

@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 import pytest
 import trimesh
-from desk import CLIENT, Desk
+from desk import CLIENT, Desk, ScriptedBrowser
 from machines import six
 from services import StubDownloads, services_for
 from workspace_feeds import drawing_of, follow
@@ -249,9 +249,7 @@ def facts_of(picture: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("axis", "angles"), [*zip(AXES, ORIENTATIONS, strict=True)])
-def test_map_has_its_place_and_its_margins_for_the_page(
-    axis: Axis, angles: tuple[float, float, float]
-) -> None:
+def test_map_has_its_place_for_the_page(axis: Axis, angles: tuple[float, float, float]) -> None:
     pose = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), angles)
     state = with_workspace(opened(OPTIMAL, pose), solid=True, cut=axis)
     drawing = drawing_of(state)
@@ -260,10 +258,6 @@ def test_map_has_its_place_and_its_margins_for_the_page(
     facts = facts_of(picture)
     assert facts["axis"] == "xyz".index(axis)
     assert facts["level"] == drawing.level
-    points = np.random.default_rng(4).normal(0.0, 10.0, (50, 3))
-    np.testing.assert_allclose(
-        points @ np.array(facts["gradients"]).T, margins(points, pose.rotation), atol=1e-12
-    )
     # Its own coordinates, placed in the picture, are the places that the page reads.
     (matrix,) = re.findall(r'<g transform="matrix\(([^)]*)\)" data-within', picture)
     a, b, c, d, e, f = map(float, matrix.split())
@@ -398,6 +392,27 @@ def shares_at(design: Design, points: FloatArray, rotation: FloatArray) -> Float
     return np.asarray(limit_shares(design, held).max(axis=-1))
 
 
+def measured(design: Design, colour: str, points: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return the measure of a colouring at positions (n, 3), from what statics find there."""
+    tool = design.tool.position
+    if colour == "plain":
+        return np.asarray(np.abs(margins(points, rotation)).min(axis=-1))
+    if colour == "condition":
+        return inverse_condition(jacobian(design, points, rotation), design.reach)
+    if colour == "share":
+        return shares_at(design, points, rotation)
+    if colour == "error":
+        return worst_error(design, points, rotation, six([0.05] * 6), tool).displacement
+    if colour == "deflection":
+        # The payload's force of any direction does not count.
+        wrench = LOAD + payload_wrench(design, rotation)
+        soft = compliance(design, points, rotation, *stiffness_of(design), tool)
+        return design.unit_mm * np.linalg.norm(deflection(soft, wrench)[:, :3], axis=-1)
+    found = reactions(Configuration(design, points, rotation), np.array(LOAD))
+    of_parts = np.abs(found.actuators) if colour == "force" else 0.01 * found.bending
+    return np.asarray(of_parts.max(axis=-1))
+
+
 def panel_text(panel: WorkspacePanel, state: State) -> str:
     """Return the markup of the panel in a state."""
     return "".join(str(v) for _, name, v in panel.updates(Frame(state)) if name == "content")
@@ -459,26 +474,64 @@ def test_surface_lies_in_the_bands_of_the_shares_also_beside_singular_planes(cut
 def test_surface_lies_in_the_bands_of_its_measure(colour: Any, cut: Any) -> None:
     design = OPTIMAL if colour in ("force", "bending") else PRECISE
     drawing = drawing_of(load_state(design, colour=colour, cut=cut))
-    rotation, tool = np.array(drawing.request.rotation), design.tool.position
-
-    def measure(points: FloatArray) -> FloatArray:
-        if colour == "error":
-            return worst_error(design, points, rotation, six([0.05] * 6), tool).displacement
-        if colour == "deflection":
-            # The payload's force of any direction does not count.
-            wrench = LOAD + payload_wrench(design, rotation)
-            soft = compliance(design, points, rotation, *stiffness_of(design), tool)
-            return design.unit_mm * np.linalg.norm(deflection(soft, wrench)[:, :3], axis=-1)
-        found = reactions(Configuration(design, points, rotation), np.array(LOAD))
-        if colour == "force":
-            return np.asarray(np.abs(found.actuators).max(axis=-1))
-        return np.asarray(0.01 * found.bending.max(axis=-1))
-
+    rotation = np.array(drawing.request.rotation)
     bands = dict(
         zip(STEP_COLOURS, itertools.pairwise(sorted((*drawing.levels, 0.0))), strict=False)
     )
-    assert share_off(drawing, bands, measure, 0.03) < 5e-3
+    assert share_off(drawing, bands, lambda at: measured(design, colour, at, rotation), 0.03) < 5e-3
     assert len(drawing.surface.shells) > 3
+
+
+READINGS = {
+    "plain": r"min \|δ\| ([\d.]+) \(δ[123]\)",
+    "condition": r"1 / cond J ([\d.]+)",
+    "share": r"largest share of a limit ([\d.]+) % \((?:actuator|bending of strut) \w+\)",
+    "force": r"largest actuator force ([\d.]+) N \(actuator \w+\)",
+    "bending": r"largest bending of a strut ([\d.]+) N m \(bending of strut [23]\)",
+    "error": r"worst error of the tool ([\d.]+) mm",
+    "deflection": r"deflection under the load ([\d.]+) mm",
+}
+
+
+@pytest.mark.parametrize(("colour", "reading"), READINGS.items())
+def test_map_words_tell_the_measure_at_a_position(colour: str, reading: str) -> None:
+    design = {"share": LOADED, "error": PRECISE, "deflection": PRECISE}.get(colour, OPTIMAL)
+    mapped = drawing_of(load_state(design, colour=colour, cut="y")).slice_map
+    assert mapped is not None
+    rotation, digit = mapped.colouring.rotation, 0.005
+    for x, z in ((12.5, 7.25), (3.0, 12.125), (9.0, 1.0)):
+        words = mapped.words_at((x, mapped.level, z))
+        found = re.fullmatch(rf"x {x:.2f}, z {z:.2f} units: {reading}", words)
+        assert found is not None, words
+        at = np.array([[x, mapped.level, z]])
+        (expected,) = measured(design, colour, at, rotation).tolist()
+        factor = 100.0 if colour == "share" else 1.0
+        assert float(found[1]) == pytest.approx(factor * expected, rel=digit, abs=digit)
+    singular = mapped.words_at((9.0, mapped.level, 0.0))
+    if colour not in ("plain", "condition"):
+        # No part has what is infinite in all.
+        assert " ∞ " in singular
+        assert "(" not in singular
+
+
+def test_map_is_read_to_the_browser_that_asks(services: Services) -> None:
+    state = with_workspace(opened(OPTIMAL), solid=True, cut="y")
+    follow(services, state)
+    panel, asking = WorkspacePanel(services), ScriptedBrowser()
+    client: Any = asking
+    place = "[12.5,5,7.25]"
+    # There is no map before the panel has shown it.
+    services.buttons.press("workspace.read", place, client)
+    assert asking.scripts == []
+    assert "data-map" in panel_text(panel, state)
+    for text in ("[12.5,5]", "[NaN,1,2]", place):
+        services.buttons.press("workspace.read", text, client)
+    (script,) = asking.scripts
+    drawing = services.get(WorkspaceFeed).drawing
+    assert drawing is not None
+    assert drawing.slice_map is not None
+    words = drawing.slice_map.words_at((12.5, 5.0, 7.25))
+    assert f'window.explorer.map("{place}", "{words}");' in script
 
 
 def test_load_that_is_not_shown_changes_no_request() -> None:

@@ -2,37 +2,27 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterator
 
 import msgspec
 import numpy as np
 import pytest
 from machines import FULL, six
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Locator, expect
 from tab import Tab
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.slice_map import map_facts
-from explorer.app.look import read_script
-from explorer.app.scene.bands import Colouring
 from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Open, Set, SetAngle
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.machine import Actuators, Struts, Tool
+from explorer.mechanism.machine import Actuators, Tool
 from explorer.mechanism.margins import margins
-from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.accuracy import worst_error
-from explorer.statics.compliance import compliance, deflection, stiffness_of
+from explorer.statics.compliance import compliance, deflection
 from explorer.statics.held import largest_shares, load_case
-from explorer.statics.reactions import PART_NAMES
-from explorer.statics.weights import payload_wrench
 from explorer.workspace.held import part_names
-from explorer.workspace.position_bands import PartMeasure, PositionMeasure
 
 OPTIMAL = PRESETS["paper-optimal"]
 READING = re.compile(r"x ([−\d.]+), z ([−\d.]+) units: min \|δ\| ([\d.]+) \(δ(\d)\)")
@@ -51,15 +41,6 @@ def tab(tab: Tab) -> Tab:
     tab.resize((1280, 720))
     tab.settle()
     return tab
-
-
-@pytest.fixture
-def script(browser: Browser) -> Iterator[Page]:
-    """A blank page with the script that reads maps."""
-    page = browser.new_page()
-    page.evaluate(f"() => {{ {read_script('map')} }}")
-    yield page
-    page.close()
 
 
 def open_map(tab: Tab, level: float) -> None:
@@ -108,120 +89,6 @@ def number(text: str) -> float:
     return float(text.replace("−", "-").replace(",", ""))
 
 
-def test_map_script_margins_and_conditioning_are_those_of_the_library(script: Page) -> None:
-    rng = np.random.default_rng(8)
-    platform = np.array([[*OPTIMAL.b1, 0.0], [OPTIMAL.b2, 0.0, 0.0], [OPTIMAL.b3, 0.0, 0.0]])
-    cases: list[dict[str, object]] = []
-    expected: list[list[float]] = []
-    for trial in range(60):
-        rotation = rotation_from_yaw_pitch_roll(rng.uniform(-80.0, 80.0, 3))
-        position = rng.uniform(-20.0, 20.0, 3)
-        if trial % 4 == 0:
-            # Near a singular position, or at one.
-            position[2] = (0.0, 1e-9, 1e-4)[trial % 3]
-        rates = jacobian(OPTIMAL, position, rotation)
-        expected.append(
-            [
-                float(np.abs(margins(position, rotation)).min()),
-                float(inverse_condition(rates, OPTIMAL.reach)),
-            ]
-        )
-        facts = {
-            "gradients": planes_of_singularity(rotation).tolist(),
-            "arms": (platform @ rotation.T).tolist(),
-            "a3": [*OPTIMAL.a3, 0.0],
-            "reach": OPTIMAL.reach,
-        }
-        cases.append({"facts": facts, "p": position.tolist()})
-    computed = script.evaluate(
-        """cases => cases.map(({ facts, p }) => {
-            const { leastMargin, inverseCondition, jacobian } = window.explorer.map;
-            return [leastMargin(facts, p).least, inverseCondition(jacobian(facts, p))];
-        })""",
-        cases,
-    )
-    np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-12)
-
-
-def test_map_script_utilisation_under_a_load_is_that_of_the_library(script: Page) -> None:
-    rng = np.random.default_rng(3)
-    load = np.array([4.0, -3.0, -6.0, 5.0, 10.0, -5.0])
-    cases: list[dict[str, object]] = []
-    expected: list[tuple[float, str]] = []
-    for trial in range(60):
-        rotation = rotation_from_yaw_pitch_roll(rng.uniform(-80.0, 80.0, 3))
-        position = rng.uniform(-20.0, 20.0, 3)
-        if trial % 4 == 0:
-            # Near a singular position, or at one.
-            position[2] = (0.0, 1e-6, 1e-3)[trial % 3]
-        measure: PartMeasure = ("share", "force", "bending")[trial % 3]
-        colouring = Colouring(FULL, rotation, measure, 1.0, load)
-        case = colouring.bands.case
-        assert case is not None
-        of_load, of_part = largest_shares(case, rotation, position[None])
-        share, part = float(of_load[0]), int(of_part[0])
-        names = part_names(FULL) if measure == "share" else PART_NAMES
-        expected.append((share, names[part]))
-        cases.append({"facts": map_facts(colouring), "p": position.tolist()})
-    found = script.evaluate(
-        """cases => cases.map(({ facts, p }) => {
-            const { value, part } = window.explorer.map.amount(facts, p);
-            return [Number.isFinite(value) ? value : -1, part];
-        })""",
-        cases,
-    )
-    assert sum(math.isinf(share) for share, _ in expected) > 2
-    for (share, part), (computed, of_page) in zip(expected, found, strict=True):
-        if math.isinf(share):
-            assert computed == -1
-        else:
-            assert computed == pytest.approx(share, rel=1e-6)
-            assert of_page == part
-
-
-def test_map_script_displacement_of_the_tool_is_that_of_the_library(script: Page) -> None:
-    rng = np.random.default_rng(4)
-    cases: list[dict[str, object]] = []
-    expected: list[float] = []
-    for trial in range(80):
-        measure: PositionMeasure = ("error", "deflection")[trial % 2]
-        design = msgspec.structs.replace(
-            FULL,
-            unit_mm=float(rng.uniform(1.0, 20.0)),
-            actuators=Actuators(
-                error_mm=six(rng.uniform(0.0, 0.1, 6)),
-                stiffness_n_mm=six(rng.uniform(100.0, 2000.0, 6)) if trial % 3 else None,
-            ),
-            struts=Struts(outer_mm=None if trial % 3 == 1 else 12.0, inner_mm=10.0),
-        )
-        rotation = rotation_from_yaw_pitch_roll(rng.uniform(-80.0, 80.0, 3))
-        position = rng.uniform(-20.0, 20.0, 3)
-        if trial % 8 in (0, 1):
-            # Near a singular position, or at one.
-            position[2] = (0.0, 1e-6, 1e-3)[trial % 3]
-        load = rng.uniform(-50.0, 50.0, 6)
-        pose, tool = (design, position, rotation), design.tool.position
-        if measure == "error":
-            moved = worst_error(*pose, design.actuators.error_mm, tool).displacement
-        else:
-            wrench = load + payload_wrench(design, rotation)
-            soft = compliance(*pose, *stiffness_of(design), tool)
-            moved = design.unit_mm * np.linalg.norm(deflection(soft, wrench)[:3])
-        expected.append(float(moved))
-        facts = map_facts(Colouring(design, rotation, measure, 1.0, load))
-        cases.append({"facts": facts, "p": position.tolist()})
-    found = script.evaluate(
-        """cases => cases.map(({ facts, p }) => {
-            const { value } = window.explorer.map.amount(facts, p);
-            return Number.isFinite(value) ? value : -1;
-        })""",
-        cases,
-    )
-    assert sum(map(math.isinf, expected)) > 2
-    finite = [-1.0 if math.isinf(moved) else moved for moved in expected]
-    np.testing.assert_allclose(found, finite, rtol=1e-6)
-
-
 def test_map_of_each_measure_is_read_and_the_reading_stays_while_it_is_drawn_again(
     tab: Tab,
 ) -> None:
@@ -253,11 +120,11 @@ def test_map_of_each_measure_is_read_and_the_reading_stays_while_it_is_drawn_aga
     rotation = tab.state.pose.rotation
     at, found = read("error", r"worst error of the tool ([\d.,]+) mm", Open(stiff), of_the_load)
     moved = float(worst_error(OPTIMAL, at, rotation, [0.05] * 6).displacement)
-    assert number(found[3]) == pytest.approx(moved, rel=0.02)
+    assert number(found[3]) == pytest.approx(moved, rel=5e-3)
     at, found = read("deflection", r"deflection under the load ([\d.,]+) mm")
     soft = compliance(OPTIMAL, at, rotation, [1000.0] * 6)
     moved = float(np.linalg.norm(deflection(soft, [*load, 0.0, 0.0, 0.0])[:3]))
-    assert number(found[3]) == pytest.approx(moved, rel=0.02)
+    assert number(found[3]) == pytest.approx(moved, rel=5e-3)
     words = r"largest share of a limit ([\d.,]+) % \(([\w ]+)\)"
     at, found = read("share", words, Open(FULL))
     drawing = tab.running.page.services.get(WorkspaceFeed).drawing
@@ -265,8 +132,44 @@ def test_map_of_each_measure_is_read_and_the_reading_stays_while_it_is_drawn_aga
     assert drawing.request.load is not None
     case = load_case(FULL, rotation, np.array(drawing.request.load))
     share = float(largest_shares(case, rotation, at[None])[0][0])
-    assert 0.01 * number(found[3]) == pytest.approx(share, rel=0.02)
+    assert 0.01 * number(found[3]) == pytest.approx(share, rel=5e-3)
     assert found[4] in part_names(FULL)
+
+
+def test_reading_follows_the_mechanism_while_the_pointer_rests(tab: Tab) -> None:
+    session = tab.running.page.session
+    session.do(Set("view.workspace.colour", "condition"))
+    open_map(tab, 6.0)
+    words = re.compile(r"x ([−\d.]+), z ([−\d.]+) units: 1 / cond J ([\d.]+)")
+    reading = tab.page.locator(".ex-reading")
+    read_at(tab, 0.6, 0.4, words)
+
+    def is_of_the_state() -> bool:
+        found = words.match(reading.inner_text())
+        assert found is not None
+        at, rotation = (number(found[1]), 6.0, number(found[2])), tab.state.pose.rotation
+        expected = inverse_condition(jacobian(OPTIMAL, at, rotation), OPTIMAL.reach)
+        return number(found[3]) == pytest.approx(float(expected), abs=5e-6 + 1e-9)
+
+    assert is_of_the_state()
+    for yaw in np.arange(-70.0, -40.0, 2.0).tolist():
+        session.do(SetAngle(0, yaw))
+    assert not is_of_the_state()
+    tab.wait_for(is_of_the_state, "the reading of the last state")
+    # A load ten times as large has the same picture, with other numbers at its colours.
+    force = re.compile(r"largest actuator force ([\d.,]+) N")
+    session.do(Set("view.forces.force", (0.0, 0.0, -5.0)))
+    session.do(Set("view.workspace.colour", "force"))
+    expect(reading).to_contain_text(force)
+    before = force.search(reading.inner_text())
+    assert before is not None
+    session.do(Set("view.forces.force", (0.0, 0.0, -50.0)))
+
+    def is_ten_times_as_large() -> bool:
+        found = force.search(reading.inner_text())
+        return found is not None and number(found[1]) == pytest.approx(10 * number(before[1]), 5e-3)
+
+    tab.wait_for(is_ten_times_as_large, "the reading of the larger load")
 
 
 def test_map_of_the_tool_is_read_and_leads_the_tool_there(tab: Tab) -> None:
@@ -279,7 +182,7 @@ def test_map_of_the_tool_is_read_and_leads_the_tool_there(tab: Tab) -> None:
     goal = np.array([number(found[1]), 6.0, number(found[2])])
     offset = tab.state.pose.rotation @ np.array(tool)
     sizes = np.abs(margins(goal - offset, tab.state.pose.rotation))
-    assert number(found[3]) == pytest.approx(float(sizes.min()), abs=0.02)
+    assert number(found[3]) == pytest.approx(float(sizes.min()), abs=5e-3 + 1e-9)
     assert int(found[4]) == int(sizes.argmin()) + 1
     press(tab)
 

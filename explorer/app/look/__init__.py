@@ -22,10 +22,13 @@ def read_script(name: str, *arguments: object) -> str:
     """
     # Scripts come to a page in any order, so that each brings what all of them use.
     source = read_file("base.js") + read_file("clock.js") + read_file(f"{name}.js")
-    if not arguments:
-        return source
+    return source + call_script(name, *arguments) if arguments else source
+
+
+def call_script(name: str, *arguments: object) -> str:
+    """Return a call of the function that a script of this folder sets, with values of JSON."""
     values = ", ".join(msgspec.json.encode(each).decode() for each in arguments)
-    return f"{source}window.explorer.{name}({values});\n"
+    return f"window.explorer.{name}({values});\n"
 
 
 def read_stylesheet() -> str:

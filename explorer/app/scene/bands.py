@@ -71,12 +71,16 @@ class Colouring:
     warn_below: float
     load: FloatArray | None = None
 
+    @property
+    def banded(self) -> PositionMeasure:
+        """The measure of the bands: the smallest margin for one colour."""
+        return "margin" if self.measure == "plain" else self.measure
+
     @cached_property
     def bands(self) -> PositionBands:
-        """The bands of the measure; those of the smallest margin for one colour."""
-        measure = "margin" if self.measure == "plain" else self.measure
+        """The bands of that measure."""
         return position_bands(
-            self.design, self.rotation, measure, warn_below=self.warn_below, load=self.load
+            self.design, self.rotation, self.banded, warn_below=self.warn_below, load=self.load
         )
 
     def shells(

@@ -44,6 +44,11 @@ def dim(content: str) -> str:
     return f'<span class="ex-dim">{content}</span>'
 
 
+def reading(hint: str) -> str:
+    """Return the line as HTML in which a script writes what is under the pointer, else a hint."""
+    return f'<div class="ex-reading ex-dim" data-hint="{escape(hint)}">{escape(hint)}</div>'
+
+
 def swatch(colour: Rgb, look: str = "ex-swatch") -> str:
     """Return a mark in a colour: a square, or what another class of the stylesheet draws."""
     return f'<span class="{look}" style="--colour:{css(colour)}"></span>'

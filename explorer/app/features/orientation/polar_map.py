@@ -11,7 +11,7 @@ from html import escape
 import msgspec
 
 from explorer.app.widgets.colours import MARGIN_COLOURS, Rgb, css
-from explorer.app.widgets.markup import row, swatch, table
+from explorer.app.widgets.markup import reading, row, swatch, table
 from explorer.mechanism.tilt_torsion import TiltTorsion
 from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap
 
@@ -84,8 +84,7 @@ def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: Tilt
         f'<svg class="ex-map ex-tilts" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
         'aria-label="Greatest tilt by azimuth" '
         f'data-tilts="{escape(msgspec.json.encode(facts).decode())}">{"".join(pieces)}</svg>'
-        f'<div class="ex-dim">{KEY_OF_OTHER if is_other else KEY}</div>'
-        f'<div class="ex-reading ex-dim" data-hint="{HINT}">{HINT}</div>'
+        f'<div class="ex-dim">{KEY_OF_OTHER if is_other else KEY}</div>' + reading(HINT)
     )
 
 

@@ -10,7 +10,7 @@ from html import escape
 import msgspec
 
 from explorer.app.features.orientation.polar_map import RING
-from explorer.app.widgets.markup import caption
+from explorer.app.widgets.markup import caption, reading
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.orientations.torsions import TiltByTorsion
 
@@ -60,7 +60,7 @@ def torsion_strip(found: TiltByTorsion, torsion: float, tilt: float) -> str:
         + f'<svg class="ex-map ex-tilts" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
         'aria-label="Greatest tilt by torsion" '
         f'data-torsions="{escape(msgspec.json.encode(facts).decode())}">{"".join(pieces)}</svg>'
-        f'<div class="ex-reading ex-dim" data-hint="{HINT}">{HINT}</div>'
+        + reading(HINT)
     )
 
 

@@ -10,14 +10,13 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
-from explorer.app.browser.browser_facts import decode_text
-from explorer.app.browser.viser_gaps import run_script
+from explorer.app.browser.viser_gaps import run_script, run_script_in
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.files import tolerance_of
 from explorer.app.features.workspace.load import drawn_measure, map_measure
 from explorer.app.features.workspace.orientation import workspace_pose
-from explorer.app.features.workspace.slice_map import Axis, level_within, map_picture
+from explorer.app.features.workspace.slice_map import Axis, SliceMap, level_within, map_picture
 from explorer.app.features.workspace.tasks import Region, WorkspaceDrawing
 from explorer.app.features.workspace.volume import VolumeFeed
 from explorer.app.features.workspace.words import (
@@ -33,7 +32,7 @@ from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import coordinate_span, fine_step, round_up
 from explorer.app.inputs.tracks import Span
-from explorer.app.look import read_script
+from explorer.app.look import call_script, read_script
 from explorer.app.scene.bands import Measure
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
@@ -112,8 +111,9 @@ class WorkspacePanel:
         self._session = session
         self._feed, self._volumes = services.get(WorkspaceFeed), services.get(VolumeFeed)
         self._nearest_start: Pose | None = None
-        # The drawing whose solid is cut.
+        # The drawing whose solid is cut, and its map where the page shows it.
         self._drawing: WorkspaceDrawing | None = None
+        self._mapped: SliceMap | None = None
         self._show = shown_chips(buttons, session)
         self._cuts = cut_chips(buttons, session)
         self._top = gui.add_html("")
@@ -170,6 +170,7 @@ class WorkspacePanel:
                 _tolerance_span,
             )
         buttons.on("workspace.go", self._go_to)
+        buttons.on("workspace.read", self._read)
         buttons.on(COLOUR, self._colour_by, values=COLOURINGS)
         run_script(services.server, read_script("map"))
 
@@ -205,12 +206,12 @@ class WorkspacePanel:
             words += note(f"{load_words(state, any_direction=any_direction)}.")
         yield self._legend, "content", words
         yield self._cut, "content", box(self._cuts.html(state))
-        yield self._map, "visible", mapped is not None
         if mapped is not None:
-            if drawing is not None and state.view.at == "tool":
-                mapped = mapped.shifted(state.offset(drawing.request.rotation))
+            mapped = mapped.shifted(state.offset(mapped.colouring.rotation))
             picture = map_picture(mapped, state.position, state.design.reach)
             yield self._map, "content", box(picture)
+        self._mapped = mapped
+        yield self._map, "visible", mapped is not None
         yield self._details, "content", workspace_details(frame, self._feed)
 
     def _level(self, state: State) -> float:
@@ -266,6 +267,13 @@ class WorkspacePanel:
                 lambda state: SetPose(state.pose_at(position, workspace_pose(Frame(state)))),
                 who=client.client_id,
             )
+
+    def _read(self, text: str, client: viser.ClientHandle) -> None:
+        """Answer a browser that asks for the words at a position on the map."""
+        position: Triple | None = decode_text(text, _POSITION)
+        mapped = self._mapped
+        if position is not None and mapped is not None:
+            run_script_in(client, call_script("map", text, mapped.words_at(position)))
 
 
 def shown_chips(buttons: Buttons, session: Session) -> Chips:

@@ -1,33 +1,31 @@
 """The map of a slice of the workspace: the report's exact drawing, with axes, and the pose in it.
 
 The worker draws the map itself; the page puts it between axes, marks b4 or the tool point, and
-lets `look/map.js` read it under the pointer.
+answers `look/map.js`, which asks what is under the pointer.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from html import escape
-from typing import Any, Literal
+from typing import Literal
 from xml.etree.ElementTree import Element
 
 import msgspec
 import numpy as np
 
 from explorer.app.scene.bands import Colouring
-from explorer.app.widgets.markup import decimals_for
+from explorer.app.widgets.markup import decimals_for, reading
 from explorer.export.report.drawings.slice_drawing import cross, placing, ruler
 from explorer.export.report.drawings.slices import Slices, in_plane
 from explorer.export.report.markup import as_html, coordinate, element
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.numerics.number_text import format_number
-from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.statics.compliance import stiffness_of
-from explorer.statics.held import FORCE, INWARD, LIMITS, WRENCH, load_case
+from explorer.numerics.number_text import format_decimals, format_number
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.held import part_names
-from explorer.workspace.position_bands import MEASURE_WORDS
+from explorer.workspace.position_bands import MEASURE_WORDS, measure_positions
 from explorer.workspace.solids.solid import Solid
 
 Axis = Literal["x", "y", "z"]
@@ -41,6 +39,9 @@ WIDTH, MOST_HEIGHT = 316.0, 236.0
 LEFT, RIGHT, TOP, BOTTOM = 42.0, 10.0, 8.0, 36.0
 # Digits of a coordinate of the size of the reach.
 DIGITS = 4
+# Decimals of 1 / cond J.
+CONDITION_DECIMALS = 5
+HINT = "Point at the map to read it, click to go there."
 # Distance up to which the point counts as in the slice, over the reach.
 IN_SLICE = 1e-3
 
@@ -55,7 +56,9 @@ class SliceMap:
         lows, highs: Ends of the map on the two other axes, in design units.
         own_scale: The map's own points per design unit.
         markup: The map as SVG, from its lows, y upwards.
-        facts: What the page's script needs to compute the measure at a position.
+        left_out: Words for positions within the limits beyond the part that is drawn.
+        colouring: Colouring by the measure of the map.
+        offset: Vector from b4 to the point of which the map is, shape (3,), in design units.
     """
 
     axis: Axis
@@ -64,7 +67,9 @@ class SliceMap:
     highs: tuple[float, float]
     own_scale: float
     markup: str
-    facts: dict[str, Any]
+    left_out: str
+    colouring: Colouring
+    offset: FloatArray
 
     @property
     def plane(self) -> tuple[int, int]:
@@ -77,9 +82,31 @@ class SliceMap:
         across, (first, second) = AXES.index(self.axis), self.plane
         du, dv, dw = offset[[first, second, across]].tolist()
         (u0, v0), (u1, v1) = self.lows, self.highs
-        facts = {**self.facts, "offset": offset.tolist()}
         lows, highs = (u0 + du, v0 + dv), (u1 + du, v1 + dv)
-        return replace(self, level=self.level + dw, lows=lows, highs=highs, facts=facts)
+        return replace(self, level=self.level + dw, lows=lows, highs=highs, offset=offset)
+
+    def words_at(self, point: Triple) -> str:
+        """Return the coordinates of a position on the map and the measure there."""
+        design, measure = self.colouring.design, self.colouring.banded
+        decimals = decimals_for(design.reach, DIGITS)
+        at = ", ".join(f"{AXES[k]} {format_decimals(point[k], decimals)}" for k in self.plane)
+        positions = (np.array(point) - self.offset)[None]
+        values, found = measure_positions(
+            design, self.colouring.rotation, measure, positions, self.colouring.load
+        )
+        value, index = float(values[0]), int(found[0])
+        match measure:
+            case "margin":
+                words = f"min |δ| {format_decimals(value, decimals)} (δ{index + 1})"
+            case "condition":
+                words = f"1 / cond J {format_decimals(value, CONDITION_DECIMALS)}"
+            case _:
+                name, unit, factor = MEASURE_WORDS[measure]
+                words = f"{name} {format_number(factor * value, 3, infinite='∞')} {unit}"
+                parts = {"share": part_names(design), "force": PART_NAMES, "bending": PART_NAMES}
+                if measure in parts and 0.0 < value < math.inf:
+                    words += f" ({parts[measure][index]})"
+        return f"{at} units: {words}"
 
 
 def level_within(low: float, high: float, level: float | None) -> float:
@@ -113,7 +140,7 @@ def slice_map(
         level: Coordinate of the cut on that axis.
         whole: Cut solid of the workspace within the limits; None if all of it is drawn.
         part: Cut solid of the part that is drawn; None likewise.
-        left_out: What the page says of positions within the limits beyond that part.
+        left_out: Words for positions within the limits beyond that part.
     """
     slices = Slices.of(colouring.design, colouring.rotation, extent, colouring.bands)
     first, second = in_plane(axis)
@@ -130,55 +157,11 @@ def slice_map(
         (u1, v1),
         slices.own_scale,
         as_html(drawn),
-        {"leftOut": left_out, **map_facts(colouring)},
+        left_out,
+        # A copy without its bands, whose functions cannot leave the worker.
+        replace(colouring),
+        np.zeros(3),
     )
-
-
-def map_facts(colouring: Colouring) -> dict[str, Any]:
-    """Return what `look/map.js` needs to compute the measure at a position.
-
-    It is the gradients of the margins; the arms of the joints for other measures; and the words for
-    a measure that is infinite in singular positions, with the load and the limits of the parts, the
-    errors of the actuators, or the load and what gives way.
-    """
-    design, rotation, bands = colouring.design, colouring.rotation, colouring.bands
-    facts: dict[str, Any] = {"gradients": planes_of_singularity(rotation).tolist()}
-    if bands.measure == "margin":
-        return facts
-    platform = np.array([[*design.b1, 0.0], [design.b2, 0.0, 0.0], [design.b3, 0.0, 0.0]])
-    facts["arms"] = (platform @ rotation.T).tolist()
-    facts["a3"] = [*design.a3, 0.0]
-    facts["reach"] = design.reach
-    if bands.measure == "condition":
-        return facts
-    facts["tool"] = (rotation @ np.array(design.tool.position)).tolist()
-    name, unit, factor = MEASURE_WORDS[bands.measure]
-    facts["words"] = {"name": name, "unit": unit, "factor": factor}
-    if bands.measure == "error":
-        facts["errors"] = design.actuators.error_mm
-    elif bands.measure == "deflection":
-        facts["giving"] = _giving_facts(colouring)
-    elif bands.case is not None:
-        facts["load"] = {
-            "wrench": bands.case[WRENCH:FORCE].tolist(),
-            "anyForce": float(bands.case[FORCE]),
-            # Over limits that are infinite shares are zero.
-            "overLimits": (1.0 / bands.case[LIMITS:INWARD]).reshape(2, -1).tolist(),
-            "parts": part_names(design) if bands.measure == "share" else PART_NAMES[:10],
-        }
-    return facts
-
-
-def _giving_facts(colouring: Colouring) -> dict[str, Any]:
-    """Return the load about b4 and what gives way, in mm/N: 1 / k, and 1 / 3EI per cubic unit."""
-    design, rotation = colouring.design, colouring.rotation
-    load = np.zeros(6) if colouring.load is None else colouring.load
-    stiffness, bending = stiffness_of(design)
-    return {
-        "wrench": load_case(design, rotation, load)[WRENCH:FORCE].tolist(),
-        "actuators": (design.unit_mm / stiffness).tolist(),
-        "struts": (design.unit_mm / (3.0 * bending)).tolist(),
-    }
 
 
 def cut_loops(solid: Solid, axes: tuple[int, int]) -> list[FloatArray]:
@@ -244,7 +227,9 @@ def map_picture(mapped: SliceMap, position: Triple, reach: float) -> str:
         "highs": mapped.highs,
         "place": (left, bottom, scale),
         "decimals": decimals_for(reach, DIGITS),
-        **mapped.facts,
+        "leftOut": mapped.left_out,
+        # Another number if the measure may be another one anywhere: then the page asks again.
+        "measure": hash(repr(mapped.colouring)),
     }
     frame = element(
         "rect",
@@ -260,6 +245,5 @@ def map_picture(mapped: SliceMap, position: Triple, reach: float) -> str:
         f'<svg class="ex-map" viewBox="0 0 {coordinate(WIDTH)} {coordinate(height)}" role="img" '
         f'aria-label="{words}" data-map="{escape(msgspec.json.encode(facts).decode())}">'
         f'{as_html(frame)}<g transform="{size}" data-within="">{mapped.markup}</g>'
-        f"{''.join(map(as_html, pieces))}</svg>"
-        '<div class="ex-reading ex-dim">Point at the map to read it, click to go there.</div>'
+        f"{''.join(map(as_html, pieces))}</svg>" + reading(HINT)
     )
