@@ -76,14 +76,13 @@ class PoseIndices:
         are 1.
         """
         c = self.configuration
-        ends = c.design.platform_points[[0, 1, 1, 2, 2, 3]]
-        at_ends = Configuration(
-            c.design, c.position[..., None, :], c.rotation[..., None, :, :], ends
-        )
-        twists = twists_of_actuators(at_ends)
-        velocities = np.diagonal(twists[..., :3, :], axis1=-3, axis2=-1)
-        # Velocities are infinite in a singular pose.
-        return 1.0 / lengths_of(np.moveaxis(velocities, -1, -2))
+        twists = np.swapaxes(twists_of_actuators(c), -1, -2)
+        ends = c.design.platform_points[[0, 1, 1, 2, 2, 3]] - c.tool[..., None, :]
+        arms = ends @ np.swapaxes(c.rotation, -1, -2)
+        # Velocities of the points are infinite in a singular pose.
+        with np.errstate(invalid="ignore"):
+            speeds = lengths_of(twists[..., :3] + np.cross(twists[..., 3:], arms))
+        return np.where(np.isnan(speeds), 0.0, 1.0 / speeds)
 
     @property
     def transmission_index(self) -> FloatArray:

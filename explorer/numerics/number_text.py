@@ -3,7 +3,7 @@
 Whether a value is a rounding error follows from the size of the numbers from which it was
 computed: a design may have any unit, so no length is small in itself. Files and the command line
 have ASCII text, see `format_ascii` and `format_fixed`; pages and reports have `format_number`,
-`format_decimals` and `format_column`.
+`format_decimals`, `format_fitted` and `format_column`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from collections.abc import Sequence
 # Powers of ten from which on, and below which, a number for people is written without one.
 LEAST_POWER, MOST_POWER = -4, 9
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+# Sizes from which on, and below which, a number that holds still is written without one.
+LEAST_SIZE, MOST_SIZE = 1e-3, 1e7
 # Share of its size up to which a number is a rounding error.
 ROUNDING = 1e-12
 
@@ -130,6 +132,24 @@ def format_column(
     return [
         format_decimals(drop_rounding(value, size), decimals, infinite=infinite) for value in values
     ]
+
+
+def format_fitted(value: float, size: float, digits: int) -> str:
+    """Return a number whose decimals depend on a size alone, so that it holds still as it changes.
+
+    A number that would look like 0, though it is none, has digits of its own.
+
+    Args:
+        value: The number.
+        size: Size of the largest number expected.
+        digits: Number of digits at this size.
+    """
+    value = drop_rounding(value, size)
+    decimals = decimals_for(size, digits)
+    is_zero = abs(value) < 0.5 * 10.0**-decimals
+    if (size != 0.0 and not LEAST_SIZE <= size < MOST_SIZE) or (value != 0.0 and is_zero):
+        return format_number(value, min(digits, 3) if is_zero else digits)
+    return format_decimals(value, decimals)
 
 
 def decimals_for(size: float, digits: int) -> int:

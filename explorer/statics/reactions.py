@@ -29,8 +29,8 @@ LIMITED = (
 PART_NAMES = (
     *(f"actuator {joint}" for joint in JOINTS),
     *("bending of strut 2", "bending of strut 3"),
-    *("carriage 2 across the guide", "carriage 3 across the guide"),
-    *("moment of carriage 2 on the guide", "moment of carriage 3 on the guide"),
+    *("force of carriage 2", "force of carriage 3"),
+    *("moment of carriage 2", "moment of carriage 3"),
 )
 """Words for these parts, in the order of `LIMITED`."""
 

@@ -42,11 +42,11 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.widgets import charts
 from explorer.app.widgets.colours import FAR_WARNINGS, OUTLINE, Rgb, proximity_colour
-from explorer.app.widgets.markup import share
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.number_text import format_fitted
 
 OPTIMAL = PRESETS["paper-optimal"]
 
@@ -173,9 +173,9 @@ def test_primitive_meshes_are_closed_and_look_outwards() -> None:
 
 
 def test_small_share_is_not_shown_as_zero() -> None:
-    assert share(0.0308) == "0.0308"
-    assert share(1.651e-9) == "1.65 × 10⁻⁹"
-    assert share(0.0) == "0.0000"
+    assert format_fitted(0.0308, 1.0, 5) == "0.0308"
+    assert format_fitted(1.651e-9, 1.0, 5) == "1.65 × 10⁻⁹"
+    assert format_fitted(0.0, 1.0, 5) == "0.0000"
     thin = msgspec.structs.replace(OPTIMAL, b3=OPTIMAL.b2 + 1e-6)
     text = re.sub(r"<[^>]+>", " ", measures_table(Frame(opened(thin))))
     # Below a millionth, as its power of ten says.

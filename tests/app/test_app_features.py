@@ -272,8 +272,10 @@ OF_VALUES = (
 OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, GiveUp, Compare, TakePlan)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
-OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")}
-"""Commands that change the camera or the panels of one browser, which there is none of."""
+OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")} | {
+    f"{tab} › Copy the command line" for tab in ("Forces", "Precision", "Singularity")
+}
+"""Commands that change the camera, the panels or the clipboard of one browser: none is there."""
 
 WHERE_IT_IS_SHOWN = {
     StartThere: "Workspace › Go there",

@@ -23,16 +23,14 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.actions import FITTING, SetForce, fitting_scale
 from explorer.app.features.forces.load_figure import LoadFigure
 from explorer.app.features.forces.loads import Loads, NearestFeed, WeightsFeed, load_of
-from explorer.app.features.forces.panel import GO, WORST, ForcesPanel, largest, tables, verdict
+from explorer.app.features.forces.panel import GO, WORST, ForcesPanel
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle, load_tip, tool_point
-from explorer.app.features.forces.words import share_colour, share_look, share_words
 from explorer.app.features.precision.actions import SetTolerances
 from explorer.app.features.precision.budget import (
     SET,
     BudgetFeed,
     BudgetPart,
     budget_request,
-    budget_rows,
 )
 from explorer.app.features.precision.panel import TYPICAL, PrecisionPanel
 from explorer.app.features.precision.pose import PosePrecision
@@ -44,10 +42,14 @@ from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import ForcesView, PrecisionView
+from explorer.app.widgets.blocks import render, share_colour
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.colours import GHOST, SINGULAR
 from explorer.errors import InputError, NoAnswerError
 from explorer.export.tolerance_table import COLUMNS
+from explorer.measures.blocks.block import Share
+from explorer.measures.blocks.budget import tolerance_budget
+from explorer.measures.blocks.forces import most_held, reaction_tables, verdict
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
@@ -81,7 +83,7 @@ def move_to(state: State, *position: float) -> State:
 
 def words_of(state: State) -> str:
     """Return the verdict as text."""
-    return re.sub("<[^>]+>", " ", " ".join(verdict(loaded_pose(state))))
+    return words(render([verdict(loaded_pose(state))]))
 
 
 def loaded_pose(state: State) -> Any:
@@ -97,13 +99,14 @@ def test_tables_show_the_forces_that_hold_the_load() -> None:
     arm = pose.rotation @ (np.array(design.payload.centre) - tool)
     load = np.concatenate([force + weight, moment + np.cross(arm, weight)])
     given = design, pose.position, pose.rotation, load, tool
-    text = " ".join(tables(loaded_pose(state)))
+    text = render(reaction_tables(loaded_pose(state)))
     texts = re.findall(r"<td>(?:<span[^>]*>)?([^<]*)", text)
     shown = dict(pairwise(texts))
     for name, value in zip(JOINTS, actuator_forces(*given), strict=True):
         assert number(shown[name].removesuffix(" N")) == pytest.approx(value, abs=6e-3)
     for leg, value in zip((2, 3), 0.01 * np.array(strut_bending(*given)), strict=True):
-        assert number(shown[f"strut {leg}"].removesuffix(" N m")) == pytest.approx(value, abs=6e-4)
+        text = shown[f"bending of strut {leg}"].removesuffix(" N m")
+        assert number(text) == pytest.approx(value, abs=6e-4)
 
 
 @pytest.mark.parametrize(
@@ -112,8 +115,8 @@ def test_tables_show_the_forces_that_hold_the_load() -> None:
 )
 def test_verdict_and_bar_name_the_largest_share(factor: float, title: str, look: str) -> None:
     state = loaded_state(force=(0.0, 0.0, -10.0 * factor))
-    share = share_words(loaded_pose(state).share)
-    text = "".join(verdict(loaded_pose(state)))
+    share = Share(loaded_pose(state).share).text()
+    text = render([verdict(loaded_pose(state))])
     assert title in words_of(state)
     assert f"ex-{look}" in text
     assert "bending of strut 2" in text.lower()
@@ -127,20 +130,20 @@ def test_design_without_limits_shows_forces_and_no_shares() -> None:
     state = loaded_state(OPTIMAL)
     found = loaded_pose(state)
     assert not found.limited.any()
-    assert "Machine" in words_of(state)
-    assert "%" not in "".join(tables(found))
-    assert "".join(largest(Frame(state), found)).count("no limit") == 2
+    assert "No limits are given" in words_of(state)
+    assert "%" not in words(render(reaction_tables(found)))
+    assert render([most_held(found)]).count("no limit") == 2
     assert services_for().get(LoadFigure)(Frame(state)) == ""
 
 
 def test_singular_pose_shows_infinite_forces() -> None:
     state = move_to(loaded_state(), 10.0, 5.0, 0.0)
     assert "infinite" in words_of(state)
-    text = "".join(tables(loaded_pose(state)))
+    text = render(reaction_tables(loaded_pose(state)))
     assert "∞" in text
     assert "nan" not in text.lower()
     assert "pushes<" not in text
-    assert "worst direction" not in "".join(largest(Frame(state), loaded_pose(state)))
+    assert "worst direction" not in render([most_held(loaded_pose(state))])
     assert "∞" in services_for().get(LoadFigure)(Frame(state))
 
 
@@ -278,11 +281,11 @@ def test_force_that_is_not_finite_is_refused(force: tuple[float, float, float]) 
 
 def test_share_has_words_and_a_look() -> None:
     shares = [None, 0.004, 0.5, 0.9996, 1.0, 1.0000001, 1.004, 1.234, 1e5, math.inf]
-    words = [share_words(share).replace("\N{NO-BREAK SPACE}", " ") for share in shares]
+    texts = [Share(share).text().replace("\N{NO-BREAK SPACE}", " ") for share in shares]
     # What exceeds the limit never reads as the limit.
-    assert words[:6] == ["no limit", "0 %", "50 %", "100.0 %", "100.0 %", "above 100.0 %"]
-    assert words[6:] == ["100.4 %", "123 %", "∞", "∞"]
-    looks = [share_look(share) for share in (0.5, 0.9, 1.0, 1.001)]
+    assert texts[:6] == ["no limit", "0 %", "50 %", "100.0 %", "100.0 %", "above 100.0 %"]
+    assert texts[6:] == ["100.4 %", "123 %", "∞", "∞"]
+    looks = [Share(share).look for share in (0.5, 0.9, 1.0, 1.001)]
     assert looks == ["within", "close", "close", "beyond"]
 
 
@@ -331,7 +334,7 @@ def test_panel_has_the_numbers_of_the_pose(services: Services) -> None:
     worst, rms = precision.worst(), precision.rms()
     text = words(markup(PrecisionPanel(services), state))
     for value in (10.0 * worst.displacement, 10.0 * rms.displacement):
-        assert f"{float(value):.3g} mm" in text
+        assert f"{float(value):.2f} mm" in text
     assert f"{math.degrees(float(worst.turn)):.3g}°" in text
     moved = 10.0 * float(np.linalg.norm(precision.deflection[:3]))
     assert f"{moved:.3g} mm" in text
@@ -439,7 +442,7 @@ def test_budget_keeps_what_is_wanted_and_is_set_in_one_step(
     drawing = budget_of(budget_request(desk.state))
     assert drawing.found is not None
     assert drawing.costs.worst_displacement <= 0.5
-    assert len(re.findall("<tr", text)) == len(SOURCES)
+    assert len(re.findall('class="ex-meter"', text)) == len(SOURCES)
     desk.press(services.buttons, SET)
     design = desk.state.design
     assert design != before
@@ -488,5 +491,6 @@ def test_source_that_only_turns_the_tool_is_listed(services: Services) -> None:
     state = state_with(msgspec.structs.replace(OPTIMAL, actuators=errors))
     text = words(markup(PrecisionPanel(services), state))
     assert re.search(r"By source\s+l1\s+0(\.0+)? mm", text)
-    rows = "".join(budget_rows(budget_of(budget_request(state))))
+    drawing = budget_of(budget_request(state))
+    rows = render(tolerance_budget(drawing.costs, drawing.found))
     assert set(re.findall(r"--share:([\d.]+)%", rows)) == {"0.00"}

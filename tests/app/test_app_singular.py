@@ -28,7 +28,7 @@ from explorer.app.features.singularity.freedom import (
     PERIOD,
     PERIODS,
     FreeMotion,
-    freedom_words,
+    show_button,
 )
 from explorer.app.features.singularity.panel import SingularityPanel, summary
 from explorer.app.features.singularity.performance import performance_table
@@ -42,7 +42,9 @@ from explorer.app.state.actions import Set, SetMode, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import SingularView
+from explorer.app.widgets.blocks import render
 from explorer.errors import InputError
+from explorer.measures.blocks.singularity import freedoms
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.displacement import displacement
@@ -149,7 +151,7 @@ def test_distances_and_their_ghosts_are_those_of_the_nearest_poses(
     distances = [each.distance for each in nearest]
     turns = np.degrees(least_turns(state.pose.position, state.pose.rotation))
     for index, margin in enumerate(Frame(state).snapshot.margins):
-        row = re.search(rf"δ{index + 1} (\S+) (\S+) mm (\S+)° Go {INCIDENCES[index]}", words)
+        row = re.search(rf"δ{index + 1} (\S+) (\S+) (\S+) Go {INCIDENCES[index]}", words)
         assert row is not None
         expected = (margin, OPTIMAL.unit_mm * distances[index], turns[index])
         assert [number(text) for text in row.groups()] == pytest.approx(
@@ -199,13 +201,14 @@ def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
 ) -> None:
     shown = viewed(state, ghost="nearest", strata=True, ellipsoid="speed", ball=True)
     frame = Frame(shown)
-    words = plain(summary(frame))
+    shows = {f"show {number}": show_button(number) for number in (1, 2, 3)}
+    words = plain(summary(frame) + render(freedoms(frame.snapshot), shows))
     for index in incidences(frame.snapshot.stratum):
         assert f"δ{index} = 0: {INCIDENCES[index - 1]}" in words
-    freedoms = frame.snapshot.freedoms
+    found = frame.snapshot.freedoms
     assert "With all actuators locked the platform" in words
-    assert words.count("it turns") == words.count("Show the motion") == len(freedoms.turns)
-    assert ("at any angle" in words) == any(turn.is_finite for turn in freedoms.turns)
+    assert words.count("it turns") == words.count("Show the motion") == len(found.turns)
+    assert ("at any angle" in words) == any(turn.is_finite for turn in found.turns)
     panel = SingularityPanel(services)
     texts = [str(v) for _, n, v in panel.updates(frame) if n == "content"]
     assert not any(re.search(r"\b(nan|inf)\b", plain(text)) for text in texts)
@@ -213,7 +216,7 @@ def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
     placed = Placed(frame)
     motion = FreeMotion(services)
     list(motion.updates(placed))
-    desk.press(services.buttons, "singular.show", freedoms.turns[0].incidence)
+    desk.press(services.buttons, "singular.show", found.turns[0].incidence)
     for scene in (EllipsoidScene(services), BallScene(services), NearestGhost(services), motion):
         for _, name, value in scene.updates(placed):
             if name in ("points", "scale", "position", "wxyz", *BATCHED):
@@ -227,17 +230,17 @@ def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
 def test_singular_pose_says_about_which_line_locked_actuators_let_the_platform_turn(
     incidence: int, line: str, through: str
 ) -> None:
-    assert freedom_words(Frame(opened(OPTIMAL))) == ""
+    assert not list(freedoms(Frame(opened(OPTIMAL)).snapshot))
     frame = Frame(GoToSingularity(incidence).apply(random_states(1)[0]))
-    words = plain(freedom_words(frame))
+    words = plain(render(freedoms(frame.snapshot), {f"show {incidence}": show_button(incidence)}))
     place, rotation = np.array(frame.state.pose.position), frame.state.pose.rotation
     found = re.fullmatch(
-        f"With all actuators locked the platform can still move: it turns about {line}, pitch 0 "
-        rf"Show the motion through {through}(?: \((.*)\) units)?, along \((.*)\)",
+        f"With all actuators locked the platform can still move: it turns about {line}, pitch 0, "
+        rf"through {through}(?: \((.*)\) units)?, along \((.*)\) Show the motion",
         words,
     )
     assert found is not None
-    point, along = ([number(each) for each in (text or "0").split(", ")] for text in found.groups())
+    point, along = ([number(each) for each in (text or "0").split(",")] for text in found.groups())
     np.testing.assert_allclose(point, place if incidence == 1 else [0.0], atol=0.06)
     expected = [rotation[:, 0], place / np.linalg.norm(place), [1.0, 0.0, 0.0]][incidence - 1]
     np.testing.assert_allclose(along, expected, atol=0.006)

@@ -55,7 +55,7 @@ def test_report_commands_reproduce_its_figures(
     assert undated[0] == undated[1]
     volume = table_of(page, "Volumes")["exact volume"].values[0]
     assert answers["workspace"]["volume"] == volume
-    condition = table_of(page, "Measures")["inverse condition number, with the reach"].values
+    condition = table_of(page, "Conditioning")["1/cond J"].values
     assert [answers["singularity"]["inverse_condition"]] == condition
 
 

@@ -172,32 +172,32 @@ def test_report_singularity_and_leg_tables_hold_snapshot(seed: int) -> None:
     design, _ = ordinary_case(seed)
     home = design.home_pose
     page, unit, snapshot = ordinary_page(seed), design.unit_mm, explorer.evaluate(design, home)
-    margins = table_of(page, "Margins in")
+    margins = table_of(page, "Margins")
     for k in range(3):
         margin, volume = float(snapshot.margins[k]), float(snapshot.volumes[k])
-        assert margins[f"δ{k + 1}"].values == [margin, margin * unit, volume]
-    measures = table_of(page, "Measures")
-    assert measures["determinant of the Jacobian"].values == [snapshot.determinant]
-    condition = measures["inverse condition number, with the reach"]
-    assert condition.values == [snapshot.inverse_condition]
-    manipulability = measures["manipulability |det J|, with the reach"]
-    assert manipulability.values == [snapshot.manipulability]
-    assert measures["output transmission index"].values[0] == snapshot.transmission_index
-    assert measures["proximity: smallest |δ| over the reach"].values == [snapshot.proximity]
-    assert measures["assembly mode"].values == [snapshot.mode]
+        away, turn = snapshot.nearest_distances[k], math.degrees(snapshot.least_turns[k])
+        row = margins[f"δ{k + 1}"].values
+        assert row == pytest.approx([margin, margin * unit, away * unit, turn], rel=1e-12)
+        assert table_of(page, "Tetrahedra")[f"δ{k + 1}"].values == [volume]
+    measures = table_of(page, "Conditioning")
+    assert measures["det J"].values == [snapshot.determinant]
+    assert measures["1/cond J"].values == [snapshot.inverse_condition]
+    assert measures["min |δ| / reach"].values == [snapshot.proximity]
+    assert snapshot.mode_words in measures["assembly mode"].text
+    around = table_of(page, "Around the pose")
     radius = singularity_free_ball(home).radius
-    ball = measures["ball of positions without a singular one"]
+    ball = around["singularity-free radius"]
     assert ball.values == [radius, radius * unit]
     certified = certified_radius(design, home)
-    regular = measures["all poses nearer than this are regular"]
+    regular = around["regular within"]
     assert regular.values == [certified, certified * unit]
     nearest = table_of(page, "Nearest singular poses")
     for each in snapshot.nearest:
         found = nearest[f"δ{each.incidence} = 0"].values
-        assert found[:5] == [each.distance, each.distance * unit, *each.pose.position]
+        assert found[:3] == [*each.pose.position]
     gains = performance(design, home).translation.gain.tolist()
     speeds = table_of(page, "Speed of b4")
-    assert [row.values[0] for row in speeds.values()] == gains
+    assert [row.values[3] for row in speeds.values()] == gains
     least = least_clearances(design, home.rotation).clearance
     (legs,) = (each for each in page.all("section") if next(each.all("h2")).text == "Legs")
     for row, here, low in zip(
@@ -340,8 +340,8 @@ def test_report_empty_workspace_gives_reason() -> None:
     level = Pose((10.0, 5.0, 9.0), (1.0, 0.0, 0.0, 0.0))
     page = page_of(OPTIMAL, level)
     assert "The workspace is empty at this orientation because of margin δ2" in page.text
-    assert "The pose is singular: lines a1a2 and b2b3 meeting" in page.text
-    assert "infinite" in page.text
+    assert "Singular: δ2 = 0: lines a1a2 and b2b3 meeting" in page.text
+    assert "∞" in page.text
     commands = page.one(id="commands").text
     assert "--position 10.0 5.0 9.0 --quaternion 1.0 0.0 0.0 0.0" in commands
 
@@ -349,8 +349,8 @@ def test_report_empty_workspace_gives_reason() -> None:
 def test_report_singular_home_says_so() -> None:
     home = Pose.of_yaw_pitch_roll((10.0, 5.0, 0.0), (-73.1, 0.0, 0.0))
     page = page_of(msgspec.structs.replace(OPTIMAL, home=home))
-    assert "The pose is singular: a1 on the platform plane" in page.text
-    assert table_of(page, "Measures")["determinant of the Jacobian"].values == [0.0]
+    assert "Singular: δ1 = 0: a1 on the platform plane" in page.text
+    assert table_of(page, "Conditioning")["det J"].values == [0.0]
 
 
 def test_report_missing_values_give_reasons_in_their_place() -> None:

@@ -13,7 +13,7 @@ from explorer.app.features.singularity.distance import distance_table
 from explorer.app.features.singularity.panel import measures_table, summary
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
-from explorer.app.widgets.markup import fitted, share, signed
+from explorer.app.widgets.markup import signed
 from explorer.cli.commands.singularity import Singularity
 from explorer.cli.output import degrees, figures
 from explorer.mechanism.design_file import PRESETS
@@ -23,6 +23,7 @@ from explorer.numerics.number_text import (
     format_ascii,
     format_column,
     format_decimals,
+    format_fitted,
     format_fixed,
     format_number,
     snap_to_decimals,
@@ -38,7 +39,7 @@ def test_number_text_of_zero_has_no_sign(value: float, size: float, digits: int)
         format_ascii(value, digits, size=size),
         signed(value, digits),
         format_number(value, digits, size=size),
-        fitted(value, size, digits),
+        format_fitted(value, size, digits),
         *figures([value, size]),
         *degrees([value]),
     ):
@@ -53,13 +54,13 @@ def test_number_text_of_rounding_reads_zero_and_of_small_numbers_above_it_does_n
     assert format_number(rounding, size=size) == "0"
     assert drop_rounding(rounding, size) == 0.0
     assert float(figures([size, rounding])[1]) == 0.0
-    assert read(fitted(rounding, size, 5)) == 0.0
+    assert read(format_fitted(rounding, size, 5)) == 0.0
     in_column = format_column([size, rounding], 3, size=size)[1]
     assert read(in_column) == 0.0
     assert not NEGATIVE_ZERO.fullmatch(in_column)
     assert format_number(1e-9 * size, size=size) != "0"
     assert format_number(1e-30 * size) != "0"
-    assert share(1.651e-9) == "1.65 × 10⁻⁹"
+    assert format_fitted(1.651e-9, 1.0, 5) == "1.65 × 10⁻⁹"
 
 
 @given(st.integers(-(10**6), 10**6), st.floats(-1e-13, 1e-13))

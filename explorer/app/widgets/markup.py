@@ -7,21 +7,13 @@ from html import escape
 from typing import Literal
 
 from explorer.app.widgets.colours import MARGIN_COLOURS, Rgb, css, margin_text
-from explorer.numerics.number_text import (
-    decimals_for,
-    drop_rounding,
-    format_decimals,
-    format_number,
-)
+from explorer.measures.blocks.block import Look
+from explorer.numerics.number_text import format_decimals
 
 
 def by_theme(light: str, dark: str) -> str:
     """Return the CSS colour that is `light` on light pages and `dark` on dark ones."""
     return f"light-dark({light},{dark})"
-
-
-Look = Literal["within", "close", "beyond"]
-"""Whether a value keeps its bounds, is close to them, or beyond."""
 
 
 def box(*parts: str) -> str:
@@ -36,7 +28,7 @@ def status(words: str, look: Look) -> str:
 
 def caption(words: str, hint: str = "") -> str:
     """Return the caption of a part of a panel."""
-    return f'<div class="ex-caption"{_title(hint)}>{escape(words)}</div>'
+    return f'<div class="ex-caption"{_title(hint)}>{escape(words)}</div>' if words else ""
 
 
 def dim(content: str) -> str:
@@ -163,26 +155,3 @@ def sentence(message: str) -> str:
 def signed(value: float, digits: int = 3) -> str:
     """Return a number with a fixed number of decimals, see `format_decimals`."""
     return format_decimals(value, digits)
-
-
-# Numbers beyond these sizes have a power of ten.
-LEAST, MOST = 1e-3, 1e7
-
-
-def fitted(value: float, size: float, digits: int) -> str:
-    """Return a number whose decimals depend on a size alone, so that it holds still.
-
-    Args:
-        value: The number.
-        size: Size of the largest number expected.
-        digits: Number of digits at this size.
-    """
-    if size != 0.0 and not LEAST <= size < MOST:
-        return format_number(value, digits, size=size)
-    return signed(value, decimals_for(size, digits))
-
-
-def share(value: float) -> str:
-    """Return a number from 0 to 1 with four decimals, or more where it would look like 0."""
-    value = drop_rounding(value, 1.0)
-    return format_number(value, 3) if 0.0 < value < LEAST else format_decimals(value, 4)

@@ -9,16 +9,16 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
+from explorer.cli.blocks import lines
 from explorer.cli.load_options import LoadOptions, check_regular
 from explorer.cli.options import TypicalOptions
-from explorer.cli.output import assumed_lines, figure, figures, heading, pose_table, table
+from explorer.cli.output import assumed_lines, heading, pose_table
 from explorer.cli.values import hint, numbers
+from explorer.measures.blocks.precision import deflections, tool_errors
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import DIMENSIONS, Six
 from explorer.mechanism.pose import Triple
-from explorer.statics.accuracy import RMS_ERRORS, error_by_geometry
-from explorer.statics.compliance import is_elastic
-from explorer.statics.error_sources import SOURCES
+from explorer.statics.accuracy import error_by_geometry
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.tool_precision import BY_ACTUATORS, BY_DIMENSIONS, GROUPS, ToolPrecision
 
@@ -127,49 +127,8 @@ def _as_json(answer: Answer) -> dict[str, object]:
 
 
 def _as_lines(answer: Answer) -> Iterator[str]:
-    precision = answer.precision
-    loaded = precision.loaded
-    design = loaded.design
-    yield from (heading(design), *assumed_lines(answer.assumed))
-    yield from (pose_table(design, loaded.pose, answer.tool), "")
-    rows = [("error from", "displacement, units", "mm", "turn")]
-    moved, turned = (each.tolist() for each in precision.alone)
-    has_tolerances = any(moved[BY_DIMENSIONS]) or any(turned[BY_DIMENSIONS])
-    for group, kind, error in _totals(precision):
-        if has_tolerances or group == "actuators":
-            rows.append((f"{group}, {kind}", *_error(design, *error)))
-    by_source = [*zip(SOURCES, moved, turned, strict=True)]
-    dimensions = sorted(by_source[BY_DIMENSIONS], key=lambda row: -row[1])
-    for name, *error in (*by_source[BY_ACTUATORS], *(each for each in dimensions if any(each[1:]))):
-        rows.append((name, *_error(design, *error)))
-    yield from (table(rows, "<>>>"), f"RMS errors are those of {RMS_ERRORS}", "")
-    if not is_elastic(design):
-        yield "rigid: the design states no stiffness of its actuators and no struts"
-        return
-    rows = [("softest first", "mm/N", "direction")]
-    principal = precision.principal
-    for value, axis in zip(
-        principal.displacement.tolist(), principal.force_directions.tolist(), strict=True
-    ):
-        rows.append(("force", figure(value * design.unit_mm), "  ".join(figures(axis))))
-    rows.append(("", "°/(N m)", ""))
-    scale = float(np.degrees(1.0)) * 1e3 / design.unit_mm
-    for value, axis in zip(
-        principal.turn.tolist(), principal.moment_directions.tolist(), strict=True
-    ):
-        rows.append(("moment", figure(value * scale), "  ".join(figures(axis))))
-    yield from (table(rows, "<><"), "")
-    moved, turned = precision.deflection[:3], precision.deflection[3:]
-    rows = [
-        ("deflection", f"{'  '.join(figures((moved * design.unit_mm).tolist()))} mm"),
-        ("turn", f"{'  '.join(figures(np.degrees(turned).tolist()))} °"),
-    ]
-    if not np.isnan(precision.shares.guide):
-        parts = zip(PARTS, precision.shares, strict=True)
-        rows.append(("of it", ", ".join(f"{name} {100.0 * part:.1f} %" for name, part in parts)))
-    yield table(rows, "<<")
-
-
-def _error(design: Design, moved: float, turned: float) -> tuple[str, str, str]:
-    angle = figure(float(np.degrees(turned)))
-    return figure(moved), figure(moved * design.unit_mm), f"{angle}°"
+    loaded = answer.precision.loaded
+    yield from (heading(loaded.design), *assumed_lines(answer.assumed))
+    yield pose_table(loaded.design, loaded.pose, answer.tool)
+    yield from lines(tool_errors(answer.precision, listed=None))
+    yield from lines(deflections(answer.precision, "the load and the payload's weight"))

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-
+from explorer.cli.blocks import lines
 from explorer.cli.options import (
     DesignOptions,
     JsonOptions,
@@ -19,22 +18,19 @@ from explorer.cli.options import (
 from explorer.cli.output import (
     assumed_lines,
     attributes,
-    figure,
     finite,
     heading,
     pose_table,
-    table,
 )
 from explorer.cli.usage import UsageError
 from explorer.cli.values import FILE, OPTIONAL, Flag, hint, numbers, positive
 from explorer.files.writing import check_writable
+from explorer.measures.blocks.budget import tolerance_budget
 from explorer.measures.size import PositionSet, positions_over
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray
-from explorer.statics.accuracy import RMS_ERRORS
 from explorer.statics.budget.allocation import ToleranceBudget, costs_or_budget
 from explorer.statics.budget.costs import (
     PARTS,
@@ -42,7 +38,7 @@ from explorer.statics.budget.costs import (
     stated_tolerances,
     with_tolerances,
 )
-from explorer.statics.error_sources import IS_TILT, SOURCES
+from explorer.statics.error_sources import SOURCES
 
 PROGRAM = "explorer budget"
 WORDS = {"box": "nodes of a grid over the box", "workspace": "nodes of a grid in the workspace"}
@@ -172,62 +168,10 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
             yield f"worst over {costs.count:,} {WORDS[answer.over]}, at one orientation"
             if answer.over == "workspace" and not design.limits.margin:
                 yield "the limits demand no margin: nearer to singular poses errors are larger"
-        yield from ("", *_ranking(answer), "")
-        results = (
-            ("worst displacement", costs.worst_displacement, " mm", self.wanted),
-            ("worst turn", costs.worst_turn, "°", self.wanted_turn),
-            ("RMS displacement", costs.rms_displacement, " mm", None),
-            ("RMS turn", costs.rms_turn, "°", None),
-        )
-        rows = [
-            (
-                name,
-                f"{figure(value)}{unit}",
-                "" if wanted is None else f"of the wanted {wanted:g}{unit}",
-            )
-            for name, value, unit, wanted in results
-        ]
-        if answer.found is not None:
-            effort = f"{100.0 * answer.found.excess:.1f} % above the least"
-            rows.append(("sum of 1/tolerance", f"{figure(answer.found.effort)} /mm", effort))
-        yield from (table(rows, "<<<"), f"RMS errors are those of {RMS_ERRORS}")
-        if answer.found is not None:
-            far = float(costs.lengths[IS_TILT].max() / np.radians(1.0))
-            yield f"a tilt counts as what it moves the guide by at {figure(far)} mm from a1"
+        budget = tolerance_budget(costs, answer.found, self.wanted, self.wanted_turn)
+        yield from lines(budget)
         if answer.out is not None:
-            yield str(answer.out)
-
-
-def _ranking(answer: Answer) -> Iterator[str]:
-    """Yield the table of the sources from the costliest."""
-    costs = answer.costs
-    stated = stated_tolerances(answer.design)
-    header = ("mm per mm or °", "° per mm or °", "stated", "found", "moves, mm", "turns", "share")
-    rows: list[tuple[str, ...]] = [("error of", "part", *header)]
-    rows += [
-        (
-            SOURCES[k],
-            PARTS[k],
-            figure(float(costs.displacement[k])),
-            figure(float(costs.turn[k])),
-            _tolerance(stated, k),
-            _tolerance(costs.tolerances, k),
-            figure(float(costs.displacement_within[k])),
-            f"{figure(float(costs.turn_within[k]))}°",
-            f"{100.0 * float(costs.shares[k]):.1f} %",
-        )
-        for k in costs.ranking.tolist()
-    ]
-    if answer.found is None:
-        rows = [(*row[:5], *row[6:]) for row in rows]
-    yield table(rows, "<<" + ">" * (len(rows[0]) - 2))
-
-
-def _tolerance(tolerances: FloatArray, k: int) -> str:
-    value = float(tolerances[k])
-    if not np.isfinite(value):
-        return "any"
-    return f"{value:g}{'°' if IS_TILT[k] else ' mm'}"
+            yield from ("", str(answer.out))
 
 
 def _as_json(answer: Answer) -> dict[str, object]:

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
+from explorer.cli.blocks import lines
 from explorer.cli.load_options import LoadOptions, check_regular
-from explorer.cli.output import figure, figures, finite, heading, pose_json, pose_table, table
+from explorer.cli.output import finite, heading, pose_json, pose_table
 from explorer.cli.values import hint, numbers, positive
 from explorer.errors import InputError
+from explorer.measures.blocks.block import Statement
+from explorer.measures.blocks.forces import (
+    most_held,
+    most_of_actuators,
+    nearest_held,
+    reaction_tables,
+    verdict,
+    worst_force,
+)
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
-from explorer.mechanism.tool_point import tool_position
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import WorstDirection, worst_direction
 from explorer.statics.loaded import LoadedPose, WorstForce
-from explorer.statics.reactions import LIMITED, PART_NAMES
+from explorer.statics.reactions import LIMITED
 from explorer.statics.weights import Weights
 
 
@@ -154,88 +163,16 @@ def _force_json(added: WorstForce) -> dict[str, object]:
 def _as_lines(answer: Answer) -> Iterator[str]:
     loaded = answer.loaded
     design = loaded.design
-    yield from (heading(design), pose_table(design, loaded.pose, answer.tool), "")
-    yield from (table([("load acts at", "b4" if answer.tool is None else "the tool")], "<<"), "")
-    yield from (_actuators(loaded), "", _struts(loaded), "", _largest(answer))
+    yield from (heading(design), pose_table(design, loaded.pose, answer.tool))
+    yield f"load acts at          {'b4' if answer.tool is None else 'the tool'}"
+    facts = most_held(loaded)
+    if answer.added is not None:
+        worst = worst_force(answer.added, "the added force")
+        facts = replace(facts, facts=(*facts.facts, *worst))
+    yield from lines((verdict(loaded), *_nearest(answer), *reaction_tables(loaded)))
+    yield from lines((most_of_actuators(answer.worst), facts))
 
 
-def _actuators(loaded: LoadedPose) -> str:
-    """Return the table of the actuators' forces."""
-    held, has_process = loaded.held, loaded.design.payload.force_n > 0.0
-    size = float(np.abs(held.actuators).max())
-    rows = [("actuator", "force, N", *(["process, ± N"] * has_process), "of its limit")]
-    for index, joint in enumerate(JOINTS):
-        # What the payload's force of any direction may add either way.
-        process = [figure(float(held.spread[index]))] * has_process
-        force = figure(float(held.actuators[index]), size)
-        rows.append((joint, force, *process, _share(loaded, index)))
-    return table(rows, "<" + ">" * (len(rows[0]) - 1))
-
-
-def _struts(loaded: LoadedPose) -> str:
-    """Return the table of struts and carriages."""
-    held, has_process = loaded.held, loaded.design.payload.force_n > 0.0
-    newton_metre = loaded.design.unit_mm * 1e-3
-    head = ["strut", "bending, N x unit", "N m", *(["process, ± N m"] * has_process)]
-    rows = [(*head, "of its limit", "on the guide, N", "of its limit")]
-    for index in range(2):
-        moment = float(held.bending[index])
-        process = [figure(newton_metre * float(held.spread[6 + index]))] * has_process
-        rows.append(
-            (
-                f"leg {index + 2}",
-                figure(moment),
-                figure(moment * newton_metre),
-                *process,
-                _share(loaded, 6 + index, 10 + index),
-                figure(float(held.guide_force[index])),
-                _share(loaded, 8 + index),
-            )
-        )
-    return table(rows, "<" + ">" * (len(rows[0]) - 1))
-
-
-def _largest(answer: Answer) -> str:
-    """Return the table of what is held at most, and where."""
-    loaded, added = answer.loaded, answer.added
-    rows = [("largest force in every direction by the actuators", _newtons(answer.largest_force))]
-    if answer.worst.share:
-        actuator = JOINTS[int(answer.worst.actuator)]
-        direction = "  ".join(figures(answer.worst.direction.tolist()))
-        rows.append(("worst direction", f"{direction}, of {actuator}"))
-    newton = loaded.newton
-    if newton.share:
-        force = f"{_newtons(1.0 / newton.share)}, limited by {PART_NAMES[newton.part]}"
-        rows.append(("largest force in every direction by all parts", force))
-    payload = loaded.largest_payload
-    most = "no limit" if np.isinf(payload) else f"{figure(payload)} kg"
-    rows.append(("largest payload", most))
-    if added is not None and added.share:
-        direction = "  ".join(figures(added.direction.tolist()))
-        what = f"{PART_NAMES[added.part]} at {_percent(added.share)}"
-        rows.append(("worst direction of the added force", f"{direction}, {what}"))
-    if loaded.share > 1.0:
-        rows.append(("gives way", f"{PART_NAMES[loaded.worst]} at {_percent(loaded.share)}"))
-        rows.append(("nearest position that holds the load", _nearest(answer)))
-    return table(rows, "<<")
-
-
-def _nearest(answer: Answer) -> str:
-    if answer.nearest is None:
-        return "none found in this orientation and mode"
-    there = tool_position(answer.nearest, answer.loaded.tool)
-    return "  ".join(figures(there))
-
-
-def _newtons(value: float) -> str:
-    return "no limit" if np.isinf(value) else f"{figure(value)} N"
-
-
-def _share(loaded: LoadedPose, *parts: int) -> str:
-    """Return the largest share of the limits of some parts; "-" without a limit."""
-    shares = [float(loaded.shares[part]) for part in parts if loaded.limited[part]]
-    return _percent(max(shares)) if shares else "-"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f} %"
+def _nearest(answer: Answer) -> Iterator[Statement]:
+    if answer.loaded.share > 1.0:
+        yield nearest_held(answer.loaded, answer.nearest, answer.tool)

@@ -32,10 +32,17 @@ from explorer.export.report.sections.singularity import singularity_section
 from explorer.export.report.sections.workspace import workspace_section
 from explorer.files.packaged import packaged_file
 from explorer.files.versions import versions
+from explorer.measures.blocks.source import (
+    DESIGN_FILE,
+    load_source,
+    name_of,
+    pose_options,
+    pose_source,
+)
 from explorer.measures.catalogue import CATALOGUE
-from explorer.mechanism.design_file import PRESETS, encode_design
-from explorer.mechanism.tool_point import tool_position
+from explorer.mechanism.design_file import encode_design
 from explorer.numerics.number_text import format_number
+from explorer.statics.loaded import LoadedPose
 from explorer.workspace.accessible.workspace import AccessibleWorkspace
 
 # The page may fetch nothing.
@@ -129,13 +136,12 @@ def _unit(words: str) -> Element:
 
 def _reproduction(data: ReportData) -> Iterator[Element]:
     yield element("h2", "How to reproduce it")
-    is_preset = PRESETS.get(data.design.name) == data.design
+    name = name_of(data.design)
     where: tuple[Piece, ...] = ("The design is a preset of the explorer. ",)
-    if not is_preset:
-        where = ("Save the file below as ", element("code", "design.json"), ". ")
+    if name == DESIGN_FILE:
+        where = ("Save the file below as ", element("code", name), ". ")
     yield paragraph(*where, "These commands give the same figures:")
-    source = shlex.quote(data.design.name if is_preset else "design.json")
-    yield element("pre", "\n".join(_commands(data, source)), id="commands")
+    yield element("pre", "\n".join(_commands(data, shlex.quote(name))), id="commands")
     if data.record is None:
         yield paragraph("Nothing here is random; there is no seed.")
     else:
@@ -159,32 +165,26 @@ def _reproduction(data: ReportData) -> Iterator[Element]:
 
 
 def _commands(data: ReportData, source: str) -> Iterator[str]:
-    pose = data.snapshot.pose
-    turned = "" if data.is_home else f" --quaternion {_words(pose.quaternion)}"
-    at = "" if data.is_home else f" --position {_words(pose.position)}{turned}"
-    # With --at tool a position is that of the tool.
-    tool = tool_position(pose, data.design.tool.position)
-    at_tool = "" if data.is_home else f" --position {_words(tool)}{turned}"
+    design, pose = data.design, data.snapshot.pose
+    turned = "" if data.is_home else f" --quaternion {' '.join(map(repr, pose.quaternion))}"
     legs = " --interference" if isinstance(data.accessible, AccessibleWorkspace) else ""
     record = "" if data.record is None else " --record record.json"
+    at = pose_options(design, pose)
     yield f"explorer report --design {source}{at}{record} --out report.html"
     yield f"explorer workspace --design {source}{turned} --hull{legs}"
-    yield f"explorer singularity --design {source}{at}"
-    yield f"explorer interference --design {source}{at}"
+    yield pose_source("singularity", design, pose).command
+    yield pose_source("interference", design, pose).command
+    loaded = LoadedPose(design, pose)
     if data.case.is_loaded or data.case.is_limited:
-        yield f"explorer forces --design {source}{at_tool} --at tool"
+        yield load_source("forces", loaded).command
     if data.precision is not None:
-        yield f"explorer accuracy --design {source}{at_tool} --at tool"
+        yield load_source("accuracy", data.precision.loaded).command
     if data.held is not None:
         yield f"explorer workspace --design {source}{turned} --load 0 0 0"
     if not isinstance(data.bill, Missing):
         yield f"explorer export mechanism --design {source} --out mechanism.zip"
     if data.record is not None:
         yield "explorer optimise --repeat record.json --out data.json"
-
-
-def _words(values: tuple[float, ...]) -> str:
-    return " ".join(repr(float(value)) for value in values)
 
 
 _SECTIONS: tuple[Callable[[ReportData], Iterable[Element]], ...] = (

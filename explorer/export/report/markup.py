@@ -11,7 +11,7 @@ from typing import TypeAlias
 from unicodedata import category
 from xml.etree.ElementTree import Element, tostring
 
-from explorer.numerics.number_text import format_column, format_decimals, format_number
+from explorer.numerics.number_text import format_decimals, format_number
 
 Piece: TypeAlias = "Element | str | float | None"
 Cell: TypeAlias = "Piece | Sequence[Piece]"
@@ -68,16 +68,12 @@ def coordinate(value: float) -> str:
 
 def number(value: float, digits: int = 6) -> Element:
     """Return an element with a rounded number, whose `value` is the number in full."""
-    return element("data", format_number(value, digits), value=repr(float(value) + 0.0))
+    return figure(format_number(value, digits), value)
 
 
-def numbers(values: Sequence[float], digits: int = 4) -> list[Element]:
-    """Return elements with numbers of equal decimals, as `number` does, for a column."""
-    texts = format_column(values, digits)
-    return [
-        element("data", text, value=repr(float(value) + 0.0))
-        for text, value in zip(texts, values, strict=True)
-    ]
+def figure(text: str, value: float) -> Element:
+    """Return an element with a number as text, whose `value` is the number in full."""
+    return element("data", text, value=repr(float(value) + 0.0))
 
 
 def percentage(share: float) -> Element:
@@ -118,7 +114,7 @@ def whole(value: int) -> Element:
 
 
 def table(
-    heads: Sequence[str], rows: Iterable[Sequence[Cell]], *, align: str, caption: str | None = None
+    heads: Sequence[str], rows: Iterable[Sequence[Cell]], *, align: str, caption: Piece = None
 ) -> Element:
     """Return a table.
 
@@ -141,7 +137,7 @@ def table(
 
     return element(
         "table",
-        element("caption", caption) if caption else None,
+        None if caption is None else element("caption", caption),
         element("thead", line("th", heads)) if heads else None,
         element("tbody", *(line("td", row) for row in rows)),
     )

@@ -11,11 +11,10 @@ from explorer.app.features.optimise.words import decimals_of
 from explorer.app.state.compared import SLOTS
 from explorer.app.state.state import State
 from explorer.app.widgets.colours import COMPARED, Rgb
-from explorer.app.widgets.markup import LEAST, MOST, format_number
 from explorer.measures.catalogue import Measure
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import Design
-from explorer.numerics.number_text import format_decimals
+from explorer.numerics.number_text import LEAST_SIZE, MOST_SIZE, format_decimals, format_number
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9
@@ -118,7 +117,7 @@ def value_text(measure: Measure, value: float, size: float, *, signed: bool = Fa
         return "" if signed else measure.names[round(value) - 1]
     if measure.is_whole:
         return format_decimals(value, 0, signed=signed)
-    if size != 0.0 and not LEAST <= size < MOST:
+    if size != 0.0 and not LEAST_SIZE <= size < MOST_SIZE:
         return ("+" if signed and value >= 0.0 else "") + format_number(value)
     text = format_decimals(value, decimals_of(size), signed=signed)
     if not text.strip("0."):

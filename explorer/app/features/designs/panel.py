@@ -20,9 +20,10 @@ from explorer.app.state.frame import Frame
 from explorer.app.storage.library import Entry
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Does, press_button
-from explorer.app.widgets.markup import box, format_number, note
+from explorer.app.widgets.markup import box, note
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, PRESETS
+from explorer.numerics.number_text import format_number
 
 # Number of rows on a page of the list.
 ROWS = 24

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import Loads
-from explorer.app.features.forces.words import share_look, share_words
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import figure
+from explorer.measures.blocks.block import Share
 from explorer.statics.reactions import PART_NAMES, has_limits
 
 
@@ -22,5 +22,5 @@ class LoadFigure:
         if not has_limits(loaded.design):
             return ""
         hint = f"Largest share of a limit under the load of this tab: {PART_NAMES[loaded.worst]}."
-        look = f"ex-{share_look(loaded.share)}"
-        return figure("Forces", "Load here", share_words(loaded.share), hint=hint, look=look)
+        share = Share(loaded.share)
+        return figure("Forces", "Load here", share.text(), hint=hint, look=f"ex-{share.look}")

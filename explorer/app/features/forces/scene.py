@@ -17,14 +17,6 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.actions import SetForce, fitting_scale, rounded
 from explorer.app.features.forces.arrows import ForceArrows
 from explorer.app.features.forces.loads import Loads
-from explorer.app.features.forces.words import (
-    Share,
-    larger,
-    newtons,
-    share_colour,
-    share_words,
-    shares_of,
-)
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed, scene_scale
@@ -38,7 +30,10 @@ from explorer.app.scene.shapes import (
 )
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.blocks import share_colour
 from explorer.app.widgets.colours import GHOST, Rgb
+from explorer.measures.blocks.block import Share
+from explorer.measures.blocks.forces import shares_of
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import position_of
@@ -109,8 +104,8 @@ class ForcesScene(ScenePart):
         for index, joint in enumerate(JOINTS):
             label = self._labels[joint]
             force, more = float(loaded.held.actuators[index]), float(loaded.held.spread[index])
-            words = newtons(drop_rounding(force, size), 3) + (
-                f" ± {newtons(more, 2)}" if more else ""
+            words = _newtons(drop_rounding(force, size), 3) + (
+                f" ± {_newtons(more, 2)}" if more else ""
             )
             yield label, "text", f"{joint} {words}{_told(shares[index])}"
             yield label, "position", tuple(places[index].tolist())
@@ -128,13 +123,13 @@ class ForcesScene(ScenePart):
         tool = tool_point(placed)
         tails[0], vectors[0] = tool, load_tip(placed) - tool
         force = math.hypot(*state.view.forces.force)
-        yield self._labels["load"], "text", newtons(force, 3)
+        yield self._labels["load"], "text", _newtons(force, 3)
         yield self._labels["load"], "position", tuple((tails[0] + vectors[0]).tolist())
         weight = weight_of(loaded)
         if weight > 0.0:
             tails[1] = placed.on_platform(state.design.payload.centre)
             vectors[1] = reaction_vectors(placed, weight * np.array([state.design.gravity]))[0]
-            yield self._labels["weight"], "text", f"weight {newtons(weight, 3)}"
+            yield self._labels["weight"], "text", f"weight {_newtons(weight, 3)}"
             yield self._labels["weight"], "position", tuple((tails[1] + vectors[1]).tolist())
         if loaded.is_regular:
             feet, tips = placed.struts
@@ -145,7 +140,7 @@ class ForcesScene(ScenePart):
             vectors[2:] = reaction_vectors(placed, forces)
             l1, d1, d2, d3, d4, l4, *_ = shares_of(loaded)
             colours[2:] = [
-                share_colour(e) for e in (l1, larger(d1, d2), larger(d3, d4), l4, d1, d3)
+                share_colour(e) for e in (l1, _larger(d1, d2), _larger(d3, d4), l4, d1, d3)
             ]
         yield from self._arrows.draw(tails, vectors, colours, placed.thickness)
 
@@ -162,7 +157,7 @@ class ForcesScene(ScenePart):
         towards = math.copysign(1.0, float(loaded.held.actuators[1 + 2 * index]))
         top = foot + np.array([towards * height, 0.0, 0.0])
         shares = shares_of(loaded)
-        share = larger(shares[6 + index], shares[10 + index])
+        share = _larger(shares[6 + index], shares[10 + index])
         colour = share_colour(share)
         yield self._bending[index], "vertices", np.array([foot, tip, top], dtype=np.float32)
         yield self._bending[index], "faces", np.array([[0, 1, 2]], dtype=np.uint32)
@@ -267,6 +262,15 @@ def scale_of(placed: Placed) -> float:
     return fitting_scale(state.design.payload.weight_n, state.view.forces.scale)
 
 
-def _told(share: Share) -> str:
-    """Return what a label adds of a share."""
-    return "" if share is None else f" · {share_words(share)}"
+def _told(share: float | None) -> str:
+    """Return a share of a limit beside a force, "" without a limit."""
+    return "" if share is None else f" · {Share(share).text()}"
+
+
+def _larger(*shares: float | None) -> float | None:
+    """Return the largest of some shares."""
+    return max((each for each in shares if each is not None), default=None)
+
+
+def _newtons(value: float, digits: int) -> str:
+    return f"{format_number(value, digits, infinite='∞')}{' N' if math.isfinite(value) else ''}"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import figure
-from explorer.app.widgets.markup import format_number
 from explorer.legs.clearance import PAIRS, pair_name
+from explorer.numerics.number_text import format_number
 
 
 def clearance_figure(frame: Frame) -> str:

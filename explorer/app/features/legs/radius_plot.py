@@ -25,11 +25,12 @@ from explorer.app.widgets.charts import (
     line,
 )
 from explorer.app.widgets.colours import Rgb
-from explorer.app.widgets.markup import alert, box, dim, format_number, row, sentence, swatch, table
+from explorer.app.widgets.markup import alert, box, dim, row, sentence, swatch, table
 from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.legs.clearance import PAIRS
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.workspace.accessible.radii import RadiusCurve
 
 # Share of the volume without radii; the largest radius that keeps it is marked.

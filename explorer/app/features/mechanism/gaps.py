@@ -35,9 +35,9 @@ from explorer.app.scene.shapes import (
 )
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import SINGULAR, WARNED, Rgb, proximity_colour
-from explorer.app.widgets.markup import fitted
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_fitted
 
 # Most dashes of one gap, their period in scene units, and the share that is drawn.
 DASHES, PERIOD, DRAWN = 32, 0.32, 0.6
@@ -138,8 +138,8 @@ def gap_text(placed: Placed, index: int, approach: Approach) -> str:
     reach, unit_mm = snapshot.design.reach, snapshot.design.unit_mm
     if approach.level == 0.0:
         return f"δ{index + 1} = 0{'' if approach.is_touching else ', lines parallel'}"
-    margin = fitted(float(snapshot.margins[index]), reach, 4)
-    length = fitted(snapshot.gaps.lengths[index] * unit_mm, reach * unit_mm, 4)
+    margin = format_fitted(float(snapshot.margins[index]), reach, 4)
+    length = format_fitted(snapshot.gaps.lengths[index] * unit_mm, reach * unit_mm, 4)
     return f"δ{index + 1} {margin} · {length} mm"
 
 

@@ -15,8 +15,9 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chip, Chips, turn
 from explorer.app.widgets.commands import Key
-from explorer.app.widgets.markup import box, fitted
+from explorer.app.widgets.markup import box
 from explorer.mechanism.margins import mode_name
+from explorer.numerics.number_text import format_fitted
 from explorer.workspace.limits.broken import Violation
 
 MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
@@ -95,7 +96,9 @@ def _row(frame: Frame, mode: int) -> str:
     is_here = mode in frame.snapshot.bordering_modes
     if solution.feasible:
         there = solution.position[mode] + frame.state.offset(solution.rotation[mode])
-        place = "".join(f"<span>{fitted(value, reach, 3)}</span>" for value in there.tolist())
+        place = "".join(
+            f"<span>{format_fitted(value, reach, 3)}</span>" for value in there.tolist()
+        )
         # The modes of a singular pose are all singular, so that none of them looks safe.
         look = "" if frame.snapshot.is_singular else "ex-within"
         limits, hint = _limits(frame.snapshot.mode_violations[mode], look)

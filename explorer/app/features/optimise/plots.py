@@ -16,8 +16,8 @@ from explorer.app.state.state import Run
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import BLUE, FONT, ORANGE, add_chart, line
 from explorer.app.widgets.colours import css
-from explorer.app.widgets.markup import format_number
 from explorer.measures.catalogue import CATALOGUE
+from explorer.numerics.number_text import format_number
 from explorer.optimise import curves
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import Problem

@@ -29,25 +29,13 @@ from explorer.app.features.optimise.problem import (
 )
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import Run, State
-from explorer.app.widgets.markup import (
-    Look,
-    alert,
-    box,
-    decimals_for,
-    dim,
-    format_number,
-    meter,
-    row,
-    sentence,
-    signed,
-    status,
-    table,
-)
+from explorer.app.widgets.markup import alert, box, dim, meter, row, sentence, signed, status, table
+from explorer.measures.blocks.block import Look
 from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.clearance import CERTAIN
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
-from explorer.numerics.number_text import format_decimals
+from explorer.numerics.number_text import decimals_for, format_decimals, format_number
 from explorer.optimise.conflicts import Conflict
 from explorer.optimise.curves import CALLED, GOALS
 from explorer.optimise.outcome import Iterate

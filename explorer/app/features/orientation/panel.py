@@ -24,18 +24,10 @@ from explorer.app.look import read_script
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.markup import (
-    alert,
-    box,
-    caption,
-    dim,
-    format_number,
-    row,
-    table,
-)
+from explorer.app.widgets.markup import alert, box, caption, dim, row, table
 from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
-from explorer.numerics.number_text import format_decimals
+from explorer.numerics.number_text import format_decimals, format_number
 from explorer.workspace.orientations.share import OrientationShare
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,

@@ -26,12 +26,12 @@ from explorer.app.state.paths import Journey
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import ORANGE, axis, dots, level_axis, line
 from explorer.app.widgets.colours import MARGIN_COLOURS
-from explorer.app.widgets.markup import format_number, margin_name, signed, swatch
+from explorer.app.widgets.markup import margin_name, signed, swatch
 from explorer.mechanism.folds import to_folds
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins
 from explorer.mechanism.pose import Pose, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_decimals
+from explorer.numerics.number_text import format_decimals, format_number
 
 # Dashes of the incidences' lines beside their colours, and the marks of the legend.
 DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))

@@ -10,11 +10,11 @@ import numpy as np
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import Loads
-from explorer.app.features.forces.words import MOST, share_look
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
 from explorer.app.widgets.markup import note
+from explorer.measures.blocks.block import MOST_SHARE, Share
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.paths.loads import DemandedLoad, PathLoads
@@ -72,11 +72,11 @@ def load_words(loads: JourneyLoads) -> str:
     if part is None:
         words = f"Nothing holds a load {at}: singular" if share else "No part bears a load"
     else:
-        number = f"{format_number(100.0 * share, 3)} %" if share < MOST else "∞"
+        number = f"{format_number(100.0 * share, 3)} %" if share < MOST_SHARE else "∞"
         most = "no bound" if math.isinf(bound) else f"{format_number(100.0 * bound, 3)} % at most"
         words = f"Largest share {number} ({most}): {PART_NAMES[part]}, {at}"
         hint = f"That of {len(loads.time)} samples; in parentheses a bound of all between them"
-    return f'<div class="ex-{share_look(share)}" title="{hint}">{escape(words)}</div>'
+    return f'<div class="ex-{Share(share).look}" title="{hint}">{escape(words)}</div>'
 
 
 def demand_note(state: State) -> str:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise.problem import requested_box
 from explorer.app.features.precision.actions import SetTolerances
-from explorer.app.features.precision.figures import ACTUATOR, DIGITS, DIMENSION, KINDS
 from explorer.app.features.precision.tasks import (
     BudgetDrawing,
     BudgetRequest,
@@ -24,15 +22,13 @@ from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.markup import box, dim, meter, note, row, swatch, table
+from explorer.app.widgets.markup import note
 from explorer.app.widgets.under_way import problem
+from explorer.measures.blocks.budget import tolerance_budget
 from explorer.measures.size import PositionSet
-from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Pose
-from explorer.numerics.number_text import format_number
-from explorer.statics.budget.costs import PARTS, SourceCosts
-from explorer.statics.error_sources import IS_TILT, SOURCES
 
 OVER: dict[str, PositionSet] = {
     "the present pose": "pose",
@@ -142,7 +138,7 @@ class BudgetPart:
         """Yield the updates that make the part show the frame."""
         yield from self._controls.updates(frame)
         yield self._result, "visible", self._feed.request is not None
-        yield self._result, "content", box(*self._parts())
+        yield self._result, "content", self._content()
 
     @property
     def _found(self) -> BudgetDrawing | None:
@@ -150,14 +146,20 @@ class BudgetPart:
         is_found = drawing is not None and drawing.found is not None and self._feed.is_current
         return drawing if is_found else None
 
-    def _parts(self) -> Iterator[str]:
+    def _content(self) -> str:
         feed = self._feed
         if feed.problem is not None:
-            yield problem(feed, "There is no budget", "")
-        elif feed.drawing is None:
-            yield note("computing …")
-        else:
-            yield from budget_rows(feed.drawing)
+            return problem(feed, "There is no budget", "")
+        if feed.drawing is None:
+            return note("computing …")
+        request = feed.drawing.request
+        button = press_button(SET, "", "Set these tolerances", hint=SET_HINT, class_name="ex-link")
+        return render(
+            tolerance_budget(
+                feed.drawing.costs, feed.drawing.found, request.wanted, request.wanted_turn
+            ),
+            {"set": button},
+        )
 
     def _set(self, _: str, client: viser.ClientHandle) -> None:
         found = self._found
@@ -168,59 +170,3 @@ class BudgetPart:
 
 def _is_wanted(state: State) -> bool:
     return state.view.precision.budget and state.view.precision.wanted is not None
-
-
-def budget_rows(drawing: BudgetDrawing) -> Iterator[str]:
-    """Yield the errors that the tolerances allow, and a bar for each source of errors, as HTML."""
-    costs, found = drawing.costs, drawing.found
-    moved, turned = (
-        format_number(value, DIGITS) for value in (costs.worst_displacement, costs.worst_turn)
-    )
-    where = "" if costs.count == 1 else f" at the worst of {costs.count:,} positions"
-    has_tolerances = bool(costs.tolerances[np.isfinite(costs.tolerances)].any())
-    if not has_tolerances:
-        yield note(
-            "The design states no tolerances; the bars show what an error of 1 mm, and of a tilt "
-            "that moves the guide's end by 1 mm, costs."
-        )
-    else:
-        yield f'<div class="ex-status">±{moved} mm, ±{turned}°{dim(where)}</div>'
-        rms = format_number(costs.rms_displacement, DIGITS)
-        yield f'<div title="{KINDS["RMS"]}">{dim("RMS displacement")} {rms} mm</div>'
-    if found is not None:
-        above = format_number(100.0 * found.excess, 2)
-        button = press_button(SET, "", "Set these tolerances", hint=SET_HINT, class_name="ex-link")
-        words = dim(f"At most {above} % above the least effort.")
-        yield f'<div class="ex-line">{words} {button}</div>'
-    yield (
-        f'<div class="ex-flow ex-after">{swatch(ACTUATOR)} {dim("actuators")} '
-        f"{swatch(DIMENSION)} {dim('dimensions')}</div>"
-    )
-    yield f'<div class="ex-budget">{table(_rows(costs, per_unit=not has_tolerances))}</div>'
-
-
-def _rows(costs: SourceCosts, *, per_unit: bool) -> Iterator[str]:
-    """Yield a row for each source of errors, the costliest first.
-
-    Args:
-        costs: Costs of the tolerances.
-        per_unit: Whether the bars show what unit errors cost, in place of the tolerances.
-    """
-    moved = costs.displacement / costs.lengths if per_unit else costs.displacement_within
-    most = float(moved.max()) or 1.0
-    ranking: list[int] = costs.ranking.tolist()
-    for k in ranking:
-        unit = "°" if IS_TILT[k] else " mm"
-        tolerance, cost = float(costs.tolerances[k]), float(moved[k])
-        given = f"± {format_number(tolerance, 6)}{unit}" if np.isfinite(tolerance) else "any"
-        colour = ACTUATOR if k < len(JOINTS) else DIMENSION
-        per = format_number(float(costs.displacement[k]), DIGITS)
-        turns = format_number(float(costs.turn[k]), DIGITS)
-        hint = f"{SOURCES[k]} of {PARTS[k]}: {per} mm and {turns}° at the tool per{unit}"
-        yield row(
-            f"{SOURCES[k]} {dim(PARTS[k])}",
-            given,
-            meter(100.0 * cost / most, colour),
-            f"{format_number(cost, 2)} mm",
-            hint=hint,
-        )

@@ -10,19 +10,23 @@ import viser
 from explorer.app.features.feature import Services
 from explorer.app.features.precision.actions import AssumeTypical
 from explorer.app.features.precision.budget import BudgetPart
-from explorer.app.features.precision.figures import deflections, errors, headline
 from explorer.app.features.precision.pose import PosePrecision
 from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.copying import CopyButton
 from explorer.app.widgets.markup import box, dim
+from explorer.measures.blocks.precision import deflections, tool_errors
+from explorer.measures.blocks.source import Source, load_source
 from explorer.mechanism.design import Design
 from explorer.mechanism.typical import typical_machine
 from explorer.statics.compliance import is_elastic
+from explorer.statics.tool_precision import ToolPrecision
 
+LOAD = "the load and the weights of the tab Forces"
 TYPICAL = "precision.typical"
 TYPICAL_HINT = (
     "Give the design typical errors, stiffness, struts and tolerances where it states none; the "
@@ -60,48 +64,52 @@ class PrecisionPanel:
         )
         with gui.add_folder("Budget of tolerances"):
             self._budget = BudgetPart(services)
+        self._copy = CopyButton(services.buttons, "Precision", self._source)
         services.buttons.on(TYPICAL, self._assume)
         services.buttons.offer(
             "Precision › Assume typical values",
             TYPICAL_HINT,
             TYPICAL,
-            is_ready=lambda: bool(_assumed(services.session.state)),
+            is_ready=lambda: bool(_assumed(services.session.state.design)),
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
         precision = self._poses.of(frame)
-        parts = [*headline(precision)]
-        if precision.has_errors and precision.is_regular:
-            parts += errors(precision)
-        if not (precision.has_errors and is_elastic(frame.state.design)):
-            parts += _offer(frame.state)
-        yield self._top, "content", box(*parts)
-        yield self._deflection, "content", box(*deflections(precision))
+        yield (
+            self._top,
+            "content",
+            render(tool_errors(precision), corner=self._copy.html) + _offer(precision),
+        )
+        yield self._deflection, "content", render(deflections(precision, LOAD))
         yield from self._controls.updates(frame)
         yield from self._budget.updates(frame)
 
+    def _source(self) -> Source:
+        state = self._session.settled()
+        loaded = self._poses.of(Frame(state)).loaded
+        density = None if loaded.own is None else state.view.prototype.density
+        return load_source("accuracy", loaded, density)
+
     def _assume(self, _: str, client: viser.ClientHandle) -> None:
-        if _assumed(self._session.state):
+        if _assumed(self._session.state.design):
             self._session.do(AssumeTypical(), who=client.client_id)
 
 
-def _assumed(state: State) -> tuple[str, ...]:
-    """Return what typical values the design would get."""
-    return _assumed_of(state.design)
-
-
 @lru_cache(maxsize=1)
-def _assumed_of(design: Design) -> tuple[str, ...]:
-    # A design stays while the mechanism moves.
+def _assumed(design: Design) -> tuple[str, ...]:
+    """Return what typical values the design would get; it stays while the mechanism moves."""
     return typical_machine(design)[1]
 
 
-def _offer(state: State) -> Iterator[str]:
-    """Yield what typical values can be assumed, with the button that does."""
-    assumed = _assumed(state)
-    if assumed:
-        values = "; ".join(assumed)
-        words = dim(f"State them in the tab Machine, or assume typical values: {values}.")
-        button = press_button(TYPICAL, "", "Assume these", hint=TYPICAL_HINT, class_name="ex-link")
-        yield f'<div class="ex-after">{words} {button}</div>'
+def _offer(precision: ToolPrecision) -> str:
+    """Return what typical values can be assumed, with the button that does, as HTML."""
+    design = precision.loaded.design
+    if precision.has_errors and is_elastic(design):
+        return ""
+    assumed = _assumed(design)
+    if not assumed:
+        return ""
+    words = dim(f"State them in the tab Machine, or assume typical values: {'; '.join(assumed)}.")
+    button = press_button(TYPICAL, "", "Assume these", hint=TYPICAL_HINT, class_name="ex-link")
+    return box(f"{words} {button}")

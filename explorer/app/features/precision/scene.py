@@ -10,7 +10,6 @@ import numpy as np
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.scene import tool_point
 from explorer.app.features.mechanism.bodies import platform_plate
-from explorer.app.features.precision.figures import degrees, millimetres
 from explorer.app.features.precision.pose import PosePrecision
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.labels import add_label
@@ -26,6 +25,7 @@ from explorer.app.scene.shapes import (
 )
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import Rgb
+from explorer.measures.blocks.precision import DIGITS
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.statics.compliance import is_elastic
@@ -69,7 +69,7 @@ class ErrorEllipsoidScene(ScenePart):
         lengths = times * placed.scale * np.maximum(ellipsoid.semi_axes, THINNEST * longest)
         axes = ellipsoid.directions.T * np.linalg.det(ellipsoid.directions)
         error = design.unit_mm * float(precision.rms().displacement)
-        words = f"RMS error {millimetres(error)}, drawn × {format_number(times)}"
+        words = f"RMS error {format_number(error, DIGITS)} mm, drawn × {format_number(times)}"
         yield from self._ellipsoid.draw(tool_point(placed), axes, lengths, ERROR, words)
 
 
@@ -118,9 +118,9 @@ class DeflectedScene(ScenePart):
         yield self._plate, "faces", faces.astype(np.uint32)
         yield self._way, "points", np.stack([tool, moved[4]])[None].astype(np.float32)
         design, deflection = precision.loaded.design, precision.deflection
-        total = millimetres(design.unit_mm * math.hypot(*deflection[:3].tolist()))
-        turn = degrees(math.hypot(*deflection[3:].tolist()))
-        yield self._label, "text", f"{total}, {turn}, drawn × {format_number(times)}"
+        total = format_number(design.unit_mm * math.hypot(*deflection[:3].tolist()), DIGITS)
+        turn = format_number(math.degrees(math.hypot(*deflection[3:].tolist())), DIGITS)
+        yield self._label, "text", f"{total} mm, {turn}°, drawn × {format_number(times)}"
         yield self._label, "position", tuple(moved[4].tolist())
 
     def _draw_legs(

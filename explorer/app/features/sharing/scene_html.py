@@ -17,8 +17,9 @@ from explorer.app.browser.viser_gaps import SceneMessage, scene_as_html
 from explorer.app.look import read_script
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.markup import format_number, signed
+from explorer.app.widgets.markup import signed
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 
 # Messages outside the tree of the scene that go into the file.
 KEPT = (

@@ -28,7 +28,9 @@ from explorer.app.widgets.colours import (
     css,
     proximity_colour,
 )
-from explorer.app.widgets.markup import box, fitted, format_number, margin_name, meter, swatch
+from explorer.app.widgets.markup import box, margin_name, meter, swatch
+from explorer.measures.blocks.block import Column, head_of
+from explorer.measures.blocks.singularity import margin_table
 from explorer.mechanism.folds import FOLD_LINES, FOLDS
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, signs_of
 from explorer.numerics.number_text import format_decimals
@@ -38,26 +40,7 @@ GO = "singular.go"
 GO_HINT = "Move the mechanism to the nearest pose with this incidence."
 # Length of a dial's needle in pixels.
 NEEDLE = 15.0
-COLUMNS = (
-    ("fold", "The fold on a dial: a red end is flat, and a flat fold is a singular pose."),
-    ("", ""),
-    (
-        "δ units",
-        (
-            "The margin: zero where the mechanism is singular. δ1 and δ3 are distances, δ2 is the "
-            "mutual moment of two lines, a distance times a sine. Its sign is that of the mode."
-        ),
-    ),
-    (
-        "distance",
-        (
-            "To the nearest pose with δ = 0: the root-mean-square displacement of b1 to b4 "
-            "(Nawratil's metric), in mm."
-        ),
-    ),
-    ("turn", "The least turn about b4 or a1 that leads to δ = 0, a transmission angle."),
-    ("", ""),
-)
+FOLD_HINT = "The fold on a dial: a red end is flat, and a flat fold is a singular pose."
 
 
 class DistancePanel:
@@ -90,23 +73,20 @@ class DistancePanel:
 
 def distance_table(frame: Frame) -> str:
     """Return the margins with their nearest singular poses as HTML, the nearest one in bold."""
-    head = "".join(f'<span title="{escape(hint)}">{name}</span>' for name, hint in COLUMNS)
-    rows = "".join(_margin(frame, index) for index in range(3))
-    table = f'<div class="ex-margins"><div class="ex-dim ex-small">{head}</div>{rows}</div>'
-    return box(table)
+    columns = margin_table(frame.snapshot).columns
+    numbers = [each for each in columns if isinstance(each, Column) and not each.wide]
+    named = [(head_of(each), each.hint) for each in numbers]
+    heads = [("fold", FOLD_HINT), ("", ""), *named, ("", "")]
+    head = "".join(f'<span title="{escape(hint)}">{name}</span>' for name, hint in heads)
+    cells = zip(*(each.texts for each in numbers), strict=True)
+    rows = "".join(_margin(frame, index, texts) for index, texts in enumerate(cells))
+    return box(f'<div class="ex-margins"><div class="ex-dim ex-small">{head}</div>{rows}</div>')
 
 
-def _margin(frame: Frame, index: int) -> str:
+def _margin(frame: Frame, index: int, texts: tuple[str, ...]) -> str:
     snapshot, level = frame.snapshot, frame.verdict.levels[index]
-    reach, unit_mm = snapshot.design.reach, snapshot.design.unit_mm
-    nearest, colour = snapshot.nearest[index], proximity_colour(level)
-    turn = math.degrees(snapshot.least_turns[index]) if nearest.distance > 0.0 else 0.0
-    volume = format_number(float(snapshot.volumes[index]), size=float(snapshot.volume_sizes[index]))
-    hint = (
-        f"{INCIDENCES[index]}, where the tetrahedron {' '.join(TETRAHEDRA[index])} is flat; its "
-        f"volume is {volume} units³"
-    )
-    is_least = nearest.distance == min(snapshot.nearest_distances)
+    distances, colour = snapshot.nearest_distances, proximity_colour(level)
+    hint = f"{INCIDENCES[index]}, where the tetrahedron {' '.join(TETRAHEDRA[index])} is flat"
     go = press_button(
         GO,
         index + 1,
@@ -115,15 +95,14 @@ def _margin(frame: Frame, index: int) -> str:
         label=f"Go to δ{index + 1} = 0",
         class_name="ex-link",
         hover=HOVER,
-        is_disabled=nearest.distance == 0.0,
+        is_disabled=snapshot.nearest[index].distance == 0.0,
     )
-    distance = fitted(nearest.distance * unit_mm, reach * unit_mm, 5)
+    is_least = distances[index] == min(distances)
+    numbers = "".join(f"<span>{text}</span>" for text in texts)
     return (
         f'<div class="ex-margin-row" data-hover="{HOVER}" data-value="{index + 1}">'
         f"{fold_dial(frame, index)}<div{' class=ex-strong' if is_least else ''}>"
-        f"{margin_name(index + 1)}"
-        f"<span>{fitted(float(snapshot.margins[index]), reach, 4)}</span>"
-        f"<span>{distance} mm</span><span>{format_decimals(turn, 1)}°</span>{go}</div>"
+        f"{margin_name(index + 1)}{numbers}{go}</div>"
         f'<div class="ex-danger" title="{escape(hint)}">{swatch(colour)}'
         f'<span class="ex-dim ex-small ex-fill">{INCIDENCES[index]}</span>'
         f"{meter(min(100.0, 100.0 * level / FAR_WARNINGS), colour, look='ex-meter is-thin')}"

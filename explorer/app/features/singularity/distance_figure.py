@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from explorer.app.features.singularity.panel import LOOKS
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import figure
+from explorer.measures.blocks.singularity import LOOKS
 
 
 def distance_figure(frame: Frame) -> str:

@@ -25,7 +25,6 @@ from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import SINGULAR
-from explorer.app.widgets.markup import fitted
 from explorer.mechanism.folds import FOLD_LINES
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.freedoms import FreeTurn
@@ -139,46 +138,9 @@ def _ends_of_axis(placed: Placed, turn: FreeTurn) -> tuple[FloatArray, FloatArra
     return foot + low * turn.direction, foot + high * turn.direction
 
 
-def freedom_words(frame: Frame) -> str:
-    """Return what a singular pose lets the platform do as HTML; "" if the pose is not singular."""
-    if not frame.snapshot.is_singular:
-        return ""
-    found = frame.snapshot.freedoms
-    if found.count == 0:
-        return (
-            '<div class="ex-after">A leg has length zero and holds its end: with all actuators '
-            "locked the platform cannot move.</div>"
-        )
-    can = "can still move" if found.count == 1 else f"still has {found.count} freedoms"
-    among = ", among them" if len(found.turns) < found.count else ""
-    lead = f"With all actuators locked the platform {can}"
-    if not found.turns:
-        return f'<div class="ex-after">{lead}.</div>'
-    turns = "".join(_turn_words(frame, turn) for turn in found.turns)
-    return f'<div class="ex-after">{lead}{among}:</div>{turns}'
-
-
-def _turn_words(frame: Frame, turn: FreeTurn) -> str:
-    reach = frame.state.design.reach
-    place = ", ".join(fitted(value, reach, 3) for value in turn.point.tolist())
-    through = f"b4 ({place}) units" if turn.incidence == 1 else "a1"
-    along = ", ".join(fitted(value, 1.0, 3) for value in turn.direction.tolist())
-    hint = (
-        "Along the axes of the base. Pitch 0: the platform does not slide along the line. Joints "
-        "change with the square of the angle only, so that play lets it turn a little; or not at "
-        "all where a point of one flag lies on the line of the other."
-    )
-    button = press_button(
-        SHOW,
-        turn.incidence,
-        "Show the motion",
-        hint=SHOW_HINT,
-        label=f"Show the motion: turn about {turn.line_name}",
-        class_name="ex-link",
-    )
-    at_all = "; no joint changes at any angle" if turn.is_finite else ""
-    return (
-        f'<div class="ex-line"><span>it turns about {turn.line_name}, pitch 0</span>'
-        f'{button}</div><div class="ex-dim ex-small" title="{hint}">'
-        f"through {through}, along ({along}){at_all}</div>"
+def show_button(incidence: int) -> str:
+    """Return the button that shows the turn of an incidence, as HTML."""
+    label = f"Show the motion: turn about the {FOLD_LINES[incidence - 1]}"
+    return press_button(
+        SHOW, incidence, "Show the motion", hint=SHOW_HINT, label=label, class_name="ex-link"
     )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from html import escape
 
 from explorer.app.features.feature import Services
 from explorer.app.features.singularity.distance import DistancePanel
-from explorer.app.features.singularity.freedom import freedom_words
+from explorer.app.features.singularity.freedom import show_button
 from explorer.app.features.singularity.performance import PerformancePanel
 from explorer.app.features.singularity.strata import StrataPanel
 from explorer.app.inputs.bindings import At
@@ -16,26 +15,19 @@ from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import length_span
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.blocks import render
 from explorer.app.widgets.colours import CLEAR, FAR, FAR_WARNINGS, SINGULAR, WARNED, css
-from explorer.app.widgets.markup import (
-    Look,
-    box,
-    dim,
-    format_number,
-    row,
-    share,
-    status,
-    table,
-    ticks,
+from explorer.app.widgets.copying import CopyButton
+from explorer.app.widgets.markup import box, status, ticks
+from explorer.measures.blocks.singularity import (
+    LOOKS,
+    VERDICT_HINT,
+    colour_words,
+    conditioning,
+    freedoms,
 )
-from explorer.measures.verdict import Kind, warnings
-from explorer.mechanism.margins import MARGIN_KINDS
-
-VERDICT_HINT = (
-    "The distance is the root-mean-square displacement of b1 to b4 (Nawratil's metric) to the "
-    "nearest singular pose, of any position and orientation"
-)
-LOOKS: dict[Kind, Look] = {"clear": "within", "near": "close", "singular": "beyond"}
+from explorer.measures.blocks.source import Source, pose_source
+from explorer.measures.verdict import warnings
 
 
 class SingularityPanel:
@@ -45,6 +37,12 @@ class SingularityPanel:
         gui = services.gui
         self._controls = Controls(gui, services.session)
         self._summary = gui.add_html("")
+
+        def source() -> Source:
+            state = services.session.settled()
+            return pose_source("singularity", state.design, state.pose)
+
+        self._copy = CopyButton(services.buttons, "Singularity", source)
         self._distances = DistancePanel(services)
         with gui.add_folder("Stratum of the two flags"):
             self._strata = StrataPanel(services)
@@ -62,7 +60,9 @@ class SingularityPanel:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
-        yield self._summary, "content", summary(frame)
+        shows = {f"show {number}": show_button(number) for number in (1, 2, 3)}
+        free = render(freedoms(frame.snapshot), shows) if frame.snapshot.is_singular else ""
+        yield self._summary, "content", summary(frame, self._copy.html) + free
         yield from self._distances.updates(frame)
         yield from self._strata.updates(frame)
         yield self._measures, "content", measures_table(frame)
@@ -70,19 +70,19 @@ class SingularityPanel:
         yield from self._controls.updates(frame)
 
 
-def summary(frame: Frame) -> str:
-    """Return the verdict, the mode, the limits and what a singular pose allows as HTML."""
+def summary(frame: Frame, corner: str = "") -> str:
+    """Return the verdict, the mode and the limits as HTML, with a button in the corner."""
     verdict, snapshot = frame.verdict, frame.snapshot
     look = LOOKS[verdict.kind]
     reason = escape(verdict.reason(frame.state.design.unit_mm))
     return box(
+        corner,
         status(verdict.title, look),
         f'<div class="{"ex-dim" if look == "within" else f"ex-{look}"} ex-two-lines" '
         f'title="{VERDICT_HINT}">{reason}</div>',
         f'<div class="ex-line"><span>{snapshot.mode_words.capitalize()}</span>'
         f"{_within(frame)}</div>",
         *(f'<div class="ex-beyond">{escape(str(limit))}</div>' for limit in snapshot.violations),
-        freedom_words(frame),
     )
 
 
@@ -99,15 +99,7 @@ def legend(frame: Frame) -> str:
     edge = 100.0 / FAR_WARNINGS
     stops = f"{css(SINGULAR)} 0%,{css(WARNED)} {edge:g}%,{css(CLEAR)} {edge:g}%,{css(FAR)} 100%"
     design = frame.state.design
-    warn = warnings(design.reach, frame.state.warn_below)
-    hint = (
-        "The colour of an incidence: the least of its measures over their warning values, which "
-        f"are {format_number(warn.margin, 3)} units of the margin, "
-        f"{format_number(warn.distance * design.unit_mm, 3)} mm of the distance, "
-        f"{format_number(math.degrees(warn.turn), 3)}° of turning (a transmission angle, which "
-        "mechanisms usually keep above 30° to 45°), and "
-        f"{format_number(warn.condition, 3)} of 1/cond J"
-    )
+    hint = colour_words(warnings(design.reach, frame.state.warn_below), design.unit_mm)
     places = ticks((0.0, "0"), (edge, "warned below"), (100.0, f"≥ {FAR_WARNINGS:g} times"))
     return (
         f'<div title="{escape(hint)}"><div class="ex-legend" style="--colours:{stops}"></div>'
@@ -117,26 +109,4 @@ def legend(frame: Frame) -> str:
 
 def measures_table(frame: Frame) -> str:
     """Return the scale of colours and the conditioning as HTML."""
-    return box(legend(frame), table(_rows(frame)))
-
-
-def _rows(frame: Frame) -> Iterator[str]:
-    snapshot = frame.snapshot
-    determinant = format_number(snapshot.determinant, size=snapshot.determinant_size)
-    yield row(dim("det J"), f"{determinant} units³", hint="Determinant of the actuator Jacobian")
-    yield row(
-        dim("1/cond J"),
-        share(snapshot.inverse_condition),
-        hint="Inverse condition number of J, with lengths divided by the reach; 0 is singular",
-    )
-    yield row(
-        dim("least σ of J"),
-        share(snapshot.smallest_singular_value),
-        hint="Smallest singular value of J, with lengths divided by the reach: errors of actuators "
-        "and loads grow at most 1/σ times to those of the platform and of the actuators",
-    )
-    yield row(
-        dim("min |δ| / reach"),
-        share(snapshot.proximity),
-        hint=f"Smallest margin over the reach |a3|; {MARGIN_KINDS}",
-    )
+    return box(legend(frame)) + render([conditioning(frame.snapshot)])

@@ -9,7 +9,6 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import platform_plate
-from explorer.app.features.singularity.performance import gain_text
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
@@ -17,6 +16,8 @@ from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent, sphere
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import FAR, GHOST, SINGULAR, Rgb, proximity_colour
+from explorer.measures.blocks.block import Number
+from explorer.measures.blocks.singularity import finite_gain
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
@@ -125,7 +126,7 @@ class EllipsoidScene(ScenePart):
         gains = placed.frame.performance.translation
         gain = gains.velocity if kind == "speed" else gains.force
         colour, unit = (SPEED, SPEED_UNIT) if kind == "speed" else (FORCE, FORCE_UNIT)
-        words = f"{kind} ≤ {gain_text(float(gain.max()))} per unit"
+        words = f"{kind} ≤ {Number(finite_gain(float(gain.max())), digits=3).text} per unit"
         lengths = drawn_axes(gain, unit)
         yield from self._ellipsoid.draw(placed.point, gains.axes, lengths, colour, words)
 

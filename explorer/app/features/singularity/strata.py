@@ -16,15 +16,16 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import css, proximity_colour
-from explorer.app.widgets.markup import box, dim, fitted
+from explorer.app.widgets.markup import box, dim
+from explorer.measures.blocks.singularity import stratum_sentence
 from explorer.measures.verdict import DISTANCE_SHARE
+from explorer.numerics.number_text import format_fitted
 from explorer.singularity.bruhat import (
     COVERED,
     OF_INCIDENCES,
     Stratum,
     codimension,
     describe_stratum,
-    incidences,
 )
 from explorer.singularity.strata import GENERIC, STRATA, inversions
 
@@ -141,12 +142,7 @@ def neighbours(frame: Frame, distances: Mapping[Stratum, float]) -> str:
     )
 
 
-@cache
-def _sentence(stratum: Stratum) -> str:
-    if stratum == GENERIC:
-        return "Generic: no incidence, not singular."
-    zero = ", ".join(f"δ{index}" for index in incidences(stratum))
-    return f"{zero} = 0: {describe_stratum(stratum)}"
+_sentence = cache(stratum_sentence)
 
 
 def _distance(distance: float | None, frame: Frame) -> str:
@@ -154,7 +150,7 @@ def _distance(distance: float | None, frame: Frame) -> str:
     if distance is None:
         return "…"
     design = frame.state.design
-    return fitted(distance * design.unit_mm, design.reach * design.unit_mm, 4)
+    return format_fitted(distance * design.unit_mm, design.reach * design.unit_mm, 4)
 
 
 def _neighbour(stratum: Stratum, value: str) -> str:

@@ -19,18 +19,11 @@ from explorer.app.state.studies import (
     title_of,
 )
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.markup import (
-    box,
-    by_theme,
-    decimals_for,
-    dim,
-    format_number,
-    meter,
-    signed,
-)
+from explorer.app.widgets.markup import box, by_theme, dim, meter, signed
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.number_text import decimals_for, format_number
 from explorer.optimise.problem import REACH, YAW
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.study import NAMES, Sense, Study

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import msgspec
 import viser
 
+from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import run_script, run_script_in
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed

@@ -16,13 +16,13 @@ import msgspec
 import numpy as np
 
 from explorer.app.scene.bands import Colouring
-from explorer.app.widgets.markup import decimals_for, reading
+from explorer.app.widgets.markup import reading
 from explorer.export.report.drawings.slice_drawing import cross, placing, ruler
 from explorer.export.report.drawings.slices import Slices, in_plane
 from explorer.export.report.markup import as_html, coordinate, element
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.numerics.number_text import format_decimals, format_number
+from explorer.numerics.number_text import decimals_for, format_decimals, format_number
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.held import part_names
 from explorer.workspace.position_bands import MEASURE_WORDS, measure_positions

@@ -21,7 +21,6 @@ from explorer.app.widgets.markup import (
     box,
     caption,
     dim,
-    format_number,
     meter,
     note,
     row,
@@ -34,6 +33,7 @@ from explorer.export.report.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBL
 from explorer.legs.clearance import pair_name
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
+from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import BAND_EDGES, band_colours
 from explorer.statics.reactions import has_limits
 from explorer.workspace.accessible.workspace import PairCost

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator
+from dataclasses import replace
 from xml.etree.ElementTree import Element
 
-import numpy as np
-
+from explorer.export.report.blocks import elements
 from explorer.export.report.data import Missing, ReportData
 from explorer.export.report.drawings.slice_drawing import legend, slices_through
 from explorer.export.report.drawings.slices import Slices
@@ -19,19 +18,18 @@ from explorer.export.report.markup import (
     element,
     illustration,
     number,
-    numbers,
     paragraph,
     percentage,
     range_of,
     table,
     vector,
 )
-from explorer.mechanism.design import JOINTS
+from explorer.measures.blocks.block import Block
+from explorer.measures.blocks.forces import most_held, reaction_tables, verdict, worst_force
 from explorer.mechanism.machine import Tool
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import WARN_SHARE
-from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.held import HeldWorkspace
 from explorer.workspace.position_bands import position_bands
 from explorer.workspace.solids.solid import Solid
@@ -49,14 +47,10 @@ def loads_section(data: ReportData) -> Iterator[Element]:
     yield paragraph(
         "What the platform carries, what its machine can bear, and what holds the payload: its "
         "weight, and the force at the tool in its worst direction. Platform and legs count as "
-        "weightless, and nothing has friction.",
+        f"weightless, and nothing has friction. All values are those in {data.pose_words}.",
     )
     yield element("div", _carried(data), _limits(data), class_="pair")
-    case = data.case
-    if not loads.loaded.is_regular:
-        yield paragraph("The pose is singular: no finite forces hold a load in it.", class_="note")
-    elif case.is_loaded or case.is_limited:
-        yield from _in_the_pose(data, loads)
+    yield from elements(_in_the_pose(data, loads))
     if data.held is not None and data.volume.volume > 0.0:
         yield from _over_the_workspace(data, data.held)
 
@@ -109,118 +103,20 @@ def _limits(data: ReportData) -> Element:
     return table((), rows, align="<>", caption="Actuators, struts, and the guide at each carriage")
 
 
-class _Part(NamedTuple):
-    """A row of a table of loaded parts, its limits to either side in the unit of its value."""
-
-    name: Cell
-    weight: float
-    force: float
-    limits: Sequence[float]
-    share: float
-
-
-def _in_the_pose(data: ReportData, loads: ReportLoads) -> Iterator[Element]:
-    if data.case.is_loaded and data.case.is_limited:
-        yield _verdict(data, loads)
-    heads = ("actuator", "push at most, N", "pull at most, N")
-    caption = f"Forces of the actuators in {data.pose_words}; positive ones push the joint’s value"
-    yield _parts(data, heads, _actuators(loads), f"{caption} up", ", N")
-    caption = f"Struts and guide in {data.pose_words}"
-    yield _parts(data, ("part", "at most"), _struts_and_guide(loads), caption, "")
-    if data.case.is_limited:
-        yield _most(data, loads)
-
-
-def _actuators(loads: ReportLoads) -> list[_Part]:
-    held, (push, pull) = loads.loaded.held, loads.case.design.actuators.limits
-    return [
-        _Part(
-            element("b", joint),
-            float(held.actuators[k]),
-            float(held.spread[k]),
-            (float(push[k]), float(pull[k])),
-            float(loads.loaded.shares[k]),
-        )
-        for k, joint in enumerate(JOINTS)
-    ]
-
-
-def _struts_and_guide(loads: ReportLoads) -> list[_Part]:
-    held, design = loads.loaded.held, loads.case.design
-    metres, guide = 1e-3 * design.unit_mm, design.guide
-    force = math.inf if guide.force_n is None else guide.force_n
-    moment = math.inf if guide.moment_nm is None else guide.moment_nm
-    parts: list[_Part] = []
-    # Each of the three takes two places in the order of `LIMITED`.
-    for start, name, factor, values, limit in (
-        (6, "bending of strut {}, N m", metres, held.bending, design.struts.largest_moment),
-        (8, "force of carriage {} across the guide, N", 1.0, held.guide_force, force),
-        (10, "moment of carriage {} on the guide, N m", metres, held.guide_moment, moment),
-    ):
-        for k, leg in enumerate((2, 3)):
-            spread, share = float(held.spread[start + k]), float(loads.loaded.shares[start + k])
-            value = factor * float(values[k])
-            parts.append(_Part(name.format(leg), value, factor * spread, (limit,), share))
-    return parts
-
-
-def _verdict(data: ReportData, loads: ReportLoads) -> Element:
-    share, part, pose = loads.loaded.share, PART_NAMES[loads.loaded.worst], data.pose_words
-    if share > 1.0:
-        words = f"The payload is not held in {pose}: {part} needs "
-        return paragraph(words, percentage(share), " of its limit.", class_="note")
-    words = f"The payload is held in {pose}. The largest share of a limit is that of {part}: "
-    return paragraph(words, percentage(share), ".")
-
-
-def _parts(
-    data: ReportData, heads: tuple[str, ...], parts: Sequence[_Part], caption: str, of_unit: str
-) -> Element:
-    """Return a table of loaded parts, with columns for what the design has: loads and limits."""
-    payload = data.design.payload
-    name, *limits = heads
-    columns: list[tuple[str, Sequence[Cell]]] = [(name, [part.name for part in parts])]
-    if payload.mass_kg:
-        columns.append((f"by the weight{of_unit}", numbers([part.weight for part in parts])))
-    if payload.force_n:
-        columns.append((f"by the force, ±{of_unit}", numbers([part.force for part in parts])))
-    if data.case.is_limited:
-        for side, head in enumerate(limits):
-            columns.append((head, [_limit(part.limits[side], "") for part in parts]))
-        if data.case.is_loaded:
-            columns.append(("share of its limit", [_share_cell(part) for part in parts]))
-    rows = list(zip(*(cells for _, cells in columns), strict=True))
-    align = "<" + ">" * (len(columns) - 1)
-    return table([head for head, _ in columns], rows, align=align, caption=caption)
-
-
-def _share_cell(part: _Part) -> Cell:
-    return percentage(part.share) if any(map(math.isfinite, part.limits)) else "–"
-
-
-def _most(data: ReportData, loads: ReportLoads) -> Element:
-    loaded, force = loads.loaded, data.design.payload.force_n
-    newton, besides = loaded.newton, " besides its force" if force else ""
-    rows: list[Row] = [
-        ("payload", _limit(loaded.largest_payload, "kg"), f"mass at the payload’s centre{besides}"),
-        (
-            "force in every direction",
-            _limit(1.0 / newton.share if newton.share else math.inf, "N"),
-            "at the tool, held by all parts, without a payload",
-        ),
-    ]
-    if newton.share and np.isfinite(newton.direction).all():
-        direction = vector(newton.direction.tolist())
-        remark = f"where {PART_NAMES[newton.part]} gives way first"
-        rows.append(("its worst direction", direction, remark))
-    worst = loads.worst_payload_force
-    if force and np.isfinite(worst.direction).all():
-        direction = vector(worst.direction.tolist())
-        remark = f"with the weight; {PART_NAMES[worst.part]} needs ", percentage(worst.share)
-        rows.append(
-            ("worst direction of the payload’s force", direction, (*remark, " of its limit"))
-        )
-    return table((), rows, align="<><", caption=f"Most that is held in {data.pose_words}")
+def _in_the_pose(data: ReportData, loads: ReportLoads) -> Iterator[Block]:
+    loaded, case = loads.loaded, data.case
+    if not loaded.is_regular or (case.is_loaded and case.is_limited):
+        yield verdict(loaded, "payload")
+    if not loaded.is_regular:
+        return
+    if case.is_loaded:
+        yield from reaction_tables(loaded)
+    if case.is_limited:
+        most = most_held(loaded)
+        if data.design.payload.force_n:
+            worst = worst_force(loads.worst_payload_force, "the payload's force")
+            most = replace(most, facts=(*most.facts, *worst))
+        yield most
 
 
 def _over_the_workspace(data: ReportData, held: HeldWorkspace | Missing) -> Iterator[Element]:

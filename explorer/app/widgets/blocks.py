@@ -1,0 +1,170 @@
+"""Blocks as HTML, for the panels of the page: strings, since a frame of a drag has many."""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Iterable, Iterator, Mapping
+from html import escape
+
+from explorer.app.widgets.charts import BLUE, ORANGE, TEAL, VIOLET
+from explorer.app.widgets.colours import GHOST, Rgb, css
+from explorer.app.widgets.markup import box, caption, dim, meter, row, swatch, table
+from explorer.measures.blocks.block import (
+    Bars,
+    Block,
+    Column,
+    Facts,
+    Kind,
+    Names,
+    Number,
+    Share,
+    Shares,
+    Split,
+    Statement,
+    Table,
+    Vector,
+    Words,
+)
+from explorer.numerics.number_text import format_decimals
+from explorer.workspace.position_bands import SHARE_COLOURS, SHARES
+
+KIND_COLOURS: dict[Kind, Rgb] = {"actuator": BLUE, "dimension": ORANGE}
+# Between the components of a vector, which stay on one line.
+COMMA = ",\N{NO-BREAK SPACE}"
+# Colours of the parts of a whole.
+PART_COLOURS = TEAL, VIOLET, BLUE
+
+
+def render(
+    blocks: Iterable[Block], acts: Mapping[str, str] | None = None, *, corner: str = ""
+) -> str:
+    """Return blocks as the box of a panel.
+
+    Args:
+        blocks: The blocks.
+        acts: Buttons by the names that blocks have for them, HTML; those missing are left out.
+        corner: Button in the upper right corner, HTML.
+    """
+    return box(corner, *(content_of(block, acts or {}) for block in blocks))
+
+
+def content_of(block: Block, acts: Mapping[str, str]) -> str:
+    """Return one block as HTML."""
+    match block:
+        case Statement():
+            return "".join(_statement(block, acts))
+        case Facts():
+            rows = [
+                row(
+                    dim(escape(fact.name)),
+                    f"{words_html(fact.words)} {dim(words_html(fact.remark))} "
+                    f"{acts.get(fact.act, '')}",
+                    hint=fact.hint,
+                )
+                for fact in block.facts
+                if not fact.wide
+            ]
+            return caption(block.title, block.hint) + table(rows)
+        case Table():
+            return caption(block.title, block.hint) + table(*_table(block))
+        case Split():
+            return _split(block)
+
+
+def words_html(words: Words) -> str:
+    """Return words with the numbers in them as HTML."""
+    if isinstance(words, str):
+        return escape(words)
+    return "".join(map(_part, words))
+
+
+def _part(part: str | Number | Vector | Share) -> str:
+    match part:
+        case str():
+            return escape(part)
+        case Number():
+            return f"{part.text}{part.unit}"
+        case Vector():
+            return f"{COMMA.join(part.texts)}{part.unit}"
+        case Share():
+            return part.text()
+
+
+def share_colour(share: float | None) -> Rgb:
+    """Return the colour of a share of a limit; grey without a limit."""
+    if share is None:
+        return GHOST
+    return SHARE_COLOURS[bisect.bisect_left(SHARES, share)]
+
+
+def _statement(block: Statement, acts: Mapping[str, str]) -> Iterator[str]:
+    look = f" ex-{block.look}" if block.look else ""
+    if block.title:
+        yield f'<div class="ex-status{look}">{words_html(block.title)}</div>'
+    if block.words:
+        words = f"{words_html(block.words)} {acts.get(block.act, '')}"
+        title = f' title="{escape(block.hint)}"' if block.hint else ""
+        yield f"<div{title}>{words if block.title else dim(words)}</div>"
+
+
+def _table(block: Table) -> tuple[list[str], list[str]]:
+    """Return the rows of a table, and its heads if a number has no unit."""
+    cells: list[list[str]] = []
+    heads: list[str] = []
+    has_heads = False
+    for column in block.columns:
+        match column:
+            case Names(head, words):
+                texts = map(words_html, words)
+                cells.append([*texts] if cells else [dim(text) for text in texts])
+                heads.append(head)
+            case Column():
+                if not column.wide:
+                    cells.append(
+                        [
+                            f"{before}{text}{unit}"
+                            for text, (before, unit) in zip(
+                                column.texts, column.around, strict=True
+                            )
+                        ]
+                    )
+                    heads.append(column.head)
+                    has_heads = has_heads or not column.unit
+            case Shares(head, values):
+                pairs = [_share(value) for value in values]
+                cells += [bar for bar, _ in pairs], [text for _, text in pairs]
+                heads += "", head
+            case Bars(lengths, kinds):
+                cells.append(
+                    [
+                        meter(100.0 * length, KIND_COLOURS[kind])
+                        for length, kind in zip(lengths, kinds, strict=True)
+                    ]
+                )
+                heads.append("")
+    return [row(*each) for each in zip(*cells, strict=True)], heads if has_heads else []
+
+
+def _share(share: float | None) -> tuple[str, str]:
+    """Return the bar of a share of a limit, and its words."""
+    words = Share(share).text()
+    if share is None:
+        return "", dim(words)
+    bar = meter(min(100.0, 100.0 * share), share_colour(share))
+    return bar, f'<span class="ex-{Share(share).look}">{words}</span>'
+
+
+def _split(block: Split) -> str:
+    parts = list(zip(block.names, PART_COLOURS, block.shares, strict=True))
+    bars = "".join(
+        f'<span style="--share:{100.0 * share:.2f}%;--colour:{css(colour)}"></span>'
+        for _, colour, share in parts
+    )
+    words = "".join(
+        f"<span>{swatch(colour)} {name} {format_decimals(100.0 * share, 0)}&nbsp;%</span>"
+        for name, colour, share in parts
+    )
+    return (
+        f'<div class="ex-stack" title="{escape(block.hint)}">{bars}</div>'
+        f'<div class="ex-flow">{words}</div>'
+    )

@@ -1,0 +1,1 @@
+"""Answers in words and numbers, one module for each topic."""

@@ -1,0 +1,309 @@
+"""Blocks: an answer as plain values, which the page, a report and the command line print.
+
+A function of a value yields the blocks that tell it, so that a word, a unit or a number of digits
+is written once. Each of the three has one renderer of blocks: `explorer.app.widgets.blocks`,
+`explorer.export.report.blocks` and `explorer.cli.blocks`. The page has room for few columns: it
+leaves out what is `wide`, and shows a hint where a pointer rests; the others print the hints of
+tables. The command line writes six digits of each number, whatever its digits here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+from explorer.numerics.number_text import (
+    format_column,
+    format_decimals,
+    format_fitted,
+    format_number,
+)
+from explorer.workspace.position_bands import SHARES
+
+Look = Literal["within", "close", "beyond"]
+"""Whether a value keeps its bounds, is close to them, or beyond."""
+
+Kind = Literal["actuator", "dimension"]
+"""What a bar stands for, which the page shows in its colour."""
+
+CLOSE = SHARES[-2]
+"""Share of a limit from which a load is close to it."""
+# Largest share that is told as a number, and distance from the limit up to which with a decimal.
+MOST_SHARE, NEAR = 1e4, 0.005
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number with its unit.
+
+    Attributes:
+        value: The number.
+        unit: Its unit, with the blank before it if there is one.
+        digits: Number of significant digits.
+        size: Magnitude of the numbers from which it was computed, see `drop_rounding`.
+        span: Size of the largest number expected, which alone sets the decimals, so that the
+            number holds still while it changes; 0 for as many as the number needs.
+    """
+
+    value: float
+    unit: str = ""
+    digits: int = 4
+    size: float = 0.0
+    span: float = 0.0
+
+    @property
+    def text(self) -> str:
+        """The number for people, without its unit."""
+        if self.span:
+            return format_fitted(self.value, self.span, self.digits)
+        return format_number(self.value, self.digits, size=self.size, infinite="∞")
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """Components of a vector.
+
+    Attributes:
+        values: The components.
+        unit: Their unit, with the blank before it if there is one.
+        digits: Number of significant digits of the largest one.
+        span: As for a `Number`.
+    """
+
+    values: Sequence[float]
+    unit: str = ""
+    digits: int = 3
+    span: float = 0.0
+
+    @property
+    def texts(self) -> list[str]:
+        """The components for people, without their unit."""
+        if self.span:
+            return [format_fitted(value, self.span, self.digits) for value in self.values]
+        return format_column(self.values, self.digits, infinite="∞")
+
+
+def direction(values: Sequence[float]) -> Vector:
+    """Return a unit vector with two decimals."""
+    return Vector(values, digits=2, span=0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """A share of a limit, of which 1 is the limit; None without a limit."""
+
+    value: float | None
+
+    @property
+    def look(self) -> Look | None:
+        """Whether the share is within the limit, close to it, or beyond; None without a limit."""
+        if self.value is None:
+            return None
+        return "beyond" if self.value > 1.0 else "close" if self.value > CLOSE else "within"
+
+    def text(self, decimals: int = 0) -> str:
+        """Return the share in per cent, with a decimal near the limit; one beyond it says so."""
+        if self.value is None:
+            return "no limit"
+        if not self.value < MOST_SHARE:
+            return "∞"
+        if abs(self.value - 1.0) < NEAR:
+            decimals = max(decimals, 1)
+        words = f"{format_decimals(100.0 * self.value, decimals)}\N{NO-BREAK SPACE}%"
+        is_limit = words.startswith("100.") and not words[4:].strip("0\N{NO-BREAK SPACE}%")
+        return f"above {words}" if self.value > 1.0 and is_limit else words
+
+
+Part: TypeAlias = "str | Number | Vector | Share"
+Words: TypeAlias = "str | tuple[Part, ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """A column of words.
+
+    Attributes:
+        head: Its head.
+        words: Its cells.
+    """
+
+    head: str
+    words: Sequence[Words]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of numbers with equal decimals.
+
+    Attributes:
+        head: Its head.
+        values: Its cells.
+        unit: Unit of all cells, or that of each, with the blank before it if there is one.
+        digits: Number of significant digits of the largest one.
+        size: Magnitude of the numbers from which they were computed, see `drop_rounding`.
+        span: As for a `Number`.
+        before: Sign before each number, such as "± ".
+        infinite: Word for infinity.
+        wide: Whether it needs more room than the page has.
+        hint: Sentence on what it is.
+    """
+
+    head: str
+    values: Sequence[float]
+    unit: str | Sequence[str] = ""
+    digits: int = 4
+    size: float = 0.0
+    span: float = 0.0
+    before: str = ""
+    infinite: str = "∞"
+    wide: bool = False
+    hint: str = ""
+
+    @property
+    def texts(self) -> list[str]:
+        """The cells for people, without their units; equal units have equal decimals."""
+        if self.span:
+            return [format_fitted(value, self.span, self.digits) for value in self.values]
+        if isinstance(self.unit, str):
+            return format_column(self.values, self.digits, size=self.size, infinite=self.infinite)
+        texts = [""] * len(self.values)
+        for unit in {*self.unit}:
+            rows = [row for row, each in enumerate(self.unit) if each == unit]
+            part = replace(self, values=[self.values[row] for row in rows], unit=unit)
+            for row, text in zip(rows, part.texts, strict=True):
+                texts[row] = text
+        return texts
+
+    @property
+    def around(self) -> list[tuple[str, str]]:
+        """What stands before and behind each number: sign and unit, unless it is infinite."""
+        units = [self.unit] * len(self.values) if isinstance(self.unit, str) else self.unit
+        return [
+            (self.before, unit) if math.isfinite(value) else ("", "")
+            for value, unit in zip(self.values, units, strict=True)
+        ]
+
+    @property
+    def has_one_unit(self) -> bool:
+        """Whether the head can have the unit of all cells."""
+        return isinstance(self.unit, str)
+
+
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """A column of shares of limits, each beside a bar; None without a limit."""
+
+    head: str
+    values: Sequence[float | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Bars:
+    """A column of bars.
+
+    Attributes:
+        lengths: Their lengths, 0 to 1.
+        kinds: What each stands for.
+    """
+
+    lengths: Sequence[float]
+    kinds: Sequence[Kind]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table, of which the first column names the rows.
+
+    Attributes:
+        title: Its title.
+        columns: Its columns, all of one length; the page shows heads only above numbers without
+            a unit.
+        hint: Sentences on what it shows.
+    """
+
+    title: str
+    columns: Sequence[Names | Column | Shares | Bars]
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A thing with its name.
+
+    Attributes:
+        name: Its name.
+        words: What is known of it.
+        remark: More of it.
+        hint: Sentence on what it is.
+        act: Name of the button that stands beside it on the page.
+        wide: Whether it needs more room than the page has.
+    """
+
+    name: str
+    words: Words
+    remark: Words = ""
+    hint: str = ""
+    act: str = ""
+    wide: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """Facts below a title."""
+
+    title: str
+    facts: Sequence[Fact]
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """A result in a few words, and a sentence on it.
+
+    Attributes:
+        title: The result; "" for a sentence alone.
+        words: The sentence.
+        look: Whether something keeps its bounds.
+        hint: More of it.
+        act: Name of the button that stands beside the sentence on the page.
+    """
+
+    title: Words
+    words: Words = ""
+    look: Look | None = None
+    hint: str = ""
+    act: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """Parts that make a whole: their names, and the share of each.
+
+    Attributes:
+        title: The whole.
+        names: Names of the parts.
+        shares: Their shares.
+        hint: Sentence on what it shows.
+    """
+
+    title: str
+    names: Sequence[str]
+    shares: Sequence[float]
+    hint: str = ""
+
+
+Block: TypeAlias = "Statement | Facts | Table | Split"
+
+
+def parts_of(words: Words) -> tuple[Part, ...]:
+    """Return the parts of words."""
+    return (words,) if isinstance(words, str) else words
+
+
+def head_of(column: Names | Column | Shares) -> str:
+    """Return the head of a column with its unit, if all cells have one."""
+    if isinstance(column, Column) and isinstance(column.unit, str) and column.unit:
+        return f"{column.head}, {column.before}{column.unit.strip()}"
+    return column.head

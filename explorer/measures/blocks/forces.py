@@ -1,0 +1,203 @@
+"""The forces that hold a load in a pose, the shares of the limits, and the most that is held."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from explorer.measures.blocks.block import (
+    Block,
+    Column,
+    Fact,
+    Facts,
+    Names,
+    Number,
+    Share,
+    Shares,
+    Statement,
+    Table,
+    Vector,
+    Words,
+    direction,
+)
+from explorer.mechanism.design import JOINTS
+from explorer.mechanism.pose import Pose, Triple
+from explorer.mechanism.tool_point import tool_position
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import drop_rounding
+from explorer.statics.forces import WorstDirection
+from explorer.statics.loaded import LoadedPose, WorstForce
+from explorer.statics.reactions import PART_NAMES, has_limits
+
+
+def shares_of(loaded: LoadedPose) -> list[float | None]:
+    """Return the shares of the limits in the order of `PART_NAMES`; None without a limit."""
+    pairs = zip(loaded.shares.tolist(), loaded.limited.tolist(), strict=True)
+    return [share if is_limited else None for share, is_limited in pairs]
+
+
+def verdict(loaded: LoadedPose, load: str = "load") -> Statement:
+    """Return whether a load is held, and which part is nearest to its limit.
+
+    Args:
+        loaded: The pose under the load.
+        load: Noun for the load, such as "payload".
+    """
+    if not loaded.is_regular:
+        return Statement("Singular pose", "The forces are infinite.", "beyond")
+    if not has_limits(loaded.design):
+        words = "Shares need limits of the actuators, the struts or the guide."
+        return Statement("No limits are given", words)
+    share, part = loaded.share, PART_NAMES[loaded.worst]
+    if share > 1.0:
+        words = part.capitalize(), " needs ", Share(share), " of its limit"
+        return Statement(f"Does not hold the {load}", words, "beyond")
+    look = Share(share).look
+    near = ", close to a limit" if look == "close" else ""
+    words = "Largest share of a limit: ", part, ", ", Share(share)
+    return Statement(f"Holds the {load}{near}", words, look)
+
+
+def reaction_tables(loaded: LoadedPose) -> Iterator[Block]:
+    """Yield the forces of the actuators, and the loads of struts and guide, beside their limits."""
+    held, design = loaded.held, loaded.design
+    spread = np.where(np.isfinite(held.spread), held.spread, 0.0)
+    push, pull = (side.tolist() for side in design.actuators.limits)
+    values = held.actuators.tolist()
+    size = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    shares, is_limited = shares_of(loaded), has_limits(design)
+    if force := design.payload.force_n:
+        words = "The payload's force of ", Number(force, " N"), " acts too, in any direction."
+        yield Statement("", words)
+    yield Table(
+        "Forces of the actuators",
+        (
+            Names("actuator", JOINTS),
+            Column("force", values, " N", size=_size(held.actuators, spread[:6])),
+            *_process(loaded, spread[:6], " N"),
+            Names("sense", [_sense(drop_rounding(value, size)) for value in values]),
+            *(
+                Column(head, limits, " N", infinite="no limit", wide=True)
+                for head, limits in (("push at most", push), ("pull at most", pull))
+                if is_limited
+            ),
+            *((Shares("of its limit", shares[:6]),) if is_limited else ()),
+        ),
+        "A positive force pushes the value of its joint up.",
+    )
+    metres = np.repeat([1e-3 * design.unit_mm, 1.0, 1e-3 * design.unit_mm], 2)
+    loads = metres * np.concatenate([held.bending, held.guide_force, held.guide_moment])
+    guide = design.guide
+    limits = [
+        math.inf if limit is None else limit
+        for limit in (design.struts.largest_moment, guide.force_n, guide.moment_nm)
+        for _ in (2, 3)
+    ]
+    units = " N m", " N m", " N", " N", " N m", " N m"
+    yield Table(
+        "Struts and guide",
+        (
+            Names("part", PART_NAMES[6:]),
+            Column("load", loads.tolist(), units, size=_size(loads, metres * spread[6:])),
+            *_process(loaded, metres * spread[6:], units),
+            *(
+                (
+                    Column("at most", limits, units, infinite="no limit", wide=True),
+                    Shares("of its limit", shares[6:]),
+                )
+                if is_limited
+                else ()
+            ),
+        ),
+        "The bending moment of a strut at its carriage, and the force and the moment of the "
+        "carriage on the guide, across it.",
+    )
+
+
+def _size(values: FloatArray, spread: FloatArray) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0)) + float(spread.max())
+
+
+def _process(
+    loaded: LoadedPose, spread: FloatArray, unit: str | tuple[str, ...]
+) -> tuple[Column, ...]:
+    """Return the column of what the payload's force of any direction adds; none without one."""
+    if not loaded.design.payload.force_n:
+        return ()
+    return (Column("payload's force", spread.tolist(), unit, 3, before="± "),)
+
+
+def _sense(force: float) -> str:
+    return "" if not math.isfinite(force) or force == 0.0 else "pushes" if force > 0.0 else "pulls"
+
+
+def most_held(loaded: LoadedPose) -> Facts:
+    """Return the largest payload, and the largest force in every direction."""
+    payload, newton = loaded.largest_payload, loaded.newton
+    facts = [
+        Fact(
+            "payload",
+            (Number(payload, " kg"),) if math.isfinite(payload) else "no limit",
+            hint="Largest mass at the centre of the payload, besides the load, that keeps all "
+            "limits",
+        ),
+        Fact(
+            "force in every direction",
+            (Number(1.0 / newton.share, " N"),) if newton.share else "no limit",
+            f"limited by {PART_NAMES[newton.part]}" if newton.share else "",
+            "Largest force at the tool, alone, that all parts hold in every direction, and the "
+            "part that gives way first",
+        ),
+    ]
+    if newton.share and np.isfinite(newton.direction).all():
+        facts.append(Fact("its worst direction", _along(newton.direction), wide=True))
+    return Facts("Most that is held here", facts)
+
+
+def worst_force(worst: WorstForce, force: str) -> Iterator[Fact]:
+    """Yield the worst direction of a force; nothing in a singular pose or without limits.
+
+    Args:
+        worst: The direction.
+        force: The force in words, such as "this force".
+    """
+    if np.isfinite(worst.direction).all():
+        remark = f"{PART_NAMES[worst.part]} at ", Share(worst.share)
+        yield Fact(f"worst direction of {force}", _along(worst.direction), remark, act="turn")
+
+
+def most_of_actuators(worst: WorstDirection) -> Facts:
+    """Return the largest force in every direction that the actuators alone hold."""
+    share = float(worst.share)
+    facts = [Fact("force in every direction", "no limit")]
+    if share:
+        limited = f"limited by actuator {JOINTS[int(worst.actuator)]}"
+        facts = [
+            Fact("force in every direction", (Number(1.0 / share, " N"),), limited),
+            Fact("its worst direction", _along(worst.direction)),
+        ]
+    return Facts("Most that the actuators hold", facts)
+
+
+def nearest_held(loaded: LoadedPose, nearest: Pose | None, tool: Triple | None) -> Statement:
+    """Return where the nearest position is that holds the load of a pose that does not.
+
+    Args:
+        loaded: The pose under its load.
+        nearest: The nearest pose; None if none was found.
+        tool: Point whose position is told, in the platform frame; None for b4.
+    """
+    if nearest is None:
+        return Statement("", "No position in this orientation and mode was found that holds it.")
+    unit, reach = loaded.design.unit_mm, loaded.design.reach
+    apart = Number(unit * math.dist(nearest.position, loaded.pose.position), " mm", 3, unit * reach)
+    there = nearest.position if tool is None else tool_position(nearest, tool)
+    point = "b4" if tool is None else "the tool"
+    words = "Held ", apart, f" from here, with {point} at ", Vector(there, digits=4)
+    return Statement("", words, act="go")
+
+
+def _along(direction_: FloatArray) -> Words:
+    return (direction(direction_.tolist()),)

@@ -1,0 +1,307 @@
+"""How near a pose is to a singularity, what a singular pose allows, and the gains of a pose."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from explorer.measures.blocks.block import (
+    Column,
+    Fact,
+    Facts,
+    Look,
+    Names,
+    Number,
+    Statement,
+    Table,
+    Vector,
+    Words,
+    direction,
+)
+from explorer.measures.snapshot import Snapshot
+from explorer.measures.verdict import Kind, Warnings
+from explorer.mechanism.design import JOINTS
+from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, TETRAHEDRA
+from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.numerics.number_text import format_number
+from explorer.singularity.bruhat import Stratum, describe_stratum, incidences
+from explorer.singularity.ellipsoids import Performance, SingularityFreeBall
+from explorer.singularity.freedoms import FreeTurn
+from explorer.singularity.strata import GENERIC, inversions
+
+VERDICT_HINT = (
+    "The distance is the root-mean-square displacement of b1 to b4 (Nawratil's metric) to the "
+    "nearest singular pose, of any position and orientation"
+)
+LOOKS: dict[Kind, Look] = {"clear": "within", "near": "close", "singular": "beyond"}
+LARGEST_GAIN = 1e9
+"""Gain beyond which a pose counts as singular in a direction: J is known to fewer digits."""
+
+
+def colour_words(warn: Warnings, unit_mm: float) -> str:
+    """Return what the colour of an incidence means, given the warning values."""
+    return (
+        "The colour of an incidence: the least of its measures over their warning values, which "
+        f"are {format_number(warn.margin, 3)} units of the margin, "
+        f"{format_number(warn.distance * unit_mm, 3)} mm of the distance, "
+        f"{format_number(math.degrees(warn.turn), 3)}° of turning (a transmission angle, which "
+        "mechanisms usually keep above 30° to 45°), and "
+        f"{format_number(warn.condition, 3)} of 1/cond J"
+    )
+
+
+def margin_table(snapshot: Snapshot) -> Table:
+    """Return the three margins, with the distance and the least turn to where each is zero."""
+    reach, unit = snapshot.design.reach, snapshot.design.unit_mm
+    distances = [unit * each.distance for each in snapshot.nearest]
+    turns = [
+        math.degrees(turn) if distance > 0.0 else 0.0
+        for turn, distance in zip(snapshot.least_turns, distances, strict=True)
+    ]
+    margins = snapshot.margins
+    return Table(
+        "Margins",
+        (
+            Names("margin", [f"δ{number}" for number in (1, 2, 3)]),
+            Column("δ", margins.tolist(), " units", size=reach, span=reach,
+                   hint="The margin: zero where the mechanism is singular. δ1 and δ3 are "
+                   "distances, δ2 is the mutual moment of two lines, a distance times a sine. Its "
+                   "sign is that of the mode."),
+            Column("δ", (unit * margins).tolist(), " mm", size=unit * reach, span=unit * reach,
+                   wide=True),
+            Column("distance", distances, " mm", 5, span=unit * reach,
+                   hint="To the nearest pose with δ = 0: the root-mean-square displacement of b1 "
+                   "to b4 (Nawratil's metric)."),
+            Column("turn", turns, "°", 3, span=90.0,
+                   hint="The least turn about b4 or a1 that leads to δ = 0, a transmission angle."),
+        ),
+        f"{MARGIN_KINDS}; the signs of the three name the assembly mode. Distances are the "
+        "root-mean-square displacement of b1 to b4 (Nawratil's metric), turns the least about b4 "
+        "or a1.",
+    )  # fmt: skip
+
+
+def tetrahedra(snapshot: Snapshot) -> Table:
+    """Return the tetrahedra that are flat where a margin is zero, and their volumes."""
+    size = float(snapshot.volume_sizes.max())
+    return Table(
+        "Tetrahedra",
+        (
+            Names("margin", [f"δ{number}" for number in (1, 2, 3)]),
+            Names("zero when", INCIDENCES),
+            Names("tetrahedron", [" ".join(points) for points in TETRAHEDRA]),
+            Column("volume", snapshot.volumes.tolist(), " units³", size=size),
+        ),
+        "A margin is zero where its tetrahedron is flat.",
+    )
+
+
+def nearest_poses(snapshot: Snapshot) -> Table:
+    """Return the nearest singular pose of each margin."""
+    poses = [nearest.pose for nearest in snapshot.nearest]
+    places = np.array([pose.position for pose in poses]).T.tolist()
+    angles = np.array([yaw_pitch_roll_from_rotation(pose.rotation) for pose in poses]).T.tolist()
+    return Table(
+        "Nearest singular poses",
+        (
+            Names("with", [f"δ{nearest.incidence} = 0" for nearest in snapshot.nearest]),
+            *(
+                Column(axis, values, " units", 5, size=snapshot.design.reach)
+                for axis, values in zip("xyz", places, strict=True)
+            ),
+            *(
+                Column(name, values, "°", 5, size=180.0)
+                for name, values in zip(("yaw", "pitch", "roll"), angles, strict=True)
+            ),
+        ),
+    )
+
+
+def conditioning(snapshot: Snapshot) -> Facts:
+    """Return the measures of the actuator Jacobian J, the mode and the stratum."""
+
+    def ratio(value: float) -> Words:
+        return (Number(value, digits=5, size=1.0, span=1.0),)
+
+    worst = int(snapshot.transmissions.argmin())
+    determinant = Number(snapshot.determinant, " units³", size=snapshot.determinant_size)
+    return Facts(
+        "Conditioning",
+        (
+            Fact("det J", (determinant,), hint="Determinant of the actuator Jacobian"),
+            Fact(
+                "1/cond J",
+                ratio(snapshot.inverse_condition),
+                hint="Inverse condition number of J, with lengths divided by the reach; 0 is "
+                "singular, 1 is best",
+            ),
+            Fact(
+                "least σ of J",
+                ratio(snapshot.smallest_singular_value),
+                hint="Smallest singular value of J, with lengths divided by the reach: errors of "
+                "actuators and loads grow at most 1/σ times to those of the platform and of the "
+                "actuators",
+            ),
+            Fact(
+                "manipulability",
+                ratio(snapshot.manipulability),
+                hint="|det J| with lengths divided by the reach (Yoshikawa)",
+            ),
+            Fact(
+                "transmission index",
+                (*ratio(snapshot.transmission_index), f" ({JOINTS[worst]})"),
+                hint="Output transmission index of the worst actuator, the cosine between its "
+                "force and the motion that it causes; 0 is singular, good above 0.64 to 0.7",
+            ),
+            Fact(
+                "min |δ| / reach",
+                ratio(snapshot.proximity),
+                hint=f"Smallest margin over the reach |a3|; {MARGIN_KINDS}",
+            ),
+            Fact("assembly mode", snapshot.mode_words, wide=True),
+            Fact("stratum", stratum_words(snapshot.stratum), wide=True),
+        ),
+    )
+
+
+def stratum_words(stratum: Stratum) -> str:
+    """Return a stratum in words, such as "(4, 3, 2, 1), dimension 6: generic"."""
+    numbers = ", ".join(map(str, stratum))
+    return f"({numbers}), dimension {inversions(stratum)}: {stratum_sentence(stratum)}"
+
+
+def stratum_sentence(stratum: Stratum) -> str:
+    """Return what holds in a stratum, such as "δ1 = 0: a1 on the platform plane"."""
+    if stratum == GENERIC:
+        return "no incidence, not singular"
+    zero = ", ".join(f"δ{index}" for index in incidences(stratum))
+    return f"{zero} = 0: {describe_stratum(stratum)}"
+
+
+def freedoms(snapshot: Snapshot) -> Iterator[Statement]:
+    """Yield what locked actuators let the platform do; nothing in a pose that is not singular."""
+    if not snapshot.is_singular:
+        return
+    found = snapshot.freedoms
+    if found.count == 0:
+        words = "A leg has length zero and holds its end: with all actuators locked the platform"
+        yield Statement("", f"{words} cannot move.")
+        return
+    can = "can still move" if found.count == 1 else f"still has {found.count} freedoms"
+    among = ", among them" if len(found.turns) < found.count else ""
+    ends = f"{among}:" if found.turns else "."
+    yield Statement("", f"With all actuators locked the platform {can}{ends}")
+    yield from (_free_turn(snapshot, turn) for turn in found.turns)
+
+
+def _free_turn(snapshot: Snapshot, turn: FreeTurn) -> Statement:
+    point = Vector(turn.point.tolist(), span=snapshot.design.reach)
+    through: Words = ("b4 (", point, ") units") if turn.incidence == 1 else ("a1",)
+    along = Vector(turn.direction.tolist(), span=1.0)
+    at_all = "; no joint changes at any angle" if turn.is_finite else ""
+    return Statement(
+        "",
+        (
+            f"it turns about {turn.line_name}, pitch 0, through ",
+            *through,
+            ", along (",
+            along,
+            ")",
+            at_all,
+        ),
+        hint="Along the axes of the base. Pitch 0: the platform does not slide along the line. "
+        "Joints change with the square of the angle only, so that play lets it turn a little; or "
+        "not at all where a point of one flag lies on the line of the other.",
+        act=f"show {turn.incidence}",
+    )
+
+
+def gains(performance: Performance, point: str) -> Table:
+    """Return the least and the largest gain of speed and of force, by the reach for turning.
+
+    Args:
+        performance: The ellipsoids of the pose.
+        point: Point of the platform, such as "b4".
+    """
+    moves, turns = performance.translation, performance.rotation
+    axes = moves.velocity, moves.force, turns.velocity, turns.force
+    return Table(
+        "Gains",
+        (
+            Names(
+                "per unit of the actuators",
+                (f"speed of {point}", f"force at {point}", "angular velocity", "moment"),
+            ),
+            Column("min", [finite_gain(float(each.min())) for each in axes], digits=3),
+            Column("max", [finite_gain(float(each.max())) for each in axes], digits=3),
+        ),
+        "Per unit of actuator speed or force; angular velocity times the reach, moment over the "
+        "reach.",
+    )
+
+
+def finite_gain(value: float) -> float:
+    """Return a gain; one that only rounding keeps finite is infinite."""
+    return math.inf if value > LARGEST_GAIN else value
+
+
+def tool_condition(condition: float) -> Facts:
+    """Return the inverse condition number of J at the tool."""
+    value = Number(condition, digits=5, size=1.0, span=1.0)
+    return Facts("At the tool", (Fact("1/cond J", (value,)),))
+
+
+def ellipsoids(performance: Performance, point: str) -> Iterator[Table]:
+    """Yield the gains of a pose and their axes, as for `gains`."""
+    for found, title, hint in (
+        (
+            performance.translation,
+            f"Speed of {point} per actuator speed",
+            "The actuator force per force along it too: where the platform is fast, it is weak.",
+        ),
+        (
+            performance.rotation,
+            "Angular velocity per actuator speed",
+            "Angular velocity times the reach; the actuator force per moment over the reach too.",
+        ),
+    ):
+        yield Table(
+            title,
+            (
+                Names("along x, y, z", [(direction(axis),) for axis in found.axes.T.tolist()]),
+                Column("gain", [finite_gain(value) for value in found.gain.tolist()], digits=6),
+            ),
+            hint,
+        )
+
+
+def free_ball(snapshot: Snapshot, ball: SingularityFreeBall, point: str) -> Fact:
+    """Return the radius of the largest ball of positions without a singular one.
+
+    Args:
+        snapshot: The pose.
+        ball: The ball.
+        point: Point of the platform, such as "b4".
+    """
+    unit = snapshot.design.unit_mm
+    hint = f"No position of {point} within this radius is singular at this orientation"
+    if snapshot.is_singular:
+        return Fact("singularity-free radius", f"none: δ{ball.incidence} = 0 here", hint=hint)
+    return Fact(
+        "singularity-free radius",
+        (Number(ball.radius, " units"),),
+        (Number(ball.radius * unit, " mm", 3), f", to δ{ball.incidence} = 0"),
+        hint,
+    )
+
+
+def regular_distance(distance: float, unit_mm: float) -> Fact:
+    """Return the distance within which no pose is singular."""
+    return Fact(
+        "regular within",
+        (Number(distance, " units"),),
+        (Number(distance * unit_mm, " mm", 3),),
+        "No pose is singular whose b1 to b4 are displaced by less, root mean square",
+    )

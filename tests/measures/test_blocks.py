@@ -1,0 +1,81 @@
+"""Blocks: the page and the report tell the same words for one value."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+
+import msgspec
+import pytest
+
+from explorer import Guide, Payload, Pose, Struts, Tool, evaluate
+from explorer.app.widgets.blocks import render
+from explorer.export.report.blocks import elements
+from explorer.measures.blocks.block import Block, Facts, Share
+from explorer.measures.blocks.forces import most_held, reaction_tables, verdict
+from explorer.measures.blocks.precision import deflections, tool_errors
+from explorer.measures.blocks.singularity import (
+    conditioning,
+    free_ball,
+    freedoms,
+    gains,
+    margin_table,
+)
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.typical import typical_machine
+from explorer.singularity.ellipsoids import performance, singularity_free_ball
+from explorer.statics.loaded import LoadedPose
+from explorer.statics.tool_precision import ToolPrecision
+
+TYPICAL = typical_machine(PRESETS["paper-optimal"])[0]
+MACHINE = msgspec.structs.replace(
+    TYPICAL,
+    tool=Tool((1.5, -1.0, 3.0)),
+    payload=Payload(0.5, (1.5, -1.0, 1.5), 4.0),
+    actuators=msgspec.structs.replace(
+        TYPICAL.actuators, push_n=(60.0, 60.0, 60.0, 60.0, 60.0, 60.0)
+    ),
+    struts=Struts(outer_mm=12.0, inner_mm=10.0, moment_nm=3.0),
+    guide=Guide(50.0, 3.0),
+)
+SINGULAR = Pose((10.0, 5.0, 0.0), MACHINE.home_pose.quaternion)
+
+
+def forces_of(pose: Pose) -> Iterable[Block]:
+    loaded = LoadedPose(MACHINE, pose, (1.0, 2.0, -10.0, 0.0, 3.0, 0.0))
+    return verdict(loaded), *reaction_tables(loaded), most_held(loaded)
+
+
+def precision_of(pose: Pose) -> Iterable[Block]:
+    precision = ToolPrecision(LoadedPose(MACHINE, pose, (1.0, 2.0, -10.0, 0.0, 3.0, 0.0)))
+    return *tool_errors(precision), *deflections(precision, "the load")
+
+
+def singularity_of(pose: Pose) -> Iterable[Block]:
+    snapshot = evaluate(MACHINE, pose)
+    ball = free_ball(snapshot, singularity_free_ball(pose), "b4")
+    answer = margin_table(snapshot), conditioning(snapshot), Facts("", (ball,))
+    return *freedoms(snapshot), *answer, gains(performance(MACHINE, pose), "b4")
+
+
+def words_of(text: str) -> set[str]:
+    """Return the words and numbers of a text; the report has a decimal more of each share."""
+    return set(re.findall(r"[^\s,;:()±]+", re.sub(r"[\d.]+\s%", "", text)))
+
+
+@pytest.mark.parametrize("answer", [forces_of, precision_of, singularity_of])
+@pytest.mark.parametrize("pose", [MACHINE.home_pose, SINGULAR])
+def test_page_and_report_tell_the_same_words_for_one_value(
+    answer: Callable[[Pose], Iterable[Block]], pose: Pose
+) -> None:
+    blocks = list(answer(pose))
+    page = re.sub("<[^>]*>", " ", re.sub("°", " ° ", render(blocks).replace("&#x27;", "'")))
+    report = " ".join(text for each in elements(blocks) for text in each.itertext())
+    assert words_of(page.replace("&nbsp;", " ")) <= words_of(report.replace("°", " ° "))
+
+
+@pytest.mark.parametrize("decimals", [0, 1])
+@pytest.mark.parametrize("share", [1.0 + 1e-12, 1.0001, 1.004, 1.2])
+def test_share_beyond_its_limit_never_reads_as_the_limit(share: float, decimals: int) -> None:
+    text = Share(share).text(decimals)
+    assert text.startswith("above ") or float(text.split()[0]) > 100.0
