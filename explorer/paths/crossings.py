@@ -13,6 +13,7 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -151,14 +152,19 @@ def _roots(values: FloatArray, size: float) -> tuple[list[tuple[float, bool, int
     at = margin(places)
     signs = np.where(np.abs(at) <= ROUNDING * size, 0.0, np.sign(at)).astype(int).tolist()
     roots: list[tuple[float, bool, int]] = []
-    last = len(signs) - 1
-    for k, sign in enumerate(signs):
-        if sign == 0:
-            before, after = signs[max(k - 1, 0)], signs[min(k + 1, last)]
-            changes = before * after < 0
-            roots.append((0.5 + 0.5 * float(places[k]), changes, before or after))
-        elif k < last and sign * signs[k + 1] < 0:
-            x = float(brentq(margin, places[k], places[k + 1], xtol=1e-16))
-            share = 0.5 + 0.5 * x
-            roots.append((share, True, sign if share > NEAREST_ROOTS else -sign))
+    sign = 0
+    for is_zero, group in groupby(range(len(signs)), lambda k: signs[k] == 0):
+        members = list(group)
+        if is_zero:
+            # Extremes that are zero side by side are one root of higher order.
+            nearest = min(members, key=lambda k: abs(at[k]))
+            after = signs[members[-1] + 1] if members[-1] + 1 < len(signs) else 0
+            roots.append((0.5 + 0.5 * float(places[nearest]), sign * after < 0, sign or after))
+            continue
+        for k, following in pairwise(members):
+            if signs[k] != signs[following]:
+                x = float(brentq(margin, places[k], places[following], xtol=1e-16))
+                share = 0.5 + 0.5 * x
+                roots.append((share, True, signs[k] if share > NEAREST_ROOTS else -signs[k]))
+        sign = signs[members[-1]]
     return roots, 0.0 if roots else float(np.abs(at).min())

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from strategies import WAYS, Case, cases, singular_cases
 from tool_moves import tool_move
 
-from explorer import PRESETS, InputError, Pose, forward, inverse, margins
+from explorer import PRESETS, Design, InputError, Pose, forward, inverse, margins
 from explorer.legs.moves import poses_between
 from explorer.mechanism.margins import mode_of
 from explorer.paths.crossings import path_margins
@@ -71,6 +71,17 @@ def test_path_margins_between_modes_cross_the_margins_that_differ(
         crossed = sum(c.incidence == incidence and c.changes_sign for c in found.crossings)
         # An odd number where the signs differ, else an even one.
         assert crossed % 2 == int(incidence in expected)
+
+
+def test_path_margins_of_roots_of_higher_order_change_sign_once() -> None:
+    """All margins vanish halfway, where two zeros of the rates lie side by side."""
+    third = np.array([[-1.0, 2.0, -2.0], [-2.0, 1.0, 2.0], [2.0, 2.0, 1.0]]) / 3.0
+    design = Design(a3=(10.0, 10.0), b1=(0.0, 10.0), b2=0.0, b3=10.0)
+    modes = forward(design, inverse(design, [7.5, 0.0, 5.0], third))
+    path = [Pose.of(modes.position[mode], modes.rotation[mode]) for mode in (3, 4)]
+    found = path_margins(path).crossings
+    assert sorted(each.incidence for each in found) == [1, 2, 3]
+    assert all(each.changes_sign and abs(each.share - 0.5) < 1e-6 for each in found)
 
 
 @given(st.data(), st.sampled_from(WAYS))
