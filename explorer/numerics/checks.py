@@ -23,13 +23,12 @@ _NOT_A_SEQUENCE = (str, bytes, bytearray, Set, Mapping)
 
 def number(name: str, value: object) -> float:
     """Return the value as a finite float of at most `LARGEST_NUMBER` in magnitude."""
-    refusal = DesignError(f"{name} must be a number; got {_short_repr(value)}", name)
-    if isinstance(value, _NOT_A_NUMBER):
-        raise refusal
     try:
-        checked = float(cast("Any", value))
+        checked = None if isinstance(value, _NOT_A_NUMBER) else float(cast("Any", value))
     except (TypeError, ValueError, OverflowError):
-        raise refusal from None
+        checked = None
+    if checked is None:
+        raise DesignError(f"{name} must be a number; got {_short_repr(value)}", name)
     if not math.isfinite(checked):
         raise DesignError(f"{name} must be a finite number; got {checked}", name)
     if abs(checked) > LARGEST_NUMBER:

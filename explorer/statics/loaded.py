@@ -6,9 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
-from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
@@ -22,9 +20,9 @@ from explorer.statics.reactions import (
     largest_payload,
     limit_shares,
     limited_parts,
-    reactions,
+    reactions_beside,
 )
-from explorer.statics.weights import Weights
+from explorer.statics.weights import NO_WEIGHTS, Carried, Weights, carry
 
 NO_LOAD: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -78,14 +76,19 @@ class LoadedPose:
     @cached_property
     def weights(self) -> Weights:
         """All masses."""
-        own = self.own or Weights()
+        own = self.own or NO_WEIGHTS
         payload: tuple[Payload, ...] = (self.design.payload,) if self.weighs_payload else ()
         return replace(own, on_platform=(*own.on_platform, *payload))
 
     @cached_property
+    def carried(self) -> Carried:
+        """What all weights do."""
+        return carry(self.configuration, self.weights)
+
+    @cached_property
     def held(self) -> Reactions:
         """All that holds the load and the weights."""
-        return self._held(self.load)
+        return reactions_beside(self.configuration, self.load, self.carried)
 
     @cached_property
     def shares(self) -> FloatArray:
@@ -97,7 +100,7 @@ class LoadedPose:
         """Whether each part has a limit, shape (12,), in the order of `LIMITED`."""
         return limited_parts(self.design)
 
-    @property
+    @cached_property
     def is_regular(self) -> bool:
         """Whether forces hold the load: whether the pose is not singular."""
         return bool(np.isfinite(self.held.actuators).all())
@@ -124,8 +127,7 @@ class LoadedPose:
         Neither load nor payload act besides; the largest force that all parts hold in every
         direction is 1 / share.
         """
-        bare = msgspec.structs.replace(self.design, payload=Payload())
-        return LoadedPose(bare, self.pose, weighs_payload=False, point=self.tool).worst_force(1.0)
+        return self._worst_force(1.0, NO_LOAD, carry(self.configuration, NO_WEIGHTS), spreads=False)
 
     def worst_force(self, force: float) -> WorstForce:
         """Return the direction of an added force at the tool that uses the largest share.
@@ -137,6 +139,19 @@ class LoadedPose:
         Args:
             force: Size of the force, in N.
         """
+        return self._worst_force(force, self.load, self.carried, spreads=True)
+
+    def _worst_force(
+        self, force: float, load: Six, carried: Carried, *, spreads: bool
+    ) -> WorstForce:
+        """Return the worst direction of a force beside a load, weights and the payload's force.
+
+        Args:
+            force: Size of the force, in N.
+            load: The load, as (F; M) at the tool.
+            carried: What the weights do.
+            spreads: Whether the payload's force of any direction acts.
+        """
         rows = twists_of_actuators(self.configuration)[:3].T
         if not np.isfinite(rows).all():
             return WorstForce(np.full(3, np.nan), self.worst, np.inf)
@@ -145,13 +160,13 @@ class LoadedPose:
         sizes = np.linalg.norm(rows, axis=1)
         units = rows[sizes > 0.0] / sizes[sizes > 0.0, None]
         directions = np.concatenate([units, -units])
-        loads = np.tile(self.load, (len(directions), 1))
+        loads = np.tile(load, (len(directions), 1))
         loads[:, :3] += force * directions
-        shares = limit_shares(self.design, self._held(loads))
+        held = reactions_beside(self.configuration, loads, carried)
+        if not spreads:
+            held = held._replace(spread=np.zeros(12))
+        shares = limit_shares(self.design, held)
         row, part = (int(i) for i in np.unravel_index(shares.argmax(), shares.shape))
         share = float(shares[row, part])
         direction = directions[row] if share > 0.0 else np.full(3, np.nan)
         return WorstForce(direction, part, share)
-
-    def _held(self, load: ArrayLike) -> Reactions:
-        return reactions(self.configuration, load, self.weights)

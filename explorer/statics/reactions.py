@@ -17,7 +17,7 @@ from explorer.statics.equilibrium import (
     forces_of,
     twists_of_actuators,
 )
-from explorer.statics.weights import Carried, Weights, carry
+from explorer.statics.weights import NO_WEIGHTS, Carried, Weights, carry
 
 LIMITED = (
     *JOINTS,
@@ -78,7 +78,11 @@ def reactions(
     Raises:
         InputError: The load is not finite, or batch axes do not broadcast.
     """
-    carried = carry(configuration, weights or Weights())
+    return reactions_beside(configuration, load, carry(configuration, weights or NO_WEIGHTS))
+
+
+def reactions_beside(configuration: Configuration, load: ArrayLike, carried: Carried) -> Reactions:
+    """Return `reactions` to a load beside weights of which it is known what they do."""
     forces = forces_of(configuration, carried.wrench + np.asarray(load, dtype=np.float64))
     signed = _signed(configuration, forces, carried)
     moments = np.abs(signed[..., _MOMENTS])
@@ -158,7 +162,7 @@ def largest_payload(
         InputError: The load is not finite, or batch axes do not broadcast.
     """
     design = configuration.design
-    base = carry(configuration, weights or Weights())
+    base = carry(configuration, weights or NO_WEIGHTS)
     one = Weights(on_platform=(Payload(1.0, design.payload.centre),))
     kilogram = carry(configuration, one)
     at_zero = forces_of(configuration, base.wrench + np.asarray(load, dtype=np.float64))

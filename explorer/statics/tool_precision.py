@@ -30,7 +30,6 @@ from explorer.statics.error_sources import (
     source_errors,
 )
 from explorer.statics.loaded import LoadedPose
-from explorer.statics.weights import carry
 
 BY_ACTUATORS, BY_DIMENSIONS, BY_ALL = slice(0, 6), slice(6, 29), slice(0, 29)
 """The sources of errors that are actuators, those that are dimensions, and all of them."""
@@ -69,12 +68,12 @@ class ToolPrecision:
         stiffness = stiffness_of(self.loaded.design)
         return compliance_of(self.loaded.configuration, *stiffness)
 
-    @property
+    @cached_property
     def is_regular(self) -> bool:
         """Whether the pose is not singular."""
         return bool(np.isfinite(self.compliance).all())
 
-    @property
+    @cached_property
     def has_errors(self) -> bool:
         """Whether an actuator has an error or a dimension a tolerance."""
         return bool(self.bounds.any())
@@ -116,8 +115,7 @@ class ToolPrecision:
     @cached_property
     def wrench(self) -> FloatArray:
         """The load and the weights as (F; M) at the tool, shape (6,), in N and N × unit."""
-        carried = carry(self.loaded.configuration, self.loaded.weights)
-        return self.loaded.load + carried.wrench
+        return self.loaded.load + self.loaded.carried.wrench
 
     @cached_property
     def deflection(self) -> FloatArray:

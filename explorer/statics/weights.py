@@ -61,6 +61,10 @@ class Weights:
         return any((*self.carriages, *self.cylinders, *self.rods))
 
 
+NO_WEIGHTS = Weights()
+"""The weights of bodies without masses."""
+
+
 @dataclass(frozen=True)
 class Carried:
     """What weights do in some poses.
