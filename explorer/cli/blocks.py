@@ -35,7 +35,7 @@ def lines(blocks: Iterable[Block]) -> Iterator[str]:
             case Facts(title, facts, hint):
                 rows = [(fact.name, text_of(fact.words), text_of(fact.remark)) for fact in facts]
                 yield from (*_title(title, hint), table(rows, "<<<"))
-            case Table(title, _, hint):
+            case Table(title, _, hint, _):
                 yield from (*_title(title, hint), _table(block))
             case Split(title, names, shares):
                 parts = (
@@ -81,7 +81,7 @@ def _table(block: Table) -> str:
     align = ""
     for column in block.columns:
         match column:
-            case Names(_, words):
+            case Names(_, words, _):
                 cells = [text_of(each) for each in words]
             case Column():
                 cells = [_figure(value, column.size, column.infinite) for value in column.values]

@@ -24,8 +24,8 @@ PAIRS = ((1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4))
 
 
 def pair_name(pair: tuple[int, int]) -> str:
-    """Return the name of a pair of legs, such as "1 – 2"."""
-    return f"{pair[0]} – {pair[1]}"
+    """Return the name of a pair of legs, such as "1–2"."""
+    return f"{pair[0]}–{pair[1]}"
 
 
 def legs_of(pairs: Iterable[bool]) -> list[bool]:

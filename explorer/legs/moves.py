@@ -96,6 +96,11 @@ class MoveClearance:
         """Whether the move is free by the paper's test, without radii, at this number of steps."""
         return not self.overlaps.any()
 
+    @property
+    def poses(self) -> tuple[FloatArray, FloatArray]:
+        """Positions of b4 and rotations where each pair is closest, shapes (6, 3), (6, 3, 3)."""
+        return poses_between(self.start, self.end, self.share, self.tool)
+
 
 @dataclass(frozen=True)
 class StraightMoves:

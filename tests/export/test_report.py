@@ -27,6 +27,7 @@ from explorer.export.report.document import report_html
 from explorer.export.report.drawings.projection import ViewName, fit_view
 from explorer.export.report.drawings.slices import Slices
 from explorer.export.report.markup import as_html, element, number
+from explorer.legs.clearance import PAIRS, pair_name
 from explorer.mechanism.design import JOINTS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.numerics.number_text import format_number
@@ -199,14 +200,13 @@ def test_report_singularity_and_leg_tables_hold_snapshot(seed: int) -> None:
     speeds = table_of(page, "Speed of b4")
     assert [row.values[3] for row in speeds.values()] == gains
     least = least_clearances(design, home.rotation).clearance
-    (legs,) = (each for each in page.all("section") if next(each.all("h2")).text == "Legs")
-    for row, here, low in zip(
-        list(legs.all("tr"))[1:],
-        snapshot.clearances.clearance.tolist(),
-        least.tolist(),
-        strict=True,
-    ):
-        assert row.values == [here, here * unit, low, low * unit]
+    here = table_of(page, "Clearance here")
+    lows = table_of(page, "Least clearance in the workspace")
+    clearances = snapshot.clearances.clearance.tolist()
+    for pair, clearance, low in zip(PAIRS, clearances, least.tolist(), strict=True):
+        name = pair_name(pair)
+        assert here[name].values[1:3] == [clearance, clearance * unit]
+        assert lows[name].values[:2] == [low, low * unit]
 
 
 def test_report_thick_legs_give_accessible_volume() -> None:
@@ -215,7 +215,7 @@ def test_report_thick_legs_give_accessible_volume() -> None:
     row = table_of(page, "Volumes")["accessible"].values
     assert row[0] == found.accessible_volume
     assert row[2:] == [found.accessible_node_count, found.node_count]
-    assert "legs collide" in page.text
+    assert "collide in the workspace" in page.text
     assert "--interference" in page.one(id="commands").text
 
 

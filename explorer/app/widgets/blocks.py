@@ -114,10 +114,11 @@ def _table(block: Table) -> tuple[list[str], list[str]]:
     has_heads = False
     for column in block.columns:
         match column:
-            case Names(head, words):
-                texts = map(words_html, words)
-                cells.append([*texts] if cells else [dim(text) for text in texts])
-                heads.append(head)
+            case Names(head, words, wide):
+                if not wide:
+                    texts = map(words_html, words)
+                    cells.append([*texts] if cells else [dim(text) for text in texts])
+                    heads.append(head)
             case Column():
                 if not column.wide:
                     cells.append(
@@ -142,7 +143,9 @@ def _table(block: Table) -> tuple[list[str], list[str]]:
                     ]
                 )
                 heads.append("")
-    return [row(*each) for each in zip(*cells, strict=True)], heads if has_heads else []
+    looks = [f"ex-{look}" if look else "" for look in block.looks] or [""] * len(cells[0])
+    rows = [row(*each, look=look) for *each, look in zip(*cells, looks, strict=True)]
+    return rows, heads if has_heads else []
 
 
 def _share(share: float | None) -> tuple[str, str]:

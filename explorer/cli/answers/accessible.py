@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,6 @@ from explorer.cli.output import (
     finite,
     lengths,
     mesh_json,
-    radii_line,
     table,
 )
 from explorer.mechanism.design import Design
@@ -43,20 +41,6 @@ def interference_json(workspace: AccessibleWorkspace) -> dict[str, object]:
         ],
         "accessible_solid": mesh_json(workspace.solid),
     }
-
-
-def interference_table(design: Design, workspace: AccessibleWorkspace) -> str:
-    """Return the table of pairs of legs and the volumes that they block."""
-    rows: list[tuple[str, ...]] = [
-        ("legs", "least clearance", "certified", "blocked alone (units³)")
-    ]
-    for pair in workspace.pairs:
-        legs = f"{pair.legs[0]} and {pair.legs[1]}"
-        if math.isinf(pair.clearance):
-            rows.append((legs, "none" if workspace.solid.is_empty else "joined", "", figure(0.0)))
-        else:
-            rows.append((legs, *map(figure, (pair.clearance, pair.bound, pair.blocked_volume))))
-    return f"{radii_line(design)}\n{table(rows, '<>>>')}"
 
 
 def curve_json(curve: RadiusCurve) -> dict[str, object]:

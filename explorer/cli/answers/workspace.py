@@ -12,16 +12,18 @@ from explorer.cli.answers.accessible import (
     curve_json,
     curve_table,
     interference_json,
-    interference_table,
 )
+from explorer.cli.blocks import lines
 from explorer.cli.output import (
     DISAGREES,
     attributes,
     figure,
     measure_text,
     mesh_json,
+    radii_line,
     table,
 )
+from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import Measurements, measure_design
@@ -150,7 +152,8 @@ class WorkspaceMeasures:
         if self.capability is not None:
             yield from ("", f"orientation capability {100.0 * self.capability:.2f} %")
         if accessible is not None:
-            yield from ("", interference_table(design, accessible))
+            yield from ("", radii_line(design))
+            yield from lines(workspace_clearances(accessible.pairs, design))
         if self.curve is not None:
             yield from ("", curve_table(design, self.curve, self.shift))
 

@@ -127,7 +127,7 @@ def _headline(data: ReportData) -> Iterator[tuple[Piece, ...]]:
     yield "Smallest margin |δ| here", number(margin * unit, 4), _unit("mm")
     yield "Inverse condition here", number(snapshot.inverse_condition, 4), _unit("of 1")
     clearance = float(snapshot.clearances.clearance.min())
-    yield "Least clearance of legs here", number(clearance * unit, 4), _unit("mm")
+    yield "Least clearance here", number(clearance * unit, 4), _unit("mm")
 
 
 def _unit(words: str) -> Element:

@@ -127,10 +127,12 @@ class Names:
     Attributes:
         head: Its head.
         words: Its cells.
+        wide: Whether it needs more room than the page has.
     """
 
     head: str
     words: Sequence[Words]
+    wide: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,11 +223,13 @@ class Table:
         columns: Its columns, all of one length; the page shows heads only above numbers without
             a unit.
         hint: Sentences on what it shows.
+        looks: What each row says of bounds, which the page shows in its colour; () if nothing.
     """
 
     title: str
     columns: Sequence[Names | Column | Shares | Bars]
     hint: str = ""
+    looks: Sequence[Look | None] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Balls, Rods, add_lines
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, TUBE
-from explorer.legs.clearance import PAIRS, leg_axes
+from explorer.legs.clearance import PAIRS, leg_axes, pair_name
 from explorer.numerics.number_text import format_number
 
 CAPSULE_OPACITY = 0.22
@@ -47,8 +47,7 @@ class ClearanceScene(ScenePart):
             clearances = snapshot.clearances
             pair = int(clearances.closest)
             ends = placed.scale * clearances.points[pair]
-            first, second = PAIRS[pair]
             yield self._line, "points", ends[None].astype(np.float32)
             yield self._label, "position", tuple(ends.mean(axis=0).tolist())
             clearance = format_number(float(clearances.clearance[pair]), 3, size=state.design.reach)
-            yield self._label, "text", f"legs {first}–{second}: {clearance}"
+            yield self._label, "text", f"legs {pair_name(PAIRS[pair])}: {clearance}"

@@ -58,13 +58,11 @@ class AccessiblePart:
         volume: Volume in cubed design units.
         node_count: Number of nodes of the paper's grid; None if the grid is too fine.
         pairs: Clearance and blocked volume of each pair of legs, in the order of `PAIRS`.
-        harmless_radius: Length by which all radii may grow before any two legs collide.
     """
 
     volume: float
     node_count: int | None
     pairs: tuple[PairCost, ...]
-    harmless_radius: float
 
 
 _cache: dict[tuple[Design, Rows, Triple | None, float], AccessibleWorkspace | Trouble] = {}
@@ -109,7 +107,6 @@ def accessible_part(workspace: AccessibleWorkspace) -> AccessiblePart:
         workspace.accessible_volume,
         workspace.accessible_node_count,
         workspace.pairs,
-        workspace.harmless_radius,
     )
 
 

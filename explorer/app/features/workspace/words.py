@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -15,6 +14,7 @@ from explorer.app.features.workspace.volume import MeasuredVolume, VolumeFeed, v
 from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Measure
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.widgets.blocks import content_of
 from explorer.app.widgets.colours import css
 from explorer.app.widgets.markup import (
     alert,
@@ -30,13 +30,12 @@ from explorer.app.widgets.markup import (
 )
 from explorer.app.widgets.under_way import problem, progress
 from explorer.export.report.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
-from explorer.legs.clearance import pair_name
+from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import BAND_EDGES, band_colours
 from explorer.statics.reactions import has_limits
-from explorer.workspace.accessible.workspace import PairCost
 from explorer.workspace.position_bands import (
     MEASURE_WORDS,
     SHARE_COLOURS,
@@ -172,7 +171,9 @@ def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
         )
     parts.append(_numbers(drawing, frame.state))
     if drawing.accessible is not None and drawing.volume > 0.0:
-        parts.append(_pairs(drawing.accessible, is_coloured=view.colour == "plain"))
+        parts.append(
+            _pairs(drawing.accessible, drawing.request.design, is_coloured=view.colour == "plain")
+        )
     coarse_edge = drawing.surface.coarse_edge
     if coarse_edge is not None:
         parts.append(
@@ -240,34 +241,12 @@ def deviation_text(deviation: float) -> str:
     )
 
 
-def _pairs(accessible: AccessiblePart, *, is_coloured: bool) -> str:
+def _pairs(accessible: AccessiblePart, design: Design, *, is_coloured: bool) -> str:
     """Return the clearance of each pair of legs, and the volume that it blocks."""
-    blocking = [pair for pair in accessible.pairs if pair.blocked_volume > 0.0]
-    words, look = "Legs touch, but block nothing", "within"
-    if min(pair.clearance for pair in accessible.pairs) > 0.0:
-        words = "No pair collides"
-    elif blocking:
-        words, look = (
-            f"Legs {', '.join(pair_name(pair.legs) for pair in blocking)} collide",
-            "beyond",
-        )
-    mark = swatch(COLLIDING) if is_coloured and blocking else ""
-    radius = ""
-    if accessible.harmless_radius > 0.0:
-        radius = (
-            '<div class="ex-dim ex-after">No two legs collide if all radii grow by up to '
-            f"{format_number(accessible.harmless_radius)}</div>"
-        )
-    rows = table(map(_pair, accessible.pairs), ("legs", "least clearance", "blocked, units³"))
-    return f'<div class="ex-strong ex-after ex-{look}">{mark}{words}</div>{rows}{radius}'
-
-
-def _pair(pair: PairCost) -> str:
-    clearance = "joined" if math.isinf(pair.clearance) else format_number(pair.clearance, 3)
-    if pair.blocked_volume > 0.0:
-        blocked = format_number(pair.blocked_volume, 3)
-        return row(pair_name(pair.legs), clearance, blocked, look="ex-beyond")
-    return row(pair_name(pair.legs), clearance, "–")
+    blocks = workspace_clearances(accessible.pairs, design)
+    is_marked = is_coloured and any(pair.blocked_volume > 0.0 for pair in accessible.pairs)
+    mark = f'<div class="ex-dim">{swatch(COLLIDING)}legs collide</div>' if is_marked else ""
+    return "".join(content_of(block, {}) for block in blocks) + mark
 
 
 def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None) -> str:
