@@ -436,7 +436,7 @@ def test_chart_shows_any_curve_and_marks_on_it(values: list[float], radius: floa
 
 def test_words_of_the_curve_show_its_radii_shares_and_first_contacts() -> None:
     expected, html = curve_of(opened(OPTIMAL)), words_of(thick(opened(OPTIMAL), RADIUS))
-    rows = rows_of("<tr></tr>" + html)
+    rows = rows_of(html)
     assert [row[0] for row in rows] == ["present radius", "99 % accessible up to", "no loss up to"]
     assert number(rows[0][1]) == RADIUS
     share = 100.0 * volume_at(expected, RADIUS) / float(expected.volumes[0])
