@@ -22,6 +22,8 @@ def legs_section(data: ReportData) -> Iterator[Element]:
         rows = zip(PAIRS, least.clearance.tolist(), least.bound.tolist(), strict=True)
         pairs = [PairCost(*row, blocked_volume=0.0) for row in rows]
     yield element("h2", "Legs")
-    yield paragraph(f"Here is {data.pose_words}. A pair that shares a joint has no clearance.")
+    yield paragraph(
+        f"The first table is of {data.pose_words}. A pair that shares a joint has no clearance."
+    )
     yield from elements(pose_clearances(data.snapshot))
     yield from elements(workspace_clearances(pairs, data.design))
