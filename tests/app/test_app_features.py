@@ -273,7 +273,7 @@ OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, GiveUp, Compar
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
 OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")} | {
-    f"{tab} › Copy the command line" for tab in ("Forces", "Precision", "Singularity")
+    f"{tab} › Copy the command line" for tab in ("Forces", "Legs", "Precision", "Singularity")
 }
 """Commands that change the camera, the panels or the clipboard of one browser: none is there."""
 
