@@ -32,7 +32,6 @@ from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import PreferenceFile, UserData
 from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.app.widgets.buttons import Buttons
-from explorer.app.widgets.compiling import CompilingNotice
 from explorer.app.widgets.markup import sentence
 from explorer.app.widgets.palette import Command, Palette
 from explorer.app.widgets.theme import Theme
@@ -113,7 +112,6 @@ class Page:
         self._is_complete = False
         self._frame = Frame(state)
         self._assigner = Assigner(server)
-        self.compiling = CompilingNotice(server)
         self._presses = presses = Presses()
         self.session = Session(
             state, self._draw, self._complain, self._report, history, press_at=presses.at

@@ -202,7 +202,7 @@ def _wait_for_interruption(running: Running, open_browser: bool) -> None:
             f"Through a proxy: {access.proxy_url(name)}   (http if the proxy does not encrypt)\n"
         )
     sys.stderr.flush()
-    warm_in_background(tell=running.page.compiling.show)
+    warm_in_background()
     running.page.start_workers()
     if open_browser:
         threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()

@@ -1,35 +1,40 @@
-"""Kernels: plain Python loops over arrays, which Numba compiles when they are needed.
+"""Kernels: plain Python loops over arrays, which Numba compiles ahead of their calls.
 
-A call with many rows loads the compiled kernel first, or compiles it. A call with few rows runs
-the plain Python until the compiled kernel is loaded in the background, because compiling takes
-seconds and loading too long for a single pose. `explorer.numerics.kernel_cache` stores the
-compiled code.
+A call with few rows runs the plain Python until the compiled form is loaded, because compiling
+takes seconds. A call with many rows loads the compiled form first. That is object code in a file,
+which comes with the explorer or lies in the user's cache (`explorer.numerics.kernel_cache`). If
+there is no such file, a child process compiles the kernel into the cache.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import os
+import pkgutil
+import random
+import subprocess
+import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
 
-from explorer.numerics.kernel_cache import Entry, await_cached
-from explorer.numerics.object_code import compile_object, load_object, with_compiled_helpers
+from explorer.files.packaged import SOURCES
+from explorer.numerics.kernel_cache import cache_folder, fingerprint_of, read_code, write_code
+from explorer.numerics.object_code import compile_object, load_object
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 # Number of rows from which compiling (or loading from the cache) is faster than interpreting.
 MANY_ROWS = 256
+KERNELS: list[Kernel[...]] = []
 
-_kernels: list[Kernel[...]] = []
 # Functions that kernels call, with their compiled forms; None before they are compiled.
 _helpers: dict[Callable[..., Any], Any] = {}
-# One thread at a time compiles and loads.
-_compile_lock = threading.RLock()
-# One thread at a time compiles in the background.
+# Two threads that load all kernels would start two child processes.
 _warm_lock = threading.Lock()
 
 
@@ -46,12 +51,13 @@ class Kernel(Generic[Arguments]):
         self._function = function
         self._signature = signature
         self._compiled: Callable[Arguments, None] | None = None
+        self.label = f"{function.__module__}:{function.__name__}"
         functools.update_wrapper(self, function)
-        _kernels.append(self)
+        KERNELS.append(self)
 
     def __call__(self, rows: int, *args: Arguments.args, **kwargs: Arguments.kwargs) -> None:
         """Run over `rows` rows: compiled if they are many or the compiled form is loaded."""
-        if self._compiled is None and rows >= MANY_ROWS:
+        if rows >= MANY_ROWS:
             self.compile()
         if self._compiled is not None:
             self._compiled(*args, **kwargs)
@@ -60,32 +66,30 @@ class Kernel(Generic[Arguments]):
         with np.errstate(all="ignore"):
             self._function(*args, **kwargs)
 
-    @functools.cached_property
-    def entry(self) -> Entry:
-        """The kernel's entry in the cache."""
-        return Entry(self._function, _helpers, self._signature, self._object)
-
     @property
     def ready(self) -> bool:
         """Whether the compiled form is in use."""
         return self._compiled is not None
 
+    @functools.cached_property
+    def file_name(self) -> str:
+        """Name of the file with the object code, which changes with the source."""
+        fingerprint = fingerprint_of(self._function, _helpers, self._signature)
+        return f"{self._function.__name__}-{fingerprint}.o"
+
     def compile(self) -> None:
-        """Load the compiled form; wait while another process compiles it."""
+        """Load the compiled form; wait while it is compiled if it is stored nowhere."""
         if self._compiled is None:
-            for _ in await_cached([self.entry], urgent=True):
-                self.load()
+            _load([self])
 
-    def load(self) -> None:
-        """Load the compiled form; compile it in this process if it is stored nowhere."""
-        with _compile_lock:
-            if self._compiled is None:
-                self._compiled = load_object(self.entry.code(), self._signature)
+    def load(self, code: bytes | None) -> None:
+        """Use object code from now on, unless there is none."""
+        if code is not None:
+            self._compiled = load_object(code, self._signature)
 
-    def _object(self) -> bytes:
+    def make_code(self) -> bytes:
         """Return the object code, compiled in this process."""
-        with _compile_lock:
-            return compile_object(with_compiled_helpers(self._function, _helpers), self._signature)
+        return compile_object(self._function, _helpers, self._signature)
 
 
 def kernel(signature: str) -> Callable[[Callable[Arguments, None]], Kernel[Arguments]]:
@@ -99,48 +103,59 @@ def helper(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]
     return function
 
 
-def all_kernels() -> tuple[Kernel[...], ...]:
-    """Return every imported kernel."""
-    return tuple(_kernels)
+def warm() -> None:
+    """Load the compiled form of every imported kernel, so that small calls are fast too."""
+    with _warm_lock:
+        _load(kernel for kernel in KERNELS if not kernel.ready)
 
 
-def fill_cache() -> None:
-    """Compile every imported kernel into the cache, in another process."""
-    for _ in await_cached(kernel.entry for kernel in _kernels if not kernel.ready):
-        pass
+def warm_in_background() -> None:
+    """Call `warm` in a thread; a kernel runs interpreted until its compiled form is loaded."""
+    threading.Thread(target=warm, name="warm kernels", daemon=True).start()
 
 
-def warm(tell: Callable[[float], None] | None = None) -> None:
-    """Load the compiled form of every imported kernel, so that small calls are fast too.
-
-    Args:
-        tell: Callback with the share of the work of compiling that is done, 0 to 1; it is called
-            only if some kernels are stored nowhere and have to be compiled.
-    """
-    waiting = {kernel.entry: kernel for kernel in _kernels if not kernel.ready}
-    missing = {entry for entry in waiting if not entry.is_filled}
-    effort, done = sum(entry.effort for entry in missing), 0
-    if missing and tell is not None:
-        tell(0.0)
-    for entry in await_cached(waiting):
-        waiting[entry].load()
-        if entry in missing and tell is not None:
-            missing.remove(entry)
-            done += entry.effort
-            tell(done / effort if missing else 1.0)
+def _load(kernels: Iterable[Kernel[...]]) -> None:
+    missing: dict[str, Kernel[...]] = {}
+    for each in kernels:
+        each.load(read_code(each.file_name))
+        if not each.ready:
+            missing[each.label] = each
+    if missing:
+        with _start_child(missing) as child:
+            for line in child.stdout or ():
+                found = missing[line.strip()]
+                found.load(read_code(found.file_name))
+    for each in missing.values():
+        # The child ends early if the cache cannot be written.
+        if not each.ready:
+            each.load(each.make_code())
 
 
-def warm_in_background(tell: Callable[[float], None] | None = None) -> threading.Thread:
-    """Call `warm` in a thread; a kernel runs interpreted until its compiled form is loaded.
+def _start_child(labels: Iterable[str]) -> subprocess.Popen[str]:
+    """Start a process that compiles kernels into the cache, even if this process ends."""
+    # The child must import the same sources in any working folder. At higher levels of
+    # optimisation compiling takes longer and the kernels are no faster.
+    return subprocess.Popen(  # noqa: S603 - our own interpreter and names of our own modules
+        [sys.executable, "-P", "-c", f"from {__name__} import main; main()", *labels],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": str(SOURCES), "NUMBA_OPT": "1"},
+        text=True,
+        # Ctrl-C in a terminal ends this process alone.
+        start_new_session=True,
+    )
 
-    Args:
-        tell: Callback in that thread, for `warm`.
-    """
 
-    def run() -> None:
-        with _warm_lock:
-            warm(tell)
-
-    thread = threading.Thread(target=run, name="warm kernels", daemon=True)
-    thread.start()
-    return thread
+def main() -> None:
+    """Compile the kernels that the command line names; print the name of each that is cached."""
+    labels = sys.argv[1:]
+    # Two such processes at a time share most of the work, as their orders differ.
+    random.shuffle(labels)
+    for label in labels:
+        found: Kernel[...] = pkgutil.resolve_name(label)
+        if read_code(found.file_name) is None:
+            write_code(cache_folder(), found.file_name, found.make_code())
+        # Nobody reads it if the parent process has ended.
+        with contextlib.suppress(OSError):
+            os.write(1, f"{label}\n".encode())

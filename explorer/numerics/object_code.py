@@ -45,8 +45,7 @@ define ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %align) {
   %room = add i64 %wide, 40
   %all = add i64 %room, %size
   %info = call ptr @malloc(i64 %all)
-  %count = getelementptr i8, ptr %info, i64 0
-  store i64 1, ptr %count
+  store i64 1, ptr %info
   %address = ptrtoint ptr %info to i64
   %least = add i64 %address, %room
   %mask = sub i64 0, %wide
@@ -70,29 +69,28 @@ define void @NRT_MemInfo_call_dtor(ptr %info) {
 
 def arguments_of(signature: str) -> list[tuple[str, int]]:
     """Return the type and the number of axes of each argument of a signature of Numba."""
-    inside = signature[len("void(") : -1]
-    arguments = re.findall(r"(\w\d)(\[[^\]]*\])?", inside)
+    arguments = re.findall(r"(\w\d)(\[[^\]]*\])?", signature)
     return [(kind, axes.count(":") - 1 if axes else 0) for kind, axes in arguments]
 
 
-def compile_object(function: Function, signature: str) -> bytes:
+def compile_object(function: Function, helpers: dict[Function, Any], signature: str) -> bytes:
     """Return the object code of a function in the subset of Python that Numba compiles.
 
     Its function `SYMBOL` takes arrays as pointers to their C structures.
 
     Args:
         function: Function that writes its results into arrays among its arguments.
+        helpers: Functions that it may call, with their compiled forms; None before they are made.
         signature: Its type signature for Numba; all arrays are contiguous.
     """
     numba, llvm = _numba(), _llvm()
     # The wrappers for calls from Python would need Numba at run time.
     options = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    dispatcher = numba.njit(signature, **options)(function)
+    dispatcher = numba.njit(signature, **options)(_with_compiled_helpers(function, helpers))
     overload = next(iter(dispatcher.overloads.values()))
     module = llvm.parse_assembly(overload.library.get_llvm_str())
-    entry = _entry(overload.fndesc.llvm_func_name, arguments_of(signature))
-    module.link_in(llvm.parse_assembly(RUNTIME))
-    module.link_in(llvm.parse_assembly(entry))
+    for each in (RUNTIME, _entry(overload.fndesc.llvm_func_name, arguments_of(signature))):
+        module.link_in(llvm.parse_assembly(each))
     module.verify()
     return _target_machine().emit_object(module)
 
@@ -104,9 +102,12 @@ def load_object(code: bytes, signature: str) -> Function:
     interpreter lock.
     """
     arguments = arguments_of(signature)
-    engine, address = _linked(code)
+    llvm = _llvm()
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
     types = [ctypes.py_object if axes else SCALARS[kind] for kind, axes in arguments]
-    native = ctypes.CFUNCTYPE(ctypes.c_int32, *types)(address)
+    native = ctypes.CFUNCTYPE(ctypes.c_int32, *types)(engine.get_function_address(SYMBOL))
     arrays = [(place, np.dtype(kind), axes) for place, (kind, axes) in enumerate(arguments) if axes]
 
     def call(*given: Any) -> None:
@@ -127,15 +128,6 @@ def load_object(code: bytes, signature: str) -> Function:
     return call
 
 
-def _linked(code: bytes) -> tuple[object, int]:
-    """Return the engine that holds object code, and the address of its function `SYMBOL`."""
-    llvm = _llvm()
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
-    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-    engine.finalize_object()
-    return engine, engine.get_function_address(SYMBOL)
-
-
 def _numba() -> Any:
     """Return Numba without its types, which are partial; importing it takes half a second."""
     return importlib.import_module("numba")
@@ -154,10 +146,9 @@ def processor() -> str:
 @functools.cache
 def _processor_type() -> str:
     """Return LLVM's name of the kind of processor for which code is made."""
-    llvm = _llvm()
-    features = llvm.get_host_cpu_features()
+    features = _llvm().get_host_cpu_features()
     is_common = all(features.get(each) for each in COMMON_FEATURES)
-    return COMMON_TYPE if is_common else llvm.get_host_cpu_name()
+    return COMMON_TYPE if is_common else _llvm().get_host_cpu_name()
 
 
 @functools.cache
@@ -187,12 +178,11 @@ def _entry(native: str, arguments: list[tuple[str, int]]) -> str:
     for index, (kind, axes) in enumerate(arguments):
         llvm_type, size = LLVM_TYPES[kind]
         name = f"%a{index}"
+        taken.append(f"{'ptr' if axes else llvm_type} {name}")
         if not axes:
-            taken.append(f"{llvm_type} {name}")
             types.append(llvm_type)
-            passed.append(f"{llvm_type} {name}")
+            passed.append(taken[-1])
             continue
-        taken.append(f"ptr {name}")
         lines += [
             f"  {name}.data.at = getelementptr i8, ptr {name}, i64 {DATA_AT}",
             f"  {name}.data = load ptr, ptr {name}.data.at",
@@ -212,33 +202,22 @@ def _entry(native: str, arguments: list[tuple[str, int]]) -> str:
         types += ["ptr", "ptr", "i64", "i64", "ptr", *["i64"] * (2 * axes)]
         passed += ["ptr null", "ptr null", f"i64 {name}.count", f"i64 {size}"]
         passed += [f"ptr {name}.data", *lengths, *strides]
-    return "\n".join(
-        [
-            f'declare i32 @"{native}"({", ".join(types)})',
-            f"define i32 @{SYMBOL}({', '.join(taken)}) {{",
-            *lines,
-            f'  %status = call i32 @"{native}"({", ".join(passed)})',
-            "  ret i32 %status",
-            "}",
-        ]
+    head = (
+        f'declare i32 @"{native}"({", ".join(types)})\ndefine i32 @{SYMBOL}({", ".join(taken)}) {{'
     )
+    lines.append(f'  %status = call i32 @"{native}"({", ".join(passed)})\n  ret i32 %status\n}}')
+    return "\n".join([head, *lines])
 
 
-def with_compiled_helpers(function: Function, helpers: dict[Function, Any]) -> Function:
-    """Return a copy of a function that calls compiled helpers instead of plain ones.
-
-    Args:
-        function: Function of a kernel or a helper.
-        helpers: The compiled form of each helper; None before it is compiled.
-    """
+def _with_compiled_helpers(function: Function, helpers: dict[Function, Any]) -> Function:
+    """Return a copy of a function that calls compiled helpers instead of plain ones."""
     numba = _numba()
     names = dict(function.__globals__)
     for name in function.__code__.co_names:
         called = names.get(name)
         if isinstance(called, FunctionType) and called in helpers:
             if helpers[called] is None:
-                plain = with_compiled_helpers(called, helpers)
-                helpers[called] = numba.njit(**OPTIONS)(plain)
+                helpers[called] = numba.njit(**OPTIONS)(_with_compiled_helpers(called, helpers))
             names[name] = helpers[called]
     copy = FunctionType(function.__code__, names, function.__name__, function.__defaults__)
     copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from explorer.errors import ExplorerError
 from explorer.files.versions import versions
-from explorer.numerics.compiled import fill_cache
+from explorer.numerics.compiled import warm
 from explorer.sweep.folder import claim
 from explorer.sweep.parts import pyarrow, sound_parts, write_part
 from explorer.sweep.rows import (
@@ -110,9 +110,9 @@ def run_study(
     check_study(study)
     path = Path(folder)
     with claim(path, study):
-        # The cache of kernels is filled once here, rather than in each worker.
+        # What is missing is compiled once here, rather than in each worker.
         load_kernels(study)
-        fill_cache()
+        warm()
         return _Run(study, path, workers, watch or (lambda _: None)).run(limit, stop)
 
 

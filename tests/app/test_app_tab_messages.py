@@ -82,18 +82,3 @@ def test_picture_of_an_impossible_size_is_refused_to_the_tab_that_asks_alone(
         (text,) = (text for _, text in notices(messages) if "got 9" in text)
         assert "the width of a picture is 16 to 8192 pixels; got 9" in text
         assert not any("got 9" in text for _, text in notices(other.read_all_sent(running)))
-
-
-def test_notice_of_compiling_counts_up_and_goes_when_it_is_done(running: Running) -> None:
-    compiling = running.page.compiling
-    with client_of(running) as client:
-        client.read_all_sent(running)
-        for share, kind, words in (
-            (0.0, "NotificationShowMessage", "0 % done"),
-            (0.4, "NotificationUpdateMessage", "40 % done"),
-            (1.0, "RemoveNotificationMessage", ""),
-        ):
-            compiling.show(share)
-            ((found, text),) = notices(client.read_all_sent(running))
-            assert found == kind
-            assert words in text

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import os
 import runpy
 import subprocess
 import sys
 from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 
 import kernels
@@ -16,11 +18,14 @@ import pytest
 
 from explorer.files.packaged import SOURCES
 from explorer.legs import clearance
-from explorer.numerics.compiled import all_kernels
+from explorer.numerics.compiled import KERNELS
 from explorer.numerics.kernel_cache import DIGEST, PACKAGED, fingerprint_of
+from explorer.numerics.object_code import processor
 
 # The processors for which object code is packaged.
 COMMON = "linux-x86-64-v3"
+# The versions of the compilers that made it; others make other code.
+COMPILERS = {"numba": "0.68.1", "llvmlite": "0.50.0"}
 
 SOURCE = """
 from typing import NamedTuple
@@ -44,7 +49,7 @@ def fingerprint(folder: Path, signature: str = "f8(f8)", **changed: str) -> str:
     path = folder / f"{len(list(folder.iterdir()))}.py"
     path.write_text(SOURCE.format(**code), encoding="utf-8")
     names = runpy.run_path(str(path))
-    return fingerprint_of(names["area"], {names["square"], names["unused"]}, signature)[0]
+    return fingerprint_of(names["area"], {names["square"], names["unused"]}, signature)
 
 
 def test_fingerprint_changes_with_the_code_and_constants_that_a_kernel_uses(tmp_path: Path) -> None:
@@ -66,10 +71,32 @@ def test_object_code_of_every_kernel_is_packaged_for_common_processors() -> None
     # To be mended by python tests/tools/kernels.py on such a machine.
     kernels.import_all()
     folder = kernels.FOLDER.with_name(COMMON)
-    assert {each.entry.file_name for each in all_kernels()} == {
-        path.name for path in folder.iterdir()
-    }
+    assert {each.file_name for each in KERNELS} == {path.name for path in folder.iterdir()}
     assert all(map(is_whole, folder.iterdir()))
+
+
+def instructions(code: bytes) -> list[bytes]:
+    """Return the instructions and the scalar constants in object code.
+
+    The rest depends on the numbers that Numba gives to names, and on the folder of the sources.
+    """
+    file = importlib.import_module("llvmlite.binding").ObjectFileRef.from_data(code)
+    sections = ((each.name() or b"", each.data()) for each in file.sections())
+    return [data for name, data in sections if name.startswith((b".text", b".ltext", b".rodata"))]
+
+
+@pytest.mark.long
+@pytest.mark.skipif(processor() != COMMON, reason="another processor")
+@pytest.mark.skipif(
+    tuple(map(version, COMPILERS)) != tuple(COMPILERS.values()), reason="other compilers"
+)
+def test_packaged_code_is_what_the_compilers_make_of_the_source() -> None:
+    kernels.import_all()
+    assert KERNELS
+    for each in KERNELS:
+        packaged = (kernels.FOLDER / each.file_name).read_bytes()[DIGEST:]
+        assert any(instructions(packaged))
+        assert instructions(packaged) == instructions(each.make_code()), each.file_name
 
 
 @pytest.fixture
@@ -122,13 +149,42 @@ def test_packaged_kernel_needs_neither_numba_nor_a_cache(tmp_path: Path) -> None
     assert not cache.exists()
 
 
+ENDING = """
+import os, subprocess
+from explorer.legs.clearance import pair_rows
+start = subprocess.Popen
+def start_and_end(*args, **options):
+    start(*args, **options | {"stderr": None})
+    os._exit(0)
+subprocess.Popen = start_and_end
+pair_rows.compile()
+"""
+
+
+def test_kernel_that_two_processes_compile_at_a_time_is_cached_whole_although_they_end_early(
+    unpackaged: Path, tmp_path: Path
+) -> None:
+    cache = tmp_path / "cache"
+    environment = {**os.environ, "XDG_CACHE_HOME": str(cache), "PYTHONPATH": str(unpackaged)}
+    command = [sys.executable, "-c", ENDING]
+    runs = [
+        subprocess.Popen(command, env=environment, cwd=unpackaged, stderr=subprocess.PIPE)
+        for _ in range(2)
+    ]
+    for run in runs:
+        # The pipe is closed when the compiling process has ended too.
+        run.communicate()
+    (made,) = (path for path in cache.rglob("*") if path.is_file())
+    assert is_whole(made)
+
+
 @pytest.mark.long
 def test_kernel_is_compiled_if_the_cache_cannot_be_written(
     unpackaged: Path, tmp_path: Path
 ) -> None:
     blocked = tmp_path / "file"
     blocked.touch()
-    run_program(f"{PROGRAM}assert not pair_rows.entry.is_filled", unpackaged, blocked)
+    run_program(PROGRAM, unpackaged, blocked)
 
 
 def test_kernel_takes_no_arrays_of_another_kind() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from explorer import PRESETS, Actuators, Payload, Struts
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.compiled import all_kernels, warm
+from explorer.numerics.compiled import KERNELS, warm
 from explorer.statics.forces import actuator_forces
 from explorer.statics.held import largest_shares, limit_values, load_case, settle_on_limit
 from explorer.statics.slopes import twist_slopes
@@ -71,7 +71,7 @@ def test_interpreted_and_compiled_kernels_agree(name: str, monkeypatch: pytest.M
     warm()
     compiled = CASES[name]()
     monkeypatch.setattr("explorer.numerics.compiled.MANY_ROWS", 10**9)
-    for kernel in all_kernels():
+    for kernel in KERNELS:
         monkeypatch.setattr(kernel, "_compiled", None)
     np.testing.assert_allclose(CASES[name](), compiled, rtol=1e-9, atol=1e-9)
-    assert not any(kernel.ready for kernel in all_kernels())
+    assert not any(kernel.ready for kernel in KERNELS)

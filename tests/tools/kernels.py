@@ -8,8 +8,8 @@ from __future__ import annotations
 import importlib
 
 from explorer.files.packaged import SOURCES
-from explorer.numerics.compiled import all_kernels
-from explorer.numerics.kernel_cache import PACKAGED, SUFFIX
+from explorer.numerics.compiled import KERNELS
+from explorer.numerics.kernel_cache import PACKAGED, write_code
 from explorer.numerics.object_code import processor
 
 FOLDER = SOURCES / "assets" / PACKAGED / processor()
@@ -25,14 +25,14 @@ def import_all() -> None:
 def main() -> None:
     """Compile what is new, and remove what is old."""
     import_all()
-    entries = {kernel.entry.file_name: kernel.entry for kernel in all_kernels()}
-    for path in FOLDER.glob(f"*{SUFFIX}"):
-        if path.name not in entries:
+    kernels = {kernel.file_name: kernel for kernel in KERNELS}
+    for path in FOLDER.glob("*.o"):
+        if path.name not in kernels:
             path.unlink()
-    for name, entry in entries.items():
+    for name, kernel in kernels.items():
         if not (FOLDER / name).exists():
             # Code in the cache is optimised less, since somebody waited for it.
-            entry.write_to(FOLDER, entry.compile_here())
+            write_code(FOLDER, name, kernel.make_code())
             print(f"{name}: {(FOLDER / name).stat().st_size} bytes")
 
 
