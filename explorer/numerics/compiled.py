@@ -34,6 +34,8 @@ KERNELS: list[Kernel[...]] = []
 
 # Functions that kernels call, with their compiled forms; None before they are compiled.
 _helpers: dict[Callable[..., Any], Any] = {}
+# LLVM crashes if two threads compile or link at a time.
+_llvm_lock = threading.RLock()
 # Two threads that load all kernels would start two child processes.
 _warm_lock = threading.Lock()
 
@@ -84,12 +86,14 @@ class Kernel(Generic[Arguments]):
 
     def load(self, code: bytes | None) -> None:
         """Use object code from now on, unless there is none."""
-        if code is not None:
-            self._compiled = load_object(code, self._signature)
+        with _llvm_lock:
+            if code is not None and self._compiled is None:
+                self._compiled = load_object(code, self._signature)
 
     def make_code(self) -> bytes:
         """Return the object code, compiled in this process."""
-        return compile_object(self._function, _helpers, self._signature)
+        with _llvm_lock:
+            return compile_object(self._function, _helpers, self._signature)
 
 
 def kernel(signature: str) -> Callable[[Callable[Arguments, None]], Kernel[Arguments]]:
