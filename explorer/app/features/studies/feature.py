@@ -4,9 +4,36 @@ from __future__ import annotations
 
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Tab
-from explorer.app.features.studies.bar import StudyChip
+from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.studies.panel import StudiesPanel
+from explorer.app.features.studies.work import study_runner
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.buttons import press_button, running
+from explorer.numerics.number_text import format_number
+
+
+class StudyChip:
+    """How far the study is, and the button that ends it."""
+
+    def __init__(self, services: Services) -> None:
+        self._runner = services.get(study_runner)
+
+    def __call__(self, _: Frame) -> str:
+        """Return the chip, as HTML; "" while no study is computed."""
+        run = self._runner.run
+        if run is None:
+            return ""
+        cancel = press_button(
+            "studies.cancel",
+            "",
+            "Cancel",
+            hint="End the study; finished designs are kept.",
+            class_name="ex-button",
+            is_disabled=run.is_cancelled,
+        )
+        done = 0 if run.progress is None else run.progress.done
+        return running("Studies", run.name, f"{format_number(done)} designs", run.share, cancel)
+
 
 STUDIES = Feature(
     "studies",

@@ -15,8 +15,8 @@ from explorer.app.features.studies.actions import (
 )
 from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.plots import HINT, StudyPlots
-from explorer.app.features.studies.runner import Run, study_feed, study_runner
 from explorer.app.features.studies.words import ALONG, acts, chips, head, legend, table
+from explorer.app.features.studies.work import Run, study_feed, study_runner
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Control
 from explorer.app.inputs.controls import Controls

@@ -1,21 +1,27 @@
-"""The two plots of the open study, and the brushes and picks made in them."""
+"""The two plots of the open study, and the brushes and picks made in them.
+
+viser's plots report nothing to the server. The script `plots` sends each of their events as a press
+whose value is a line of JSON. The server draws brushes and picks, for every browser.
+"""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
+import msgspec
 import viser
 
+from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
-from explorer.app.features.studies.actions import BrushAxis, BrushBox
+from explorer.app.features.studies.actions import MOST_RANGES, BrushAxis, BrushBox
 from explorer.app.features.studies.feed import PlotJson, StudyDrawing
-from explorer.app.features.studies.plot_events import Boxed, Brushed, Picked, event_of
 from explorer.app.look import read_script
 from explorer.app.session.session import Who
+from explorer.app.state.studies import Range
 from explorer.app.widgets.assigning import Update
 
 # Height over width.
@@ -91,3 +97,46 @@ class StudyPlots:
                 self._session.do(BrushAxis(axis, ranges), who=client.client_id)
             case Boxed(axes=(across, up), box=box):
                 self._session.do(BrushBox(across, up, box), who=client.client_id)
+
+
+Word = Annotated[str, msgspec.Meta(max_length=200)]
+Ranges = Annotated[tuple[Range, ...], msgspec.Meta(max_length=MOST_RANGES)]
+Index = Annotated[int, msgspec.Meta(ge=0, le=2**31)]
+
+
+class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="do"):
+    """An event in a plot.
+
+    Attributes:
+        study: Name of the study of the plot.
+    """
+
+    study: Word
+
+
+class Picked(Event, frozen=True, tag="pick"):
+    """A click on a design."""
+
+    index: Index
+
+
+class Brushed(Event, frozen=True, tag="brush"):
+    """A brush along an axis of the parallel lines; no ranges free it."""
+
+    axis: Word
+    ranges: Ranges
+
+
+class Boxed(Event, frozen=True, tag="box"):
+    """A box drawn in the scatter plot; None frees both axes."""
+
+    axes: tuple[Word, Word]
+    box: tuple[Range, Range] | None
+
+
+_DECODER = msgspec.json.Decoder(Picked | Brushed | Boxed)
+
+
+def event_of(line: str) -> Picked | Brushed | Boxed | None:
+    """Return the event in a line of JSON; None if the script did not write it."""
+    return decode_text(line, _DECODER)

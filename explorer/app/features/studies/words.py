@@ -10,7 +10,7 @@ import numpy as np
 from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.figures import FRONT, PICKED, SCALE
 from explorer.app.features.studies.plot_rows import MOST_ROWS
-from explorer.app.features.studies.runner import Run
+from explorer.app.features.studies.work import Run
 from explorer.app.state.studies import (
     RADIUS,
     StudyPlan,

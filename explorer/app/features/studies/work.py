@@ -7,19 +7,24 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from explorer.app.features.feature import Services
-from explorer.app.features.studies import tasks
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.features.studies.feed import StudyFeed
 from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Session, Who
+from explorer.app.session.worker import Channel
 from explorer.app.state.studies import StudyPlan, study_around
 from explorer.app.storage.study_folders import keep_study, study_in
 from explorer.errors import ExplorerError, InputError
 from explorer.mechanism.design import Design
-from explorer.sweep.run import Progress
+from explorer.sweep.run import Progress, run_study
 from explorer.sweep.study import Study
+from explorer.sweep.workers import LocalWorkers, cores
+
+if TYPE_CHECKING:
+    # The process of the studies needs no viser.
+    from explorer.app.features.feature import Services
 
 # Seconds between two drawings of the results so far.
 PACE = 1.0
@@ -49,6 +54,30 @@ class Run:
     def share(self) -> float:
         """The share of the designs that are done, from 0 to 1."""
         return 0.0 if self.progress is None else self.progress.done / self.progress.total
+
+
+def run_in_worker(study: Study, folder: Path, channel: Channel) -> Progress:
+    """Compute the missing designs of a study, and send the progress after each part.
+
+    One core remains for the page.
+
+    Args:
+        study: The study.
+        folder: Folder of its results.
+        channel: Channel to the parent.
+
+    Raises:
+        InputError: the study cannot be run, or the folder is another's or in use.
+        StorageError: the folder cannot be written.
+        MissingExtraError: pyarrow is not installed.
+        RunError: the workers are gone.
+    """
+    workers = LocalWorkers(max(1, cores() - 1))
+    try:
+        return run_study(study, folder, workers, watch=channel.send, stop=channel.is_cancelled)
+    finally:
+        # Designs of a cancelled study that are being computed are not needed.
+        workers.shutdown(cancel_futures=True)
 
 
 def study_feed(services: Services) -> StudyFeed:
@@ -93,7 +122,7 @@ class StudyRunner:
     ) -> None:
         self.worker = Worker(
             lambda message: complain(message, None),
-            preload=[tasks.__name__],
+            preload=[__name__],
             died=DIED,
         )
         self._session = session
@@ -171,7 +200,7 @@ class StudyRunner:
             self._run = Run(name, study)
             self._order = self.worker.submit(
                 "study",
-                tasks.run,
+                run_in_worker,
                 (study, folder),
                 self._ended,
                 self._failed,
