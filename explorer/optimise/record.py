@@ -11,7 +11,6 @@ from typing import Literal
 
 import msgspec
 
-from explorer.errors import InputError
 from explorer.files.json_text import decode_strictly
 from explorer.files.versions import versions
 from explorer.files.writing import read_at_most
@@ -141,17 +140,3 @@ def load_record(path: Path) -> Record:
 def step_of(iterate: Iterate) -> Step:
     """Return an iterate without its design."""
     return Step(**{name: getattr(iterate, name) for name in Step.__struct_fields__})
-
-
-def iterate_of(problem: Problem, step: Step) -> Iterate:
-    """Return an iterate of a problem, with its design.
-
-    Raises:
-        InputError: the values are too few, too many or those of no design.
-    """
-    if len(step.values) != len(problem.variables):
-        raise InputError(
-            f"iterate {step.number} must have {len(problem.variables)} values; "
-            f"got {len(step.values)}"
-        )
-    return Iterate(design=problem.design_at(step.values), **msgspec.structs.asdict(step))

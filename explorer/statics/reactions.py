@@ -35,7 +35,7 @@ PART_NAMES = (
 """Words for these parts, in the order of `LIMITED`."""
 
 # Columns of `_signed`: actuators, moments at the carriages, forces across the guide (y, z).
-_ACTUATORS, _MOMENTS, _ACROSS_2, _ACROSS_3 = slice(0, 6), slice(6, 8), slice(8, 10), slice(10, 12)
+_MOMENTS, _ACROSS_2, _ACROSS_3 = slice(6, 8), slice(8, 10), slice(10, 12)
 
 
 class Reactions(NamedTuple):

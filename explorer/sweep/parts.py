@@ -25,8 +25,6 @@ SUFFIX = ".parquet"
 
 _STUDY, _HASH, _SEED = b"explorer.study", b"explorer.study_hash", b"explorer.seed"
 _CHUNK, _VERSIONS = b"explorer.chunk", b"explorer.versions"
-# The key of the versions in parts that were written for some time.
-_OTHER_VERSIONS = b"explorer.files.versions"
 
 
 class BadPartError(InputError):
