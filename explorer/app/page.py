@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
+from collections import deque
 
 import numpy as np
 import viser
@@ -59,8 +60,8 @@ NOTICE_SECONDS = 6.0
 NOTICE_COLOUR = "orange"
 # Largest number of notices that wait for a browser; the newest are kept.
 MOST_PENDING = 10
-# Seconds between two updates of all panels, while events come faster than frames.
-PANELS_SECONDS = 0.1
+# Seconds that the panels of a frame may take while another frame waits.
+PANELS_SECONDS = 0.004
 # Seconds without a frame after which cameras follow what was drawn.
 FOLLOW_SECONDS = 0.35
 # Seconds to send a frame to one browser, and number of browsers that need no rest.
@@ -99,7 +100,6 @@ class Page:
         # Notices without a browser, kept for the next one; the lock guards them.
         self._pending: list[tuple[str, str]] = []
         self._pending_lock = threading.Lock()
-        self._panels_updated = 0.0
         self._redraw_timer: clock.Timer | None = None
         # Looks after the cameras once nothing has been drawn for a while, or at a release.
         self._camera_timer: clock.Timer | None = None
@@ -165,7 +165,7 @@ class Page:
             self.services.get(kind) for each in self._features for kind in each.runners
         ]
         self.services.cameras.frame_first()
-        self._panels = self._add_panels() if panels else []
+        self._panels = deque(self._add_panels() if panels else ())
         layout = Layout(server, theme, self.services.cameras, self.panels if panels else None)
         self.palette = self._add_palette(layout)
         for message in () if user_data is None else user_data.messages:
@@ -262,7 +262,8 @@ class Page:
         self._rest()
 
     def _draw_all(self, frame: Frame) -> None:
-        self._frame, began = frame, time.time()
+        is_drawn, began = frame.state is self._frame.state, time.time()
+        self._frame = frame
         if self.autosaver is not None:
             self.autosaver.follow(frame.state, self.session.history)
         # Feeds come first, so that a drawing counts as outdated until the new one arrives.
@@ -270,7 +271,12 @@ class Page:
             feed.follow(frame)
         # The scene is updated before the panels, whose numbers nobody reads during a drag.
         placed = self._placed()
-        drawn = [update for part in self._scene for update in part.updates(placed)]
+        drawn: list[Update] = []
+        for part in self._scene:
+            # What was computed for a state that is drawn already does not hold up a newer one.
+            if is_drawn and self.session.has_changes:
+                return
+            drawn.extend(part.updates(placed))
         self._assigner.assign(drawn, since=began)
         for runner in self._runners:
             runner.follow(frame)
@@ -321,17 +327,14 @@ class Page:
         self.session.redraw()
 
     def _panel_updates(self, frame: Frame) -> list[Update]:
-        """Return the updates of the panels for a frame, or of the first panels if another waits.
-
-        The panels that are left out are updated with the next frame.
-        """
-        is_due = time.monotonic() - self._panels_updated >= PANELS_SECONDS
+        """Return the updates of all panels for a frame, or of a few in turn if another waits."""
+        began = time.monotonic()
         updates: list[Update] = []
-        for panel in self._panels:
-            if self.session.has_more and not is_due:
-                return updates
-            updates.extend(panel.updates(frame))
-        self._panels_updated = time.monotonic()
+        for _ in range(len(self._panels)):
+            if self.session.has_changes and time.monotonic() - began > PANELS_SECONDS:
+                break
+            updates.extend(self._panels[0].updates(frame))
+            self._panels.rotate(-1)
         return updates
 
     def _rest(self) -> None:

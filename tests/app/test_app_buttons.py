@@ -25,7 +25,7 @@ from explorer.app.browser.viser_gaps import PLACE
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.features.optimise import runner
 from explorer.app.features.optimise.actions import SetRequest, StartRun
-from explorer.app.features.paths.actions import Go
+from explorer.app.features.paths.actions import Go, Play
 from explorer.app.inputs.controls import MAIN
 from explorer.app.server import Running
 from explorer.app.session.session import UNDO, Session
@@ -61,6 +61,7 @@ def test_press_of_a_client_is_one_step(running: Running, tab: SocketTab) -> None
         tab.update(*press_update(running, "compare.turn", "Outlines"))
         wait_for(lambda on=on: session.state.compared.look.outlines is on)
     assert session.history.step.number == number + 3
+    assert session.wait_until_idle()
     assert ("compare.open", SLOTS[0]) in presses_in(running)
     for _ in range(4):
         session.travel(UNDO)
@@ -186,6 +187,8 @@ def test_each_tab_has_one_filled_button_at_most(running: Running) -> None:
     check_filled(running)
     session.do(Go())
     wait_for(lambda: session.state.journey is not None)
+    # The page does not come to rest while the path is played.
+    session.do(Play(on=False))
     check_filled(running, "Paths")
     session.do(Open(PRESETS["paper-optimal"]))
 
@@ -335,8 +338,8 @@ def test_panels_that_a_drag_leaves_no_time_for_are_drawn_with_the_next_frame(
 
     before = controls()
     with monkeypatch.context() as drag:
-        drag.setattr(Session, "has_more", property(lambda _: True))
-        drag.setattr("explorer.app.page.PANELS_SECONDS", np.inf)
+        drag.setattr(Session, "has_changes", property(lambda _: True))
+        drag.setattr("explorer.app.page.PANELS_SECONDS", -1.0)
         session.do(SetPosition(0, 1.5))
         assert controls() == before
     session.redraw()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from typing import Any, cast
 
 import numpy as np
@@ -57,6 +57,27 @@ def _send_place(node: viser.SceneNodeHandle, name: str) -> None:
     internals: Any = node
     kind = _messages.SetPositionMessage if name == "position" else _messages.SetOrientationMessage
     internals._impl.api._queue_scene_message(kind(node.name, tuple(getattr(node, name).tolist())))
+
+
+def assign_properties(node: viser.SceneNodeHandle, values: Mapping[str, object]) -> None:
+    """Assign properties of a node of the scene, in one message.
+
+    viser's own assignment resolves the type of each property anew and sends a message for each,
+    which takes longer than all that is computed for it.
+    """
+    from viser import _messages
+
+    internals: Any = node
+    properties = internals._impl.props
+    updates = dict(values)
+    for name, value in values.items():
+        dtype = getattr(getattr(properties, name), "dtype", None)
+        if dtype is not None:
+            # A copy, since the message is sent later.
+            updates[name] = np.array(value, dtype=dtype)
+        setattr(properties, name, updates[name])
+    message = _messages.SceneNodeUpdateMessage(node.name, updates)
+    internals._impl.api._queue_scene_message(message)
 
 
 def put_camera(

@@ -47,14 +47,13 @@ class LatestWins(Generic[Item]):
 
     def is_waiting(self, key: object) -> bool:
         """Whether an item with this key waits."""
-        with self._condition:
-            return key in self._waiting
+        return key in self.waiting
 
     @property
-    def has_waiting(self) -> bool:
-        """Whether any item waits."""
+    def waiting(self) -> set[object]:
+        """The keys of the items that wait."""
         with self._condition:
-            return bool(self._waiting)
+            return set(self._waiting)
 
     def wait_until_idle(self, timeout: float) -> bool:
         """Wait until no item waits and none is handled; return whether that is so."""

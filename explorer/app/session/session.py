@@ -24,6 +24,8 @@ from explorer.errors import ExplorerError
 
 # Seconds after which changes that are not made are waited for no more.
 SETTLED_SECONDS = 10.0
+# Key of requests to draw the present state again.
+REDRAW = "redraw"
 
 Change = Callable[[State], Action]
 Who = int | None
@@ -151,8 +153,13 @@ class Session:
 
     @property
     def has_more(self) -> bool:
-        """Whether any change waits, so that another frame follows at once."""
-        return self._jobs.has_waiting
+        """Whether anything waits, so that another frame follows at once."""
+        return bool(self._jobs.waiting)
+
+    @property
+    def has_changes(self) -> bool:
+        """Whether a change waits, other than a request to draw the state again."""
+        return bool(self._jobs.waiting - {REDRAW})
 
     def wait_until_idle(self, timeout: float = 60.0) -> bool:
         """Wait until all changes are made and drawn; return whether they are."""
@@ -160,7 +167,7 @@ class Session:
 
     def redraw(self) -> None:
         """Draw the present state again."""
-        self.post("redraw", lambda _: _Nothing())
+        self.post(REDRAW, lambda _: _Nothing())
 
     def stop(self) -> None:
         """End the session's thread."""

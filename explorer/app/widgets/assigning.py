@@ -14,7 +14,14 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from explorer.app.browser.viser_gaps import PLACE, is_stale, place, resend, show_value
+from explorer.app.browser.viser_gaps import (
+    PLACE,
+    assign_properties,
+    is_stale,
+    place,
+    resend,
+    show_value,
+)
 from explorer.numerics.arrays import FloatArray
 
 Update: TypeAlias = tuple[Any, str, object]
@@ -24,8 +31,6 @@ Update: TypeAlias = tuple[Any, str, object]
 CROSSING_SECONDS = 5.0
 # A user who has changed nothing for so long has paused.
 QUIET_SECONDS = 0.6
-# Types of most values; they compare fast.
-PLAIN = (bool, int, float, str)
 
 
 class Assigner:
@@ -56,17 +61,23 @@ class Assigner:
         if not new:
             return new
         # Nothing is computed in this block, since it holds up every browser.
+        # By identity, since viser's handles have no hash.
+        properties: dict[int, tuple[viser.SceneNodeHandle, dict[str, object]]] = {}
         with self._server.atomic():
             for handle, name, value in new:
                 if name in PLACE:
                     place(handle, name, cast("FloatArray", value))
-                elif is_set_by_clients(handle, name):
+                elif name == "value":
                     show_value(handle, value)
+                elif name != "visible" and isinstance(handle, viser.SceneNodeHandle):
+                    properties.setdefault(id(handle), (handle, {}))[1][name] = value
                 else:
                     setattr(handle, name, value)
                 if is_set_by_clients(handle, name):
                     # After the assignment, since viser sets the time of the last change by it too.
                     self._sent[id(handle), name] = handle, time.time()
+            for node, values in properties.values():
+                assign_properties(node, values)
         return new
 
     def settle(self, *, has_paused: bool = False) -> bool:
@@ -118,10 +129,9 @@ def _is_overtaken(update: Update, since: float) -> bool:
 def _same(a: object, b: object) -> bool:
     if a is b:
         return True
-    if type(a) in PLAIN:
-        return a == b
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        return np.array_equal(np.asarray(a), np.asarray(b))
+        one, other = np.asarray(a), np.asarray(b)
+        return one.shape == other.shape and bool((one == other).all())
     if is_columns(a) and is_columns(b):
         # Where a chart has no value it is not a number.
         pairs = zip(a, b, strict=False)
@@ -131,6 +141,5 @@ def _same(a: object, b: object) -> bool:
 
 def is_columns(value: object) -> TypeGuard[tuple[NDArray[Any], ...]]:
     """Whether a value is the data of a chart, a tuple of arrays."""
-    if not isinstance(value, tuple):
-        return False
-    return any(isinstance(column, np.ndarray) for column in cast("tuple[object, ...]", value))
+    columns = cast("tuple[object, ...]", value)
+    return isinstance(value, tuple) and len(columns) > 0 and isinstance(columns[0], np.ndarray)
