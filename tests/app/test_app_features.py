@@ -22,15 +22,14 @@ from desk import CLIENT
 import explorer.app
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
-from explorer.app.features.forces.actions import SetForce
-from explorer.app.features.forces.loads import WeightsFeed
+from explorer.app.features.forces.loads import SetForce, WeightsFeed
 from explorer.app.features.listed import FEATURES
 from explorer.app.features.machine.actions import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun, GiveUp
 from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
 from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
 from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
-from explorer.app.features.precision.actions import SetTolerances
+from explorer.app.features.precision.budget import SetTolerances
 from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
 from explorer.app.features.view.camera_buttons import HINTS as CAMERA_HINTS
 from explorer.app.features.workspace.panel import KEYS as CHIP_KEYS

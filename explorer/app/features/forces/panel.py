@@ -11,8 +11,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.actions import SetForce, rounded
-from explorer.app.features.forces.loads import Loads, NearestFeed
+from explorer.app.features.forces.loads import Loads, NearestFeed, SetForce, rounded
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.actions import SetPose

@@ -14,19 +14,20 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.actions import SetForce, fitting_scale, rounded
-from explorer.app.features.forces.arrows import ForceArrows
-from explorer.app.features.forces.loads import Loads
+from explorer.app.features.forces.loads import Loads, SetForce, fitting_scale, rounded
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.scene.shapes import (
     NO_MESH,
+    Instances,
     Rods,
     add_lines,
     add_translucent,
+    cone,
     linear_colour,
     of_one_colour,
+    turned_to,
 )
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
@@ -47,11 +48,62 @@ LONGEST_REACTION, LONGEST_BENDING = 0.4, 0.3
 # Moment over the force of the scale and the reach at which a drawn moment is half its largest.
 HALF_MOMENT = 0.25
 SLEEVE_RADIUS, SLEEVE_OPACITY = 0.3, 0.45
-# Number of ordinates of a drawn bending moment.
+# Number of ordinates of a drawn bending moment, and their places along the strut.
 ORDINATES = 9
+ALONG = np.linspace(0.0, 1.0, ORDINATES)[:, None]
 HANDLE_NAME, HANDLE_SCALE = "/forces/handle", 0.8
+# Radii of shaft and head over a length, and length of the head, in scene units.
+SHAFT, HEAD, HEAD_LENGTH = 0.08, 0.21, 0.55
+# Share of a short arrow that its head takes.
+MOST_HEAD = 0.6
+# Size of what is not drawn, since a copy of no size has no normals.
+NOTHING = 1e-6
 # Difference of forces that rounding makes, over the scale.
 SAME_FORCE = 1e-3
+
+
+class ForceArrows:
+    """Arrows between points.
+
+    Args:
+        scene: Where they are added.
+        name: Their node.
+        count: Number of arrows.
+        colour: Colour before the first frame.
+    """
+
+    def __init__(self, scene: viser.SceneApi, name: str, count: int, colour: Rgb) -> None:
+        self._shafts = Rods(scene, f"{name}/shafts", [colour] * count)
+        self._heads = Instances(scene, f"{name}/heads", cone(), [colour] * count)
+
+    def show(self, visible: bool) -> Iterator[Update]:
+        """Yield the updates that show or hide the arrows."""
+        yield from self._shafts.show(visible)
+        yield from self._heads.show(visible)
+
+    def draw(
+        self, tails: FloatArray, vectors: FloatArray, colours: list[Rgb], size: float
+    ) -> Iterator[Update]:
+        """Yield the updates that draw arrows from tails (n, 3) along vectors (n, 3).
+
+        Args:
+            tails: Where they begin, in scene units.
+            vectors: Their directions and lengths, in scene units.
+            colours: Their colours.
+            size: Scale of their thickness.
+        """
+        lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+        units = vectors / np.maximum(lengths, 1e-12)
+        heads = np.minimum(HEAD_LENGTH * size, MOST_HEAD * lengths)
+        necks = tails + units * (lengths - heads)
+        drawn = lengths[:, 0] > NOTHING
+        yield from self._shafts.between(tails, necks, np.where(drawn, SHAFT * size, NOTHING))
+        linear = [linear_colour(each) for each in colours]
+        yield from self._shafts.colour(linear)
+        radii = np.minimum(HEAD * size, heads * HEAD / HEAD_LENGTH)
+        scales = np.maximum(np.concatenate([radii, radii, heads], axis=1), NOTHING)
+        yield from self._heads.place(necks, turned_to(vectors), scales)
+        yield from self._heads.colour(linear)
 
 
 class ForcesScene(ScenePart):
@@ -86,18 +138,19 @@ class ForcesScene(ScenePart):
             yield label, "visible", shown and force.get(name, holds)
         if not shown:
             return
-        yield from self._draw_arrows(placed, loaded)
+        shares = shares_of(loaded)
+        yield from self._draw_arrows(placed, loaded, shares)
         if not holds:
             return
         feet, tips = placed.struts
         radius = np.full(4, SLEEVE_RADIUS * placed.thickness)
-        shares = shares_of(loaded)
         yield from self._sleeves.between(feet, tips, radius)
         yield from self._sleeves.colour(
             [linear_colour(share_colour(shares[i])) for i in (0, 2, 4, 5)]
         )
         for index, leg in enumerate((2, 3)):
-            yield from self._draw_bending(placed, loaded, index, leg)
+            share = _larger(shares[6 + index], shares[10 + index])
+            yield from self._draw_bending(placed, loaded, index, leg, share)
         middles = 0.5 * (feet + tips)
         places = (middles[0], feet[1], middles[1], feet[2], middles[2], middles[3])
         size = float(np.abs(loaded.held.actuators).max())
@@ -116,7 +169,9 @@ class ForcesScene(ScenePart):
             return NO_POINTS
         return load_tip(placed)[None]
 
-    def _draw_arrows(self, placed: Placed, loaded: LoadedPose) -> Iterator[Update]:
+    def _draw_arrows(
+        self, placed: Placed, loaded: LoadedPose, shares: list[float | None]
+    ) -> Iterator[Update]:
         state = placed.frame.state
         tails, vectors = np.zeros((8, 3)), np.zeros((8, 3))
         colours: list[Rgb] = [LOAD] * 8
@@ -138,14 +193,14 @@ class ForcesScene(ScenePart):
             forces[:4] = loaded.held.joints
             forces[4:, 0] = loaded.held.actuators[[1, 3]]
             vectors[2:] = reaction_vectors(placed, forces)
-            l1, d1, d2, d3, d4, l4, *_ = shares_of(loaded)
+            l1, d1, d2, d3, d4, l4, *_ = shares
             colours[2:] = [
                 share_colour(e) for e in (l1, _larger(d1, d2), _larger(d3, d4), l4, d1, d3)
             ]
         yield from self._arrows.draw(tails, vectors, colours, placed.thickness)
 
     def _draw_bending(
-        self, placed: Placed, loaded: LoadedPose, index: int, leg: int
+        self, placed: Placed, loaded: LoadedPose, index: int, leg: int, share: float | None
     ) -> Iterator[Update]:
         """Yield the updates that draw the bending moment of strut 2 or 3 beside it."""
         design = placed.frame.state.design
@@ -156,17 +211,16 @@ class ForcesScene(ScenePart):
         height = LONGEST_BENDING * placed.reach * moment / (moment + half)
         towards = math.copysign(1.0, float(loaded.held.actuators[1 + 2 * index]))
         top = foot + np.array([towards * height, 0.0, 0.0])
-        shares = shares_of(loaded)
-        share = _larger(shares[6 + index], shares[10 + index])
         colour = share_colour(share)
         yield self._bending[index], "vertices", np.array([foot, tip, top], dtype=np.float32)
         yield self._bending[index], "faces", np.array([[0, 1, 2]], dtype=np.uint32)
         yield self._bending[index], "color", colour
         # The moment falls from the carriage to nothing at the platform's joint.
-        along = np.linspace(0.0, 1.0, ORDINATES)[:, None]
-        lines = np.stack([foot + along * (tip - foot), top + along * (tip - top)], axis=1)
-        lines = np.concatenate([lines, [[top, tip]]])
-        yield self._ordinates[index], "points", lines.astype(np.float32)
+        lines = np.empty((ORDINATES + 1, 2, 3), dtype=np.float32)
+        lines[:-1, 0] = foot + ALONG * (tip - foot)
+        lines[:-1, 1] = top + ALONG * (tip - top)
+        lines[-1] = top, tip
+        yield self._ordinates[index], "points", lines
         yield self._ordinates[index], "colors", of_one_colour(colour, ORDINATES + 1)
         label = self._labels[f"strut {leg}"]
         words = f"strut {leg} {format_number(moment * 1e-3 * design.unit_mm, 3)} N m"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
 
+import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise.problem import requested_box
-from explorer.app.features.precision.actions import SetTolerances
 from explorer.app.features.precision.tasks import (
     BudgetDrawing,
     BudgetRequest,
@@ -19,8 +21,11 @@ from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls
 from explorer.app.session.feed import Feed
 from explorer.app.session.session import Who
+from explorer.app.state.action import Action
+from explorer.app.state.actions import check_free
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.state.values import with_value
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import press_button
@@ -29,6 +34,7 @@ from explorer.app.widgets.under_way import problem
 from explorer.measures.blocks.budget import tolerance_budget
 from explorer.measures.size import PositionSet
 from explorer.mechanism.pose import Pose
+from explorer.statics.budget.costs import with_tolerances
 
 OVER: dict[str, PositionSet] = {
     "the present pose": "pose",
@@ -41,6 +47,30 @@ OVER_HINT = (
 )
 SET = "precision.set"
 SET_HINT = "Give the design these tolerances, and these errors of its actuators."
+
+
+@dataclass(frozen=True)
+class SetTolerances(Action):
+    """Give the design the tolerances and the errors of its actuators that a budget found.
+
+    Attributes:
+        tolerances: Tolerances in mm and degrees, in the order of `SOURCES`; infinite for any,
+            which the design keeps as it states them.
+    """
+
+    template: ClassVar[str] = "Tolerances of the budget"
+
+    tolerances: tuple[float, ...]
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        check_free(state)
+        design = with_tolerances(state.design, np.array(self.tolerances))
+        return with_value(state, "design", design)
 
 
 class BudgetFeed(Feed[BudgetRequest, BudgetDrawing]):

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.precision.actions import AssumeTypical
+from explorer.app.features.forces.loads import Loads
 from explorer.app.features.precision.budget import BudgetPart
-from explorer.app.features.precision.pose import PosePrecision
 from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls
+from explorer.app.state.action import Action
+from explorer.app.state.actions import check_free
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.app.state.values import with_value
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import press_button
@@ -34,12 +39,28 @@ TYPICAL_HINT = (
 )
 
 
+@dataclass(frozen=True)
+class AssumeTypical(Action):
+    """Give the design typical errors, stiffness, struts and tolerances where it states none."""
+
+    template: ClassVar[str] = "Typical errors, stiffness and tolerances"
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        check_free(state)
+        return with_value(state, "design", typical_machine(state.design)[0])
+
+
 class PrecisionPanel:
     """Errors of the tool, its deflection, and what is drawn of them."""
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
-        self._poses = services.get(PosePrecision)
+        self._loads = services.get(Loads)
         self._controls = controls = Controls(gui, services.session)
         self._top = gui.add_html("")
         controls.checkbox(
@@ -75,7 +96,7 @@ class PrecisionPanel:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
-        precision = self._poses.of(frame)
+        precision = self._loads.precision(frame)
         yield (
             self._top,
             "content",
@@ -87,7 +108,7 @@ class PrecisionPanel:
 
     def _source(self) -> Source:
         state = self._session.settled()
-        loaded = self._poses.of(Frame(state)).loaded
+        loaded = self._loads.of(Frame(state))
         density = None if loaded.own is None else state.view.prototype.density
         return load_source("accuracy", loaded, density)
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.app.features.feature import Services
+from explorer.app.features.forces.loads import Loads
 from explorer.app.features.forces.scene import tool_point
 from explorer.app.features.mechanism.bodies import platform_plate
-from explorer.app.features.precision.pose import PosePrecision
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
@@ -39,21 +39,24 @@ PLATE_OPACITY = 0.7
 ELLIPSOID_SIZE, DEFLECTION_SIZE, THINNEST = 0.18, 0.25, 0.01
 # Pieces of a drawn strut, and its radius in scene units.
 PIECES, RADIUS = 12, 0.1
-# Largest automatic magnification, largest drawn displacement over the reach, and the deflection
-# from which none is drawn.
-LARGEST_TIMES, FARTHEST, LARGEST_DEFLECTION = 1e12, 5.0, 1e100
+# Displacements along a strut over that of its tip. Along x it is a cantilever with a force at its
+# tip: (3 u² − u³) / 2 at the share u of its length.
+U = np.linspace(0.0, 1.0, PIECES + 1)
+ALONG = np.stack([0.5 * (3.0 * U**2 - U**3), U, U], axis=1)
+# Largest automatic magnification, and largest drawn displacement over the reach.
+LARGEST_TIMES, FARTHEST = 1e12, 5.0
 
 
 class ErrorEllipsoidScene(ScenePart):
     """The ellipsoid of the tool's RMS displacement by all sources of errors."""
 
     def __init__(self, services: Services) -> None:
-        self._poses = services.get(PosePrecision)
+        self._loads = services.get(Loads)
         self._ellipsoid = Ellipsoid(services.scene, "/precision/ellipsoid")
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the ellipsoid of this frame."""
-        precision = self._poses.of(placed.frame)
+        precision = self._loads.precision(placed.frame)
         shown = (
             placed.frame.state.view.precision.ellipsoid
             and not placed.is_apart
@@ -77,7 +80,7 @@ class DeflectedScene(ScenePart):
     """Platform and legs where the load deflects them to, magnified."""
 
     def __init__(self, services: Services) -> None:
-        scene, self._poses = services.scene, services.get(PosePrecision)
+        scene, self._loads = services.scene, services.get(Loads)
         self._plate = add_translucent(
             scene, "/precision/platform", NO_MESH, PLATE_OPACITY, colour=DEFLECTED
         )
@@ -88,15 +91,13 @@ class DeflectedScene(ScenePart):
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the deflection of this frame."""
-        precision = self._poses.of(placed.frame)
+        precision = self._loads.precision(placed.frame)
         view = placed.frame.state.view
         shown = (
             view.precision.deflected
             and not (view.is_twin or placed.is_apart)
             and is_elastic(precision.loaded.design)
             and precision.is_regular
-            # The square of a larger one would overflow.
-            and float(np.abs(precision.deflection).max()) < LARGEST_DEFLECTION
         )
         for handle in (self._plate, self._way, self._label):
             yield handle, "visible", shown
@@ -127,15 +128,11 @@ class DeflectedScene(ScenePart):
     ) -> Iterator[Update]:
         """Yield the updates that draw legs 1 and 4 straight, and the struts of 2 and 3 bent."""
         feet = placed.struts[0]
-        starts, ends = [feet[0], feet[3]], [tips[0], tips[3]]
-        lines = [np.stack([np.array(starts), np.array(ends)], axis=1)]
+        lines = [np.stack([feet[[0, 3]], tips[[0, 3]]], axis=1)]
         for index, leg in enumerate((2, 3)):
             foot = feet[leg - 1].copy()
             foot[0] += times * placed.scale * precision.carriages[index]
-            u = np.linspace(0.0, 1.0, PIECES + 1)
-            points = foot + u[:, None] * (tips[leg - 1] - foot)
-            # A cantilever with a force at its tip: (3 u² − u³) / 2 of the tip's displacement.
-            points[:, 0] = foot[0] + 0.5 * (3.0 * u**2 - u**3) * (tips[leg - 1, 0] - foot[0])
+            points = foot + ALONG * (tips[leg - 1] - foot)
             lines.append(np.stack([points[:-1], points[1:]], axis=1))
         pieces = np.concatenate(lines)
         radii = np.full(len(pieces), RADIUS * placed.thickness)
