@@ -16,7 +16,6 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from explorer.cli import streams
-from explorer.cli.usage import UsageError
 from explorer.errors import ExplorerError, NoAnswerError
 
 COMMANDS: Mapping[str, str] = {
@@ -62,7 +61,8 @@ def run(argv: Sequence[str]) -> int:
         streams.prepare()
         _dispatch(list(argv))
     except ExplorerError as error:
-        program = error.program if isinstance(error, UsageError) else "explorer"
+        # Of a `UsageError`, whose module needs tyro.
+        program = getattr(error, "program", "explorer")
         streams.write_error(f"{program}: {error}")
         return error.exit_status
     except KeyboardInterrupt:

@@ -19,7 +19,23 @@ from typing import Any, ClassVar, Protocol
 import tyro
 
 from explorer.cli.streams import write
-from explorer.cli.usage import UsageError
+from explorer.errors import ExplorerError
+
+
+class UsageError(ExplorerError):
+    """Invalid arguments.
+
+    The class is no ValueError, so that tyro does not replace its message.
+
+    Args:
+        reason: Reason, in one line.
+        program: Program or command that the arguments are for.
+    """
+
+    def __init__(self, reason: str, program: str = "explorer") -> None:
+        super().__init__(reason)
+        self.program = program
+
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _FRAME = "│╭╮╰╯─ "

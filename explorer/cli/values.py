@@ -10,7 +10,7 @@ from typing import Annotated, Any, TypeAlias
 import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
-from explorer.cli.usage import UsageError
+from explorer.cli.parsing import UsageError
 from explorer.mechanism.design import LARGEST_SIZE
 
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six", 7: "seven"}

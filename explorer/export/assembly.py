@@ -17,10 +17,18 @@ from typing import Any
 import numpy as np
 
 from explorer.errors import InputError
-from explorer.export.glb import METRES_PER_MILLIMETRE, Y_UP, Body, Material, glb_bytes
 from explorer.export.mesh import mesh_bytes
-from explorer.export.metadata import Rgb
-from explorer.export.three_mf import Model, check_size, refusals_of_lib3mf
+from explorer.export.packing import (
+    METRES_PER_MILLIMETRE,
+    Y_UP,
+    Body,
+    Material,
+    Model,
+    Rgb,
+    check_size,
+    glb_bytes,
+    refusals_of_lib3mf,
+)
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Places

@@ -20,17 +20,23 @@ from typing import Any
 import numpy as np
 
 from explorer.errors import ExplorerError, InputError, NoAnswerError
-from explorer.export.glb import METRES_PER_MILLIMETRE, Y_UP, Body, Material, glb_bytes
-from explorer.export.metadata import (
+from explorer.export.packing import (
     APPLICATION,
+    METRES_PER_MILLIMETRE,
+    Y_UP,
+    Body,
+    Material,
+    Model,
     Rgb,
     ascii_name,
+    check_size,
     comments,
     design_json,
+    glb_bytes,
     json_line,
     printable_name,
+    refusals_of_lib3mf,
 )
-from explorer.export.three_mf import Model, check_size, refusals_of_lib3mf
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.solids.solid import Solid

@@ -18,10 +18,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import ExplorerError, MissingExtraError
-from explorer.export.metadata import Rgb, linear, printable_name
+from explorer.export.packing import Rgb, linear, printable_name
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.kernel import Circle
+from explorer.prototype.forms import Circle
 
 SCHEMA = "AP242DIS"
 
@@ -91,7 +91,7 @@ def volume_of(shape: Any) -> float:
 
 @dataclass(frozen=True)
 class ExactShape:
-    """A body with exact faces; implements `explorer.prototype.kernel.Shape`."""
+    """A body with exact faces; implements `explorer.prototype.forms.Shape`."""
 
     shape: Any
 

@@ -20,8 +20,7 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.kinematics import inverse
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES, Chains
-from explorer.prototype.mass import Mass, total_mass
-from explorer.prototype.weights import machine_weights
+from explorer.prototype.weights import Mass, machine_weights, total_mass
 from explorer.statics.compliance import stiffness_of
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import actuator_forces

@@ -38,9 +38,7 @@ from explorer.mechanism.machine import Guide
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED, BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Chains
-from explorer.prototype.mass import Mass
-from explorer.prototype.sketch import BALL, ROD, leg_radii
-from explorer.prototype.weights import bar_masses
+from explorer.prototype.weights import BALL, ROD, Mass, bar_masses, leg_radii
 from explorer.statics.compliance import is_elastic
 from explorer.statics.error_sources import source_errors
 

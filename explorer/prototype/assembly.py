@@ -1,4 +1,4 @@
-"""The prototype: all parts of a design, their placements in a pose, and the exploded view.
+"""The prototype: all parts of a design, their placements, the exploded view, the bill of materials.
 
 Parts are made once for a design; between poses they move as rigid bodies.
 """
@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES, LEGS, Chains, Places
-from explorer.prototype.fitting import sizes_of
-from explorer.prototype.joint_limits import broken_joint_limits
-from explorer.prototype.mass import Mass, total_mass
-from explorer.prototype.part import Part
+from explorer.prototype.dimensions import Stroke
+from explorer.prototype.fitting import broken_joint_limits, sizes_of
+from explorer.prototype.shapes import Part
 from explorer.prototype.sizes import Sizes
+from explorer.prototype.weights import Mass, total_mass
 
 # The gap between layers of the exploded view: over the reach, and over the largest leg radius.
 _GAP, _GAP_IN_RADII = 0.05, 6.0
@@ -122,3 +122,69 @@ def exploded_offsets(prototype: Prototype, places: Places) -> FloatArray:
     offsets[balls] = offsets[rods] + gap * normal
     offsets[index["platform"]] = offsets[balls][0] + gap * normal
     return offsets
+
+
+@dataclass(frozen=True)
+class Item:
+    """One part in the bill of materials.
+
+    Attributes:
+        name: Name of the part, such as "cylinder 2".
+        size: Extents along the axes of the part's own frame, in millimetres.
+        volume: Volume in cubic millimetres.
+        mass: Mass in kilograms.
+    """
+
+    name: str
+    size: tuple[float, float, float]
+    volume: float
+    mass: float
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """An actuator of a leg: a cylinder and its rod.
+
+    Attributes:
+        leg: Number of the leg, 1 to 4.
+        stroke: Shortest and longest length, from base joint to ball, in millimetres.
+        required: Stroke that the limits of the design allow; a single rod may cover less of it.
+        diameter: Diameter of the cylinder, in millimetres.
+        mass: Mass of cylinder and rod, in kilograms.
+    """
+
+    leg: int
+    stroke: Stroke
+    required: Stroke
+    diameter: float
+    mass: float
+
+
+@dataclass(frozen=True)
+class Bill:
+    """All parts of a prototype, and its actuators."""
+
+    items: tuple[Item, ...]
+    actuators: tuple[Actuator, ...]
+
+    @property
+    def mass(self) -> float:
+        """The mass of all parts, in kilograms."""
+        return sum(item.mass for item in self.items)
+
+
+def bill_of_materials(prototype: Prototype, density: float) -> Bill:
+    """Return the bill of materials of a prototype; the density is in kg/m³."""
+    unit, sizes = prototype.design.unit_mm, prototype.sizes
+    items: list[Item] = []
+    for part in prototype.parts:
+        x, y, z = ((part.vertices.max(axis=0) - part.vertices.min(axis=0)) * unit).tolist()
+        volume = part.unit_mass.mass * unit**3
+        items.append(Item(part.name, (x, y, z), volume, part.mass(density, unit).mass))
+    mass = {item.name: item.mass for item in items}
+    actuators: list[Actuator] = []
+    for leg, stroke in enumerate(sizes.strokes, 1):
+        actuator_mass = mass[f"cylinder {leg}"] + mass[f"rod {leg}"]
+        diameter = 2.0 * sizes.radii[leg - 1]
+        actuators.append(Actuator(leg, stroke, sizes.required_stroke(leg), diameter, actuator_mass))
+    return Bill(tuple(items), tuple(actuators))

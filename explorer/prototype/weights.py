@@ -1,20 +1,129 @@
-"""The weights of the machine's bodies, from their masses, as the forces of the actuators need them.
+"""The masses of bodies in closed form, and the weights that the forces of the actuators need.
 
-Centres of mass count by their distance along the leg; their distance from its axis is left out.
+Bodies are closed meshes, or bars and balls in their place, which simulate a design that is too
+tight for its parts. Units are those of the lengths and the density given.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Payload
-from explorer.prototype.chains import LEGS, ON_GUIDE, Chains
-from explorer.prototype.mass import Mass
-from explorer.prototype.sketch import sketch_masses
+from explorer.numerics.arrays import FloatArray
+from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
 from explorer.statics.weights import Weights
+
+
+@dataclass(frozen=True)
+class Mass:
+    """The mass properties of a rigid body.
+
+    Attributes:
+        mass: Mass, positive.
+        centre: Centre of mass in the body's frame, shape (3,).
+        inertia: Inertia about the centre, along the axes of the body's frame, shape (3, 3).
+    """
+
+    mass: float
+    centre: FloatArray
+    inertia: FloatArray
+
+    def scaled(self, length: float, mass: float = 1.0) -> Mass:
+        """Return the properties in other units, given the factors for lengths and masses."""
+        return Mass(self.mass * mass, self.centre * length, self.inertia * (mass * length**2))
+
+
+def bar(radius: float, start: FloatArray, end: FloatArray, density: float) -> Mass:
+    """Return the mass properties of a round bar between two points (3,), zero if they coincide."""
+    along = end - start
+    length = float(np.linalg.norm(along))
+    mass = density * math.pi * radius**2 * length
+    across = mass * (radius**2 / 4.0 + length**2 / 12.0)
+    about_axis = mass * radius**2 / 2.0
+    axis = along / length if length > 0.0 else np.zeros(3)
+    inertia = across * np.eye(3) + (about_axis - across) * np.outer(axis, axis)
+    return Mass(mass, 0.5 * (start + end), inertia)
+
+
+def ball(radius: float, centre: FloatArray, density: float) -> Mass:
+    """Return the mass properties of a ball about a point (3,)."""
+    mass = density * 4.0 / 3.0 * math.pi * radius**3
+    return Mass(mass, centre, 0.4 * mass * radius**2 * np.eye(3))
+
+
+def total_mass(parts: Iterable[Mass]) -> Mass:
+    """Return the mass properties of parts joined as one body; at least one part has a mass."""
+    masses = list(parts)
+    mass = sum(part.mass for part in masses)
+    centre = np.sum([part.mass * part.centre for part in masses], axis=0) / mass
+    inertia = np.zeros((3, 3))
+    for part in masses:
+        off = part.centre - centre
+        inertia += part.inertia + part.mass * (off @ off * np.eye(3) - np.outer(off, off))
+    return Mass(mass, centre, inertia)
+
+
+def mesh_mass(vertices: FloatArray, faces: NDArray[np.int32], density: float) -> Mass:
+    """Return the mass properties of the body that a closed mesh encloses, exactly.
+
+    They are sums over the tetrahedra between the faces (m, 3), counter-clockwise from outside, and
+    one point; their second moments have a closed form.
+    """
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    corners = (vertices - middle)[faces]
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    volume = float(volumes.sum())
+    sums = a + b + c
+    centre = volumes @ sums / (4.0 * volume)
+    # ∫ x xᵀ over a tetrahedron with a corner at 0 is V/20 (Σ c cᵀ + Σc Σcᵀ).
+    moments = np.einsum("i,ikj,ikl->jl", volumes, corners, corners, optimize=True)
+    moments = (moments + (volumes[:, None] * sums).T @ sums) / 20.0
+    moments -= volume * np.outer(centre, centre)
+    inertia = density * (np.trace(moments) * np.eye(3) - moments)
+    return Mass(density * volume, centre + middle, inertia)
+
+
+DEFAULT_RADIUS = 0.01
+"""Radius, over the reach, of a leg that has none in the design."""
+
+# Length of a cylinder and of a rod, over the leg's length at home; above a half, so they overlap.
+SHARE = 0.55
+# Radii over the radius of the leg.
+ROD, JOINT, BALL = 0.6, 2.0, 1.2
+
+
+def leg_radii(design: Design) -> tuple[float, ...]:
+    """Return the radii of the four legs, all positive, in design units."""
+    return tuple(radius or DEFAULT_RADIUS * design.reach for radius in design.limits.leg_radii)
+
+
+def sketch_masses(chains: Chains, home_joints: FloatArray, density: float) -> Mapping[str, Mass]:
+    """Return the masses of all bodies but the base, in the bodies' frames and design units.
+
+    The joint values at home have the shape (12,); the density is per cubed design unit.
+    """
+    radii = leg_radii(chains.design)
+    masses: dict[str, Mass] = {}
+    for leg, radius in enumerate(radii, 1):
+        length = SHARE * max(float(joints_of_leg(home_joints, leg)[-1]), radius)
+        joint = "carriage" if leg in ON_GUIDE else "cross"
+        along = np.array([0.0, 0.0, length])
+        masses[f"{joint} {leg}"] = ball(JOINT * radius, np.zeros(3), density)
+        masses[f"cylinder {leg}"] = bar(radius, np.zeros(3), along, density)
+        masses[f"rod {leg}"] = bar(ROD * radius, -along, np.zeros(3), density)
+    points = chains.design.platform_points
+    hub = points.mean(axis=0)
+    balls = (ball(BALL * r, point, density) for r, point in zip(radii, points, strict=True))
+    bars = (bar(r, hub, point, density) for r, point in zip(radii, points, strict=True))
+    masses["platform"] = total_mass([*balls, *bars])
+    return masses
 
 
 def machine_weights(design: Design, masses: Mapping[str, Mass], *, payload: bool = True) -> Weights:

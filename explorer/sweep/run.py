@@ -17,8 +17,7 @@ from pathlib import Path
 from explorer.errors import ExplorerError
 from explorer.files.versions import versions
 from explorer.numerics.compiled import warm
-from explorer.sweep.folder import claim
-from explorer.sweep.parts import pyarrow, sound_parts, write_part
+from explorer.sweep.parts import claim, pyarrow, sound_parts, write_part
 from explorer.sweep.rows import (
     Answer,
     Rows,

@@ -52,7 +52,7 @@ from explorer.app.widgets.blocks import render, share_colour
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.colours import GHOST, SINGULAR
 from explorer.errors import InputError, NoAnswerError
-from explorer.export.tolerance_table import COLUMNS
+from explorer.export.tables import TOLERANCE_COLUMNS
 from explorer.measures.blocks.block import Share
 from explorer.measures.blocks.budget import tolerance_budget
 from explorer.measures.blocks.forces import most_held, reaction_tables, verdict
@@ -474,7 +474,7 @@ def test_budget_that_cannot_be_kept_is_reported_in_one_line(
 
 def test_table_has_every_source_with_its_part() -> None:
     rows = list(csv.reader(io.StringIO(budget_table(budget_request(state_with())).decode())))
-    assert rows[0] == list(COLUMNS)
+    assert rows[0] == list(TOLERANCE_COLUMNS)
     assert sorted(row[1] for row in rows[1:]) == sorted(SOURCES)
     by_source = {row[1]: row for row in rows[1:]}
     assert by_source["b2y"][0] == "platform"

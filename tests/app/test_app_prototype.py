@@ -37,8 +37,7 @@ from explorer.errors import InputError
 from explorer.export.assembly import FORMATS, assembly_bytes
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
-from explorer.prototype.assembly import make_prototype
-from explorer.prototype.bill import bill_of_materials
+from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.chains import LEGS, ON_GUIDE, Places
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -344,7 +343,7 @@ def test_files_of_the_assembly_are_those_of_the_library(monkeypatch: pytest.Monk
             export_assembly(thick(opened(OPTIMAL), 0.4).design, file_format)
     assert {file_format for file_format, _ in ASSEMBLIES.values()} == {*FORMATS, "step"}
     write = Mock(return_value=b"ISO-10303-21")
-    monkeypatch.setattr("explorer.export.step_assembly.assembly_step", write)
+    monkeypatch.setattr("explorer.export.step.assembly_step", write)
     assert export_assembly(OPTIMAL, "step") == b"ISO-10303-21"
     write.assert_called_once_with(make_prototype(OPTIMAL).sizes)
 

@@ -36,7 +36,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import ForcesView
 from explorer.errors import InputError
-from explorer.export.report.drawings.slices import Slices
+from explorer.export.drawings.slices import Slices
 from explorer.measures.verdict import warnings
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design, Limits

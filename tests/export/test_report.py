@@ -22,11 +22,11 @@ from report_page import Node, read, table_of
 import explorer
 from explorer import Design, Pose, __version__
 from explorer.app.features.sharing.reporting import make_report
+from explorer.export.drawings.markup import as_html, element, number
+from explorer.export.drawings.projection import ViewName, fit_view
+from explorer.export.drawings.slices import Slices
 from explorer.export.report.data import Missing, gather_report_data
 from explorer.export.report.document import report_html
-from explorer.export.report.drawings.projection import ViewName, fit_view
-from explorer.export.report.drawings.slices import Slices
-from explorer.export.report.markup import as_html, element, number
 from explorer.legs.clearance import PAIRS, pair_name
 from explorer.mechanism.design import JOINTS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design, encode_design
@@ -34,8 +34,7 @@ from explorer.numerics.number_text import format_number
 from explorer.optimise.defaults import paper_problem
 from explorer.optimise.record import Record, Settings, record_of
 from explorer.optimise.solver import optimise_design
-from explorer.prototype.assembly import make_prototype
-from explorer.prototype.bill import bill_of_materials
+from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.singularity.ellipsoids import certified_radius, performance, singularity_free_ball
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.accessible.workspace import accessible_workspace

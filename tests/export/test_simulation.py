@@ -25,7 +25,7 @@ from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import ACTUATED, CHAIN_JOINTS, Chains
-from explorer.prototype.mass import ball, bar, mesh_mass, total_mass
+from explorer.prototype.weights import ball, bar, mesh_mass, total_mass
 
 OPTIMAL = PRESETS["paper-optimal"]
 POSES = 40

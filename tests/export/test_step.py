@@ -23,8 +23,13 @@ from explorer import (
 )
 from explorer.export.mesh import colour_of
 from explorer.export.opencascade import coordinates, faces_of, occ, volume_of
-from explorer.export.step import exact_workspace, step_bytes, workspace_step
-from explorer.export.step_assembly import assembly_step, exact_parts
+from explorer.export.step import (
+    assembly_step,
+    exact_parts,
+    exact_workspace,
+    step_bytes,
+    workspace_step,
+)
 from explorer.mechanism.design import Swing
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]

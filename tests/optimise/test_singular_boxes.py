@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from explorer import Actuators, Design, Payload, Struts
-from explorer.export.report.drawings.history import charts
+from explorer.export.report.search import charts
 from explorer.measures.case import Case
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Triple

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from tool_moves import tool_move
 
 from explorer import PRESETS, InputError, Pose, inverse, rotation_from_quaternion as rotation_of
-from explorer.export.trajectory import trajectory_csv
+from explorer.export.tables import trajectory_csv
 from explorer.paths.trajectory import trajectory
 
 DESIGN = PRESETS["paper-optimal"]

@@ -23,11 +23,10 @@ from explorer.errors import TooTightError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.assembly import Prototype, make_prototype
-from explorer.prototype.bill import bill_of_materials
+from explorer.prototype.assembly import Prototype, bill_of_materials, make_prototype
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, Places, joints_of_leg
 from explorer.prototype.dimensions import CLEARANCE, LegSizes, Stroke
-from explorer.prototype.part import Part
+from explorer.prototype.shapes import Part
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
 HALF_TURN_X, HALF_TURN_Z = np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, -1.0, 1.0])

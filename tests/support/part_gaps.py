@@ -9,7 +9,7 @@ from manifold3d import Error, Manifold, Mesh64
 
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import Places
-from explorer.prototype.part import Part
+from explorer.prototype.shapes import Part
 
 
 def overlaps(parts: Sequence[Part], places: Places) -> Iterator[tuple[str, str, float]]:

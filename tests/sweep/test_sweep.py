@@ -30,8 +30,8 @@ from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.pose import Pose
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.loaded import LoadedPose
-from explorer.sweep.front import front, undominated
 from explorer.sweep.machine import MACHINE
+from explorer.sweep.results import front, undominated
 from explorer.sweep.rows import Value, check_study, design_of, evaluate
 from explorer.sweep.sampling import samples
 from explorer.sweep.study import (

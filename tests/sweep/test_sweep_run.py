@@ -31,10 +31,8 @@ from explorer import InputError, workspace_volume
 from explorer.errors import MissingExtraError
 from explorer.sweep import run as runs
 from explorer.sweep.cluster import DaskWorkers
-from explorer.sweep.folder import LOCK_FILE
-from explorer.sweep.front import front
-from explorer.sweep.parts import part_path, part_paths, read_part, sound_parts
-from explorer.sweep.results import design_at, load_results, summarise
+from explorer.sweep.parts import LOCK_FILE, part_path, part_paths, read_part, sound_parts
+from explorer.sweep.results import design_at, front, load_results, summarise
 from explorer.sweep.rows import columns_of
 from explorer.sweep.run import AHEAD, Progress, RunError, run_study
 from explorer.sweep.sampling import samples

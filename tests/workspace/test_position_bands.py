@@ -11,7 +11,7 @@ import pytest
 from machines import FULL, six
 
 from explorer import PRESETS, Actuators, Design, Payload, Struts, Tool, inverse, reactions
-from explorer.export.report.drawings.slices import Slices
+from explorer.export.drawings.slices import Slices
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll

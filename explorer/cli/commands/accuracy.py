@@ -9,10 +9,9 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from explorer.cli.blocks import lines
 from explorer.cli.load_options import LoadOptions, check_regular
 from explorer.cli.options import TypicalOptions
-from explorer.cli.output import assumed_lines, heading, pose_table
+from explorer.cli.output import assumed_lines, heading, lines, pose_table
 from explorer.cli.values import hint, numbers
 from explorer.measures.blocks.precision import deflections, tool_errors
 from explorer.mechanism.design import Design

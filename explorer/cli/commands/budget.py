@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from explorer.cli.blocks import lines
 from explorer.cli.options import (
     DesignOptions,
     JsonOptions,
@@ -20,9 +19,10 @@ from explorer.cli.output import (
     attributes,
     finite,
     heading,
+    lines,
     pose_table,
 )
-from explorer.cli.usage import UsageError
+from explorer.cli.parsing import UsageError
 from explorer.cli.values import FILE, OPTIONAL, Flag, hint, numbers, positive
 from explorer.files.writing import check_writable
 from explorer.measures.blocks.budget import tolerance_budget

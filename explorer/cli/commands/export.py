@@ -197,8 +197,7 @@ def _step(command: Export) -> tuple[bytes, Facts]:
 def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.export.assembly import assembly_bytes, check_format
     from explorer.export.simulation import DENSITY
-    from explorer.prototype.assembly import make_prototype
-    from explorer.prototype.bill import bill_of_materials
+    from explorer.prototype.assembly import bill_of_materials, make_prototype
 
     command.refuse(
         *("tolerance", "masses", *ERRORS, "position", "quaternion"),
@@ -206,8 +205,7 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
     )
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     if file_format == "step":
-        from explorer.export.step import check_extra
-        from explorer.export.step_assembly import assembly_step
+        from explorer.export.step import assembly_step, check_extra
 
         check_extra()
         prototype = make_prototype(command.read_design())

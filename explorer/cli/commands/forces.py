@@ -8,9 +8,8 @@ from typing import Annotated
 
 import numpy as np
 
-from explorer.cli.blocks import lines
 from explorer.cli.load_options import LoadOptions, check_regular
-from explorer.cli.output import finite, heading, pose_json, pose_table
+from explorer.cli.output import finite, heading, lines, pose_json, pose_table
 from explorer.cli.values import hint, numbers, positive
 from explorer.errors import InputError
 from explorer.measures.blocks.block import Statement

@@ -17,8 +17,8 @@ from explorer.cli.answers.optimisation import (
 )
 from explorer.cli.options import DesignOptions, JsonOptions, write_files
 from explorer.cli.output import heading, write_json
-from explorer.cli.progress import SearchMeter
-from explorer.cli.usage import UsageError
+from explorer.cli.parsing import UsageError
+from explorer.cli.streams import SearchMeter
 from explorer.cli.values import (
     FILE,
     OPTIONAL,

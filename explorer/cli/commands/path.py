@@ -148,7 +148,7 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
             NoPathError: There is no path, or the time ended before one was found.
             MissingExtraError: OMPL is not installed.
         """
-        from explorer.export.trajectory import trajectory_csv
+        from explorer.export.tables import trajectory_csv
         from explorer.files.writing import check_writable
         from explorer.paths.loads import path_loads
         from explorer.paths.planning import NoPathError, plan_path

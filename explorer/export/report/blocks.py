@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from xml.etree.ElementTree import Element
 
-from explorer.export.report.markup import Cell, Piece, Row, element, figure, paragraph, table
+from explorer.export.drawings.markup import Cell, Piece, Row, element, figure, paragraph, table
 from explorer.measures.blocks.block import (
     Bars,
     Block,

@@ -9,9 +9,7 @@ from hashlib import sha256
 from xml.etree.ElementTree import Element
 
 from explorer import __version__
-from explorer.export.report.data import Missing, ReportData
-from explorer.export.report.drawings.mechanism import cover_drawing
-from explorer.export.report.markup import (
+from explorer.export.drawings.markup import (
     Piece,
     as_html,
     element,
@@ -21,15 +19,13 @@ from explorer.export.report.markup import (
     table,
     whole,
 )
-from explorer.export.report.sections.claims import claims_section
-from explorer.export.report.sections.legs import legs_section
-from explorer.export.report.sections.loads import loads_section
-from explorer.export.report.sections.mechanism import mechanism_section
-from explorer.export.report.sections.parts import parts_section
-from explorer.export.report.sections.precision import precision_section
-from explorer.export.report.sections.search import search_section
-from explorer.export.report.sections.singularity import singularity_section
-from explorer.export.report.sections.workspace import workspace_section
+from explorer.export.drawings.mechanism import cover_drawing
+from explorer.export.report.data import Missing, ReportData
+from explorer.export.report.loads import loads_section, precision_section
+from explorer.export.report.mechanism import mechanism_section, parts_section
+from explorer.export.report.search import claims_section, search_section
+from explorer.export.report.singularity import legs_section, singularity_section
+from explorer.export.report.workspace import workspace_section
 from explorer.files.packaged import packaged_file
 from explorer.files.versions import versions
 from explorer.measures.blocks.source import (

@@ -41,7 +41,7 @@ from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chip, Chips, choose
 from explorer.app.widgets.markup import alert, beside, box, dim, note, sentence, signed
 from explorer.errors import InputError
-from explorer.export.trajectory import trajectory_csv
+from explorer.export.tables import trajectory_csv
 from explorer.mechanism.margins import margins, mode_name, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tool_point import position_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from explorer.export.tolerance_table import tolerance_csv
+from explorer.export.tables import tolerance_csv
 from explorer.measures.size import PositionSet, positions_over
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple

@@ -20,7 +20,7 @@ from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import alert, box, caption, note, row, sentence, table
 from explorer.mechanism.design import LENGTHS
 from explorer.numerics.number_text import format_decimals, format_number
-from explorer.prototype.bill import Actuator
+from explorer.prototype.assembly import Actuator
 
 FIT = "prototype.fit"
 

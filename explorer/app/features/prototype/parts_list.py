@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from explorer.numerics.number_text import format_decimals
-from explorer.prototype.assembly import Prototype
-from explorer.prototype.bill import Actuator, bill_of_materials
-from explorer.prototype.part import Part
+from explorer.prototype.assembly import Actuator, Prototype, bill_of_materials
+from explorer.prototype.shapes import Part
 
 # Axis of the round bar in the frame of the part, for the kinds cut from one.
 _ROUND = {"cylinder": 2, "rod": 2, "ball": 2, "carriage": 0}

@@ -19,7 +19,7 @@ def export_assembly(design: Design, file_format: str) -> bytes:
     from explorer.prototype.assembly import make_prototype
 
     if file_format == "step":
-        from explorer.export.step_assembly import assembly_step
+        from explorer.export.step import assembly_step
         from explorer.prototype.fitting import sizes_of
 
         return assembly_step(sizes_of(design))

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from explorer.app.state.studies import Studies, within
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.sweep.front import costs
-from explorer.sweep.results import Results
+from explorer.sweep.results import Results, costs
 from explorer.sweep.study import Study
 
 MOST_ROWS = 5000

@@ -17,9 +17,9 @@ import numpy as np
 
 from explorer.app.scene.bands import Colouring
 from explorer.app.widgets.markup import reading
-from explorer.export.report.drawings.slice_drawing import cross, placing, ruler
-from explorer.export.report.drawings.slices import Slices, in_plane
-from explorer.export.report.markup import as_html, coordinate, element
+from explorer.export.drawings.markup import as_html, coordinate, element
+from explorer.export.drawings.slice_drawing import cross, placing, ruler
+from explorer.export.drawings.slices import Slices, in_plane
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import decimals_for, format_decimals, format_number

@@ -29,7 +29,7 @@ from explorer.app.widgets.markup import (
     ticks,
 )
 from explorer.app.widgets.under_way import problem, progress
-from explorer.export.report.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
+from explorer.export.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
 from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple

@@ -1,17 +1,86 @@
-"""Charts of a search: objective, volume and worst demand over its iterations."""
+"""The sections on where the design comes from: its search, and the claims of the paper."""
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
+import msgspec
 import numpy as np
 
-from explorer.export.report.drawings.mechanism import WIDTH, round_length, svg_drawing
-from explorer.export.report.markup import coordinate, drawing_text, element
+from explorer.export.drawings.markup import (
+    Row,
+    coordinate,
+    drawing_text,
+    element,
+    illustration,
+    paragraph,
+    table,
+    whole,
+)
+from explorer.export.drawings.mechanism import WIDTH, round_length, svg_drawing
+from explorer.export.report.data import ReportData
+from explorer.files.packaged import packaged_file
+from explorer.mechanism.design import VARIABLES
+from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.number_text import format_number, power_of_ten
 from explorer.optimise.curves import CALLED, Curve, curves_of
 from explorer.optimise.record import Record, Step
+
+
+def search_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on the search that found the design; nothing without a record."""
+    record = data.record
+    if record is None:
+        return
+    yield element("h2", "Optimisation")
+    run, problem = record.runs[record.chosen], record.problem
+    if record.design.variables != data.design.variables:
+        yield paragraph(
+            "The design of this report is not the one that this search found.", class_="note"
+        )
+    yield paragraph(f"{run.message[:1].upper()}{run.message[1:].rstrip('.')}.")
+    drawn = charts(record)
+    if drawn is not None:
+        yield illustration(
+            drawn,
+            "The search from the chosen start, by iterations; dashed lines are the demands.",
+        )
+    best = next((step for step in record.history if step.number == run.best), None)
+    rows: list[Row] = [
+        ("objective", problem.objective.replace("-", " ")),
+        ("status", run.status),
+    ]
+    if problem.demands.volume is not None:
+        rows.append(("demanded volume, units³", problem.demands.volume))
+    if best is not None:
+        value = "infinite" if best.objective is None else best.objective
+        rows.append((CALLED[problem.objective], value))
+        rows.append(("volume, units³", best.volume))
+    rows += [
+        ("iterations", whole(run.iterations)),
+        ("evaluations", whole(run.evaluations)),
+        ("starts", whole(record.settings.starts)),
+        ("seed", whole(record.settings.seed)),
+        ("time, s", record.seconds),
+    ]
+    if run.holding:
+        rows.append(("held by", run.holding))
+    start, end = problem.start, record.design
+    names = [*((element("b", name),) for name in VARIABLES), (element("b", "|a3|"), " reach")]
+    before, after = ((*design.variables, design.reach) for design in (start, end))
+    changes = [(*row, row[2] - row[1]) for row in zip(names, before, after, strict=True)]
+    yield element(
+        "div",
+        table((), rows, align="<>", caption="The search"),
+        table(("units", "start", "optimum", "change"), changes, align="<>>>", caption="The design"),
+        class_="pair",
+    )
+    if not steps_of(record):
+        yield paragraph("No iterate was recorded.")
+
 
 HEIGHT = 190.0
 LEFT, RIGHT, TOP, BOTTOM = 52.0, 14.0, 26.0, 36.0
@@ -105,3 +174,32 @@ def _ticks(low: float, high: float, *, whole: bool) -> list[float]:
         step = max(1.0, float(np.ceil(step)))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [tick * step for tick in range(first, last + 1)]
+
+
+def claims_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on the paper's claims; nothing for designs other than the paper's."""
+    design = data.design
+    is_of_paper = any(
+        msgspec.structs.replace(preset, name=design.name, unit_mm=design.unit_mm) == design
+        for preset in PRESETS.values()
+    )
+    if not is_of_paper:
+        return
+    claims = json.loads(packaged_file("claims", "claims.json").read_text("utf-8"))
+    yield element("h2", "The paper’s claims")
+    yield paragraph(
+        "The command explorer reproduce measures them again, with the paper’s words and the values "
+        "behind each verdict. Numbers mark our reading of what the paper leaves open."
+    )
+    readings = list(dict.fromkeys(claim["reading"] for claim in claims if claim["reading"]))
+    rows = [
+        (
+            claim["claim"],
+            claim["verdict"],
+            str(readings.index(claim["reading"]) + 1) if claim["reading"] else "",
+        )
+        for claim in claims
+    ]
+    yield table(("claim", "verdict", "our reading"), rows, align="<<<")
+    for number, reading in enumerate(readings, start=1):
+        yield paragraph(f"{number}. {reading}")

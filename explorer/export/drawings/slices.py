@@ -16,8 +16,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.export.report.drawings.mechanism import path_of, round_length
-from explorer.export.report.markup import coordinate, element
+from explorer.export.drawings.markup import coordinate, element
+from explorer.export.drawings.mechanism import path_of, round_length
 from explorer.legs.clearance import leg_clearances
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design

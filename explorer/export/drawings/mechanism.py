@@ -12,9 +12,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from explorer.export.report.drawings.labels import labels
-from explorer.export.report.drawings.projection import Projection, ViewName, fit_view
-from explorer.export.report.markup import coordinate, drawing_text, element
+from explorer.export.drawings.markup import coordinate, drawing_text, element
+from explorer.export.drawings.projection import Projection, ViewName, fit_view, labels
 from explorer.legs.clearance import leg_axes
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import verdict

@@ -1,13 +1,11 @@
-"""The section on the mechanism: design variables, limits and the pose."""
+"""The sections on the mechanism and its prototype: variables, limits, pose and parts."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from explorer.export.report.data import ReportData
-from explorer.export.report.drawings.mechanism import three_views
-from explorer.export.report.markup import (
+from explorer.export.drawings.markup import (
     Cell,
     Row,
     element,
@@ -16,8 +14,12 @@ from explorer.export.report.markup import (
     paragraph,
     table,
 )
+from explorer.export.drawings.mechanism import three_views
+from explorer.export.report.data import Missing, ReportData
+from explorer.export.simulation import DENSITY
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_SHARE
 from explorer.workspace.limits.table import joint_ranges, limits_in_force
 
@@ -117,3 +119,37 @@ def _limits(data: ReportData) -> Element:
     for leg, radius in enumerate(data.design.limits.leg_radii, 1):
         rows.append(_lengths(data, f"radius of leg {leg}", radius))
     return table(("limit", "units", "mm"), rows, align="<>>", caption="Limits in force")
+
+
+def parts_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on the prototype."""
+    yield element("h2", "Prototype")
+    bill = data.bill
+    if isinstance(bill, Missing):
+        yield paragraph(f"Its parts cannot be made: {bill.reason}.", class_="note")
+        return
+    yield paragraph(
+        f"Parts sized from the design, of {format_number(DENSITY, 6)} kg/m³ (printed PLA): ",
+        number(bill.mass * 1000.0, 4),
+        " g in all.",
+    )
+    actuators = [
+        (str(leg.leg), *_rounded(*leg.stroke, *leg.required, leg.diameter, leg.mass * 1000.0))
+        for leg in bill.actuators
+    ]
+    parts = [
+        (item.name, *_rounded(*item.size, item.volume / 1000.0, item.mass * 1000.0))
+        for item in bill.items
+    ]
+    yield table(
+        ("leg", "from, mm", "to, mm", "limits from, mm", "to, mm", "Ø, mm", "mass, g"),
+        actuators,
+        align="<>>>>>>",
+        caption="Actuators: strokes, and the strokes that the limits require",
+    )
+    heads = ("part", "x, mm", "y, mm", "z, mm", "volume, cm³", "mass, g")
+    yield table(heads, parts, align="<>>>>>", caption="Bill of parts")
+
+
+def _rounded(*values: float) -> list[Element]:
+    return [number(value, 4) for value in values]

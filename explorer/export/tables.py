@@ -1,4 +1,4 @@
-"""The tolerances of a design as CSV, for its drawings."""
+"""Trajectories, and the tolerances of a design, as tables of comma-separated values."""
 
 from __future__ import annotations
 
@@ -7,10 +7,40 @@ import io
 
 import numpy as np
 
+from explorer.mechanism.design import JOINTS
+from explorer.paths.trajectory import Trajectory
 from explorer.statics.budget.costs import PARTS, SourceCosts
 from explorer.statics.error_sources import IS_TILT, SOURCES
 
-COLUMNS = (
+_TRAJECTORY_COLUMNS = ("time_s", *JOINTS, "x", "y", "z", "qw", "qx", "qy", "qz")
+"""The names of the columns, without the unit of lengths."""
+
+_TOOL_COLUMNS = ("tool_x", "tool_y", "tool_z")
+"""The names of the columns that follow if the tool point moves straight."""
+
+_LENGTHS = (*JOINTS, "x", "y", "z", *_TOOL_COLUMNS)
+"""The names of the columns in design units."""
+
+
+def trajectory_csv(trajectory: Trajectory) -> str:
+    """Return a trajectory as CSV: a header, then a line per sample.
+
+    The header has the unit of each length, such as "l1 [10 mm]". Numbers round-trip to the
+    last bit.
+    """
+    columns = [trajectory.time, trajectory.joints, trajectory.position, trajectory.quaternion]
+    names = _TRAJECTORY_COLUMNS
+    if trajectory.tool_position is not None:
+        columns.append(trajectory.tool_position)
+        names += _TOOL_COLUMNS
+    rows = np.column_stack(columns)
+    unit = repr(trajectory.unit_mm).removesuffix(".0")
+    head = [f"{name} [{unit} mm]" if name in _LENGTHS else name for name in names]
+    lines = [",".join(head), *(",".join(map(repr, row)) for row in rows.tolist())]
+    return "\n".join(lines) + "\n"
+
+
+TOLERANCE_COLUMNS = (
     *("part", "error of", "unit", "tolerance"),
     *("mm per unit", "degrees per unit", "mm at tolerance", "degrees at tolerance", "share"),
 )
@@ -33,7 +63,7 @@ def tolerance_csv(costs: SourceCosts) -> str:
     )
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    writer.writerow(TOLERANCE_COLUMNS)
     for k in sorted(range(len(SOURCES)), key=lambda k: PARTS[k]):
         tolerance = float(costs.tolerances[k])
         writer.writerow(

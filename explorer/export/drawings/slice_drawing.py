@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element
 
-from explorer.export.report.drawings.mechanism import WIDTH, round_length, svg_drawing
-from explorer.export.report.drawings.slices import Slices, in_plane
-from explorer.export.report.markup import coordinate, drawing_text, element
+from explorer.export.drawings.markup import coordinate, drawing_text, element
+from explorer.export.drawings.mechanism import WIDTH, round_length, svg_drawing
+from explorer.export.drawings.slices import Slices, in_plane
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, css
 from explorer.workspace.position_bands import MEASURE_WORDS

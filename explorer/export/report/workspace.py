@@ -7,11 +7,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from explorer.export.report.data import Missing, ReportData
-from explorer.export.report.drawings.slice_drawing import legend, slice_strip, slices_through
-from explorer.export.report.drawings.slices import Slices
-from explorer.export.report.drawings.workspace_drawing import workspace_views
-from explorer.export.report.markup import (
+from explorer.export.drawings.markup import (
     Cell,
     Piece,
     Row,
@@ -23,9 +19,14 @@ from explorer.export.report.markup import (
     table,
     whole,
 )
+from explorer.export.drawings.slice_drawing import legend, slice_strip, slices_through
+from explorer.export.drawings.slices import Slices
+from explorer.export.drawings.workspace_drawing import workspace_views
+from explorer.export.report.data import Missing, ReportData, compute
 from explorer.measures.catalogue import CATALOGUE
 from explorer.numerics.number_text import format_number
 from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solids import convex_hull
 
 
 def workspace_section(data: ReportData) -> Iterator[Element]:
@@ -100,7 +101,8 @@ def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
 
 
 def _volumes(data: ReportData) -> Element:
-    nodes, hull, accessible = data.nodes, data.hull_volume, data.accessible
+    nodes, solid, accessible = data.nodes, data.solid, data.accessible
+    hull = solid if isinstance(solid, Missing) else compute(lambda: convex_hull(solid).volume)
     remarks: dict[str, Cell] = {}
     is_exact = data.volume.error <= 1e-6 * data.volume.volume
     remarks["volume"] = "exact" if is_exact else "to four digits"

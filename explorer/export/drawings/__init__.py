@@ -1,0 +1,1 @@
+"""Drawings as SVG, which the report and the page show."""
