@@ -39,11 +39,7 @@ class LoadOptions(JsonOptions, PoseOptions, DesignOptions):
     """Mass of the payload, in kg; its weight is added to the load."""
 
     def read_loaded_design(self) -> Design:
-        """Return the design with the given mass of the payload.
-
-        Raises:
-            DesignError: There is no such design, or the file holds none.
-        """
+        """Return the design with the given mass of the payload."""
         design = self.read_design()
         if self.payload is None:
             return design
@@ -61,9 +57,6 @@ def held_by(
         rotation: Platform to base, shape (3, 3).
         load: (F; M) at the tool besides the payload, base axes, in N and N × unit.
         tolerance: Tolerance of the mesh, in design units; None for the usual one.
-
-    Raises:
-        InputError: The design has no limit that a load could exceed.
     """
     from explorer.workspace.held import held_workspace
 
@@ -72,11 +65,7 @@ def held_by(
 
 
 def check_limited(design: Design) -> None:
-    """Check that a part of a design has a limit.
-
-    Raises:
-        InputError: The design has no limit that a load could exceed.
-    """
+    """Check that a part of a design has a limit."""
     if not has_limits(design):
         raise InputError(
             "the design limits neither its actuators nor its struts nor its guide, so that it "
@@ -91,9 +80,6 @@ def check_regular(pose: Pose, values: FloatArray, infinite: str) -> None:
         pose: The pose.
         values: The results.
         infinite: What is infinite in a singular pose, such as "the forces that hold a load".
-
-    Raises:
-        NoAnswerError: The pose is singular.
     """
     if np.isfinite(values).all():
         return

@@ -41,11 +41,7 @@ class DesignOptions:
 
 
 def load(name: str) -> Design:
-    """Return a preset, the design in a file, or a design saved on the page.
-
-    Raises:
-        DesignError: There is no such preset, file or saved design, or the file holds no design.
-    """
+    """Return a preset, the design in a file, or a design saved on the page."""
     try:
         return load_design(name)
     except DesignError:
@@ -103,9 +99,6 @@ class JsonOptions:
             as_json: Returns the answer as plain values.
             as_lines: Returns the answer as lines of text.
             errors: Errors that keep the answer from being whole.
-
-        Raises:
-            PartialAnswerError: There are errors; their messages are one line.
         """
         if self.json:
             write_json(as_json())
@@ -140,11 +133,7 @@ class RadiiOptions:
     """Radii of the four legs in design units, or one for all."""
 
     def with_radii(self, design: Design) -> Design:
-        """Return the design with the given radii.
-
-        Raises:
-            DesignError: A radius is negative.
-        """
+        """Return the design with the given radii."""
         if self.radii is None:
             return design
         limits = msgspec.structs.replace(design.limits, leg_radii=self.radii)
@@ -190,10 +179,6 @@ def make_pose(
         folds: The whole pose as r in design units and five angles in degrees.
         tool: Tool point in the platform frame, in design units; None if the position is that of
             b4. Without a position the tool stays where it is in the default pose.
-
-    Raises:
-        InputError: The pose or its orientation is given twice, the quaternion is zero, r is
-            negative, or b4 is too far away.
     """
     orientations = {
         "quaternion": quaternion,
@@ -224,6 +209,41 @@ def make_pose(
 
 
 _HOME_HINT = hint("default: that of the home pose")
+_INSTEAD = hint("instead of --quaternion")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EndOptions:
+    """The options for the orientation or the folds at the end of a move."""
+
+    to_quaternion: Annotated[
+        Quadruple | None,
+        numbers("--to-quaternion", "w x y z"),
+        hint("default: that of the start"),
+    ] = None
+    """Orientation of the platform at the end."""
+
+    to_yaw_pitch_roll: Annotated[
+        Triple | None,
+        numbers("--to-yaw-pitch-roll", "yaw pitch roll"),
+        hint("instead of --to-quaternion"),
+    ] = None
+    """Orientation of the platform at the end, in degrees."""
+
+    to_tilt_torsion: Annotated[
+        Triple | None,
+        numbers("--to-tilt-torsion", "azimuth tilt torsion"),
+        hint("instead of --to-quaternion"),
+    ] = None
+    """Azimuth, tilt and torsion of the platform at the end, in degrees."""
+
+    to_folds: Annotated[Six | None, fold_numbers("--to-folds"), hint("instead of --to")] = None
+    """Folds of the pose at the end; r in design units, angles in degrees."""
+
+    @property
+    def end(self) -> tuple[Quadruple | None, Triple | None, Triple | None, Six | None]:
+        """The orientations and folds that may be given, in the order of `make_pose`."""
+        return self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion, self.to_folds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,16 +254,12 @@ class OrientationOptions:
     """Orientation of the platform; of any length but zero."""
 
     yaw_pitch_roll: Annotated[
-        Triple | None,
-        numbers("--yaw-pitch-roll", "yaw pitch roll"),
-        hint("instead of --quaternion"),
+        Triple | None, numbers("--yaw-pitch-roll", "yaw pitch roll"), _INSTEAD
     ] = None
     """Orientation of the platform: angles in degrees about its own z, then y, then x axis."""
 
     tilt_torsion: Annotated[
-        Triple | None,
-        numbers("--tilt-torsion", "azimuth tilt torsion"),
-        hint("instead of --quaternion"),
+        Triple | None, numbers("--tilt-torsion", "azimuth tilt torsion"), _INSTEAD
     ] = None
     """Orientation of the platform in T&T angles: azimuth and angle of its tilt, and its torsion, in
     degrees."""

@@ -48,20 +48,12 @@ class Command(Protocol):
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     def run(self) -> None:
-        """Run the command and write its answer to standard output.
-
-        Raises:
-            ExplorerError: The input is bad, or the question has no answer.
-        """
+        """Run the command and write its answer to standard output."""
         ...
 
 
 def load_command(name: str, known: Iterable[str]) -> type[Command]:
-    """Import a command's module and return its dataclass.
-
-    Raises:
-        UsageError: The command is unknown; the message suggests a similar one.
-    """
+    """Import a command's module and return its dataclass."""
     if name not in known:
         hint = suggestion(name, known) or f"there are {', '.join(known)}"
         raise UsageError(f"no command {name!r} ({hint}); see explorer --help")
@@ -70,11 +62,7 @@ def load_command(name: str, known: Iterable[str]) -> type[Command]:
 
 
 def parse(name: str, command: type[Command], argv: Sequence[str]) -> Command | None:
-    """Return the command with its options set; None if the arguments ask for help.
-
-    Raises:
-        UsageError: The arguments are invalid.
-    """
+    """Return the command with its options set; None if the arguments ask for help."""
     program = f"explorer {name}"
     page, errors = io.StringIO(), io.StringIO()
     try:
@@ -128,11 +116,7 @@ def suggestion(word: str, known: Iterable[str]) -> str | None:
 
 
 def _check_options(command: type[Command], argv: Sequence[str]) -> None:
-    """Refuse options that the command lacks, and options given twice, of which the last would win.
-
-    Raises:
-        UsageError: There is one.
-    """
+    """Refuse options that the command lacks, and options given twice."""
     known = {"--help": "help"}
     for field in dataclasses.fields(command):
         # A field whose name Python reserves, such as from, ends in an underscore.

@@ -79,12 +79,7 @@ def _plain(letter: str) -> str:
 
 
 def write(text: str) -> None:
-    """Write text to standard output and flush it.
-
-    Raises:
-        OutputError: Standard output cannot be written.
-        BrokenPipeError: The reader has closed the pipe.
-    """
+    """Write text to standard output and flush it."""
     answered.set(True)
     try:
         sys.stdout.write(text)

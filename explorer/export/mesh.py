@@ -106,11 +106,7 @@ def _millimetres(solid: Solid, design: Design) -> FloatArray:
 def _single(
     points: FloatArray, solid: Solid, file_format: str, decimals: int | None = None
 ) -> FloatArray:
-    """Return points rounded to single precision, and to decimals if given, as float64.
-
-    Raises:
-        InputError: Rounding changes the volume by more than `ROUNDING`.
-    """
+    """Return points rounded to single precision, and to decimals if given, as float64."""
     with np.errstate(over="ignore", under="ignore"):
         rounded = points.astype(np.float32).astype(np.float64)
     if np.isfinite(rounded).all():

@@ -6,14 +6,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 
 from explorer.errors import InputError
-from explorer.reproduce.charts import chart
 from explorer.reproduce.claim import Claim, Result
 from explorer.reproduce.comparison import large_workspace, orientations
-from explorer.reproduce.flags import strata, uncoupled
+from explorer.reproduce.flags import chart, strata, uncoupled
 from explorer.reproduce.interference import FROM, clear_optimum, lower_risk
-from explorer.reproduce.kinematics import closed_form, same_kinematics
+from explorer.reproduce.kinematics import (
+    closed_form,
+    flat_tetrahedra,
+    mode_paths,
+    same_kinematics,
+)
 from explorer.reproduce.search import search
-from explorer.reproduce.singularities import flat_tetrahedra, mode_paths
 from explorer.reproduce.table_one import extents
 
 OUR_READING = (

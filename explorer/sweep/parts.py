@@ -149,12 +149,7 @@ def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, A
 
 
 def _checked_metadata(metadata: Mapping[bytes, bytes], copy: Mapping[bytes, bytes]) -> Part:
-    """Return the metadata of a part; it holds two copies of them, without a checksum.
-
-    Raises:
-        KeyError: a value is missing.
-        ValueError: the metadata are damaged.
-    """
+    """Return the metadata of a part; it holds two copies of them, without a checksum."""
     names = (_STUDY, _HASH, _SEED, _CHUNK, _VERSIONS)
     part = Part(
         study=metadata[_STUDY],

@@ -169,12 +169,7 @@ class LocalWorkers(Workers):
             task.future.set_exception(value)
 
     def _ready_child(self, number: int) -> ChildProcess:
-        """Return the process of a thread, ready for tasks: a start that fails is no task's fault.
-
-        Raises:
-            NoWorkerError: no process stays alive until it is ready.
-            WorkerDiedError: the process was killed by `shutdown`.
-        """
+        """Return the process of a thread, ready for tasks; a failed start is no task's fault."""
         last = ""
         for _ in range(STARTS):
             if not self._was_ready and self._failed_starts >= max(FIRST_STARTS, self.size):

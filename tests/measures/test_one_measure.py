@@ -19,7 +19,7 @@ from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.words import chips
 from explorer.app.state.compared import unnamed
 from explorer.app.state.studies import StudyPlan, label_of, study_around, title_of
-from explorer.cli.answers.optimisation import measure_rows as measure_rows_of_command
+from explorer.cli.commands.optimise import measure_rows as measure_rows_of_command
 from explorer.export.report.data import gather_report_data
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, Measure, measures_in

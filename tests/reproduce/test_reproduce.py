@@ -21,15 +21,15 @@ from explorer.files.packaged import packaged_file
 from explorer.legs.segments import write_closest
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.folds import FOLDS
-from explorer.mechanism.kinematics import forward, inverse
-from explorer.mechanism.margins import margins, mode_of
+from explorer.mechanism.kinematics import inverse
+from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.reproduce import charts, comparison, flags, interference, kinematics, singularities
-from explorer.reproduce.claim import Measurement, Result, Verdict, random_design, random_poses
+from explorer.reproduce import comparison, flags, interference, kinematics
+from explorer.reproduce.claim import Measurement, Result, Verdict, random_poses
 from explorer.reproduce.claims import CLAIMS, measure_claims
 from explorer.reproduce.interference import Interference
-from explorer.reproduce.singularities import (
+from explorer.reproduce.kinematics import (
     Paths,
     conditions_at_crossings,
     judge_paths,
@@ -79,20 +79,6 @@ def test_manual_and_report_are_made_of_all_claims_and_conditions_stand_where_nee
         assert bool(measurement.condition) == (measurement.verdict == "confirmed within")
 
 
-def test_trilaterations_lead_to_the_eight_modes_of_the_forward_kinematics() -> None:
-    random = np.random.default_rng(0)
-    for design in (*PRESETS.values(), random_design(random)):
-        joints = inverse(design, *random_poses(random, 100, 0.7 * design.reach))
-        p, r = kinematics.solve_by_trilaterations(design, joints)
-        order = np.argsort(mode_of(margins(p, r)), axis=1)
-        position, rotation, feasible = forward(design, joints)
-        assert feasible.all()
-        p = np.take_along_axis(p, order[..., None], axis=1)
-        r = np.take_along_axis(r, order[..., None, None], axis=1)
-        np.testing.assert_allclose(p, position, atol=1e-9)
-        np.testing.assert_allclose(r, rotation, atol=1e-9)
-
-
 def test_single_actuators_of_uncoupled_motions_are_l1_and_l4(results: dict[str, Result]) -> None:
     values: Any = results["uncoupled-motions"].measurement.values
     moves = values["margins_of_actuators"]
@@ -140,7 +126,7 @@ def test_table_of_the_charts_states_the_margins_that_each_coordinate_changes() -
     random = np.random.default_rng(4)
     folds = to_folds(*random_poses(random, 100, 1.0))
     before = margins(*from_folds(folds))
-    for line in charts.TABLE[1:]:
+    for line in flags.TABLE[1:]:
         name, *_ = line.removeprefix("−").split()
         other = folds.copy()
         column = FOLDS.index(name)
@@ -304,11 +290,15 @@ def judge_orientations(share: float, tilt: float) -> Measurement:
     return comparison.judge_orientations(ours, ours, [other])
 
 
-EXACT = singularities.Errors(1e-16, 1e-16, 1e-15, 1e-3)
-FORM = kinematics.FormErrors(1e-15, 1e-12, 8)
-TWINS = kinematics.TwinErrors(1e-15, 1e-15, 1e-15)
-CHART = charts.ChartErrors(1e-15, 1e-15, 24, 1e-15, 1e-15, 1e-10, 0.7)
 BORDERS = {(w, other) for w in STRATA for other in STRATA if is_below(w, other)}
+
+
+def judge_chart(**changes: float) -> Measurement:
+    errors = dict.fromkeys(("poses", "folds", "motions", "margins"), 1e-15)
+    plain = {**errors, "strata": 24, "determinant": 1e-10, "at_home": 0.7}
+    return flags.judge_chart(**{**plain, **changes})  # pyright: ignore[reportArgumentType]
+
+
 VERDICTS_OF_VALUES = [
     ("confirmed", judge_risk()),
     ("confirmed within", judge_risk(free=THICK)),
@@ -327,11 +317,11 @@ VERDICTS_OF_VALUES = [
     ("confirmed within", judge_orientations(0.2, 20.0)),
     ("not confirmed", judge_orientations(0.11, 21.0)),
     # Any large error refutes a law.
-    ("confirmed", singularities.judge_flat(EXACT)),
-    ("not confirmed", singularities.judge_flat(replace(EXACT, volumes=1e-6))),
-    ("not confirmed", singularities.judge_flat(replace(EXACT, identity=1e-6))),
-    ("not confirmed", singularities.judge_flat(replace(EXACT, on_planes=1e-6))),
-    ("not confirmed", singularities.judge_flat(replace(EXACT, off_planes=1e-9))),
+    ("confirmed", kinematics.judge_flat(1e-16, 1e-16, 1e-15, 1e-3)),
+    ("not confirmed", kinematics.judge_flat(1e-6, 1e-16, 1e-15, 1e-3)),
+    ("not confirmed", kinematics.judge_flat(1e-16, 1e-6, 1e-15, 1e-3)),
+    ("not confirmed", kinematics.judge_flat(1e-16, 1e-16, 1e-6, 1e-3)),
+    ("not confirmed", kinematics.judge_flat(1e-16, 1e-16, 1e-15, 1e-9)),
     ("confirmed", flags.judge_strata(BORDERS, 1)),
     ("not confirmed", flags.judge_strata(BORDERS - {(STRATA[0], STRATA[0])}, 1)),
     ("not confirmed", flags.judge_strata(BORDERS | {(STRATA[-1], STRATA[0])}, 1)),
@@ -339,23 +329,23 @@ VERDICTS_OF_VALUES = [
     ("not confirmed", flags.judge_uncoupled(0.0, 1e-16, {}, 1e-15)),
     ("not confirmed", flags.judge_uncoupled(0.1, 1e-3, {}, 1e-15)),
     ("not confirmed", flags.judge_uncoupled(0.1, 1e-16, {}, 1e-3)),
-    ("confirmed", charts.judge_chart(CHART)),
+    ("confirmed", judge_chart()),
     *(
-        ("not confirmed", charts.judge_chart(replace(CHART, **{name: 1e-6})))
+        ("not confirmed", judge_chart(**{name: 1e-6}))
         for name in ("poses", "folds", "motions", "margins", "determinant", "at_home")
     ),
-    ("not confirmed", charts.judge_chart(replace(CHART, strata=23))),
-    ("confirmed", kinematics.judge_same_kinematics(TWINS)),
-    ("not confirmed", kinematics.judge_same_kinematics(replace(TWINS, lengths=1e-3))),
-    ("not confirmed", kinematics.judge_same_kinematics(replace(TWINS, joints=1e-3))),
-    ("not confirmed", kinematics.judge_same_kinematics(replace(TWINS, determinant=1e-3))),
+    ("not confirmed", judge_chart(strata=23)),
+    ("confirmed", kinematics.judge_same_kinematics(1e-15, 1e-15, 1e-15)),
+    ("not confirmed", kinematics.judge_same_kinematics(1e-3, 1e-15, 1e-15)),
+    ("not confirmed", kinematics.judge_same_kinematics(1e-15, 1e-3, 1e-15)),
+    ("not confirmed", kinematics.judge_same_kinematics(1e-15, 1e-15, 1e-3)),
     ("confirmed", judge_paths(1e-12, 1.0)),
     ("not confirmed", judge_paths(1e-3, 1.0)),
     ("not confirmed", judge_paths(1e-12, 0.99)),
-    ("confirmed", kinematics.judge_closed_form(FORM)),
-    ("not confirmed", kinematics.judge_closed_form(replace(FORM, joints=1e-6))),
-    ("not confirmed", kinematics.judge_closed_form(replace(FORM, pose=1e-3))),
-    ("not confirmed", kinematics.judge_closed_form(replace(FORM, modes=7))),
+    ("confirmed", kinematics.judge_closed_form(1e-15, 1e-12, 8)),
+    ("not confirmed", kinematics.judge_closed_form(1e-6, 1e-12, 8)),
+    ("not confirmed", kinematics.judge_closed_form(1e-15, 1e-3, 8)),
+    ("not confirmed", kinematics.judge_closed_form(1e-15, 1e-12, 7)),
 ]
 
 

@@ -9,9 +9,10 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
+from explorer.cli.blocks import lines
 from explorer.cli.load_options import LoadOptions, check_regular
 from explorer.cli.options import TypicalOptions
-from explorer.cli.output import assumed_lines, heading, lines, pose_table
+from explorer.cli.output import assumed_lines, heading, pose_table
 from explorer.cli.values import hint, numbers
 from explorer.measures.blocks.precision import deflections, tool_errors
 from explorer.mechanism.design import Design
@@ -24,21 +25,6 @@ from explorer.statics.tool_precision import BY_ACTUATORS, BY_DIMENSIONS, GROUPS,
 B4: Triple = (0.0, 0.0, 0.0)
 ORDER = "l1 d1 d2 d3 d4 l4"
 PARTS = ("guide", "struts", "actuators")
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What the command computes of a pose.
-
-    Attributes:
-        assumed: Words for what is assumed of the design.
-        tool: Tool point in the platform frame, in design units; None for b4.
-        precision: Errors, compliance and deflection at this point.
-    """
-
-    assumed: tuple[str, ...]
-    tool: Triple | None
-    precision: ToolPrecision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,15 +54,14 @@ class Accuracy(TypicalOptions, LoadOptions):
         loaded = LoadedPose(design, pose, self.load, point=tool or B4)
         precision = ToolPrecision(loaded)
         check_regular(pose, precision.by_source, "errors and compliance")
-        answer = Answer(assumed, tool, precision)
-        self.write(lambda: _as_json(answer), lambda: _as_lines(answer))
+        head = (heading(design), *assumed_lines(assumed), pose_table(design, pose, tool))
+        self.write(
+            lambda: {**_as_json(precision), "assumed": assumed},
+            lambda: (*head, *_as_lines(precision)),
+        )
 
     def _with_actuators(self, design: Design) -> Design:
-        """Return the design with the given errors and stiffness.
-
-        Raises:
-            DesignError: An error is negative, or a stiffness is not positive.
-        """
+        """Return the design with the given errors and stiffness."""
         actuators = design.actuators
         if self.errors is not None:
             actuators = msgspec.structs.replace(actuators, error_mm=self.errors)
@@ -92,8 +77,7 @@ def _totals(precision: ToolPrecision) -> Iterator[tuple[str, str, tuple[float, f
             yield group, kind, (float(error.displacement), float(error.turn))
 
 
-def _as_json(answer: Answer) -> dict[str, object]:
-    precision = answer.precision
+def _as_json(precision: ToolPrecision) -> dict[str, object]:
     principal, alone = precision.principal, precision.alone
     shares = {
         name: None if np.isnan(share) else float(share)
@@ -121,13 +105,9 @@ def _as_json(answer: Answer) -> dict[str, object]:
         "pose_error_by_geometry": error_by_geometry(precision.loaded.configuration),
         "displacement_by_geometry": alone.displacement[BY_DIMENSIONS],
         "turn_by_geometry": alone.turn[BY_DIMENSIONS],
-        "assumed": answer.assumed,
     }
 
 
-def _as_lines(answer: Answer) -> Iterator[str]:
-    loaded = answer.precision.loaded
-    yield from (heading(loaded.design), *assumed_lines(answer.assumed))
-    yield pose_table(loaded.design, loaded.pose, answer.tool)
-    yield from lines(tool_errors(answer.precision, listed=None))
-    yield from lines(deflections(answer.precision, "the load and the payload's weight"))
+def _as_lines(precision: ToolPrecision) -> Iterator[str]:
+    yield from lines(tool_errors(precision, listed=None))
+    yield from lines(deflections(precision, "the load and the payload's weight"))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from explorer.cli.blocks import lines
 from explorer.cli.options import (
     DesignOptions,
     JsonOptions,
@@ -19,7 +20,6 @@ from explorer.cli.output import (
     attributes,
     finite,
     heading,
-    lines,
     pose_table,
 )
 from explorer.cli.parsing import UsageError
@@ -30,7 +30,7 @@ from explorer.measures.size import PositionSet, positions_over
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
-from explorer.mechanism.pose import Pose, Triple
+from explorer.mechanism.pose import Triple
 from explorer.statics.budget.allocation import ToleranceBudget, costs_or_budget
 from explorer.statics.budget.costs import (
     PARTS,
@@ -42,31 +42,6 @@ from explorer.statics.error_sources import SOURCES
 
 PROGRAM = "explorer budget"
 WORDS = {"box": "nodes of a grid over the box", "workspace": "nodes of a grid in the workspace"}
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What the command computes.
-
-    Attributes:
-        design: Design with what is assumed of it.
-        assumed: Words for what is assumed.
-        pose: Pose with the orientation, and with the position if there is only one.
-        tool: Tool point in the platform frame, in design units; None for b4.
-        over: Kind of the positions.
-        costs: Costs of the tolerances found, or else of those stated.
-        found: Tolerances that keep the wanted precision; None if none is wanted.
-        out: File of the design with these tolerances; None if none is written.
-    """
-
-    design: Design
-    assumed: tuple[str, ...]
-    pose: Pose
-    tool: Triple | None
-    over: PositionSet
-    costs: SourceCosts
-    found: ToleranceBudget | None
-    out: Path | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,12 +80,7 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
     """File for the design with the tolerances that are found."""
 
     def run(self) -> None:
-        """Write the costs of the tolerances, and the tolerances that are found.
-
-        Raises:
-            NoAnswerError: Errors are infinite at the positions, or those of the actuators alone
-                exceed what is wanted.
-        """
+        """Write the costs of the tolerances, and the tolerances that are found."""
         over, box = self._positions()
         if self.wanted is None and (self.wanted_turn or self.keep_actuators or self.out):
             raise UsageError(
@@ -135,15 +105,24 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
         if found is not None and self.out is not None:
             files[self.out] = encode_design(with_tolerances(design, found.tolerances))
         written, errors = write_files(files)
-        answer = Answer(design, assumed, pose, tool, over, costs, found, next(iter(written), None))
-        self.write(lambda: _as_json(answer), lambda: self._as_lines(answer), errors)
+        head = (heading(design), *assumed_lines(assumed))
+        out = ("", str(written[0])) if written else ()
+        if over == "pose":
+            head += (pose_table(design, pose, tool),)
+        self.write(
+            lambda: {
+                "over": over,
+                "assumed": assumed,
+                **_as_json(costs, found),
+                "stated": stated_tolerances(design),
+                "out": next(iter(written), None),
+            },
+            lambda: (*head, *self._as_lines(design, over, costs, found), *out),
+            errors,
+        )
 
     def _positions(self) -> tuple[PositionSet, tuple[Triple, Triple] | None]:
-        """Return the kind of the positions, and the given box.
-
-        Raises:
-            UsageError: Options contradict each other, or a low of the box exceeds its high.
-        """
+        """Return the kind of the positions, and the given box."""
         given = self.required_box
         over = self.over or ("pose" if given is None else "box")
         if over != "box" and given is not None:
@@ -158,36 +137,25 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
             raise UsageError("--required-box takes three lows, then highs above them", PROGRAM)
         return over, (lows, highs)
 
-    def _as_lines(self, answer: Answer) -> Iterator[str]:
-        design, costs = answer.design, answer.costs
-        yield heading(design)
-        yield from assumed_lines(answer.assumed)
-        if answer.over == "pose":
-            yield pose_table(design, answer.pose, answer.tool)
-        else:
-            yield f"worst over {costs.count:,} {WORDS[answer.over]}, at one orientation"
-            if answer.over == "workspace" and not design.limits.margin:
-                yield "the limits demand no margin: nearer to singular poses errors are larger"
-        budget = tolerance_budget(costs, answer.found, self.wanted, self.wanted_turn)
-        yield from lines(budget)
-        if answer.out is not None:
-            yield from ("", str(answer.out))
+    def _as_lines(
+        self, design: Design, over: PositionSet, costs: SourceCosts, found: ToleranceBudget | None
+    ) -> Iterator[str]:
+        if over != "pose":
+            yield f"worst over {costs.count:,} {WORDS[over]}, at one orientation"
+        if over == "workspace" and not design.limits.margin:
+            yield "the limits demand no margin: nearer to singular poses errors are larger"
+        yield from lines(tolerance_budget(costs, found, self.wanted, self.wanted_turn))
 
 
-def _as_json(answer: Answer) -> dict[str, object]:
-    costs, found = answer.costs, answer.found
+def _as_json(costs: SourceCosts, found: ToleranceBudget | None) -> dict[str, object]:
     names = "count position turn displacement displacement_within turn_within shares turn_shares"
     return {
-        "over": answer.over,
-        "assumed": answer.assumed,
         "sources": SOURCES,
         "parts": PARTS,
         "ranking": [SOURCES[k] for k in costs.ranking.tolist()],
         **attributes(costs, names),
         **attributes(costs, "worst_displacement worst_turn rms_displacement rms_turn"),
-        "stated": stated_tolerances(answer.design),
         "tolerances": None if found is None else [*map(finite, found.tolerances.tolist())],
         "effort": None if found is None else found.effort,
         "least_effort": None if found is None else found.least_effort,
-        "out": answer.out,
     }

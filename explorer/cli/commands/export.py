@@ -1,21 +1,30 @@
-"""`explorer export`: the workspace, the mechanism or the scene as a file."""
+"""`explorer export`: the workspace, the mechanism, its simulation or the scene as a file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 import tyro
 
 from explorer.cli.load_options import held_by
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions, TypicalOptions
+from explorer.cli.output import DISAGREES, assumed_lines, figure, figures, table
 from explorer.cli.values import OPTIONAL, hint, load_numbers, positive, whole_number
 from explorer.errors import InputError, NoAnswerError
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import Six
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
+
+if TYPE_CHECKING:
+    from explorer.export.imperfect import ImperfectMachine
+    from explorer.export.simulation import SimulationModel
 
 What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
 
@@ -81,12 +90,7 @@ class Export(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
     the design, and whose actuators and struts give way as the design states."""
 
     def run(self) -> None:
-        """Write the file, and its measures to standard output.
-
-        Raises:
-            NoAnswerError: The workspace is empty, or nothing holds the load.
-            MissingExtraError: STEP needs OpenCASCADE, which is not installed.
-        """
+        """Write the file, and its measures to standard output."""
         from explorer.files.writing import check_writable, write_whole
 
         file_format = self.format or self.out.suffix.lower().removeprefix(".")
@@ -100,11 +104,7 @@ class Export(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
         self.write(lambda: {"file": self.out, **facts}, lambda: (str(self.out), *_as_lines(facts)))
 
     def refuse(self, *options: str) -> None:
-        """Refuse options that do not apply to the object to write.
-
-        Raises:
-            InputError: One of the options is given.
-        """
+        """Refuse options that do not apply to the object to write."""
         for option in options:
             if getattr(self, option) != getattr(type(self), option):
                 raise InputError(f"--{option.replace('_', '-')} is not for {self.what}")
@@ -115,12 +115,8 @@ Facts = dict[str, Any]
 
 def _as_lines(facts: Facts) -> list[str]:
     """Return remarks on the file: a mesh that is off, a model, strokes below the limits."""
-    from explorer.cli.output import DISAGREES
-
     remarks: list[str] = []
     if "left_out" in facts:
-        from explorer.cli.answers.simulation import simulation_lines
-
         remarks += simulation_lines(facts)
     if facts.get("agrees") is False:
         remarks.append(f"This differs from the workspace: {DISAGREES}.")
@@ -234,6 +230,7 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
 
 def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
+    from explorer.export.imperfect import ImperfectMachine
     from explorer.export.simulation import DENSITY, SimulationModel
 
     command.refuse(
@@ -248,15 +245,12 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
         from explorer.prototype.assembly import make_prototype
 
         masses = make_prototype(design).masses(density)
-    from explorer.cli.answers.simulation import imperfect_json, simulation_json
 
     if command.errors is None:
         if command.typical:
             raise InputError("--typical is for the errors of a machine: give --errors SEED")
         model = SimulationModel(design, density, masses)
         return model.text().encode(), simulation_json(model)
-    from explorer.export.imperfect import ImperfectMachine
-
     design, assumed = command.with_typical(design)
     machine = ImperfectMachine.draw(design, command.errors)
     model = SimulationModel(machine, density, masses)
@@ -296,3 +290,90 @@ _WRITERS: Mapping[What, Callable[[Export, str], tuple[bytes, Facts]]] = MappingP
         "scene": _scene,
     }
 )
+
+
+def simulation_json(model: SimulationModel) -> dict[str, Any]:
+    """Return names, servos and what is left out of a model as plain values."""
+    from explorer.export.simulation import SIMULATION_BODIES, SIMULATION_JOINTS
+
+    servos = model.servos
+    return {
+        "format": "mjcf",
+        "bodies": SIMULATION_BODIES[1:],
+        "joints": SIMULATION_JOINTS,
+        "servo_stiffness_n_mm": (1e-3 * servos.stiffness).tolist(),
+        "servo_forces_n": servos.forces.tolist(),
+        "servo_rotors_kg": servos.rotors.tolist(),
+        "droop": _tool_json(model.design, servos.droop(model.design, servos.forces)),
+        "droop_without_forces": _tool_json(model.design, servos.droop(model.design, np.zeros(6))),
+        "left_out": model.left_out,
+    }
+
+
+def imperfect_json(machine: ImperfectMachine) -> dict[str, Any]:
+    """Return deviations and errors of the tool at home as plain values."""
+    from explorer.statics.error_sources import SOURCES, UNITS, drawing_values, source_errors
+
+    design = machine.design
+    off, most = (
+        drawing_values(design, each) for each in (machine.deviations, source_errors(design))
+    )
+    rows = zip(SOURCES, off.tolist(), most.tolist(), UNITS, strict=True)
+    names = ("name", "deviation", "largest", "unit")
+    return {
+        "seed": machine.seed,
+        "deviations": [dict(zip(names, row, strict=True)) for row in rows],
+        "tool_error": _tool_json(design, machine.tool_error()),
+        "linear_tool_error": _tool_json(design, machine.linear_tool_error()),
+    }
+
+
+def _tool_json(design: Design, error: FloatArray) -> dict[str, list[float]]:
+    return {
+        "displacement_mm": (design.unit_mm * error[:3]).tolist(),
+        "turn_degrees": np.degrees(error[3:]).tolist(),
+    }
+
+
+def simulation_lines(facts: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the tables of a model from what `simulation_json` and `imperfect_json` return."""
+    if "deviations" in facts:
+        yield from _imperfect_lines(facts)
+        yield ""
+    keys = ("servo_stiffness_n_mm", "servo_forces_n", "servo_rotors_kg")
+    columns = (figures(facts[key]) for key in keys)
+    head = ("servo", "stiffness, N/mm", "force at home, N", "rotor, kg")
+    yield table([head, *zip(JOINTS, *columns, strict=True)], "<>>>")
+    words = f"at home the weights move the tool by {_sizes(facts['droop'])}"
+    if facts["droop"] != facts["droop_without_forces"]:
+        words += f"; without the forces at home by {_sizes(facts['droop_without_forces'])}"
+    yield words
+    yield f"left out: {', '.join(facts['left_out'])}"
+
+
+def _sizes(error: Mapping[str, list[float]]) -> str:
+    """Return the sizes of a displacement and a turn in words."""
+    moved, turned = (math.hypot(*error[key]) for key in ("displacement_mm", "turn_degrees"))
+    return f"{format_number(moved, 3)} mm and {format_number(turned, 3)}°"
+
+
+def _imperfect_lines(facts: Mapping[str, Any]) -> Iterator[str]:
+    yield from assumed_lines(facts["assumed"])
+    stated = [row for row in facts["deviations"] if row["largest"] > 0.0]
+    if not stated:
+        yield "the design states neither errors nor tolerances: only its servos give way"
+        return
+    rows = [(f"seed {facts['seed']}", "deviation", "within ±", "")]
+    rows += [
+        (row["name"], figure(row["deviation"]), f"{row['largest']:g}", row["unit"])
+        for row in stated
+    ]
+    yield from (table(rows, "<>><"), "")
+    errors = [("tool at home off by", "size", *"xyz", "")]
+    for part, unit in (("displacement", "mm"), ("turn", "degrees")):
+        for words, key in (("", "tool_error"), (", linear model", "linear_tool_error")):
+            vector = facts[key][f"{part}_{unit}"]
+            size = float(np.linalg.norm(vector))
+            x, y, z = figures(vector)
+            errors.append((part + words, figure(size), x, y, z, unit))
+    yield table(errors, "<>>>><")

@@ -8,11 +8,11 @@ from typing import Annotated
 
 import numpy as np
 
+from explorer.cli.blocks import lines
 from explorer.cli.load_options import LoadOptions, check_regular
-from explorer.cli.output import finite, heading, lines, pose_json, pose_table
+from explorer.cli.output import finite, heading, pose_json, pose_table
 from explorer.cli.values import hint, numbers, positive
 from explorer.errors import InputError
-from explorer.measures.blocks.block import Statement
 from explorer.measures.blocks.forces import (
     most_held,
     most_of_actuators,
@@ -30,31 +30,6 @@ from explorer.statics.forces import WorstDirection, worst_direction
 from explorer.statics.loaded import LoadedPose, WorstForce
 from explorer.statics.reactions import LIMITED
 from explorer.statics.weights import Weights
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What the command computes of a pose.
-
-    Attributes:
-        loaded: The pose under the load and all weights.
-        tool: Point that positions are of; None for b4.
-        worst: Direction in which a force alone loads an actuator most.
-        added: An added force in its worst direction; None if none is asked for.
-        nearest: The nearest pose that holds the load; None if this one does, or none was found.
-    """
-
-    loaded: LoadedPose
-    tool: Triple | None
-    worst: WorstDirection
-    added: WorstForce | None
-    nearest: Pose | None
-
-    @property
-    def largest_force(self) -> float:
-        """The largest force in every direction, in N; infinite without a limit."""
-        share = float(self.worst.share)
-        return 1.0 / share if share else np.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,21 +74,18 @@ class Forces(LoadOptions):
             from explorer.workspace.nearest_held import nearest_held
 
             nearest = nearest_held(loaded)
-        answer = Answer(
-            loaded,
-            tool,
-            worst_direction(configuration, most),
-            None if self.force is None else loaded.worst_force(self.force),
-            nearest,
+        worst = worst_direction(configuration, most)
+        added = None if self.force is None else loaded.worst_force(self.force)
+        self.write(
+            lambda: {
+                **_as_json(loaded, worst, added),
+                "nearest_held": None if nearest is None else pose_json(nearest, tool),
+            },
+            lambda: _as_lines(loaded, worst, added, nearest, tool),
         )
-        self.write(lambda: _as_json(answer), lambda: _as_lines(answer))
 
     def _own_weights(self, design: Design) -> Weights:
-        """Return the weights of legs and platform.
-
-        Raises:
-            ExplorerError: The design has no prototype.
-        """
+        """Return the weights of legs and platform."""
         if self.density is None:
             return Weights()
         from explorer.prototype.weights import bar_masses, machine_weights
@@ -127,16 +99,16 @@ class Forces(LoadOptions):
         return machine_weights(design, masses, payload=False)
 
 
-def _as_json(answer: Answer) -> dict[str, object]:
-    loaded, worst, added = answer.loaded, answer.worst, answer.added
-    held, is_limited = loaded.held, bool(worst.share)
-    nearest = answer.nearest
+def _as_json(
+    loaded: LoadedPose, worst: WorstDirection, added: WorstForce | None
+) -> dict[str, object]:
+    held, share = loaded.held, float(worst.share)
     return {
         "actuator_forces": held.actuators,
         "strut_bending": held.bending,
-        "largest_force": finite(answer.largest_force),
-        "worst_direction": worst.direction if is_limited else None,
-        "worst_actuator": JOINTS[int(worst.actuator)] if is_limited else None,
+        "largest_force": 1.0 / share if share else None,
+        "worst_direction": worst.direction if share else None,
+        "worst_actuator": JOINTS[int(worst.actuator)] if share else None,
         "joint_forces": held.joints,
         "guide_force": held.guide_force,
         "guide_moment": held.guide_moment,
@@ -145,33 +117,29 @@ def _as_json(answer: Answer) -> dict[str, object]:
         "shares": dict(zip(LIMITED, loaded.shares.tolist(), strict=True)),
         "largest_payload": finite(loaded.largest_payload),
         "largest_force_by_all_parts": 1.0 / loaded.newton.share if loaded.newton.share else None,
-        "worst_force": None if added is None else _force_json(added),
-        "nearest_held": None if nearest is None else pose_json(nearest, answer.tool),
+        "worst_force": None
+        if added is None
+        else {
+            "direction": added.direction if added.share > 0.0 else None,
+            "part": LIMITED[added.part] if added.share > 0.0 else None,
+            "share": added.share,
+        },
     }
 
 
-def _force_json(added: WorstForce) -> dict[str, object]:
-    is_limited = added.share > 0.0
-    return {
-        "direction": added.direction if is_limited else None,
-        "part": LIMITED[added.part] if is_limited else None,
-        "share": added.share,
-    }
-
-
-def _as_lines(answer: Answer) -> Iterator[str]:
-    loaded = answer.loaded
-    design = loaded.design
-    yield from (heading(design), pose_table(design, loaded.pose, answer.tool))
-    yield f"load acts at          {'b4' if answer.tool is None else 'the tool'}"
+def _as_lines(
+    loaded: LoadedPose,
+    worst: WorstDirection,
+    added: WorstForce | None,
+    nearest: Pose | None,
+    tool: Triple | None,
+) -> Iterator[str]:
+    yield from (heading(loaded.design), pose_table(loaded.design, loaded.pose, tool))
+    yield f"load acts at          {'b4' if tool is None else 'the tool'}"
     facts = most_held(loaded)
-    if answer.added is not None:
-        worst = worst_force(answer.added, "the added force")
-        facts = replace(facts, facts=(*facts.facts, *worst))
-    yield from lines((verdict(loaded), *_nearest(answer), *reaction_tables(loaded)))
-    yield from lines((most_of_actuators(answer.worst), facts))
-
-
-def _nearest(answer: Answer) -> Iterator[Statement]:
-    if answer.loaded.share > 1.0:
-        yield nearest_held(answer.loaded, answer.nearest, answer.tool)
+    if added is not None:
+        more = worst_force(added, "the added force")
+        facts = replace(facts, facts=(*facts.facts, *more))
+    refused = (nearest_held(loaded, nearest, tool),) if loaded.share > 1.0 else ()
+    yield from lines((verdict(loaded), *refused, *reaction_tables(loaded)))
+    yield from lines((most_of_actuators(worst), facts))

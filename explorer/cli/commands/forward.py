@@ -53,11 +53,7 @@ class Forward(JsonOptions, PointOptions, DesignOptions):
     """Values of the joints, in design units."""
 
     def run(self) -> None:
-        """Write all eight poses of the joints.
-
-        Raises:
-            NoAnswerError: The lengths do not close.
-        """
+        """Write all eight poses of the joints."""
         design = self.read_design()
         joints = checked_joints(design, self.joints)
         squares, modes = discriminants(design, joints), forward(design, joints)

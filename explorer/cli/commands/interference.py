@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from explorer.cli.blocks import lines
 from explorer.cli.options import (
     DesignOptions,
+    EndOptions,
     JsonOptions,
     PoseOptions,
     RadiiOptions,
@@ -23,19 +25,17 @@ from explorer.cli.output import (
     indented,
     limits_json,
     limits_lines,
-    lines,
     pose_table,
     radii_line,
     tool_json,
 )
-from explorer.cli.values import OPTIONAL, fold_numbers, hint, numbers, whole_number
+from explorer.cli.values import OPTIONAL, hint, numbers, whole_number
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.blocks.clearances import move_clearances, pose_clearances
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Six
-from explorer.mechanism.pose import Pose, Quadruple, Triple
+from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tool_point import tool_position
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ MOST_STEPS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
+class Interference(JsonOptions, RadiiOptions, EndOptions, PoseOptions, DesignOptions):
     """Measure the clearances of the legs, in a pose or over a move.
 
     Legs are capsules about their axes; the clearance of two legs is the distance of the axes minus
@@ -56,28 +56,6 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
 
     to: Annotated[Triple | None, numbers("--to", "x y z"), OPTIONAL] = None
     """Move b4, or the tool, straight to this position, in design units."""
-
-    to_quaternion: Annotated[Quadruple | None, numbers("--to-quaternion", "w x y z"), OPTIONAL] = (
-        None
-    )
-    """Rotate the platform to this orientation on the move, by the smaller angle."""
-
-    to_yaw_pitch_roll: Annotated[
-        Triple | None,
-        numbers("--to-yaw-pitch-roll", "yaw pitch roll"),
-        hint("instead of --to-quaternion"),
-    ] = None
-    """Rotate the platform to this orientation on the move, in degrees."""
-
-    to_tilt_torsion: Annotated[
-        Triple | None,
-        numbers("--to-tilt-torsion", "azimuth tilt torsion"),
-        hint("instead of --to-quaternion"),
-    ] = None
-    """Rotate the platform to this azimuth, tilt and torsion on the move, in degrees."""
-
-    to_folds: Annotated[Six | None, fold_numbers("--to-folds"), hint("instead of --to")] = None
-    """Move the platform to the pose of these folds; r in design units, angles in degrees."""
 
     steps: Annotated[
         int | None,
@@ -91,13 +69,7 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
         design = self.with_radii(self.read_design())
         start, tool = self.pose(design), self.tool(design)
         here = evaluate(design, start)
-        target = (
-            self.to,
-            self.to_quaternion,
-            self.to_yaw_pitch_roll,
-            self.to_tilt_torsion,
-            self.to_folds,
-        )
+        target = (self.to, *self.end)
         if target == (None,) * 5:
             if self.steps is not None:
                 raise InputError(
@@ -116,11 +88,7 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
 
 
 def _steps_of(design: Design, start: Pose, end: Pose, tool: Triple | None) -> int:
-    """Return the number of steps in which no leg's end moves farther than a node step.
-
-    Raises:
-        InputError: The number exceeds `MOST_STEPS`.
-    """
+    """Return the number of steps in which no leg's end moves farther than a node step."""
     from explorer.workspace.slices.volume import node_step_of
 
     step = node_step_of(design)

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
-from explorer.cli.answers.optimisation import (
-    infeasible_json,
-    optimised_design,
-    outcome_json,
-    outcome_lines,
-)
 from explorer.cli.options import DesignOptions, JsonOptions, write_files
-from explorer.cli.output import heading, write_json
+from explorer.cli.output import attributes, figure, heading, table, write_json
 from explorer.cli.parsing import UsageError
 from explorer.cli.streams import SearchMeter
 from explorer.cli.values import (
@@ -31,7 +27,11 @@ from explorer.cli.values import (
     whole_number,
 )
 from explorer.errors import InputError, NoAnswerError
-from explorer.mechanism.design import Design
+from explorer.measures.case import Case
+from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measurements import Measurements, measure_design
+from explorer.measures.size import longest_leg
+from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
 from explorer.optimise.curves import CALLED
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from explorer.optimise.outcome import Outcome
     from explorer.optimise.problem import Problem, Variable
     from explorer.optimise.record import Settings
+
 
 _CORNERS = "x-low y-low z-low x-high y-high z-high"
 
@@ -155,12 +156,7 @@ class Optimise(JsonOptions, DesignOptions):
     """Record whose problem to solve again, instead of one given by options."""
 
     def run(self) -> None:
-        """Write the outcome of the search.
-
-        Raises:
-            PartialAnswerError: The search did not converge, and the best iterate has been
-                written; or a file could not be written.
-        """
+        """Write the outcome of the search."""
         from explorer.files.writing import check_writable
 
         record = self.record
@@ -233,12 +229,7 @@ class Optimise(JsonOptions, DesignOptions):
         return design
 
     def _check_possible(self, problem: Problem) -> None:
-        """Refuse a problem that the limits make infeasible, before kernels are compiled.
-
-        Raises:
-            NoAnswerError: No design within the bounds meets the demands; the message says what
-                would help.
-        """
+        """Refuse a problem that the limits make infeasible, before kernels are compiled."""
         from explorer.optimise.conflicts import BOX_LIMIT, find_conflicts, paper_box
 
         conflicts = find_conflicts(problem)
@@ -274,13 +265,13 @@ def _search(problem: Problem, settings: Settings) -> Outcome:
     """Run a search with a progress bar."""
     from explorer.optimise.solver import optimise_design
 
-    symbol = CALLED[problem.objective]
-    with SearchMeter(settings.starts, settings.iterations, symbol) as meter:
+    starts, iterations = settings.starts, settings.iterations
+    with SearchMeter(starts, iterations, CALLED[problem.objective]) as meter:
         return optimise_design(
             problem,
-            starts=settings.starts,
+            starts=starts,
             seed=settings.seed,
-            iterations=settings.iterations,
+            iterations=iterations,
             watch=meter.show_iterate,
         )
 
@@ -304,3 +295,108 @@ def _as_variable(word: str) -> Variable:
             "explorer optimise",
         )
     return Variable(match[1].strip(), *ends)
+
+
+def optimised_design(outcome: Outcome) -> Design:
+    """Return the design of an outcome, renamed."""
+    name = f"{outcome.problem.start.name[:80]}, optimised"
+    return msgspec.structs.replace(outcome.design, name=name)
+
+
+def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]:
+    """Return an outcome as plain values."""
+    best, run, problem = outcome.best, outcome.run, outcome.problem
+    return {
+        "design": optimised_design(outcome),
+        "objective": best.objective,
+        "objective_name": problem.objective,
+        "volume": best.volume,
+        "reach": outcome.design.reach,
+        "longest_leg": longest_leg(outcome.design),
+        **attributes(run, "iterations evaluations"),
+        **attributes(outcome, "seconds converged"),
+        **attributes(run, "status holding message"),
+        "values": dict(zip(problem.names, best.values, strict=True)),
+        "runs": [
+            {
+                "status": start.status,
+                "objective": start.best.objective,
+                **attributes(start, "iterations attempts"),
+            }
+            for start in outcome.runs
+        ],
+        "files": written,
+    }
+
+
+def infeasible_json(problem: Problem, limit: str, message: str) -> dict[str, object]:
+    """Return the answer to a problem that a limit makes infeasible; null is not measured."""
+    return {
+        **dict.fromkeys(("objective", "volume")),
+        **dict.fromkeys(("iterations", "evaluations", "seconds"), 0),
+        "design": problem.start,
+        "objective_name": problem.objective,
+        "reach": problem.start.reach,
+        "longest_leg": longest_leg(problem.start),
+        "converged": False,
+        "status": "infeasible",
+        "holding": limit,
+        "message": message,
+        "values": dict(zip(problem.names, problem.start_values, strict=True)),
+        "runs": [],
+        "files": [],
+    }
+
+
+def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> Iterator[str]:
+    """Yield an outcome as lines of text, with the start and the best design side by side."""
+    problem = outcome.problem
+    margin = None if problem.demands.clearance is None else problem.demands.clearance_margin
+    box = problem.demands.required_box
+    shifted = None if box is None else problem.required_box_at(outcome.best.values)
+    before, after = (
+        measure_design(Case(design, demanded_margin=margin, box=where), measures_in("optimise"))
+        for design, where in ((problem.start, box), (outcome.design, shifted))
+    )
+    optimum = "optimum" if outcome.converged else "best so far"
+    rows: list[tuple[str, ...]] = [("", "start", optimum, "change")]
+    for name, values in measure_rows(before, after):
+        finite = [value for value in values if value is not None and math.isfinite(value)]
+        change = f"{finite[1] - finite[0]:+.6g}" if len(finite) == len(values) else ""
+        rows.append((name, *map(_cell, values), change))
+    if outcome.converged:
+        yield from (outcome.run.message, "")
+    yield table(rows, "<>>>")
+    yield (
+        f"\n{len(outcome.runs)} start{'s' if len(outcome.runs) > 1 else ''}, "
+        f"{outcome.run.iterations} iterations and {outcome.run.evaluations} evaluations of the "
+        f"best, {outcome.seconds:.2f} s in all"
+    )
+    yield from map(str, written)
+
+
+def measure_rows(
+    before: Measurements, after: Measurements
+) -> Iterator[tuple[str, tuple[float | None, float | None]]]:
+    """Yield the label and the two values of each measure that the second design has.
+
+    A value may be infinite.
+    """
+    yield from zip(
+        VARIABLES, zip(before.design.variables, after.design.variables, strict=True), strict=True
+    )
+    for name in after.values:
+        new = after.value(name)
+        if new is None:
+            continue
+        measure = CATALOGUE[name]
+        label = f"{measure.label} (degrees)" if measure.unit == "°" else measure.label
+        if "demanded_margin" in measure.needs:
+            label += f", margins ≥ {after.demanded_margin:.4g}"
+        yield label, (before.value(name), new)
+
+
+def _cell(value: float | None) -> str:
+    if value is None:
+        return "none"
+    return figure(value) if math.isfinite(value) else "infinite"

@@ -13,6 +13,7 @@ import tyro
 from explorer.cli.load_options import check_limited
 from explorer.cli.options import (
     DesignOptions,
+    EndOptions,
     JsonOptions,
     PointOptions,
     RadiiOptions,
@@ -53,7 +54,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
+class Path(JsonOptions, RadiiOptions, EndOptions, PointOptions, DesignOptions):
     """Plan a path between two poses within limits, margins and clearances.
 
     Both poses must have the same assembly mode. A pose is a position x y z, or a position and yaw
@@ -97,30 +98,6 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
     to: Annotated[Numbers | None, pose_numbers("--to"), OPTIONAL] = None
     """End of the path; lengths are in design units."""
 
-    to_quaternion: Annotated[
-        Quadruple | None,
-        numbers("--to-quaternion", "w x y z"),
-        hint("default: that of the start"),
-    ] = None
-    """Orientation of the platform at the end."""
-
-    to_yaw_pitch_roll: Annotated[
-        Triple | None,
-        numbers("--to-yaw-pitch-roll", "yaw pitch roll"),
-        hint("instead of --to-quaternion"),
-    ] = None
-    """Orientation of the platform at the end, in degrees."""
-
-    to_tilt_torsion: Annotated[
-        Triple | None,
-        numbers("--to-tilt-torsion", "azimuth tilt torsion"),
-        hint("instead of --to-quaternion"),
-    ] = None
-    """Azimuth, tilt and torsion of the platform at the end, in degrees."""
-
-    to_folds: Annotated[Six | None, fold_numbers("--to-folds"), hint("instead of --to")] = None
-    """Folds of the pose at the end; r in design units, angles in degrees."""
-
     load: Annotated[Six | None, load_numbers("--load"), OPTIONAL] = None
     """Force in N and moment in N × unit at the tool, along the axes of the base, besides the
     payload: the path holds them within the limits of actuators, struts and guide."""
@@ -141,13 +118,7 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
     tool`."""
 
     def run(self) -> None:
-        """Write the path.
-
-        Raises:
-            EndError: The start or the goal is outside the limits or singular.
-            NoPathError: There is no path, or the time ended before one was found.
-            MissingExtraError: OMPL is not installed.
-        """
+        """Write the path."""
         from explorer.export.tables import trajectory_csv
         from explorer.files.writing import check_writable
         from explorer.paths.loads import path_loads
@@ -163,13 +134,7 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
             self.from_tilt_torsion,
             self.from_folds,
         )
-        ends = (
-            self.to,
-            self.to_quaternion,
-            self.to_yaw_pitch_roll,
-            self.to_tilt_torsion,
-            self.to_folds,
-        )
+        ends = (self.to, *self.end)
         start = _pose("--from", design.home_pose, *starts, tool)
         if ends == (None,) * 5:
             raise InputError(

@@ -31,11 +31,7 @@ class Report(JsonOptions, PoseOptions, DesignOptions):
     """Record of the search that found the design, written by `explorer optimise`."""
 
     def run(self) -> None:
-        """Write the report and its path.
-
-        Raises:
-            MissingExtraError: A PDF needs the extra "screenshot" and a Chromium.
-        """
+        """Write the report and its path."""
         from explorer.files.writing import check_writable, write_whole
 
         start = time.monotonic()
@@ -57,11 +53,7 @@ class Report(JsonOptions, PoseOptions, DesignOptions):
 
 
 def format_of(path: Path) -> ReportFormat:
-    """Return the format that the suffix of a file names.
-
-    Raises:
-        InputError: The suffix is not .html, .htm or .pdf.
-    """
+    """Return the format that the suffix of a file names."""
     formats: dict[str, ReportFormat] = {".html": "html", ".htm": "html", ".pdf": "pdf"}
     if path.suffix.lower() not in formats:
         raise InputError(f"--out must end in .html or .pdf; got {str(path)!r}")

@@ -37,11 +37,7 @@ class Screenshot(JsonOptions, PoseOptions, DesignOptions):
     """Include the handle by which the page moves the platform."""
 
     def run(self) -> None:
-        """Draw the picture and write its path.
-
-        Raises:
-            MissingExtraError: The extra "screenshot" or a Chromium is missing.
-        """
+        """Draw the picture and write its path."""
         from explorer.files.writing import check_writable
 
         if self.out.suffix.lower() != ".png":

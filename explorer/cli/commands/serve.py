@@ -42,12 +42,7 @@ class Serve:
     """Open the browser."""
 
     def run(self) -> None:
-        """Serve the page until interrupted.
-
-        Raises:
-            ServerError: The server cannot start, for instance because the port is in use, or
-                the token or a name cannot be used.
-        """
+        """Serve the page until interrupted."""
         design = None if self.design is None else load(self.design)
         from explorer.app.server import serve
         from explorer.app.storage.study_folders import check_given

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from explorer.cli.blocks import lines
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
 from explorer.cli.output import (
     attributes,
     finite,
     folds_in_degrees,
     heading,
-    lines,
     pose_json,
     pose_table,
     tool_json,

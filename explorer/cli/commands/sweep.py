@@ -69,12 +69,7 @@ class Sweep(JsonOptions):
     """Write an example of a study file, and compute nothing."""
 
     def run(self) -> None:
-        """Compute the missing designs and summarise the folder.
-
-        Raises:
-            RunError: The workers were lost or cannot evaluate designs.
-            MissingExtraError: An extra is not installed.
-        """
+        """Compute the missing designs and summarise the folder."""
         if self.new:
             self._write_study()
             return

@@ -1,11 +1,14 @@
-"""`explorer workspace`: the measures of the workspace."""
+"""`explorer workspace`: the measures of the workspace, and of its accessible part."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from explorer.cli.answers.workspace import WorkspaceMeasures
+import numpy as np
+
+from explorer.cli.blocks import lines
 from explorer.cli.load_options import held_by
 from explorer.cli.options import (
     DesignOptions,
@@ -14,7 +17,20 @@ from explorer.cli.options import (
     PointOptions,
     RadiiOptions,
 )
-from explorer.cli.output import degrees, figures, heading
+from explorer.cli.output import (
+    DISAGREES,
+    attributes,
+    degrees,
+    figure,
+    figures,
+    finite,
+    heading,
+    lengths,
+    measure_text,
+    mesh_json,
+    radii_line,
+    table,
+)
 from explorer.cli.values import (
     OPTIONAL,
     Flag,
@@ -25,7 +41,10 @@ from explorer.cli.values import (
     whole_number,
 )
 from explorer.errors import InputError
+from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.measures.case import Case
+from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
@@ -35,9 +54,14 @@ if TYPE_CHECKING:
     from explorer.workspace.accessible.radii import RadiusCurve
     from explorer.workspace.accessible.workspace import AccessibleWorkspace
     from explorer.workspace.held import HeldWorkspace
+    from explorer.workspace.solids.solid import Solid
 
 Ends = tuple[float, float]
 
+# The measures of nodes that the remark on their volume gives.
+_IN_REMARK = ("node_count", "node_step")
+# The number of rows of the radius curve in a table, less one.
+ROWS = 10
 # Default numbers of orientations: of a range of angles, and of a cone of tilts.
 SAMPLES_ON_RANGE = 5
 SAMPLES_OF_TILT = 33
@@ -126,51 +150,40 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
     ) -> WorkspaceMeasures:
         from explorer.workspace.solids import solids
 
-        case = Case(design, node_step=self.step, pose=pose)
+        case, rotation = Case(design, node_step=self.step, pose=pose), pose.rotation
         # Too fine a grid is refused before anything else is computed.
         _ = case.paper_nodes
-        solid = solids.workspace_solid(design, pose.rotation, self.tolerance, volume=case.volume)
+        solid = solids.workspace_solid(design, rotation, self.tolerance, volume=case.volume)
         shift, tool = self.shift(design, pose), self.tool(design)
-        if shift is not None:
-            solid = solid.shifted(shift)
-        inclusive = total = None
+        measures = WorkspaceMeasures(case, shift, solid if shift is None else solid.shifted(shift))
+        if self.hull:
+            measures.hull = solids.convex_hull(measures.solid)
         if orientations is not None:
-            inclusive = solids.inclusive_solid(design, orientations, self.tolerance, tool)
-            total = solids.total_solid(design, orientations, self.tolerance, tool)
-        return WorkspaceMeasures(
-            case=case,
-            shift=shift,
-            solid=solid,
-            hull=solids.convex_hull(solid) if self.hull else None,
-            orientations=None if orientations is None else len(orientations),
-            inclusive=inclusive,
-            total=total,
-            capability=self._share(design, orientations),
-            held=self._held(design, pose),
-            interference=self._interference(design, pose),
-            curve=self._curve(design, pose),
-        )
+            measures.orientations = len(orientations)
+            measures.inclusive = solids.inclusive_solid(design, orientations, self.tolerance, tool)
+            measures.total = solids.total_solid(design, orientations, self.tolerance, tool)
+        if self.capability is not None:
+            from explorer.workspace.orientations.share import (
+                CAPABILITY_ORIENTATIONS,
+                orientation_capability,
+            )
 
-    def _interference(self, design: Design, pose: Pose) -> AccessibleWorkspace | None:
-        if not self.interference:
-            return None
-        from explorer.workspace.accessible.workspace import accessible_workspace
+            count = self.samples or CAPABILITY_ORIENTATIONS
+            chosen = count if orientations is None else orientations
+            measures.capability = orientation_capability(design, self.capability, chosen, tool)
+        if self.load is not None:
+            measures.held = held_by(design, rotation, self.load, self.tolerance)
+        if self.interference:
+            from explorer.workspace.accessible.workspace import accessible_workspace
 
-        return accessible_workspace(
-            design, pose.rotation, node_step=self.step, tolerance=self.tolerance
-        )
+            measures.accessible = accessible_workspace(
+                design, rotation, node_step=self.step, tolerance=self.tolerance
+            )
+        if self.radius_curve:
+            from explorer.workspace.accessible.radii import radius_curve
 
-    def _held(self, design: Design, pose: Pose) -> HeldWorkspace | None:
-        if self.load is None:
-            return None
-        return held_by(design, pose.rotation, self.load, self.tolerance)
-
-    def _curve(self, design: Design, pose: Pose) -> RadiusCurve | None:
-        if not self.radius_curve:
-            return None
-        from explorer.workspace.accessible.radii import radius_curve
-
-        return radius_curve(design, pose.rotation)
+            measures.curve = radius_curve(design, rotation)
+        return measures
 
     def _orientations(self, pose: Pose) -> FloatArray | None:
         """Return the requested orientations, shape (n, 3, 3); None without any."""
@@ -194,14 +207,179 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
             [1 if ends is None else count for ends in ranges],
         )
 
-    def _share(self, design: Design, orientations: FloatArray | None) -> float | None:
-        if self.capability is None:
-            return None
-        from explorer.workspace.orientations.share import (
-            CAPABILITY_ORIENTATIONS,
-            orientation_capability,
-        )
 
-        count = self.samples or CAPABILITY_ORIENTATIONS
-        chosen = count if orientations is None else orientations
-        return orientation_capability(design, self.capability, chosen, self.tool(design))
+@dataclass
+class WorkspaceMeasures:
+    """The measures of a workspace; None if not requested.
+
+    Attributes:
+        case: Design and orientation, with the exact volume and the nodes of the workspace.
+        shift: Vector from b4 to the tool point whose workspace it is, shape (3,); None for b4.
+        solid: Mesh of the workspace.
+        hull: Convex hull of the mesh.
+        orientations: Number of orientations of the next two.
+        inclusive: Union of the workspaces over the orientations.
+        total: Intersection of the workspaces over the orientations.
+        capability: Share of feasible orientations at a position, from 0 to 1.
+        held: Part where a load is held.
+        accessible: Accessible workspace.
+        curve: Accessible volume as a function of the radius of all legs.
+    """
+
+    case: Case
+    shift: FloatArray | None
+    solid: Solid
+    hull: Solid | None = None
+    orientations: int | None = None
+    inclusive: Solid | None = None
+    total: Solid | None = None
+    capability: float | None = None
+    held: HeldWorkspace | None = None
+    accessible: AccessibleWorkspace | None = None
+    curve: RadiusCurve | None = None
+
+    def _extent(self) -> FloatArray | tuple[Triple, Triple] | None:
+        """Return the lowest and the highest position of the counted nodes."""
+        extent = self.case.paper_nodes.extent
+        if extent is None or self.shift is None:
+            return extent
+        return np.array(extent) + self.shift
+
+    def as_json(self) -> dict[str, object]:
+        """Return the measures as plain values."""
+        measured = measure_design(self.case, measures_in("workspace"))
+        answer: dict[str, object] = {
+            "volume": measured["volume"],
+            **attributes(self.case.volume, "gradient empty_because"),
+            "node_step": measured["node_step"],
+            **measured.values,
+            "extent": self._extent(),
+            "mesh": mesh_json(self.solid),
+        }
+        if self.solid.agrees is False:
+            answer["mesh_agrees"] = False
+        if self.hull is not None:
+            answer["hull_volume"] = self.hull.volume
+        if self.inclusive is not None and self.total is not None:
+            answer["orientations"] = self.orientations
+            answer["inclusive_mesh"] = mesh_json(self.inclusive)
+            answer["total_mesh"] = mesh_json(self.total)
+        if self.held is not None:
+            answer["held_volume"] = self.held.held_volume
+            answer["held_mesh"] = mesh_json(self.held.solid)
+            if self.held.factor is not None:
+                answer["held_factor"] = self.held.factor
+        if self.capability is not None:
+            answer["orientation_capability"] = self.capability
+        if self.accessible is not None:
+            found = self.accessible
+            answer |= {
+                **attributes(found, "accessible_volume accessible_node_count"),
+                "harmless_radius": finite(found.harmless_radius),
+                "pairs": [
+                    {
+                        "legs": pair.legs,
+                        "clearance": finite(pair.clearance),
+                        "bound": finite(pair.bound),
+                        "blocked_volume": pair.blocked_volume,
+                    }
+                    for pair in found.pairs
+                ],
+                "accessible_solid": mesh_json(found.solid),
+            }
+        if self.curve is not None:
+            curve = attributes(self.curve, "radii volumes harmless harmless_bound")
+            answer["radius_curve"] = {**curve, "closest": self.curve.closest_legs}
+        return answer
+
+    def as_lines(self) -> Iterator[str]:
+        """Yield the measures as lines of text."""
+        design, nodes, volume = self.case.design, self.case.paper_nodes, self.case.volume
+        remarks = {"node_volume": f"{nodes.count} nodes at multiples of {nodes.step:.6g}"}
+        volumes: list[tuple[str, float, str]] = []
+        others: list[tuple[str, str]] = []
+        measured = measure_design(self.case, measures_in("workspace"))
+        for name, value in measured.values.items():
+            measure = CATALOGUE[name]
+            if measure.power == CATALOGUE["volume"].power:
+                volumes.append((measure.heading, value or 0.0, remarks.get(name, "")))
+            elif name not in _IN_REMARK:
+                text = f"{measure_text(measure, value)} {measure.unit_in('units')}"
+                others.append((measure.heading, text.rstrip()))
+        volumes += self._volumes_of_meshes()
+        accessible = self.accessible
+        if accessible is not None:
+            remark = f"{accessible.accessible_node_count} of {accessible.node_count} nodes"
+            title = CATALOGUE["accessible_volume"].heading
+            volumes.append((title, accessible.accessible_volume, remark))
+        cubic = (0.1 * design.unit_mm) ** 3
+        rows = [("", "units³", "cm³", "")]
+        rows += [(name, figure(v), figure(v * cubic), remark) for name, v, remark in volumes]
+        yield table(rows, "<>><")
+        if others:
+            yield table(others, "<<")
+        extent = self._extent()
+        if extent is not None:
+            yield from ("", "extent of the nodes")
+            for axis, low, high in zip("xyz", *extent, strict=True):
+                yield f"  {axis}  {figure(low)} to {figure(high)}"
+        if volume.empty_because:
+            yield from ("", f"empty because of {', '.join(volume.empty_because)}")
+        if volume.gradient:
+            rates = [("moves with", "units² (yaw: units³ a radian)")]
+            rates += [(name, figure(rate)) for name, rate in volume.gradient.items()]
+            yield from ("", table(rates, "<>"))
+        if self.capability is not None:
+            yield from ("", f"orientation capability {100.0 * self.capability:.2f} %")
+        if accessible is not None:
+            yield from ("", radii_line(design))
+            yield from lines(workspace_clearances(accessible.pairs, design))
+        if self.curve is not None:
+            yield from ("", *_curve_lines(design, self.curve, self.shift))
+
+    def _volumes_of_meshes(self) -> Iterator[tuple[str, float, str]]:
+        """Yield the name, the volume and a remark of each mesh."""
+        yield "mesh", self.solid.volume, _mesh_remark(self.solid)
+        if self.hull is not None:
+            yield "convex hull", self.hull.volume, ""
+        for name, solid in (
+            ("inclusive workspace", self.inclusive),
+            ("total workspace", self.total),
+        ):
+            if solid is not None:
+                remark = f"{self.orientations} orientations, {_mesh_remark(solid)}"
+                yield name, solid.volume, remark
+        if self.held is not None:
+            remark = _mesh_remark(self.held.solid)
+            if self.held.factor is not None:
+                remark += f"; {self.held.factor:.3g} of load and payload is held somewhere"
+            yield "that holds the load", self.held.held_volume, remark
+
+
+def _mesh_remark(solid: Solid) -> str:
+    off = f", {DISAGREES}" if solid.agrees is False else ""
+    if solid.is_empty:
+        return f"empty because of {', '.join(solid.empty_because) or 'the tolerance'}{off}"
+    state = "watertight" if solid.is_watertight else "not watertight"
+    return f"{len(solid.faces)} triangles, {state}, tolerance {solid.tolerance:.3g}{off}"
+
+
+def _curve_lines(design: Design, curve: RadiusCurve, shift: FloatArray | None) -> Iterator[str]:
+    """Yield a radius curve at a few radii, and the largest radius without a loss."""
+    rows = [("radius of all legs", "mm", "accessible (units³)", "share")]
+    # The last radius comes twice: beyond it the volume is zero.
+    last = max(0, len(curve.radii) - 2)
+    for index in sorted({round(last * row / ROWS) for row in range(ROWS + 1)}):
+        radius, volume = float(curve.radii[index]), float(curve.volumes[index])
+        share = volume / float(curve.volumes[0]) if curve.volumes[0] > 0.0 else 0.0
+        rows.append((*lengths(design, radius), figure(volume), f"{100.0 * share:.1f} %"))
+    yield table(rows, ">>>>")
+    if curve.closest_legs is not None:
+        i, j = curve.closest_legs
+        at = np.array(curve.closest_position) + (0.0 if shift is None else shift)
+        place = ", ".join(f"{x:.4g}" for x in at.tolist())
+        if curve.harmless > 0.0:
+            yield f"no legs collide up to a radius of {figure(curve.harmless)}"
+            yield f"legs {i} and {j} come closest, at ({place})"
+        else:
+            yield f"no radius is harmless: legs {i} and {j} touch at ({place})"

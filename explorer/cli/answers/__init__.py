@@ -1,1 +1,0 @@
-"""The answers of commands, as plain values for JSON and as lines of text."""
