@@ -21,12 +21,11 @@ from explorer.export.mesh import mesh_bytes
 from explorer.export.packing import (
     METRES_PER_MILLIMETRE,
     Y_UP,
-    Body,
-    Material,
     Model,
     Rgb,
     check_size,
     glb_bytes,
+    material,
     refusals_of_lib3mf,
 )
 from explorer.mechanism.pose import quaternion_from_rotation
@@ -120,11 +119,11 @@ def _glb(prototype: Prototype) -> bytes:
     kinds = list(COLOURS)
     return glb_bytes(
         {
-            part.name: Body(part.vertices * metres, part.faces, kinds.index(part.kind))
+            part.name: (part.vertices * metres, part.faces, kinds.index(part.kind))
             for part in prototype.parts
         },
         _nodes(prototype, _at_home(prototype), metres),
-        [Material(kind, rgb, metallic=0.2, roughness=0.6) for kind, rgb in COLOURS.items()],
+        [material(kind, rgb, metallic=0.2, roughness=0.6) for kind, rgb in COLOURS.items()],
         prototype.design,
     )
 

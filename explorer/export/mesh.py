@@ -24,8 +24,6 @@ from explorer.export.packing import (
     APPLICATION,
     METRES_PER_MILLIMETRE,
     Y_UP,
-    Body,
-    Material,
     Model,
     Rgb,
     ascii_name,
@@ -34,6 +32,7 @@ from explorer.export.packing import (
     design_json,
     glb_bytes,
     json_line,
+    material,
     printable_name,
     refusals_of_lib3mf,
 )
@@ -107,15 +106,13 @@ def _single(
     points: FloatArray, solid: Solid, file_format: str, decimals: int | None = None
 ) -> FloatArray:
     """Return points rounded to single precision, and to decimals if given, as float64."""
-    with np.errstate(over="ignore", under="ignore"):
-        rounded = points.astype(np.float32).astype(np.float64)
-    if np.isfinite(rounded).all():
-        if decimals is not None:
-            rounded = rounded.round(decimals)
-        middle = points.mean(axis=0)
-        before, after = (_volume(corners - middle, solid) for corners in (points, rounded))
-        if abs(after - before) <= ROUNDING * before:
-            return rounded
+    rounded = points.astype(np.float32).astype(np.float64)
+    if decimals is not None:
+        rounded = rounded.round(decimals)
+    middle = points.mean(axis=0)
+    before, after = (_volume(corners - middle, solid) for corners in (points, rounded))
+    if abs(after - before) <= ROUNDING * before:
+        return rounded
     raise InputError(
         f"{file_format} holds single precision, which spoils a mesh of this size at coordinates up "
         f"to {float(np.abs(points).max()):.3g}; ply and obj hold double"
@@ -189,9 +186,9 @@ def _obj(solid: Solid, design: Design, name: str) -> bytes:
 def _glb(solid: Solid, design: Design, name: str) -> bytes:
     points = _single(_millimetres(solid, design) * METRES_PER_MILLIMETRE, solid, "glb")
     return glb_bytes(
-        {name: Body(points, solid.faces)},
+        {name: (points, solid.faces, 0)},
         [{"name": name, "mesh": 0, "rotation": Y_UP}],
-        [Material("workspace", HULL_COLOUR, metallic=0.0, roughness=0.8)],
+        [material("workspace", HULL_COLOUR, metallic=0.0, roughness=0.8)],
         design,
     )
 

@@ -21,7 +21,7 @@ from explorer.errors import ExplorerError, MissingExtraError
 from explorer.export.packing import Rgb, linear, printable_name
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.forms import Circle
+from explorer.prototype.forms import Circle, Kernel
 
 SCHEMA = "AP242DIS"
 
@@ -133,37 +133,27 @@ class ExactShape:
         return ExactShape(work.Shape())
 
 
-class ExactKernel:
+def primitive(kind: str, *arguments: Any) -> ExactShape:
+    """Return a primitive of OpenCASCADE, such as a "Box"."""
+    return ExactShape(occ(f"BRepPrimAPI_Make{kind}")(*arguments).Shape())
+
+
+class ExactKernel(Kernel):
     """Bodies of exact faces; a hole needs no correction for facets."""
 
     def disc(self, circle: Circle, low: float, high: float) -> ExactShape:
         """Return a cylinder along z between two heights."""
         frame = occ("gp_Ax2")(point(np.array([circle.x, circle.y, low])), direction(np.eye(3)[2]))
-        return ExactShape(occ("BRepPrimAPI_MakeCylinder")(frame, circle.radius, high - low).Shape())
-
-    def hole(self, circle: Circle, low: float, high: float) -> ExactShape:
-        """Return the cutter of a round hole."""
-        return self.disc(circle, low, high)
+        return primitive("Cylinder", frame, circle.radius, high - low)
 
     def ball(self, radius: float) -> ExactShape:
         """Return a ball about the origin."""
-        return ExactShape(occ("BRepPrimAPI_MakeSphere")(radius).Shape())
-
-    def cavity(self, radius: float) -> ExactShape:
-        """Return the cutter of a ball about the origin."""
-        return self.ball(radius)
+        return primitive("Sphere", radius)
 
     def box(self, low: Triple, high: Triple) -> ExactShape:
         """Return a box between two corners."""
         corners = point(np.array(low)), point(np.array(high))
-        return ExactShape(occ("BRepPrimAPI_MakeBox")(*corners).Shape())
-
-    def union(self, shapes: Sequence[ExactShape]) -> ExactShape:
-        """Return the union of some shapes."""
-        whole, *others = shapes
-        for shape in others:
-            whole = whole + shape
-        return whole
+        return primitive("Box", *corners)
 
     def hull(self, circles: Sequence[Circle], low: float, high: float) -> ExactShape:
         """Return a plate between two heights, whose outline is the convex hull of circles."""
@@ -193,7 +183,7 @@ class ExactKernel:
             wire.Add(edge(on(circle, end), on(following, end)).Edge())
         face = occ("BRepBuilderAPI_MakeFace")(wire.Wire()).Face()
         up = occ("gp_Vec")(0.0, 0.0, high - low)
-        return ExactShape(occ("BRepPrimAPI_MakePrism")(face, up).Shape())
+        return primitive("Prism", face, up)
 
 
 def _outline(circles: Sequence[Circle]) -> list[int]:

@@ -8,7 +8,6 @@ import math
 import re
 import unicodedata
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import msgspec
@@ -82,51 +81,25 @@ Y_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
 """The rotation (x, y, z, w) of the first node, which turns z up to y up."""
 
 
-@dataclass(frozen=True)
-class Material:
-    """A surface: its colour and its reflectance.
-
-    Attributes:
-        name: Name in the file.
-        rgb: Colour in sRGB, 0 to 255.
-        metallic: Metalness, from 0 to 1.
-        roughness: Roughness, from 0 to 1.
-    """
-
-    name: str
-    rgb: Rgb
-    metallic: float
-    roughness: float
-
-    def as_gltf(self) -> dict[str, Any]:
-        """Return the material in glTF."""
-        factors = {
-            "baseColorFactor": [*(linear(channel) for channel in self.rgb), 1.0],
-            "metallicFactor": self.metallic,
-            "roughnessFactor": self.roughness,
-        }
-        return {"name": self.name, "pbrMetallicRoughness": factors}
+Body: TypeAlias = tuple[FloatArray, NDArray[np.integer], int]
+"""Corners of a mesh in metres, shape (n, 3), the indices of the corners of each triangle, shape
+(m, 3), and the index of its material in the file."""
 
 
-@dataclass(frozen=True)
-class Body:
-    """A mesh of one material.
-
-    Attributes:
-        vertices: Corners in metres, shape (n, 3).
-        faces: Indices of the corners of each triangle, shape (m, 3).
-        material: Index of its material in the file.
-    """
-
-    vertices: FloatArray
-    faces: NDArray[np.integer]
-    material: int = 0
+def material(name: str, rgb: Rgb, *, metallic: float, roughness: float) -> dict[str, Any]:
+    """Return a material in glTF, with its metalness and roughness from 0 to 1."""
+    factors = {
+        "baseColorFactor": [*(linear(channel) for channel in rgb), 1.0],
+        "metallicFactor": metallic,
+        "roughnessFactor": roughness,
+    }
+    return {"name": name, "pbrMetallicRoughness": factors}
 
 
 def glb_bytes(
     bodies: Mapping[str, Body],
     nodes: Sequence[Mapping[str, Any]],
-    materials: Sequence[Material],
+    materials: Sequence[Mapping[str, Any]],
     design: Design,
 ) -> bytes:
     """Return a GLB file.
@@ -134,7 +107,7 @@ def glb_bytes(
     Args:
         bodies: Meshes by name, none empty; nodes refer to them by their index in this order.
         nodes: Nodes in glTF; the first is the root and rotates by `Y_UP`.
-        materials: The materials that the bodies refer to.
+        materials: Materials that the bodies refer to, as `material` returns them.
         design: The design, kept as JSON in the file.
     """
     import trimesh
@@ -152,16 +125,14 @@ def glb_bytes(
         }
         tree["scenes"] = [{"nodes": [0]}]
         tree["nodes"] = list(nodes)
-        tree["materials"] = [material.as_gltf() for material in materials]
-        for mesh, body in zip(tree["meshes"], bodies.values(), strict=True):
-            mesh["primitives"][0]["material"] = body.material
+        tree["materials"] = list(materials)
+        for mesh, (_, _, index) in zip(tree["meshes"], bodies.values(), strict=True):
+            mesh["primitives"][0]["material"] = index
 
     untyped: Any = trimesh
     scene = untyped.Scene()
-    for name, body in bodies.items():
-        scene.add_geometry(
-            untyped.Trimesh(body.vertices, body.faces, process=False), geom_name=name
-        )
+    for name, (vertices, faces, _) in bodies.items():
+        scene.add_geometry(untyped.Trimesh(vertices, faces, process=False), geom_name=name)
     return scene.export(file_type="glb", tree_postprocessor=complete)
 
 

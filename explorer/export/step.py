@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +29,7 @@ from explorer.export.opencascade import (
     faces_of,
     occ,
     point,
+    primitive,
     transform,
     volume_of,
 )
@@ -138,6 +139,10 @@ def check_extra() -> None:
     occ("gp_Pnt")
 
 
+Step: TypeAlias = tuple[ExactShape, bool]
+"""A primitive and whether it keeps positions inside."""
+
+
 class _Primitives:
     """The primitives of the limits, in millimetres, as large as a box of positions needs."""
 
@@ -155,13 +160,12 @@ class _Primitives:
         steps = list(self._steps(limits, region))
         half = len(steps) // 2
         for order in (steps, steps[::-1], steps[half:] + steps[:half]):
-            shape = occ("BRepPrimAPI_MakeBox")(point(self.lows), point(self.highs))
-            shape = shape.Shape()
-            for primitive, inside in order:
-                shape = _combined(shape, primitive, inside)
-            yield shape
+            shape = primitive("Box", point(self.lows), point(self.highs))
+            for block, inside in order:
+                shape = shape ^ block if inside else shape - block
+            yield shape.shape
 
-    def _steps(self, limits: tuple[Constraint, ...], region: Region) -> Iterator[tuple[Any, bool]]:
+    def _steps(self, limits: tuple[Constraint, ...], region: Region) -> Iterator[Step]:
         """Yield the primitives that bound the region, and whether they keep p inside."""
         planes = [end for end in (region.low_limit, region.high_limit, *region.plane_limits) if end]
         for plane in planes:
@@ -187,7 +191,7 @@ class _Primitives:
         far = np.maximum(np.abs(lows), np.abs(highs))
         return float(np.linalg.norm(near)), float(np.linalg.norm(far))
 
-    def _half_space(self, normal: FloatArray, offset: float) -> Any:
+    def _half_space(self, normal: FloatArray, offset: float) -> ExactShape:
         """Return the block of the positions with normal · p <= offset."""
         length = float(np.linalg.norm(normal))
         unit_normal = normal / length
@@ -199,18 +203,18 @@ class _Primitives:
         corner: Any = occ("gp_Ax2")(
             point(foot - far * (x + y)), direction(-unit_normal), frame.XDirection()
         )
-        return occ("BRepPrimAPI_MakeBox")(corner, 2.0 * far, 2.0 * far, 2.0 * far).Shape()
+        return primitive("Box", corner, 2.0 * far, 2.0 * far, 2.0 * far)
 
-    def _round(self, limit: BallOrCylinder) -> Any:
+    def _round(self, limit: BallOrCylinder) -> ExactShape:
         radius, centre = limit.radius * self.unit, limit.centre * self.unit
         if limit.is_ball:
             away = self._away(centre)
             aside = _cross(away, np.eye(3)[np.abs(away).argmin()])
-            return occ("BRepPrimAPI_MakeSphere")(self._frame(centre, aside), radius).Shape()
+            return primitive("Sphere", self._frame(centre, aside), radius)
         start = np.array([self.lows[0] - self.size, centre[1], centre[2]])
         frame = self._frame(start, np.array([1.0, 0.0, 0.0]))
         length = float(self.highs[0] - self.lows[0]) + 2.0 * self.size
-        return occ("BRepPrimAPI_MakeCylinder")(frame, radius, length).Shape()
+        return primitive("Cylinder", frame, radius, length)
 
     def _away(self, point: FloatArray) -> FloatArray:
         """Return a vector from the middle of the workspace to a point, never zero."""
@@ -225,7 +229,7 @@ class _Primitives:
             return occ("gp_Ax2")(point(origin), direction(axis))
         return occ("gp_Ax2")(point(origin), direction(axis), direction(across))
 
-    def _cone(self, cone: Cone) -> Iterator[tuple[Any, bool]]:
+    def _cone(self, cone: Cone) -> Iterator[Step]:
         """Yield primitives and whether they keep p inside; a section of a cone is a wedge."""
         apex, axis, angle = cone.apex, cone.axis, cone.half_angle
         if cone.flat:
@@ -245,18 +249,18 @@ class _Primitives:
                 for side in (_turned(axis, sign * (angle + 0.5 * math.pi)) for sign in (1, -1))
             ]
             if outside:
-                yield _combined(sides[0], sides[1], True), False
+                yield sides[0] ^ sides[1], False
             else:
                 yield from ((side, True) for side in sides)
         else:
             yield self._round_cone(apex, axis, angle), not outside
 
-    def _round_cone(self, apex: FloatArray, axis: FloatArray, angle: float) -> Any:
+    def _round_cone(self, apex: FloatArray, axis: FloatArray, angle: float) -> ExactShape:
         apex = apex * self.unit
         far = np.maximum(np.abs(self.lows - apex), np.abs(self.highs - apex))
         height = 1.1 * float(np.linalg.norm(far))
         frame = self._frame(apex, axis)
-        return occ("BRepPrimAPI_MakeCone")(frame, 0.0, height * math.tan(angle), height).Shape()
+        return primitive("Cone", frame, 0.0, height * math.tan(angle), height)
 
 
 def _turned(vector: FloatArray, angle: float) -> FloatArray:
@@ -267,13 +271,6 @@ def _turned(vector: FloatArray, angle: float) -> FloatArray:
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.cross(a, b), dtype=np.float64)
-
-
-def _combined(shape: Any, other: Any, inside: bool) -> Any:
-    work: Any = (occ("BRepAlgoAPI_Common") if inside else occ("BRepAlgoAPI_Cut"))(shape, other)
-    if not work.IsDone():
-        raise ExplorerError("OpenCASCADE cannot combine the limits of the workspace")
-    return work.Shape()
 
 
 def _limit_of(face: Any, limits: tuple[Constraint, ...], unit: float) -> str:

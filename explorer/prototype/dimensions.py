@@ -7,7 +7,6 @@ thinnest wall do not.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 CLEARANCE = 0.2
@@ -33,101 +32,54 @@ class Stroke(NamedTuple):
     longest: float
 
 
-@dataclass(frozen=True)
 class LegSizes:
     """The dimensions of a leg from its base joint to its ball.
 
-    Attributes:
+    Args:
         radius: Radius of its cylinder.
         floor: Distance from the base joint to the bottom of the bore.
+
+    Attributes:
+        wall: Thickness of walls.
+        bore: Radius of the bore.
+        rod: Radius of the rod.
+        eye: Radius of the eyes of the universal joint.
+        pin: Radius of the pins of the universal joint.
+        inner: Distance from the centre of the universal joint to the inner face of its eyes.
+        plate: Thickness of eyes and of the cylinder's bottom.
+        outer: Distance from the centre of the universal joint to the outer face of its eyes.
+        swing: Radius of a ball about the universal joint that holds its parts, without the leg.
+        bottom: Distance from the universal joint to the cylinder's bottom.
+        ball: Radius of the ball.
+        neck: Radius of the neck that carries the ball.
+        rim: Distance from the ball's centre back to the rim of the cup.
+        cup: Radius of the cup about the ball.
+        end: Distance from the ball's centre back to the end of the cup.
+        dead: Dead length: the excess of twice the shortest length over the longest one.
     """
 
-    radius: float
-    floor: float
-
-    @property
-    def wall(self) -> float:
-        """The thickness of walls."""
-        return max(_WALL * self.radius, THINNEST)
-
-    @property
-    def bore(self) -> float:
-        """The radius of the bore."""
-        return self.radius - self.wall
-
-    @property
-    def rod(self) -> float:
-        """The radius of the rod."""
-        return self.bore - CLEARANCE
-
-    @property
-    def eye(self) -> float:
-        """The radius of the eyes of the universal joint."""
-        return _EYE * self.radius
-
-    @property
-    def pin(self) -> float:
-        """The radius of the pins of the universal joint."""
-        return _PIN * self.radius
-
-    @property
-    def inner(self) -> float:
-        """The distance from the centre of the universal joint to the inner face of its eyes."""
-        return self.eye + 2.0 * CLEARANCE
-
-    @property
-    def plate(self) -> float:
-        """The thickness of eyes and of the cylinder's bottom."""
-        return max(0.5 * self.radius, 1.2 * THINNEST)
-
-    @property
-    def outer(self) -> float:
-        """The distance from the centre of the universal joint to the outer face of its eyes."""
-        return self.inner + self.plate
-
-    @property
-    def swing(self) -> float:
-        """The radius of a ball about the universal joint that holds its parts, the leg excluded."""
-        return math.hypot(self.outer, self.eye)
+    def __init__(self, radius: float, floor: float) -> None:
+        self.radius, self.floor = radius, floor
+        self.wall = max(_WALL * radius, THINNEST)
+        self.bore = radius - self.wall
+        self.rod = self.bore - CLEARANCE
+        self.eye = _EYE * radius
+        self.pin = _PIN * radius
+        self.inner = self.eye + 2.0 * CLEARANCE
+        self.plate = max(0.5 * radius, 1.2 * THINNEST)
+        self.outer = self.inner + self.plate
+        self.swing = math.hypot(self.outer, self.eye)
+        self.bottom = _SWING * radius + CLEARANCE
+        self.ball = radius
+        self.neck = _NECK * radius
+        self.rim = _RIM * radius
+        self.cup = math.sqrt((radius + CLEARANCE) ** 2 - self.rim**2) + self.wall
+        self.end = radius + CLEARANCE + 2.0 * self.wall
+        self.dead = floor + self.end + _OVERLAP * radius + 2.0 * CLEARANCE
 
     def sweep(self, height: float) -> float:
         """Return the distance from its joint within which a leaning leg is below a height."""
         return height * math.tan(FIRST_SWING) + self.outer / math.cos(FIRST_SWING)
-
-    @property
-    def bottom(self) -> float:
-        """The distance from the universal joint to the cylinder's bottom."""
-        return _SWING * self.radius + CLEARANCE
-
-    @property
-    def ball(self) -> float:
-        """The radius of the ball."""
-        return self.radius
-
-    @property
-    def neck(self) -> float:
-        """The radius of the neck that carries the ball."""
-        return _NECK * self.radius
-
-    @property
-    def rim(self) -> float:
-        """The distance from the ball's centre back to the rim of the cup."""
-        return _RIM * self.ball
-
-    @property
-    def cup(self) -> float:
-        """The radius of the cup about the ball."""
-        return math.sqrt((self.ball + CLEARANCE) ** 2 - self.rim**2) + self.wall
-
-    @property
-    def end(self) -> float:
-        """The distance from the ball's centre back to the end of the cup."""
-        return self.ball + CLEARANCE + 2.0 * self.wall
-
-    @property
-    def dead(self) -> float:
-        """The dead length: the excess of twice the shortest length over the longest one."""
-        return self.floor + self.end + _OVERLAP * self.radius + 2.0 * CLEARANCE
 
     def stroke(self, required: Stroke, home_length: float) -> Stroke:
         """Return the required stroke, or the part of it that a single rod covers.
@@ -146,38 +98,22 @@ class LegSizes:
         return Stroke(shortest, min(required.longest, 2.0 * shortest - self.dead))
 
 
-@dataclass(frozen=True)
 class GuideSizes:
-    """The dimensions of the guide's shaft, and of the sleeves and eyes about it."""
+    """The dimensions of the guide, given the larger radius of its legs.
 
-    radius: float
+    Attributes:
+        shaft: Half the side of the square shaft, on which carriages cannot turn.
+        sleeve: Radius of a carriage's sleeve, on which a leg turns.
+        flange: Radius of a carriage's flanges, which keep the leg on it.
+        eye: Outer radius of the eye of a leg.
+        pillar: Thickness of the pillars along the guide.
+    """
 
-    @property
-    def wall(self) -> float:
-        """The thickness of walls."""
-        return max(_WALL * self.radius, THINNEST)
-
-    @property
-    def shaft(self) -> float:
-        """Half the side of the square shaft, on which carriages cannot turn."""
-        return _SHAFT * self.radius
-
-    @property
-    def sleeve(self) -> float:
-        """The radius of a carriage's sleeve, on which a leg turns."""
-        return math.sqrt(2.0) * (self.shaft + CLEARANCE) + self.wall
-
-    @property
-    def flange(self) -> float:
-        """The radius of a carriage's flanges, which keep the leg on it."""
-        return self.sleeve + CLEARANCE + 0.5 * self.wall
-
-    @property
-    def eye(self) -> float:
-        """The outer radius of the eye of a leg."""
-        return self.sleeve + CLEARANCE + self.wall
-
-    @property
-    def pillar(self) -> float:
-        """The thickness of the pillars along the guide."""
-        return max(0.8 * self.radius, 2.0 * THINNEST)
+    def __init__(self, radius: float) -> None:
+        self.radius = radius
+        wall = max(_WALL * radius, THINNEST)
+        self.shaft = _SHAFT * radius
+        self.sleeve = math.sqrt(2.0) * (self.shaft + CLEARANCE) + wall
+        self.flange = self.sleeve + CLEARANCE + 0.5 * wall
+        self.eye = self.sleeve + CLEARANCE + wall
+        self.pillar = max(0.8 * radius, 2.0 * THINNEST)

@@ -68,7 +68,7 @@ def _strokes(sizes: Sizes, joints: FloatArray) -> Iterator[str]:
             yield f"leg {leg} is {format_number(length, size=high)} mm long, its stroke is {stroke}"
     places = [float(joints_of_leg(joints, leg)[0]) * unit for leg in ON_GUIDE]
     for leg, place in zip(ON_GUIDE, places, strict=True):
-        low, high = sizes.carriage_range(leg)
+        low, high = sizes.carriage_ranges[leg]
         if not low - _SLACK * abs(low) <= place <= high + _SLACK * abs(high):
             rail = f"{format_number(low)} to {format_number(high)} mm"
             at = format_number(place, size=high - low)

@@ -5,8 +5,11 @@ Shapes are in millimetres, each in the frame of its body (`explorer.prototype.ch
 
 from __future__ import annotations
 
+import functools
+import operator
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -29,36 +32,36 @@ class Circle(NamedTuple):
     y: float = 0.0
 
 
-class Kernel(Protocol):
+class Kernel(ABC):
     """A maker of bodies, in millimetres."""
 
+    @abstractmethod
     def disc(self, circle: Circle, low: float, high: float) -> Shape:
         """Return a cylinder along z between two heights."""
-        ...
+
+    @abstractmethod
+    def ball(self, radius: float) -> Shape:
+        """Return a ball about the origin."""
+
+    @abstractmethod
+    def box(self, low: Triple, high: Triple) -> Shape:
+        """Return a box between two corners."""
+
+    @abstractmethod
+    def hull(self, circles: Sequence[Circle], low: float, high: float) -> Shape:
+        """Return a plate between two heights, whose outline is the convex hull of circles."""
 
     def hole(self, circle: Circle, low: float, high: float) -> Shape:
         """Return the tool that cuts a round hole; its chords lie outside the circle."""
-        ...
-
-    def ball(self, radius: float) -> Shape:
-        """Return a ball about the origin."""
-        ...
+        return self.disc(circle, low, high)
 
     def cavity(self, radius: float) -> Shape:
         """Return the tool that cuts a seat for a ball about the origin."""
-        ...
-
-    def box(self, low: Triple, high: Triple) -> Shape:
-        """Return a box between two corners."""
-        ...
+        return self.ball(radius)
 
     def union(self, shapes: Sequence[Shape]) -> Shape:
         """Return the union of shapes."""
-        ...
-
-    def hull(self, circles: Sequence[Circle], low: float, high: float) -> Shape:
-        """Return a plate between two heights, whose outline is the convex hull of circles."""
-        ...
+        return functools.reduce(operator.add, shapes)
 
 
 # Half the width of lugs and arms, over the radius of their eyes.

@@ -16,7 +16,7 @@ from explorer.errors import ExplorerError
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES
-from explorer.prototype.forms import Circle, forms_of
+from explorer.prototype.forms import Circle, Kernel, forms_of
 from explorer.prototype.sizes import Sizes
 from explorer.prototype.weights import Mass, mesh_mass
 from explorer.workspace.solids.solid import Solid
@@ -84,14 +84,18 @@ def make_parts(sizes: Sizes) -> tuple[Part, ...]:
     )
 
 
-class MeshKernel:
+class MeshKernel(Kernel):
     """A maker of polyhedra: inscribed in round shapes, circumscribed about round holes."""
+
+    def __init__(self) -> None:
+        import manifold3d
+
+        self._library = manifold3d
 
     def disc(self, circle: Circle, low: float, high: float) -> Manifold:
         """Return a cylinder along z between two heights."""
-        from manifold3d import Manifold
-
-        cylinder = Manifold.cylinder(high - low, circle.radius, circle.radius, SEGMENTS)
+        radius, length = circle.radius, high - low
+        cylinder = self._library.Manifold.cylinder(length, radius, radius, SEGMENTS)
         return cylinder.translate((circle.x, circle.y, low))
 
     def hole(self, circle: Circle, low: float, high: float) -> Manifold:
@@ -101,9 +105,7 @@ class MeshKernel:
 
     def ball(self, radius: float) -> Manifold:
         """Return a ball about the origin."""
-        from manifold3d import Manifold
-
-        return Manifold.sphere(radius, SEGMENTS)
+        return self._library.Manifold.sphere(radius, SEGMENTS)
 
     def cavity(self, radius: float) -> Manifold:
         """Return the tool that cuts a seat for a ball about the origin."""
@@ -111,22 +113,16 @@ class MeshKernel:
 
     def box(self, low: Triple, high: Triple) -> Manifold:
         """Return a box between two corners."""
-        from manifold3d import Manifold
-
         x, y, z = (b - a for a, b in zip(low, high, strict=True))
-        return Manifold.cube((x, y, z)).translate(low)
+        return self._library.Manifold.cube((x, y, z)).translate(low)
 
     def union(self, shapes: Sequence[Manifold]) -> Manifold:
         """Return the union of shapes."""
-        from manifold3d import Manifold, OpType
-
-        return Manifold.batch_boolean(list(shapes), OpType.Add)
+        return self._library.Manifold.batch_boolean(list(shapes), self._library.OpType.Add)
 
     def hull(self, circles: Sequence[Circle], low: float, high: float) -> Manifold:
         """Return a plate between two heights, whose outline is the convex hull of circles."""
-        from manifold3d import Manifold
-
-        return Manifold.batch_hull([self.disc(circle, low, high) for circle in circles])
+        return self._library.Manifold.batch_hull([self.disc(each, low, high) for each in circles])
 
 
 @functools.cache

@@ -112,25 +112,23 @@ class Sizes:
         sweep = self.legs[0].sweep(self.guide.eye)
         return sweep + 2.0 * CLEARANCE + self.guide.pillar + radius
 
-    def carriage_range(self, leg: int) -> Stroke:
-        """Return the range along the guide of the carriage of a leg.
+    @cached_property
+    def carriage_ranges(self) -> Mapping[int, Stroke]:
+        """The ranges of the carriages along the guide, by their legs.
 
-        It is the range of the guide's limits or, without such limits, the range that the
+        A range is that of the guide's limits or, without such limits, the range that the
         workspace needs, on the carriage's side of a1.
         """
-        return self._carriage_ranges[leg]
-
-    @cached_property
-    def _carriage_ranges(self) -> Mapping[int, Stroke]:
-        return {leg: self._compute_carriage_range(leg) for leg in ON_GUIDE}
-
-    def _compute_carriage_range(self, leg: int) -> Stroke:
-        home, nearest = self.carriage_at_home(leg), self.nearest_to_a1(leg)
-        low, high = self._required_guide_range(leg)
-        low, high = min(low, home), max(high, home)
-        if home > 0.0:
-            return Stroke(max(low, min(nearest, home)), high)
-        return Stroke(low, min(high, max(-nearest, home)))
+        ranges: dict[int, Stroke] = {}
+        for leg in ON_GUIDE:
+            home, nearest = self.carriage_at_home(leg), self.nearest_to_a1(leg)
+            low, high = self._required_guide_range(leg)
+            low, high = min(low, home), max(high, home)
+            if home > 0.0:
+                ranges[leg] = Stroke(max(low, min(nearest, home)), high)
+            else:
+                ranges[leg] = Stroke(low, min(high, max(-nearest, home)))
+        return ranges
 
     def _required_guide_range(self, leg: int) -> Stroke:
         design, home = self.design, self.design.home_pose
@@ -152,7 +150,7 @@ class Sizes:
         ends_by_side: dict[bool, list[float]] = {}
         for leg in ON_GUIDE:
             overhang = self.radii[leg - 1] + CLEARANCE + self.guide.pillar
-            low, high = self.carriage_range(leg)
+            low, high = self.carriage_ranges[leg]
             ends_by_side.setdefault(self.carriage_at_home(leg) > 0.0, []).extend(
                 (low - overhang, high + overhang)
             )

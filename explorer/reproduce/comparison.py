@@ -42,13 +42,7 @@ Holds = Callable[[FloatArray, FloatArray], BoolArray]
 
 @dataclass(frozen=True)
 class Workspace:
-    """The volume of the workspace of a mechanism at the orientation of its home.
-
-    Attributes:
-        name: Name of the mechanism.
-        volume: Volume over the cubed reach.
-        error: Standard error of the volume; 0 if it is exact.
-    """
+    """The volume over the cubed reach at the orientation of home, and its standard error."""
 
     name: str
     volume: float
@@ -115,7 +109,8 @@ def judge_workspace(
 
 def orientations() -> Measurement:
     """Compare the orientations of the 4-4 with those of six-legged mechanisms."""
-    points = qmc.scale(_points(0), *_four_box())
+    reach = OPTIMAL.reach
+    points = qmc.scale(_points(0), 3 * [-2.0 * reach], 3 * [2.0 * reach])
     rotation = OPTIMAL.home_pose.rotation
     ours = _abilities("4-4", four_four, points, rotation)
     crossed = _abilities("4-4, any order", in_any_order, points, rotation)
@@ -180,11 +175,6 @@ def _twins() -> list[SixLegs]:
 def _points(seed: int) -> FloatArray:
     """Return scrambled points of the sequence of Sobol in the unit cube, shape (n, 3)."""
     return qmc.Sobol(3, rng=np.random.default_rng([10, seed])).random_base2(POINTS_LOG2)
-
-
-def _four_box() -> tuple[FloatArray, FloatArray]:
-    reach = OPTIMAL.reach
-    return np.full(3, -2.0 * reach), np.full(3, 2.0 * reach)
 
 
 def _workspace(mechanism: SixLegs) -> Workspace:

@@ -69,35 +69,19 @@ class Interference:
     steps: tuple[tuple[float, ...], ...]
 
 
-@dataclass(frozen=True)
-class Touching:
-    """The nodes at which legs touch.
-
-    Attributes:
-        count: Number of these nodes.
-        nodes: Number of all nodes.
-        highest: Largest z of these nodes, in design units.
-    """
-
-    count: int
-    nodes: int
-    highest: float
-
-
 def lower_risk() -> Measurement:
     """Compare clearances and swept steps of the 4-4 and of its 6-4 twin over a workspace."""
     nodes = _nodes(NODE_STEP, LOWEST[0])
     pairs = leg_clearances(Configuration(OPTIMAL, nodes, ROTATION)).clearance
     four = pairs.min(axis=1)
-    ours = _interference("4-4", nodes, four, four, _four_collides)
-    twins: list[Interference] = []
+    mechanisms = [_interference("4-4", nodes, four, four, _four_collides)]
     for a2x in (*A2X, BEYOND):
         twin = six_four_twin(OPTIMAL, a2x)
         six = twin.clearances(nodes, ROTATION).min(axis=1)
-
         collides = partial(twin.step_overlaps, rotation=ROTATION)
-        twins.append(_interference(twin.name, nodes, six, four, collides))
-    return judge_risk(ours, twins[:-1], twins[-1], float(pairs[:, PAIRS.index((2, 3))].max()))
+        mechanisms.append(_interference(twin.name, nodes, six, four, collides))
+    ours, *twins, beyond = mechanisms
+    return judge_risk(ours, twins, beyond, float(pairs[:, PAIRS.index((2, 3))].max()))
 
 
 def judge_risk(
@@ -154,30 +138,26 @@ def judge_risk(
 def clear_optimum() -> Measurement:
     """Test steps of the paper's optimum by swept tetrahedra, and its nodes by clearances."""
     nodes = _nodes(NODE_STEP, LOWEST[0])
-    apart = float(
-        leg_clearances(Configuration(OPTIMAL, nodes, ROTATION))
-        .clearance[:, PAIRS.index((2, 3))]
-        .min()
-    )
+    pairs = leg_clearances(Configuration(OPTIMAL, nodes, ROTATION)).clearance
+    apart = float(pairs[:, PAIRS.index((2, 3))].min())
     of_table = _nodes(STEPS[-1], 0.0)
     clearance = leg_clearances(Configuration(OPTIMAL, of_table, ROTATION)).clearance.min(axis=1)
     touching = of_table[clearance < TOUCHING]
-    return judge_optimum(
-        _shares_of_steps(nodes, _four_collides),
-        apart,
-        Touching(len(touching), len(of_table), float(touching[:, 2].max(initial=0.0))),
-    )
+    shares, highest = _shares_of_steps(nodes, _four_collides), touching[:, 2].max(initial=0.0)
+    return judge_optimum(shares, apart, len(touching), len(of_table), float(highest))
 
 
 def judge_optimum(
-    steps: tuple[tuple[float, ...], ...], apart: float, touching: Touching
+    steps: tuple[tuple[float, ...], ...], apart: float, touching: int, nodes: int, highest: float
 ) -> Measurement:
     """Return the measurement of the optimum.
 
     Args:
         steps: Shares of colliding steps, by length as in `STEPS` and by axis.
         apart: Distance of legs 2 and 3, in design units.
-        touching: The nodes by which Table 1 is read.
+        touching: Number of the nodes, out of those by which Table 1 is read, where legs touch.
+        nodes: Number of all these nodes.
+        highest: Largest z of a node where legs touch, in design units.
     """
     lines = [f"{'step':>8}" + "".join(f"{axis:>8}" for axis in "xyz")]
     lines += [
@@ -191,16 +171,16 @@ def judge_optimum(
         f"those of {STEPS[-1]:g} units, our reading of the step of the optimum's nodes. Legs 2 and "
         f"3 are {apart:.3f} units apart: on a longer step along the guide each passes where the "
         "other was or will be, though they never touch. The answer depends on the sampling "
-        f"interval, which the paper does not print. Whatever it is, legs touch at {touching.count} "
-        f"of the {touching.nodes} nodes by which we read the volume, none of them above z = "
-        f"{touching.highest:g}; the paper does not say whether it counts such nodes."
+        f"interval, which the paper does not print. Whatever it is, legs touch at {touching} of "
+        f"the {nodes} nodes by which we read the volume, none of them above z = "
+        f"{highest:g}; the paper does not say whether it counts such nodes."
     )
     values = {
         "steps": dict(zip(map(str, STEPS), steps, strict=True)),
         "apart": apart,
-        "touching": asdict(touching),
+        "touching": {"count": touching, "nodes": nodes, "highest": highest},
     }
-    if shortest == longest == touching.count == 0:
+    if shortest == longest == touching == 0:
         return Measurement(text, "confirmed", values, tuple(lines))
     if shortest < RARE < longest:
         return Measurement(text, "not testable from the paper", values, tuple(lines))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from types import MappingProxyType
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -31,26 +31,18 @@ YAWS = (-72.6, -73.0, -73.1, -73.2, -73.6, -75.0, -90.0)
 """Yaws at which the nodes of both designs are counted, in degrees."""
 
 
-@dataclass(frozen=True)
-class Printed:
-    """A row as the paper prints it.
-
-    Attributes:
-        extent: Extent of the workspace, lows then highs, in design units.
-        volume: Node volume of the workspace in cubed design units; None if it is not printed.
-    """
+class Printed(NamedTuple):
+    """A row as the paper prints it: lows and highs, and the node volume; None if not printed."""
 
     extent: Extent
     volume: float | None
 
 
-PRINTED: Mapping[str, Printed] = MappingProxyType(
-    {
-        "paper-initial": Printed(((0.0, -5.026, 0.0), (10.052, 10.770, 9.334)), None),
-        "paper-optimal": Printed(((0.0, -12.0, 0.0), (20.0, 22.0, 18.0)), 7992.0),
-    }
-)
-"""The rows by preset."""
+PRINTED: Mapping[str, Printed] = {
+    "paper-initial": Printed(((0.0, -5.026, 0.0), (10.052, 10.770, 9.334)), None),
+    "paper-optimal": Printed(((0.0, -12.0, 0.0), (20.0, 22.0, 18.0)), 7992.0),
+}
+"""The rows by preset, lengths in design units."""
 
 
 @dataclass(frozen=True)
@@ -127,10 +119,7 @@ def judge_table(
         "table1": [
             {
                 "design": row.preset,
-                "printed": {
-                    "extent": PRINTED[row.preset].extent,
-                    "node_volume": PRINTED[row.preset].volume,
-                },
+                "printed": dict(zip(("extent", "node_volume"), PRINTED[row.preset], strict=True)),
                 "node_step": row.nodes.step,
                 "node_count": row.nodes.count,
                 "node_volume": row.nodes.volume,

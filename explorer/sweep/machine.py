@@ -34,18 +34,12 @@ class MachineVariable:
     bound: Literal["any", "not negative", "positive"] = "positive"
 
     def check(self, name: str, low: float) -> None:
-        """Check the low end of the range of a variable.
-
-        Args:
-            name: Name of the variable.
-            low: The low end.
+        """Check the low end of the range of a variable of a name.
 
         Raises:
             InputError: The number is not allowed.
         """
-        if (self.bound == "not negative" and low < 0.0) or (
-            self.bound == "positive" and low <= 0.0
-        ):
+        if self.bound != "any" and (low < 0.0 or (low == 0.0 and self.bound == "positive")):
             demand = "not be negative" if self.bound == "not negative" else "be positive"
             raise InputError(f"{name} must {demand}; its range starts at {low:g}")
 
@@ -80,6 +74,12 @@ class MachineVariable:
         )
 
 
+_TOOL = {
+    f"tool_{name}": MachineVariable(
+        f"{name} of the tool point in the platform", "units", "tool", "position", axis, "any"
+    )
+    for axis, name in enumerate("xyz")
+}
 MACHINE: Mapping[str, MachineVariable] = MappingProxyType(
     {
         "payload_mass": MachineVariable(
@@ -88,17 +88,7 @@ MACHINE: Mapping[str, MachineVariable] = MappingProxyType(
         "payload_force": MachineVariable(
             "force of any direction at the tool", "N", "payload", "force_n", bound="not negative"
         ),
-        **{
-            f"tool_{name}": MachineVariable(
-                f"{name} of the tool point in the platform",
-                "units",
-                "tool",
-                "position",
-                axis,
-                "any",
-            )
-            for axis, name in enumerate("xyz")
-        },
+        **_TOOL,
         "actuator_limit": MachineVariable(
             "one limit of push and pull for all six actuators", "N", "actuators", "push_n"
         ),

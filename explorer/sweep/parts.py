@@ -107,7 +107,7 @@ def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -
         StorageError: the part cannot be written; a part that was there is unchanged.
         MissingExtraError: pyarrow is not installed.
     """
-    arrow, parquet = pyarrow(), _parquet()
+    arrow = pyarrow()
     fields: list[Any] = []
     columns: list[Any] = []
     for name, kind in columns_of(study).items():
@@ -123,7 +123,7 @@ def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -
     }
     table = arrow.table(columns, schema=arrow.schema(fields, metadata=metadata))
     data = io.BytesIO()
-    parquet.write_table(table, data, compression="zstd", write_page_checksum=True)
+    arrow.parquet.write_table(table, data, compression="zstd", write_page_checksum=True)
     write_whole(part_path(folder, chunk), data.getvalue())
 
 
@@ -138,31 +138,22 @@ def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, A
         BadPartError: the file is damaged or cut off, or no part of a study.
         MissingExtraError: pyarrow is not installed.
     """
-    arrow, parquet = pyarrow(), _parquet()
+    arrow = pyarrow()
     try:
-        file = parquet.ParquetFile(path, page_checksum_verification=True)
+        file = arrow.parquet.ParquetFile(path, page_checksum_verification=True)
         with file:
-            part = _checked_metadata(file.schema_arrow.metadata or {}, file.metadata.metadata or {})
+            part = _part_of(file.metadata.metadata or {})
             return part, file.read(columns=None if columns is None else list(columns))
     except (arrow.ArrowException, OSError, ValueError, KeyError) as error:
         raise BadPartError(f"{path} is no part of a study: {one_line(error)}") from None
 
 
-def _checked_metadata(metadata: Mapping[bytes, bytes], copy: Mapping[bytes, bytes]) -> Part:
-    """Return the metadata of a part; it holds two copies of them, without a checksum."""
-    names = (_STUDY, _HASH, _SEED, _CHUNK, _VERSIONS)
-    part = Part(
-        study=metadata[_STUDY],
-        study_hash=metadata[_HASH].decode(),
-        chunk=int(metadata[_CHUNK]),
-        versions=json.loads(metadata[_VERSIONS]),
-    )
-    if (
-        any(metadata[name] != copy[name] for name in names)
-        or hashlib.sha256(part.study).hexdigest() != part.study_hash
-    ):
+def _part_of(metadata: Mapping[bytes, bytes]) -> Part:
+    """Return the metadata of a part; a KeyError or a ValueError if they are damaged."""
+    study, known_hash = metadata[_STUDY], metadata[_HASH].decode()
+    if hashlib.sha256(study).hexdigest() != known_hash:
         raise ValueError("its metadata is damaged")
-    return part
+    return Part(study, known_hash, int(metadata[_CHUNK]), json.loads(metadata[_VERSIONS]))
 
 
 def sound_parts(
@@ -213,21 +204,14 @@ def _is_whole(table: Any, study: Study, chunk: int) -> bool:
 
 
 def pyarrow() -> Any:
-    """Return the library that reads and writes Parquet.
+    """Return the library that reads and writes Parquet, with its module `parquet`.
 
     Raises:
         MissingExtraError: it is not installed.
     """
-    return _imported("pyarrow")
-
-
-def _parquet() -> Any:
-    return _imported("pyarrow.parquet")
-
-
-def _imported(name: str) -> Any:
     try:
-        return importlib.import_module(name)
+        importlib.import_module("pyarrow.parquet")
+        return importlib.import_module("pyarrow")
     except ImportError:
         raise MissingExtraError(
             "studies are kept as Parquet, which needs the extra study: "

@@ -120,11 +120,7 @@ class Results:
 
 
 def design_of_index(study: Study, index: int, values: Mapping[str, float]) -> Design:
-    """Return the design with given values, named after its study and its index.
-
-    Raises:
-        DesignError: the values make a degenerate design.
-    """
+    """Return the design with given values, named after its study and its index."""
     return design_of(study, values, f"{study.name[:80]} #{index}")
 
 
@@ -210,20 +206,17 @@ def summarise(folder: str | Path) -> Summary:
         if study.objectives:
             lacking += int(incomparable(columns, study.objectives).sum())
             chosen = table.filter(front(columns, study.objectives))
-            best = _merged(best + chosen.to_pylist(), study)
+            best += chosen.to_pylist()
+            of_best = {
+                goal.measure: [row[goal.measure] for row in best] for goal in study.objectives
+            }
+            best = [best[k] for k in undominated(costs(of_best, study.objectives)).tolist()]
     if study is None:
         raise _no_results(folder, damaged)
-    first = study.objectives[0] if study.objectives else None
-    if first is not None:
+    for first in study.objectives[:1]:
         best.sort(key=lambda row: float(row[first.measure] or 0.0), reverse=first.sense == "max")
     strays = [path.name for path in stray_paths(Path(folder), study)]
     return Summary(study, dict(counts), best, lacking, len(damaged), strays)
-
-
-def _merged(rows: list[dict[str, Value]], study: Study) -> list[dict[str, Value]]:
-    names = [objective.measure for objective in study.objectives]
-    columns = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names}
-    return [rows[index] for index in undominated(costs(columns, study.objectives)).tolist()]
 
 
 def _column(table: Any, name: str, kind: str) -> Column:

@@ -94,23 +94,10 @@ def evaluate(study: bytes, start: int, stop: int) -> Rows:
     return _as_columns(decoded, indices, rows)
 
 
-@dataclass(frozen=True)
-class Answer:
-    """Result of a task.
-
-    Attributes:
-        pieces: Rows of each piece of the task.
-        seconds: Time that the worker took.
-    """
-
-    pieces: tuple[Rows, ...]
-    seconds: float
-
-
 def answer(
     function: Callable[[bytes, int, int], Rows], study: bytes, pieces: Sequence[range]
-) -> Answer:
-    """Return the rows of several pieces of a study, and the time they took.
+) -> tuple[tuple[Rows, ...], float]:
+    """Return the rows of several pieces of a study, and the seconds that they took.
 
     Args:
         function: Function that returns the rows of one piece, such as `evaluate`.
@@ -119,7 +106,7 @@ def answer(
     """
     began = time.perf_counter()
     rows = tuple(function(study, piece.start, piece.stop) for piece in pieces)
-    return Answer(rows, time.perf_counter() - began)
+    return rows, time.perf_counter() - began
 
 
 def rows_of_dead_workers(study: Study, indices: range, reason: str) -> Rows:
@@ -269,12 +256,13 @@ def load_common() -> None:
 
 def load_kernels(study: Study) -> None:
     """Import all kernels that the rows of a study may need."""
-    if study.polish is not None:
-        importlib.import_module("explorer.optimise.solver")
-    if "accessible_volume" in study.measures:
-        importlib.import_module("explorer.workspace.accessible.workspace")
-    if "held_volume" in study.measures:
-        importlib.import_module("explorer.workspace.held")
+    for is_needed, module in (
+        (study.polish is not None, "explorer.optimise.solver"),
+        ("accessible_volume" in study.measures, "explorer.workspace.accessible.workspace"),
+        ("held_volume" in study.measures, "explorer.workspace.held"),
+    ):
+        if is_needed:
+            importlib.import_module(module)
 
 
 @functools.lru_cache(4)

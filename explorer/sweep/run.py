@@ -19,7 +19,6 @@ from explorer.files.versions import versions
 from explorer.numerics.compiled import warm
 from explorer.sweep.parts import claim, pyarrow, sound_parts, write_part
 from explorer.sweep.rows import (
-    Answer,
     Rows,
     answer,
     check_study,
@@ -141,7 +140,7 @@ class _Run:
         self.retries: deque[_Piece] = deque()
         # Designs whose evaluation may have killed a worker; each is tried alone.
         self.suspects: deque[_Piece] = deque()
-        self.under_way: dict[Future[Answer], list[_Piece]] = {}
+        self.under_way: dict[Future[tuple[tuple[Rows, ...], float]], list[_Piece]] = {}
         # Rows of the chunks that have no part yet.
         self.pending: dict[int, list[Rows]] = {}
         # Designs that workers have evaluated in this run, and the seconds that they took.
@@ -212,11 +211,11 @@ class _Run:
         ranges = [piece.indices for piece in pieces]
         self.under_way[self.workers.submit(answer, evaluate, self.encoded, ranges)] = pieces
 
-    def _collect(self, future: Future[Answer]) -> None:
+    def _collect(self, future: Future[tuple[tuple[Rows, ...], float]]) -> None:
         """Add the rows of a task, or queue it again if its worker died."""
         pieces = self.under_way.pop(future)
         try:
-            result = future.result()
+            found, seconds = future.result()
         except self.workers.died:
             self._retry(pieces)
             return
@@ -234,12 +233,11 @@ class _Run:
                 f"the workers cannot do the tasks: {type(error).__name__}: {error}"
             ) from error
         self.timed_designs += sum(len(piece.indices) for piece in pieces)
-        self.timed_seconds += result.seconds
-        for piece, rows in zip(pieces, result.pieces, strict=True):
+        self.timed_seconds += seconds
+        for piece, rows in zip(pieces, found, strict=True):
             if rows.versions != versions():
                 there, here = (
-                    ", ".join(map(" ".join, libraries.items()))
-                    for libraries in (rows.versions, versions())
+                    ", ".join(map(" ".join, each.items())) for each in (rows.versions, versions())
                 )
                 raise RunError(
                     f"the workers have other versions than this process: {there} there, {here} "

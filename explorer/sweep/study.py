@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -321,16 +322,11 @@ def load_study(path: str | Path) -> Study:
     known = STUDIES.get(str(path))
     if known is not None:
         return known
-    try:
-        Path(path).stat()
-    except (FileNotFoundError, ValueError):
+    if not os.path.lexists(path):
         raise InputError(
             f"no study and no file named {str(path)!r}; the studies that come along are "
             f"{', '.join(STUDIES)}"
-        ) from None
-    except OSError:
-        # Reading the file raises an error with the reason.
-        pass
+        )
     return decode_study(read_at_most(Path(path), LARGEST_FILE), str(path))
 
 

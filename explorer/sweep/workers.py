@@ -34,9 +34,8 @@ MOST_WORKERS = 1024
 # the processes many.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
-# Failed starts in a row after which a task fails, and number of processes that may end by
-# themselves before any was ready: with more of them no process can start.
-STARTS, FIRST_STARTS = 10, 4
+# Failed starts in a row after which a task fails.
+STARTS = 10
 
 # One thread at a time changes the environment, or one would restore what another has set.
 _environment = threading.Lock()
@@ -92,8 +91,6 @@ class LocalWorkers(Workers):
         # Guards the processes, by the number of their thread.
         self._lock = threading.Lock()
         self._children: dict[int, ChildProcess] = {}
-        # Whether any process was ever ready, and how many ended by themselves before.
-        self._was_ready, self._failed_starts = False, 0
         self._threads = [
             threading.Thread(target=self._serve, args=(k,), name=f"worker {k}", daemon=True)
             for k in range(count)
@@ -110,7 +107,7 @@ class LocalWorkers(Workers):
     def process_ids(self) -> list[int]:
         """Ids of the processes that exist now."""
         with self._lock:
-            return [child.process_id for child in self._children.values()]
+            return [child.process.pid or 0 for child in self._children.values()]
 
     def submit(
         self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
@@ -136,7 +133,7 @@ class LocalWorkers(Workers):
                     pass
             with self._lock:
                 for child in self._children.values():
-                    child.kill()
+                    child.process.kill()
         for _ in self._threads:
             self._tasks.put(None)
         if wait:
@@ -172,9 +169,6 @@ class LocalWorkers(Workers):
         """Return the process of a thread, ready for tasks; a failed start is no task's fault."""
         last = ""
         for _ in range(STARTS):
-            if not self._was_ready and self._failed_starts >= max(FIRST_STARTS, self.size):
-                break
-            child = None
             try:
                 with self._lock:
                     child = self._children.get(number)
@@ -183,15 +177,10 @@ class LocalWorkers(Workers):
                 child.wait_until_ready()
             except PIPE_ERRORS as error:
                 last = f" ({error})" if str(error) else ""
-                # That a process was killed does not mean that others cannot start.
-                is_own_fault = child is None or not child.was_killed()
                 self._drop(number)
                 if self._is_over.is_set():
                     raise WorkerDiedError("the worker process was ended") from None
-                with self._lock:
-                    self._failed_starts += is_own_fault
             else:
-                self._was_ready = True
                 return child
         raise NoWorkerError(
             f"no worker process stays alive until it is ready{last}; see what they wrote. A "
@@ -213,19 +202,14 @@ class ChildProcess:
     def __init__(self) -> None:
         context = get_context("spawn")
         self._pipe, child_end = context.Pipe()
-        self._process: SpawnProcess = context.Process(
+        self.process: SpawnProcess = context.Process(
             target=_answer_calls, args=(child_end,), name="explorer worker", daemon=True
         )
         with _environment, _one_thread_each():
-            self._process.start()
+            self.process.start()
         # While the parent holds the child's end too, it does not see the child close it.
         child_end.close()
         self._is_ready = False
-
-    @property
-    def process_id(self) -> int:
-        """Id of the process."""
-        return self._process.pid or 0
 
     def wait_until_ready(self) -> None:
         """Wait for the first message; raise one of `PIPE_ERRORS` if the process died."""
@@ -241,21 +225,11 @@ class ChildProcess:
         self._pipe.send(call)
         return self._pipe.recv()
 
-    def was_killed(self) -> bool:
-        """Return whether a signal ended the process, which is dead, rather than itself."""
-        # A process that ends by itself closes its pipe a little earlier.
-        self._process.join(1.0)
-        return (self._process.exitcode or 0) < 0
-
-    def kill(self) -> None:
-        """Kill the process."""
-        self._process.kill()
-
     def end(self) -> None:
         """Kill the process, wait for its end and close the pipe."""
-        self._process.kill()
-        self._process.join()
-        self._process.close()
+        self.process.kill()
+        self.process.join()
+        self.process.close()
         self._pipe.close()
 
 

@@ -275,7 +275,7 @@ def judge_risk(**changes: Any) -> Measurement:
 
 def judge_optimum(*shares: float, touching: int = 0) -> Measurement:
     steps = tuple((x, 0.0, 0.0) for x in shares)
-    return interference.judge_optimum(steps, 0.6, interference.Touching(touching, 999, 0.0))
+    return interference.judge_optimum(steps, 0.6, touching, 999, 0.0)
 
 
 def judge_workspace(ours: float, twin: float, *octahedra: float) -> Measurement:

@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -76,13 +77,8 @@ class Slices:
             warn_below = WARN_SHARE * design.reach
             bands = position_bands(design, rotation, "margin", warn_below=warn_below)
         lows, highs = bounds(region_of(constraints(design, rotation)))
-        return Slices(
-            design,
-            rotation,
-            np.maximum(lows, extent[0]),
-            np.minimum(highs, extent[1]),
-            bands,
-        )
+        lows, highs = np.maximum(lows, extent[0]), np.minimum(highs, extent[1])
+        return Slices(design, rotation, lows, highs, bands)
 
     @property
     def own_scale(self) -> float:
@@ -124,7 +120,11 @@ class Slices:
             not_accessible: Polygons around the positions that are not accessible, each of shape
                 (n, 2), filled by the even-odd rule; () to mark none.
         """
-        to_map = _ToMap(self.lows[in_plane(axis)], self.own_scale)
+        lows, scale = self.lows[in_plane(axis)], self.own_scale
+
+        def to_map(points: FloatArray) -> FloatArray:
+            return (points - lows) * scale
+
         data = self._outline_data(axis, level, to_map)
         if not data:
             return element("g")
@@ -159,7 +159,7 @@ class Slices:
                 Configuration(self.design, grid.points, self.rotation)
             ).clearance
             add(
-                grid.loops(-clearance.min(axis=-1), 0.0),
+                level_loops(grid.columns, grid.rows, -clearance.min(axis=-1), 0.0),
                 fill=css(OUTLINE),
                 fill_rule="evenodd",
                 class_="is-colliding",
@@ -167,14 +167,16 @@ class Slices:
         clip = element("clipPath", element("path", d=data, clip_rule="evenodd"), id=name)
         return element("g", clip, filled, element("path", d=data, class_="edge"))
 
-    def _outline_data(self, axis: str, level: float, to_map: _ToMap) -> str:
+    def _outline_data(self, axis: str, level: float, to_map: ToMap) -> str:
         """Return the outline of a slice as the data of a path; "" if the slice is empty."""
         outline = self.outline(axis, level)
         if outline is not None:
-            return "".join(_loop(loop, to_map) for loop in outline.loops)
+            return "".join(_loop(loop, to_map, self.own_scale) for loop in outline.loops)
         grid = self._grid(axis, level, CELLS)
         slack = slacks(constraints(self.design, self.rotation), grid.points).min(axis=-1)
-        return "".join(path_of(to_map(loop)) for loop in grid.loops(slack, 0.0))
+        return "".join(
+            path_of(to_map(loop)) for loop in level_loops(grid.columns, grid.rows, slack, 0.0)
+        )
 
     def _corners(self, axis: str) -> FloatArray:
         (u0, v0), (u1, v1) = self.lows[in_plane(axis)], self.highs[in_plane(axis)]
@@ -198,7 +200,8 @@ class Slices:
             def field_at(points: FloatArray) -> FloatArray:
                 return sign * self._signed(np.insert(points, index, level, axis=1))
 
-            return grid.loops(sign * field, value, None if is_slow else field_at)
+            refine = None if is_slow else field_at
+            return level_loops(grid.columns, grid.rows, sign * field, value, refine)
 
         return lambda value: [*loops(value, 1.0), *loops(value, -1.0)]
 
@@ -236,25 +239,12 @@ class Slices:
         return _Grid(columns, rows, points)
 
 
-@dataclass(frozen=True)
-class _Grid:
+class _Grid(NamedTuple):
     """A grid of positions on a slice: columns (n,), rows (m,), points (m, n, 3), all ascending."""
 
     columns: FloatArray
     rows: FloatArray
     points: FloatArray
-
-    def loops(
-        self,
-        values: FloatArray,
-        level: float,
-        field_at: Callable[[FloatArray], FloatArray] | None = None,
-    ) -> list[FloatArray]:
-        """Return the polygons around the parts in which values (m, n) are at least a level.
-
-        For `field_at` see `level_loops`.
-        """
-        return level_loops(self.columns, self.rows, values, level, field_at)
 
 
 def in_plane(axis: str) -> list[int]:
@@ -262,35 +252,29 @@ def in_plane(axis: str) -> list[int]:
     return [index for index, name in enumerate(AXES) if name != axis]
 
 
-@dataclass(frozen=True)
-class _ToMap:
-    """The conversion from design units to the own coordinates of a map."""
-
-    lows: FloatArray
-    scale: float
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        return (points - self.lows) * self.scale
-
-    def text(self, point: ArrayLike) -> str:
-        """Return a point as coordinates of a path."""
-        x, y = self(np.asarray(point)).tolist()
-        return f"{coordinate(x)},{coordinate(y)}"
+ToMap: TypeAlias = Callable[[FloatArray], FloatArray]
+"""The conversion of points from design units to the own coordinates of a map."""
 
 
-def _loop(loop: tuple[Edge, ...], to_map: _ToMap) -> str:
+def _text(point: ArrayLike, to_map: ToMap) -> str:
+    """Return a point as coordinates of a path."""
+    x, y = to_map(np.asarray(point)).tolist()
+    return f"{coordinate(x)},{coordinate(y)}"
+
+
+def _loop(loop: tuple[Edge, ...], to_map: ToMap, scale: float) -> str:
     """Return a closed loop of edges as the data of a path."""
-    data = [f"M{to_map.text(loop[0].start)}"]
+    data = [f"M{_text(loop[0].start, to_map)}"]
     for edge in loop:
         if edge.centre is None:
-            data.append(f"L{to_map.text(edge.end)}")
+            data.append(f"L{_text(edge.end, to_map)}")
             continue
-        radius = coordinate(edge.radius * to_map.scale)
+        radius = coordinate(edge.radius * scale)
         arc = f"A{radius},{radius} 0 0 {int(edge.turn > 0.0)}"
         if abs(edge.turn) > math.pi - 1e-6:
             # An arc of a path must be less than a whole circle: two halves are plain.
-            data.append(f"{arc} {to_map.text(_middle(edge))}")
-        data.append(f"{arc} {to_map.text(edge.end)}")
+            data.append(f"{arc} {_text(_middle(edge), to_map)}")
+        data.append(f"{arc} {_text(edge.end, to_map)}")
     return "".join((*data, "Z"))
 
 
