@@ -48,7 +48,7 @@ from explorer.workspace.limits.constraints import (
     constraints,
 )
 from explorer.workspace.limits.region import Region, region_of
-from explorer.workspace.slices.volume import bounds, home_rotation, workspace_volume
+from explorer.workspace.slices.volume import home_rotation, workspace_volume
 
 # OpenCASCADE merges points that are nearer than 1e-7, whatever the unit.
 SMALLEST_MM, LARGEST_MM = 1e-1, 1e7
@@ -105,7 +105,7 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
         raise NoAnswerError(f"there is nothing to export, the workspace is empty: {reason}")
     limits, unit = constraints(design, r), design.unit_mm
     region = region_of(limits)
-    lows, highs = (end * unit for end in bounds(region))
+    lows, highs = (end * unit for end in region.ends)
     size = float((highs - lows).max())
     if not SMALLEST_MM <= size <= LARGEST_MM:
         raise InputError(

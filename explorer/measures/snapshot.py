@@ -37,7 +37,7 @@ from explorer.singularity.nearest import (
 )
 from explorer.singularity.strata import GENERIC, inversions, stratum
 from explorer.singularity.turning import least_turns
-from explorer.workspace.limits.broken import Violation, violations
+from explorer.workspace.limits.valid_poses import Violation, violations
 
 
 class Snapshot(Configuration):

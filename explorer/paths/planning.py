@@ -37,9 +37,8 @@ from explorer.paths.tree_search import TreeSearch
 from explorer.singularity.bruhat import incidences
 from explorer.statics.reactions import PART_NAMES
 from explorer.statics.weights import Weights
-from explorer.workspace.limits.broken import violations
 from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_rows
-from explorer.workspace.limits.valid_poses import Rules, valid_rows
+from explorer.workspace.limits.valid_poses import Rules, valid_rows, violations
 
 DEFAULT_SECONDS = 2.0
 # Preferred margin and clearance, as shares of those of the ends. The line in the folds keeps all of

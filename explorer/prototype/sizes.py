@@ -18,7 +18,6 @@ from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
 from explorer.prototype.dimensions import CLEARANCE, THINNEST, GuideSizes, LegSizes, Stroke
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import bounds
 
 # Parts of a leg that are as thick as one capsule: its base joint, its tube and rod, its cup. Rows
 # combine the parts of the four legs in all ways.
@@ -137,11 +136,9 @@ class Sizes:
             return Stroke(low * design.unit_mm, high * design.unit_mm)
         region = region_of(constraints(design, home.rotation))
         shift = float(home.rotation[0, 0]) * (design.b2 if leg == 2 else design.b3)
-        if region.is_empty:
+        low, high = region.low, region.high
+        if region.is_flat or not low < high:
             low = high = home.position[0]
-        else:
-            lows, highs = bounds(region)
-            low, high = float(lows[0]), float(highs[0])
         return Stroke((low + shift) * design.unit_mm, (high + shift) * design.unit_mm)
 
     @cached_property

@@ -17,8 +17,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.common_points import Surfaces
 from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace, constraints
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import bounds
+from explorer.workspace.limits.region import box_of
 
 # Largest violation of a limit by a point before its rounding errors are removed, as a share of the
 # size of the region.
@@ -58,9 +57,10 @@ def extreme_positions(design: Design, rotation: FloatArray, normals: FloatArray)
     on either side of the planes through a1 with these normals.
     """
     limits = constraints(design, rotation)
-    lows, highs = bounds(region_of(limits))
-    if not (lows < highs).all():
+    box = box_of(limits)
+    if box is None:
         return np.zeros((0, 3))
+    lows, highs = box
     middle, unit = 0.5 * (lows + highs), 0.5 * float(np.linalg.norm(highs - lows))
     lengths = np.linalg.norm(normals, axis=1)
     directions = normals[lengths > 0.0] / lengths[lengths > 0.0, None]

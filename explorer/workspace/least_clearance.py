@@ -30,9 +30,9 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.descent import descend
-from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, Never, constraints
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import bounds, home_rotation
+from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, constraints
+from explorer.workspace.limits.region import box_of
+from explorer.workspace.slices.volume import home_rotation
 
 # Tolerance of a least clearance, over the reach.
 DEFAULT_TOLERANCE = 1e-4
@@ -104,13 +104,13 @@ def least_clearances(
     positions = np.full((len(PAIRS), 3), math.nan)
     # The least bound of the cells of each pair that are not divided any further.
     settled = np.full(len(PAIRS), math.inf)
-    lows, highs = bounds(region_of(domain.limits))
-    if any(isinstance(limit, Never) for limit in domain.limits) or not (lows < highs).all():
+    box = box_of(domain.limits)
+    if box is None:
         return LeastClearances(settled, settled, positions)
     # Legs 2 and 3 lie in planes across the guide, whose distance is the same at every position.
     plane_distance = np.zeros(len(PAIRS))
     plane_distance[PAIRS.index((2, 3))] = abs((design.b3 - design.b2) * float(r[0, 0]))
-    size = (highs - lows) / FIRST_CELLS
+    lows, size = box[0], (box[1] - box[0]) / FIRST_CELLS
     middles = lows + size * (np.indices((FIRST_CELLS,) * 3).reshape(3, -1).T + 0.5)
     # Pairs whose bounds can still be raised.
     is_open = ~joined

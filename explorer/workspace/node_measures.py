@@ -26,7 +26,7 @@ from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.quantities import RADII, write_ends
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.nodes import is_within
-from explorer.workspace.slices.volume import bounds, home_rotation
+from explorer.workspace.slices.volume import home_rotation
 
 # Number of nodes on each axis: default, least and largest.
 DEFAULT_NODES = 20
@@ -86,11 +86,11 @@ def node_measures(
         )
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     region = region_of(constraints(design, r))
-    lows, highs = bounds(region)
+    box = region.box
+    lows, highs = box or (np.zeros(3), np.zeros(3))
     results, within = np.zeros(RESULTS), np.zeros((nodes, nodes, nodes), dtype=np.bool_)
     step = (highs - lows) / nodes
-    is_empty = region.is_empty or not (lows < highs).all()
-    if not is_empty:
+    if box is not None:
         row = np.zeros(RADII)
         row[:] = design.variables
         radii = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design))

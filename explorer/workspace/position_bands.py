@@ -38,8 +38,7 @@ from explorer.statics.held import largest_shares, load_case
 from explorer.statics.reactions import has_limits
 from explorer.statics.weights import payload_wrench
 from explorer.workspace.limits.constraints import constraints, slacks
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import bounds
+from explorer.workspace.limits.region import box_of
 
 PositionMeasure = Literal["margin", "condition", "share", "force", "bending", "error", "deflection"]
 PartMeasure = Literal["share", "force", "bending"]
@@ -238,9 +237,7 @@ def _round_levels(
 ) -> tuple[float, ...]:
     """Return round numbers that suit what is measured within the limits, ascending."""
     limits = constraints(design, rotation)
-    lows, highs = bounds(region_of(limits))
-    if not (lows < highs).all():
-        lows, highs = np.zeros(3), np.full(3, design.reach)
+    lows, highs = box_of(limits) or (np.zeros(3), np.full(3, design.reach))
     axes = np.linspace(lows, highs, NODES + 2)[1:-1].T
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     within = nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]

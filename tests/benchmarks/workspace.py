@@ -26,7 +26,7 @@ from explorer.workspace.held import held_workspace
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints, slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.nodes import count_nodes
-from explorer.workspace.slices.volume import bounds, home_rotation, workspace_volume
+from explorer.workspace.slices.volume import home_rotation, workspace_volume
 from explorer.workspace.solids.solids import workspace_solid
 
 ROUNDS = 10
@@ -70,7 +70,7 @@ def _exact_volume() -> Row:
 def _voxels() -> tuple[float, float]:
     """Return the volume by voxels whose centre is inside, and how long counting takes."""
     region = region_of(constraints(DESIGN, home_rotation(DESIGN)))
-    lows, highs = bounds(region)
+    lows, highs = region.ends
     step = float((highs - lows).max()) / VOXELS
     counts = np.ceil((highs - lows) / step).astype(np.int64)
     found = np.zeros(7, dtype=np.int64)

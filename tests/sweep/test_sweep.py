@@ -48,7 +48,7 @@ from explorer.sweep.study import (
     study_hash,
 )
 from explorer.workspace.held import held_workspace
-from explorer.workspace.limits.broken import violations
+from explorer.workspace.limits.valid_poses import violations
 from explorer.workspace.node_measures import node_measures
 
 MEASURES = measures_in("studies")
@@ -290,9 +290,8 @@ def nodes_of(design: Any, rotation: Any, count: int) -> Any:
     """Return the middles of the cells of a box that is measured by sampling, not asked for."""
     from explorer.workspace.limits.constraints import constraints
     from explorer.workspace.limits.region import region_of
-    from explorer.workspace.slices.volume import bounds
 
-    lows, highs = bounds(region_of(constraints(design, rotation)))
+    lows, highs = region_of(constraints(design, rotation)).ends
     axes = [
         low + (high - low) * (np.arange(count) + 0.5) / count
         for low, high in zip(lows, highs, strict=True)

@@ -40,7 +40,6 @@ from explorer.workspace.limits.constraints import (
     slacks,
 )
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import bounds
 
 CORNERS = np.array([*itertools.product((-0.5, 0.5), repeat=3)])
 STALLING = [
@@ -148,7 +147,7 @@ def cells_may_hold(limit: Constraint, centres: FloatArray, half: FloatArray) -> 
 def is_proven_empty(limits: Iterable[Constraint], resolution: float) -> bool:
     """Return whether division into ever smaller boxes proves that no position meets all limits."""
     limits = [*limits]
-    lows, highs = bounds(region_of(limits))
+    lows, highs = region_of(limits).ends
     for limit in limits:
         if isinstance(limit, HalfSpace):
             axis = int(np.abs(limit.normal).argmax())
@@ -173,7 +172,7 @@ def is_proven_empty(limits: Iterable[Constraint], resolution: float) -> bool:
 
 
 def size_of(limits: tuple[Constraint, ...]) -> float:
-    lows, highs = bounds(region_of(limits))
+    lows, highs = region_of(limits).ends
     return float(np.linalg.norm(highs - lows))
 
 

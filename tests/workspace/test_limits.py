@@ -24,9 +24,8 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.margins import mode_of, signs_of
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.broken import Violation, violations
 from explorer.workspace.limits.constraints import Cone, constraints, slacks
-from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
+from explorer.workspace.limits.valid_poses import Rules, Violation, poses_are_valid, violations
 
 Signs = tuple[int, int, int]
 ANY: dict[str, Any] = dict.fromkeys(LENGTHS, (0.0, 1e6))

@@ -14,7 +14,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.outline import Edge, slice_outline
-from explorer.workspace.slices.volume import bounds, workspace_volume
+from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 LEVELS = 60
@@ -36,7 +36,7 @@ def in_space(axis: str, level: float, points: FloatArray) -> FloatArray:
 
 
 def extent(design: explorer.Design, rotation: FloatArray, axis: str) -> tuple[float, float]:
-    lows, highs = bounds(region_of(constraints(design, rotation)))
+    lows, highs = region_of(constraints(design, rotation)).ends
     return float(lows["xyz".index(axis)]), float(highs["xyz".index(axis)])
 
 

@@ -30,7 +30,6 @@ from explorer.workspace.limits.constraints import YAW, constraints
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.nodes import column_lengths
 from explorer.workspace.slices.volume import (
-    bounds,
     home_rotation,
     workspace_nodes,
     workspace_volume,
@@ -77,7 +76,7 @@ def test_volume_is_the_sum_of_columns(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     region, many = region_of(constraints(design, rotation)), 500
     assert len(region.cones) == 0
-    lows, highs = bounds(region)
+    lows, highs = region.ends
     total = np.zeros(1)
     column_lengths(many * many, *region.rows, lows, highs, many, total)
     volume = float(total[0] * (highs[0] - lows[0]) * (highs[1] - lows[1])) / many**2
@@ -185,7 +184,7 @@ def test_volume_of_extreme_designs_is_that_of_random_positions(seed: int) -> Non
     assert found.volume >= 0.0
     assert math.isfinite(found.volume)
     assert bool(found.empty_because) == (found.volume == 0.0)
-    lows, highs = bounds(region_of(limits))
+    lows, highs = region_of(limits).ends
     if not (lows < highs).all():
         assert found.volume == 0.0
         return

@@ -12,7 +12,7 @@ from explorer.export.drawings.slices import Slices, in_plane
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, css
 from explorer.workspace.position_bands import MEASURE_WORDS
-from explorer.workspace.slices.axes import AXES
+from explorer.workspace.slices.outline import AXES
 
 # The space around a map that has ticks, and between maps.
 LEFT, RIGHT, TOP, BOTTOM = 42.0, 12.0, 26.0, 38.0

@@ -30,10 +30,8 @@ from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.limits.table import bounds_angles
 from explorer.workspace.position_bands import PositionBands, position_bands
-from explorer.workspace.slices.axes import AXES
 from explorer.workspace.slices.level_loops import level_loops
-from explorer.workspace.slices.outline import Edge, Outline, slice_outline
-from explorer.workspace.slices.volume import bounds
+from explorer.workspace.slices.outline import AXES, Edge, Outline, slice_outline
 
 # The longer side of a workspace in the drawing's own coordinates.
 OWN_SIZE = 1000.0
@@ -76,7 +74,7 @@ class Slices:
         if bands is None:
             warn_below = WARN_SHARE * design.reach
             bands = position_bands(design, rotation, "margin", warn_below=warn_below)
-        lows, highs = bounds(region_of(constraints(design, rotation)))
+        lows, highs = region_of(constraints(design, rotation)).ends
         lows, highs = np.maximum(lows, extent[0]), np.minimum(highs, extent[1])
         return Slices(design, rotation, lows, highs, bands)
 

@@ -11,10 +11,9 @@ from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.descent import descend
 from explorer.workspace.accessible.nodes import make_cell_grid
-from explorer.workspace.limits.broken import violations
-from explorer.workspace.limits.constraints import Never, constraints, slacks
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import bounds
+from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.region import box_of
+from explorer.workspace.limits.valid_poses import violations
 
 # Search for the nearest valid position: cells on each axis, number of the nearest nodes from
 # which a descent starts, and clearance over the reach.
@@ -80,10 +79,10 @@ def nearest_clear_position(
     of the grid is free.
     """
     limits = constraints(design, rotation)
-    lows, highs = bounds(region_of(limits))
-    if any(isinstance(limit, Never) for limit in limits) or not (lows < highs).all():
+    box = box_of(limits)
+    if box is None:
         return None
-    nodes = make_cell_grid(lows, highs, CELLS).positions.reshape(-1, 3)
+    nodes = make_cell_grid(*box, CELLS).positions.reshape(-1, 3)
     nodes = nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]
     nodes = nodes[
         (leg_clearances(Configuration(design, nodes, rotation)).clearance > 0.0).all(axis=-1)

@@ -17,9 +17,7 @@ from explorer.workspace.faces.divide import divide, find_roots
 from explorer.workspace.faces.patterns import pattern
 from explorer.workspace.faces.surfaces import Smooth, Surfaces
 from explorer.workspace.limits.constraints import Constraint, Never
-from explorer.workspace.limits.contraction import contract_box
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import bounds
+from explorer.workspace.limits.region import box_of, contract_box
 from explorer.workspace.solids.facets import Box
 
 # Distances below this share of the size of a workspace are rounding; those of roots are
@@ -85,11 +83,8 @@ def workspace_faces(limits: Sequence[Constraint]) -> Faces:
     smooth = [limit for limit in limits if not isinstance(limit, Never)]
     surfaces = Surfaces(smooth)
     names = tuple(limit.name for limit in smooth)
-    region = region_of(limits)
-    lows, highs = bounds(region)
-    ends = None
-    if not region.is_empty and (lows < highs).all():
-        ends = contract_box(limits, lows, highs)
+    box = box_of(limits)
+    ends = None if box is None else contract_box(limits, *box)
     if ends is None:
         return _finish(NOTHING, surfaces, names, 1.0)
     box = Box(*ends).surroundings(ROUNDING)

@@ -1,4 +1,10 @@
-"""Regions: intersections of limits as rows of numbers for kernels.
+"""Regions: intersections of limits as rows of numbers for kernels, and boxes around them.
+
+A circle is a row (x, y, z, radius, is_ball, side): a sphere about (x, y, z), or a cylinder along
+the x-axis through that point. Their slices at constant x are circles. The region lies inside the
+surface (side +1) or outside it (side -1). A plane is a row (x, y, z, offset): the half-space
+n·p <= offset with the normal n = (x, y, z). A cone is a row of its apex, its unit axis, the cosine
+of its half-angle, and whether it is flat: only the yz-part of a position counts for a flat one.
 
 Two limits may have the same surface (the box may start where δ3 is zero); only the tighter of
 them has a row. Planes perpendicular to x become ends of the x-range.
@@ -13,16 +19,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.columns import CONE_COLUMNS, PLANE_COLUMNS
 from explorer.workspace.limits.constraints import BallOrCylinder, Cone, Constraint, HalfSpace, Never
 
+# Columns of the rows.
+X, Y, Z = 0, 1, 2
+RADIUS, IS_BALL, SIDE = 3, 4, 5
+OFFSET, PLANE_COLUMNS = 3, 4
+AXIS_X, AXIS_Y, AXIS_Z, COSINE, IS_FLAT, CONE_COLUMNS = 3, 4, 5, 6, 7, 8
 # Surfaces that differ by less than this share of the region's size are the same.
 SAME = 1e-12
+# Approximate number of cells in each round of contracting a box, most rounds, and the share of the
+# box's volume of which a round that leaves more is the last.
+CELLS, MOST_ROUNDS, WORTH_WHILE = 4096, 60, 0.8
 
 
 @dataclass(frozen=True)
 class Region:
-    """An intersection of limits; rows are those of `explorer.workspace.limits.columns`.
+    """An intersection of limits.
 
     Attributes:
         circles: Rows of balls and cylinders, whose slices at constant x are circles, shape (n, 6).
@@ -52,16 +65,41 @@ class Region:
         return self.circles, self.planes, self.cones
 
     @property
-    def is_empty(self) -> bool:
-        """Whether the range of x or a single surface already shows that there is no volume."""
-        return self.is_flat or not self.low < self.high
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """(lows, highs) of a box that holds the region, (3,) each; lows may exceed highs."""
+        lows = np.array([self.low, -math.inf, -math.inf])
+        highs = np.array([self.high, math.inf, math.inf])
+        for limit in self.circle_limits:
+            if limit.inside:
+                start = 0 if limit.is_ball else 1
+                lows[start:] = np.maximum(lows[start:], limit.centre[start:] - limit.radius)
+                highs[start:] = np.minimum(highs[start:], limit.centre[start:] + limit.radius)
+        for row in self.planes:
+            for axis, other in ((Y, Z), (Z, Y)):
+                if row[X] == 0.0 and row[other] == 0.0:
+                    end = float(row[OFFSET] / row[axis])
+                    if row[axis] > 0.0:
+                        highs[axis] = min(float(highs[axis]), end)
+                    else:
+                        lows[axis] = max(float(lows[axis]), end)
+        return lows, highs
+
+    @property
+    def box(self) -> tuple[FloatArray, FloatArray] | None:
+        """`ends`; None if they or a single surface already show that there is no volume."""
+        lows, highs = self.ends
+        return None if self.is_flat or not (lows < highs).all() else (lows, highs)
+
+
+def box_of(limits: Sequence[Constraint]) -> tuple[FloatArray, FloatArray] | None:
+    """Return `Region.box` of the region that satisfies all limits."""
+    return region_of(limits).box
 
 
 def region_of(limits: Sequence[Constraint]) -> Region:
     """Return the region that satisfies all limits; at least one must be the inside of a ball."""
     balls = [c for c in limits if isinstance(c, BallOrCylinder)]
-    size = max(ball.radius + float(np.abs(ball.centre).max()) for ball in balls)
-    tolerance = SAME * max(size, 1e-300)
+    tolerance = SAME * max(ball.radius + float(np.abs(ball.centre).max()) for ball in balls)
     circles, is_flat = _drop_duplicates(balls, tolerance)
     low, high = -math.inf, math.inf
     low_limit: HalfSpace | None = None
@@ -139,3 +177,35 @@ def _add_plane(planes: list[HalfSpace], new: HalfSpace, tolerance: float) -> lis
             tighter = new.offset / norm < old.offset / scale - tolerance
             return [*planes[:index], new, *planes[index + 1 :]] if tighter else planes
     return [*planes, new]
+
+
+def contract_box(
+    limits: Sequence[Constraint], lows: FloatArray, highs: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return (lows, highs) of a smaller box that holds all positions within the limits, (3,) each.
+
+    The slack of a limit anywhere in a cell of the box exceeds that at its middle by half its
+    diagonal at most, so that cells are discarded with certainty. Cones are ignored. None if no
+    position of the box is within the limits.
+    """
+    for _ in range(MOST_ROUNDS):
+        size, volume = float((highs - lows).max()), float(np.prod(highs - lows))
+        edge = max(volume / CELLS, (size / CELLS) ** 3) ** (1.0 / 3.0)
+        counts = np.maximum(1, np.ceil((highs - lows) / edge)).astype(np.int64)
+        step = (highs - lows) / counts
+        cells = np.indices(tuple(counts.tolist())).reshape(3, -1).T
+        middles, half = lows + (cells + 0.5) * step, 0.5 * float(np.linalg.norm(step))
+        # Rounding must not discard a cell of which only a corner satisfies the limits.
+        half += 1e-12 * (size + float(np.abs([lows, highs]).max()))
+        for limit in limits:
+            if not isinstance(limit, Cone):
+                steepest = np.linalg.norm(limit.normal) if isinstance(limit, HalfSpace) else 1.0
+                satisfiable = limit.slack(middles) >= -half * float(steepest)
+                cells, middles = cells[satisfiable], middles[satisfiable]
+        if not len(cells):
+            return None
+        highs = lows + (cells.max(axis=0) + 1) * step
+        lows = lows + cells.min(axis=0) * step
+        if float(np.prod(highs - lows)) > WORTH_WHILE * volume:
+            break
+    return lows, highs

@@ -1,12 +1,12 @@
-"""Validity of poses: whether they satisfy all demands of a design, in compiled loops.
+"""Validity of poses: whether they satisfy all demands of a design, and which limits they violate.
 
-The demands are the limits, the home's sign triple and the clearances of all pairs of legs.
-`explorer.workspace.limits.broken` and `explorer.legs.clearance`, with which this module agrees,
-name the demands that a pose violates.
+The demands are the limits, the home's sign triple and the clearances of all pairs of legs. They
+are tested in compiled loops. `explorer.legs.clearance` names the legs that collide.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from explorer.legs.clearance import joined_pairs, radii_of_pairs
 from explorer.legs.segments import closest_shares, square_at
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import (
@@ -25,6 +26,7 @@ from explorer.numerics.arrays import (
 )
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import minus, vector
+from explorer.workspace.limits.limit import Demand
 from explorer.workspace.limits.quantities import (
     ANGLE,
     DELTA1,
@@ -36,6 +38,7 @@ from explorer.workspace.limits.quantities import (
     RADII,
     angle_at,
     quantity_at,
+    quantity_rows,
     write_ends,
 )
 from explorer.workspace.limits.table import by_quantity, demands_of, rows_of
@@ -188,3 +191,68 @@ def valid_rows(
     base, ends = np.zeros((4, 3)), np.zeros((4, 3))
     for index in range(position.shape[0]):
         valid[index] = is_valid(row, demands, position[index], rotation[index], base, ends)
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A limit that a pose violates.
+
+    Attributes:
+        demand: Range in which the limit demands a quantity.
+        value: Value of the quantity, in design units, of an angle in degrees.
+        above: Whether the value exceeds a maximum, rather than falling below a minimum.
+    """
+
+    demand: Demand
+    value: float
+    above: bool
+
+    @property
+    def limit(self) -> str:
+        """Name of the limit, such as "l1", "gap |d1 − d3|" or "swing a1"."""
+        return self.demand.name
+
+    @property
+    def bound(self) -> float:
+        """The maximum or the minimum of the value."""
+        return (self.demand.high if self.above else self.demand.low).value
+
+    def __str__(self) -> str:
+        demand = self.demand
+        value = demand.text_of(self.value, size=abs(self.bound))
+        if demand.is_sign and self.bound == 0.0:
+            sign = "negative" if self.above else "positive"
+            of = "" if demand.name.endswith(demand.symbol) else f": {demand.symbol}"
+            return f"{self.limit}{of} = {value}, but it is {sign} in the home pose"
+        relation = "above its maximum" if self.above else "below its minimum"
+        return f"{self.limit} = {value} is {relation} {demand.text_of(self.bound)}"
+
+
+def violations(
+    configuration: Configuration,
+    signs: tuple[int, int, int] | None = None,
+    order: int | None = None,
+) -> list[tuple[Violation, ...]]:
+    """Return the limits that each pose of a batch violates, in the order of the design file.
+
+    Args:
+        configuration: A design in n poses, or in one.
+        signs: Sign triple to demand instead of the home's, even if no margin is demanded.
+        order: Sign of d3 − d1 to demand, 0 for either; the design's if None.
+    """
+    design = configuration.design
+    demands, row = demands_of(design, signs, order), configuration.variables
+    rows = rows_of(design, demands)
+    values = np.empty((len(configuration.positions), len(demands)))
+    poses = configuration.positions, configuration.rotations
+    quantity_rows(len(values), row, rows, *poses, values)
+    lows, highs = rows[:, LOW], rows[:, HIGH]
+    beyond = np.greater(values, highs) * 1 - np.less(values, lows)
+    return [
+        tuple(
+            Violation(demand, math.degrees(value) if demand.angle else value, above=side > 0)
+            for demand, value, side in zip(demands, row, sides, strict=True)
+            if side
+        )
+        for row, sides in zip(values.tolist(), beyond.tolist(), strict=True)
+    ]

@@ -61,7 +61,7 @@ def orientation_share(
 ) -> OrientationShare:
     """Return the share of all orientations that a position can have within the limits.
 
-    The limits are those of `explorer.workspace.limits.broken.violations`: lengths, guide, gap,
+    The limits are those of `explorer.workspace.limits.valid_poses.violations`: lengths, guide, gap,
     carriage order, box, margins with the home's sign triple, and swing demands.
 
     Args:
@@ -124,7 +124,7 @@ def orientations_within(
 ) -> BoolArray:
     """Return which orientations a position can have within all limits, shape (n,).
 
-    The limits are those of `explorer.workspace.limits.broken.violations`: lengths, guide, gap,
+    The limits are those of `explorer.workspace.limits.valid_poses.violations`: lengths, guide, gap,
     carriage order, box, margins with the home's sign triple, and swing demands.
 
     Args:

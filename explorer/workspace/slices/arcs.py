@@ -4,7 +4,7 @@ A slice at constant x is bounded by circles and lines only, so Green's theorem g
 area in closed form, arc by arc. The lengths and moments of the arcs give the gradient:
 a boundary that moves sweeps area at the rate of its length.
 
-Circles and planes are rows of `explorer.workspace.limits.columns`. No two rows may describe the
+Circles and planes are rows of `explorer.workspace.limits.region`. No two rows may describe the
 same surface.
 """
 
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
-from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
+from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
 
 TWO_PI = 2.0 * math.pi
 # Columns of a forbidden arc: angles on a circle, or lengths along a line.

@@ -3,7 +3,7 @@
 Only points on the boundary of the region count; elsewhere surfaces may meet without effect.
 Rounding may move a point off the surfaces that it was computed from, so it may violate limits by
 a slack. The slack is wide, since one break too many costs time and one too few makes the volume
-wrong. Circles and planes are rows of `explorer.workspace.limits.columns`.
+wrong. Circles and planes are rows of `explorer.workspace.limits.region`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper
-from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
+from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
 
 # A point that violates a limit by less than this share of the region's size may lie on it.
 NEAR = 1e-7

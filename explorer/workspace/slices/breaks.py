@@ -2,7 +2,7 @@
 
 Between two breaks the area of the slices is analytic. A break is at a pole of a sphere, where
 two curves of the slices touch, or at a vertex, where three surfaces meet. Circles and planes are
-rows of `explorer.workspace.limits.columns`.
+rows of `explorer.workspace.limits.region`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
-from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, X, Y, Z
+from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, X, Y, Z
 from explorer.workspace.slices.break_points import (
     Boundary,
     add_break,

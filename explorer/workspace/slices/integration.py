@@ -4,7 +4,7 @@ The area of the slices is integrated along x, piece by piece between its breaks,
 Gauss-Legendre quadrature. It converges to rounding, since the area is analytic on each piece. The
 rate of convergence depends on singularities just beyond the piece, so the piece with the largest
 error is halved until the estimated error of all pieces is rounding. Circles and planes are rows
-of `explorer.workspace.limits.columns`.
+of `explorer.workspace.limits.region`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
+from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
 from explorer.workspace.slices.arcs import LENGTH, MOMENT_Y, MOMENT_Z, Slicer, slice_area
 from explorer.workspace.slices.break_points import region_size
 from explorer.workspace.slices.breaks import find_breaks

@@ -1,6 +1,6 @@
 """Kernels over single positions (node counts) and over columns of them (volumes within cones).
 
-Circles, planes and cones are rows of `explorer.workspace.limits.columns`.
+Circles, planes and cones are rows of `explorer.workspace.limits.region`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.workspace.limits.columns import (
+from explorer.workspace.limits.region import (
     AXIS_X,
     AXIS_Y,
     AXIS_Z,

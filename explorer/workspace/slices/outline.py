@@ -15,19 +15,21 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace, constraints
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.axes import axes_of_slice
-from explorer.workspace.slices.volume import bounds
+from explorer.workspace.limits.region import box_of
 
 # Shares of the size of the region: curves that differ by less than SAME are the same, ends of edges
 # closer than CORNER are one corner, and edges shorter than SHORT are dropped.
 SAME = 1e-11
 CORNER = 1e-6
 SHORT = 1e-9
+
+AXES = "xyz"
+"""The axes across which a slice can be cut."""
 
 Point: TypeAlias = tuple[float, float]
 
@@ -126,16 +128,18 @@ def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) 
     Raises:
         InputError: no such axis, or not a rotation.
     """
-    axes = axes_of_slice(axis)
+    if axis not in AXES or len(axis) != 1:
+        raise InputError(f"a slice is cut across x, y or z; got {axis!r}")
+    cut = AXES.index(axis)
+    axes = cut, *(other for other in range(3) if other != cut)
     limits = constraints(design, checked_rotation(rotation))
     if any(isinstance(limit, Cone) for limit in limits):
         return None
     empty = Outline(axis, level, ())
-    region = region_of(limits)
-    lows, highs = bounds(region)
-    if region.is_empty or not (lows < highs).all():
+    box = box_of(limits)
+    if box is None:
         return empty
-    size = float(max(np.abs(lows).max(), np.abs(highs).max()))
+    size = float(np.abs(box).max())
     curves: list[_Curve] = []
     for limit_index, limit in enumerate(limits):
         if not isinstance(limit, BallOrCylinder | HalfSpace):
@@ -152,7 +156,7 @@ def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) 
 
 
 def _curves_of(
-    limit: BallOrCylinder | HalfSpace, axes: tuple[int, int, int], level: float, limit_index: int
+    limit: BallOrCylinder | HalfSpace, axes: tuple[int, ...], level: float, limit_index: int
 ) -> list[_Curve] | None:
     """Return the curves in which a plane cuts a limit surface; None if the limit holds nowhere."""
     cut, first, second = axes

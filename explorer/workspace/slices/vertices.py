@@ -4,7 +4,7 @@ Two planes meet in a line, and two cylinders, or a cylinder and a plane along x,
 along x. Their intersections with a third surface have closed forms. Two spheres, or a sphere and
 a plane, meet in a circle, whose intersections with a plane or a sphere have closed forms too, and
 those with a cylinder are roots of a quartic. Circles and planes are rows of
-`explorer.workspace.limits.columns`; a line is (x, y, z, axis), a point and a unit direction.
+`explorer.workspace.limits.region`; a line is (x, y, z, axis), a point and a unit direction.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
-from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, X, Y, Z
+from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, X, Y, Z
 from explorer.workspace.slices.break_points import (
     Boundary,
     add_break,

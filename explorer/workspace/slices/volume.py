@@ -20,13 +20,11 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.columns import OFFSET, X, Y, Z
+from explorer.numerics.checks import positive
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
-    Cone,
     Constraint,
     HalfSpace,
-    Never,
     constraints,
 )
 from explorer.workspace.limits.region import Region, region_of
@@ -174,19 +172,15 @@ def node_step_of(design: Design, step: float | None = None) -> float:
         InputError: the step is not positive.
     """
     width = step if step is not None else design.node_step or design.reach / STEPS_IN_REACH
-    if not (math.isfinite(width) and width > 0.0):
-        raise InputError(f"the node step must be positive; got {width:g}")
-    return width
+    return positive("the node step", width)
 
 
 def node_range(region: Region, step: float) -> tuple[FloatArray, FloatArray]:
     """Return the index of the first node and the number of nodes around a region, each (3,)."""
-    lows, highs = _bounding_box(region)
+    lows, highs = region.ends
     # Nodes on a boundary count, so the grid must not lose one to rounding.
-    # A tiny step overflows; `check_node_count` refuses such a count.
-    with np.errstate(over="ignore", invalid="ignore"):
-        first = np.ceil(lows / step - 1e-9)
-        return first, np.maximum(0.0, np.floor(highs / step + 1e-9) - first + 1.0)
+    first = np.ceil(lows / step - 1e-9)
+    return first, np.maximum(0.0, np.floor(highs / step + 1e-9) - first + 1.0)
 
 
 def check_node_count(counts: FloatArray, step: float, most: int) -> None:
@@ -195,45 +189,13 @@ def check_node_count(counts: FloatArray, step: float, most: int) -> None:
     Raises:
         InputError: the grid has too many nodes.
     """
-    with np.errstate(over="ignore"):
-        count = float(np.prod(counts))
-    if not math.isfinite(count):
-        raise InputError(f"a node step of {step:g} is too small for any grid; leave it out")
+    count = float(np.prod(counts))
     if count > most:
         coarsest = step * (count / most) ** (1.0 / 3.0)
         raise InputError(
             f"a node step of {step:g} makes {count:.3g} nodes; at most {most:,} are counted, "
             f"which takes a step of about {coarsest:.2g} or more"
         )
-
-
-def bounds(region: Region) -> tuple[FloatArray, FloatArray]:
-    """Return (lows, highs) of a box that holds a region, each (3,), in design units.
-
-    The box need not be the tightest. If the region has no volume, a low may exceed its high.
-    """
-    lows, highs = _bounding_box(region)
-    return (lows, np.full(3, -math.inf)) if region.is_flat else (lows, highs)
-
-
-def _bounding_box(region: Region) -> tuple[FloatArray, FloatArray]:
-    """Return (lows, highs) of a box that holds a region, even if the region is a surface."""
-    lows = np.array([region.low, -math.inf, -math.inf])
-    highs = np.array([region.high, math.inf, math.inf])
-    for limit in region.circle_limits:
-        if limit.inside:
-            start = 0 if limit.is_ball else 1
-            lows[start:] = np.maximum(lows[start:], limit.centre[start:] - limit.radius)
-            highs[start:] = np.minimum(highs[start:], limit.centre[start:] + limit.radius)
-    for row in region.planes:
-        for axis, other in ((Y, Z), (Z, Y)):
-            if row[X] == 0.0 and row[other] == 0.0:
-                end = float(row[OFFSET] / row[axis])
-                if row[axis] > 0.0:
-                    highs[axis] = min(float(highs[axis]), end)
-                else:
-                    lows[axis] = max(float(lows[axis]), end)
-    return lows, highs
 
 
 @cache
@@ -249,8 +211,7 @@ def quadrature() -> FloatArray:
 
 
 def _volume_of_slices(region: Region) -> tuple[float, float, dict[str, float]]:
-    lows, highs = bounds(region)
-    if region.is_empty or not (lows < highs).all():
+    if region.box is None:
         return 0.0, 0.0, {}
     surfaces = (*region.circle_limits, *region.plane_limits)
     if len(surfaces) > MOST_SURFACES:
@@ -278,9 +239,10 @@ def _volume_of_slices(region: Region) -> tuple[float, float, dict[str, float]]:
 
 
 def _volume_of_columns(region: Region, columns: int = COLUMNS) -> tuple[float, float]:
-    lows, highs = bounds(region)
-    if region.is_empty or not (lows < highs).all():
+    box = region.box
+    if box is None:
         return 0.0, 0.0
+    lows, highs = box
     volumes: list[float] = []
     for per_axis in (columns // 2, columns):
         total = np.zeros(1)
@@ -297,12 +259,15 @@ def find_emptying_limits(limits: Sequence[Constraint]) -> tuple[str, ...]:
     limit, they are a set that empties the workspace together, of which none can be left out.
     """
     names = tuple(dict.fromkeys(limit.name for limit in limits))
-    surrounding_ball = _surroundings(limits)
+    # A region must be bounded; this ball is far around all limits.
+    sizes = [float(limit.distance(np.zeros(3))) for limit in limits]
+    sizes += [2.0 * limit.radius for limit in limits if isinstance(limit, BallOrCylinder)]
+    radius = SURROUNDINGS * max(size for size in sizes if size < math.inf)
+    surroundings = BallOrCylinder("", np.zeros(3), radius, is_ball=True, inside=True)
 
     def is_empty(chosen: Collection[str]) -> bool:
-        return not _has_volume(
-            [*(limit for limit in limits if limit.name in chosen), surrounding_ball]
-        )
+        rest = [*(limit for limit in limits if limit.name in chosen), surroundings]
+        return volume_within(region_of(rest), COARSE_COLUMNS)[0] <= 0.0
 
     sufficient = tuple(name for name in names if not is_empty({*names} - {name}))
     if sufficient:
@@ -312,23 +277,3 @@ def find_emptying_limits(limits: Sequence[Constraint]) -> tuple[str, ...]:
         if is_empty(needed - {name}):
             needed.remove(name)
     return tuple(name for name in names if name in needed)
-
-
-def _has_volume(limits: Sequence[Constraint]) -> bool:
-    return volume_within(region_of(limits), COARSE_COLUMNS)[0] > 0.0
-
-
-def _surroundings(limits: Sequence[Constraint]) -> BallOrCylinder:
-    """Return a ball far around all limits, since a region must be bounded."""
-    sizes = [1e-300]
-    for limit in limits:
-        match limit:
-            case BallOrCylinder():
-                sizes.append(limit.radius + float(np.abs(limit.centre).max()))
-            case HalfSpace():
-                sizes.append(abs(limit.offset) / float(np.linalg.norm(limit.normal)))
-            case Cone():
-                sizes.append(float(np.abs(limit.apex).max()))
-            case Never():
-                pass
-    return BallOrCylinder("", np.zeros(3), SURROUNDINGS * max(sizes), is_ball=True, inside=True)

@@ -17,9 +17,7 @@ import numpy as np
 from explorer.errors import InputError
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import BallOrCylinder, Cone, Constraint, HalfSpace
-from explorer.workspace.limits.contraction import contract_box
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import bounds
+from explorer.workspace.limits.region import box_of, contract_box, region_of
 from explorer.workspace.solids.facets import (
     Box,
     Facets,
@@ -124,7 +122,7 @@ def frame_of(
     """
     if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
         raise InputError(f"the tolerance must be positive; got {tolerance:g}")
-    boxes = [box for box in map(_box_of, families) if box is not None]
+    boxes = [box for box in map(box_of, families) if box is not None]
     # If all workspaces are empty, any frame will do.
     lows = np.min([low for low, _ in boxes], axis=0) if boxes else np.zeros(3)
     highs = np.max([high for _, high in boxes], axis=0) if boxes else np.full(3, reach)
@@ -147,10 +145,10 @@ def primitives_of(
     The list is empty if the boxes around the primitives already show that the workspace is. If the
     frame is contracted, its box holds this workspace more tightly than the box of its region.
     """
-    ends = _box_of(limits)
+    region = region_of(limits)
+    ends = region.box
     if ends is None:
         return []
-    region = region_of(limits)
     box = frame.box if contracted else Box(frame.to_frame(ends[0]), frame.to_frame(ends[1]))
     # The box ends on surfaces of limits, to rounding. The block extends beyond them, so that
     # rounding does not decide whether all of the block satisfies a limit.
@@ -171,12 +169,6 @@ def primitives_of(
         if primitive is not True:
             primitives.append(primitive)
     return primitives
-
-
-def _box_of(limits: Sequence[Constraint]) -> tuple[FloatArray, FloatArray] | None:
-    region = region_of(limits)
-    lows, highs = bounds(region)
-    return None if region.is_empty or not (lows < highs).all() else (lows, highs)
 
 
 def _half_space(plane: HalfSpace, box: Box, block: Box, frame: Frame) -> Primitive | bool:

@@ -18,7 +18,7 @@ from explorer.app.widgets.commands import Key
 from explorer.app.widgets.markup import box
 from explorer.mechanism.margins import mode_name
 from explorer.numerics.number_text import format_fitted
-from explorer.workspace.limits.broken import Violation
+from explorer.workspace.limits.valid_poses import Violation
 
 MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
 """The modes by number and sign triple, as in lists and beside ghosts."""
