@@ -17,13 +17,13 @@ from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.table import CARRIAGE_ORDER
-from explorer.workspace.orientations.connected import is_connected
 from explorer.workspace.orientations.share import (
     orientation_capability,
     orientations_within,
 )
 from explorer.workspace.orientations.tilts import greatest_tilt, greatest_tilts, tilt_map
 from explorer.workspace.orientations.torsions import (
+    is_connected,
     tilt_by_torsion,
     torsion_range,
 )

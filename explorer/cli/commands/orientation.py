@@ -46,10 +46,13 @@ class Orientation(JsonOptions, PointOptions, DesignOptions):
 
     def run(self) -> None:
         """Write the measures of the orientations."""
-        from explorer.workspace.orientations.connected import is_connected
         from explorer.workspace.orientations.share import orientation_share
         from explorer.workspace.orientations.tilts import greatest_tilt, tilt_map
-        from explorer.workspace.orientations.torsions import tilt_by_torsion, torsion_range
+        from explorer.workspace.orientations.torsions import (
+            is_connected,
+            tilt_by_torsion,
+            torsion_range,
+        )
 
         design = self.read_design()
         home, tool = design.home_pose, self.tool(design)

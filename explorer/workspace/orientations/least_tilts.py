@@ -10,8 +10,8 @@ from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector
 from explorer.workspace.limits.quantities import A3, D1, HIGH, L1, LOW, QUANTITY, X
-from explorer.workspace.orientations.turn_polynomials import SCRATCH, arm_of, write_tilt
-from explorer.workspace.orientations.turns import HALF_TURN, NO_LIMIT, first_limit
+from explorer.workspace.orientations.turn_polynomials import SCRATCH, TurnSearch, arm_of
+from explorer.workspace.orientations.turns import NO_LIMIT, tilt_in
 
 # Share of a bracket that the search by the golden section keeps.
 GOLDEN_SECTION = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -24,62 +24,27 @@ WORST = 20
 
 
 @helper
-def tilt_in(
-    row: FloatArray,
-    demands: FloatArray,
-    p: FloatArray,
-    tool: FloatArray,
-    azimuth: float,
-    torsion: float,
-    turn: FloatArray,
-    scratch: FloatArray,
-) -> tuple[float, int]:
-    """Return the greatest tilt of a position in one azimuth and its limit, in radians."""
-    write_tilt(azimuth, torsion, turn)
-    return first_limit(row, demands, p, tool, turn, HALF_TURN, scratch)
-
-
-@helper
 def lowest_about(
-    row: FloatArray,
-    demands: FloatArray,
-    p: FloatArray,
-    tool: FloatArray,
-    torsion: float,
-    bracket: tuple[float, float, float],
-    width: float,
-    turn: FloatArray,
-    scratch: FloatArray,
+    search: TurnSearch, torsion: float, bracket: tuple[float, float, float], width: float
 ) -> tuple[float, float, int]:
     """Return the least of the greatest tilts about an azimuth, its own azimuth and its limit.
 
-    The search by the golden section keeps the lowest azimuth that it knows within the bracket, so
-    it does not leave a dip that the first azimuth lies in.
-
-    Args:
-        row: Row of `Rules`.
-        demands: Demands of `Rules`.
-        p: Position of the tool, shape (3,).
-        tool: Tool point in platform coordinates, shape (3,).
-        torsion: Torsion in radians.
-        bracket: Low end, first azimuth and high end, in radians.
-        width: Width of the bracket at which the search ends, in radians.
-        turn: Scratch array, shape (3, 3, 3).
-        scratch: Array of the shape `SCRATCH`.
+    The bracket is a low end, the azimuth and a high end, in radians. The search by the golden
+    section keeps the lowest azimuth that it knows within it, until it is as narrow as a width.
     """
     low, first, high = bracket
     second = first + (1.0 - GOLDEN_SECTION) * (high - first)
-    at_first, limit_first = tilt_in(row, demands, p, tool, first, torsion, turn, scratch)
-    at_second, limit_second = tilt_in(row, demands, p, tool, second, torsion, turn, scratch)
+    at_first, limit_first = tilt_in(search, first, torsion)
+    at_second, limit_second = tilt_in(search, second, torsion)
     while high - low > width:
         if at_first <= at_second:
             high, second, at_second, limit_second = second, first, at_first, limit_first
             first = GOLDEN_SECTION * second + (1.0 - GOLDEN_SECTION) * low
-            at_first, limit_first = tilt_in(row, demands, p, tool, first, torsion, turn, scratch)
+            at_first, limit_first = tilt_in(search, first, torsion)
         else:
             low, first, at_first, limit_first = first, second, at_second, limit_second
             second = GOLDEN_SECTION * first + (1.0 - GOLDEN_SECTION) * high
-            at_second, limit_second = tilt_in(row, demands, p, tool, second, torsion, turn, scratch)
+            at_second, limit_second = tilt_in(search, second, torsion)
     if at_first <= at_second:
         return at_first, first, limit_first
     return at_second, second, limit_second
@@ -112,30 +77,13 @@ def bounds_of(demands: FloatArray, kind: int) -> tuple[float, float]:
 
 
 @helper
-def write_worst_azimuths(
-    row: FloatArray,
-    demands: FloatArray,
-    p: FloatArray,
-    tool: FloatArray,
-    torsion: float,
-    worst: FloatArray,
-) -> int:
+def write_worst_azimuths(search: TurnSearch, torsion: float, worst: FloatArray) -> int:
     """Write the azimuths of tilts to which lengths, carriages and b4 in the box are at extremes.
 
     Only those that violate a bound count. Beyond such a bound the region of tilts may be small, so
-    that azimuths at equal distances pass by it.
-
-    Args:
-        row: Row of `Rules`.
-        demands: Demands of `Rules`.
-        p: Position of the tool, shape (3,).
-        tool: Tool point in platform coordinates, shape (3,).
-        torsion: Torsion in radians.
-        worst: Azimuths in radians, shape (`WORST`,).
-
-    Returns:
-        The number of azimuths.
+    that azimuths at equal distances pass by it. Return their number, `WORST` at most.
     """
+    row, demands, p, tool = search.row, search.demands, search.p, search.tool
     count = 0
     c, s = math.cos(torsion), math.sin(torsion)
     for leg in range(4):
@@ -216,8 +164,8 @@ def least_tilt_rows(
         demands: Demands of `Rules`.
         positions: Positions of the tool, shape (n, 3).
         tool: Tool point in platform coordinates, shape (3,).
-        torsions: Torsion of each position in radians, shape (n,).
-        azimuths: Azimuths in radians at equal distances once around, shape (m,).
+        torsions: Torsion of each position, shape (n,).
+        azimuths: Azimuths at equal distances once around, shape (m,).
         tilts: Scratch array, shape (m,).
         least: Least tilt of each position, negative where tilt zero violates a limit, shape (n,).
         towards: Azimuth of the least tilt, shape (n,).
@@ -227,10 +175,11 @@ def least_tilt_rows(
     count = azimuths.shape[0]
     step = 2.0 * math.pi / count
     for index in range(positions.shape[0]):
-        p, torsion = positions[index], torsions[index]
-        best, towards[index], limits[index] = HALF_TURN, 0.0, NO_LIMIT
+        search = TurnSearch(row, demands, positions[index], tool, turn, scratch)
+        torsion = torsions[index]
+        best, towards[index], limits[index] = math.pi, 0.0, NO_LIMIT
         for k in range(count):
-            tilts[k], limit = tilt_in(row, demands, p, tool, azimuths[k], torsion, turn, scratch)
+            tilts[k], limit = tilt_in(search, azimuths[k], torsion)
             if tilts[k] < best:
                 best, towards[index], limits[index] = tilts[k], azimuths[k], limit
             if best < 0.0:
@@ -248,22 +197,18 @@ def least_tilt_rows(
             if not is_lowest or tilts[k] - 0.25 * rise > best:
                 continue
             bracket = (azimuths[k] - step, azimuths[k], azimuths[k] + step)
-            found, azimuth, limit = lowest_about(
-                row, demands, p, tool, torsion, bracket, AZIMUTH_WIDTH, turn, scratch
-            )
+            found, azimuth, limit = lowest_about(search, torsion, bracket, AZIMUTH_WIDTH)
             if found < best:
                 best, towards[index], limits[index] = found, azimuth, limit
-        for k in range(write_worst_azimuths(row, demands, p, tool, torsion, worst)):
+        for k in range(write_worst_azimuths(search, torsion, worst)):
             place = (worst[k] - azimuths[0]) % (2.0 * math.pi)
             left = int(place / step) % count
-            tilt, _ = tilt_in(row, demands, p, tool, worst[k], torsion, turn, scratch)
+            tilt, _ = tilt_in(search, worst[k], torsion)
             if not (tilt < tilts[left] and tilt < tilts[(left + 1) % count]):
                 continue
             low = worst[k] - (place - left * step)
             bracket = (low, worst[k], low + step)
-            found, azimuth, limit = lowest_about(
-                row, demands, p, tool, torsion, bracket, NARROW_WIDTH, turn, scratch
-            )
+            found, azimuth, limit = lowest_about(search, torsion, bracket, NARROW_WIDTH)
             if found < best:
                 best, towards[index], limits[index] = found, azimuth, limit
         least[index] = best

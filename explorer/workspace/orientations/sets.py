@@ -1,4 +1,4 @@
-"""Sets of orientations: a range of yaw, pitch and roll, or a cone of tilts."""
+"""Sets of orientations: a range of yaw, pitch and roll, or a cone of tilts; checks of angles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 from explorer.errors import InputError
 from explorer.mechanism.pose import checked_rotation, rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray, finite_array
-from explorer.workspace.orientations.inputs import whole_number
 
 MOST_ORIENTATIONS = 1_000_000
 """Largest number of orientations in a set."""
@@ -24,19 +23,17 @@ GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 def yaw_pitch_roll_range(
     lows: Sequence[float], highs: Sequence[float], counts: Sequence[int]
 ) -> FloatArray:
-    """Return the orientations of a grid over ranges of yaw, pitch and roll.
+    """Return the orientations of a grid over ranges of yaw, pitch and roll, (n, 3, 3).
+
+    The yaw is outermost.
 
     Args:
         lows: Least yaw, pitch and roll, in degrees.
         highs: Largest yaw, pitch and roll, in degrees.
         counts: Numbers of values on the ranges, ends included; a single one is the middle.
 
-    Returns:
-        Rotations from platform to base, shape (n, 3, 3), yaw outermost.
-
     Raises:
-        InputError: not three of each, a reversed range, a count that is not positive, or too
-            many orientations.
+        InputError: not three of each, a reversed range, or no usable number of orientations.
     """
     low, high = finite_array("lows", lows, (3,)), finite_array("highs", highs, (3,))
     if low.ndim != 1 or high.ndim != 1 or len(counts) != 3:
@@ -53,7 +50,7 @@ def yaw_pitch_roll_range(
 
 
 def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> FloatArray:
-    """Return orientations that tilt a platform in all directions up to a half-angle.
+    """Return orientations that tilt a platform in all directions up to a half-angle, (count, 3, 3).
 
     Each tilt turns the platform's z-axis along the shortest arc, without torsion. The tilted
     axes are spread evenly over the cone, the first at its centre, the last on its rim.
@@ -62,9 +59,6 @@ def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> Fl
         rotation: Rotation from platform to base without tilt, shape (3, 3).
         half_angle: Half-angle of the cone in degrees, 0 to 180.
         count: Number of orientations.
-
-    Returns:
-        Rotations from platform to base, shape (count, 3, 3).
 
     Raises:
         InputError: not a rotation, a half-angle out of its range, or no usable count.
@@ -83,3 +77,58 @@ def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> Fl
 
 def _check_count(name: str, count: int) -> None:
     whole_number(name, count, 1, MOST_ORIENTATIONS)
+
+
+# Largest number of azimuths or torsions.
+MOST_ANGLES = 100_000
+
+
+def one_position(position: ArrayLike) -> FloatArray:
+    """Return one position (3,) after checking it.
+
+    Raises:
+        InputError: The position is not finite, or there are several.
+    """
+    p = finite_array("position", position, (3,))
+    if p.ndim != 1:
+        raise InputError(f"give one position, three numbers; got the shape {p.shape}")
+    return p
+
+
+def one_angle(name: str, angle: ArrayLike) -> float:
+    """Return one angle after checking it.
+
+    Raises:
+        InputError: The angle is not finite, or there are several.
+    """
+    value = finite_array(name, angle, ())
+    if value.ndim:
+        raise InputError(f"give one {name}, a number; got the shape {value.shape}")
+    return float(value)
+
+
+def whole_number(name: str, value: ArrayLike, least: int, most: int | None = None) -> int:
+    """Return a whole number from `least` to `most` after checking it; 3.0 counts as whole.
+
+    Raises:
+        InputError: The value is not one whole number, or beyond the bounds.
+    """
+    array = np.asarray(value)
+    if not (array.ndim == 0 and array.dtype.kind in "iuf" and float(array).is_integer()):
+        raise InputError(f"{name} must be a whole number; got {value}")
+    number = int(array)
+    if number < least and most is None:
+        raise InputError(f"{name} must be at least {least}; got {number}")
+    if number < least or (most is not None and number > most):
+        raise InputError(f"{name} must lie within {least} to {most:,}; got {number}")
+    return number
+
+
+def even_angles(name: str, count: ArrayLike, fewest: int = 3) -> FloatArray:
+    """Return angles in degrees at equal distances once around from 0 on, shape (count,).
+
+    Raises:
+        InputError: Not a whole number, or too few or too many angles.
+    """
+    number = whole_number(f"the number of {name}", count, fewest, MOST_ANGLES)
+    return np.asarray(np.arange(number) * (360.0 / number), dtype=np.float64)

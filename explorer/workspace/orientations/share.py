@@ -24,8 +24,7 @@ from explorer.mechanism.tool_point import one_tool, tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import kernel
 from explorer.workspace.limits.valid_poses import Rules, is_valid, valid_rows
-from explorer.workspace.orientations.inputs import one_position, whole_number
-from explorer.workspace.orientations.sets import MOST_ORIENTATIONS
+from explorer.workspace.orientations.sets import MOST_ORIENTATIONS, one_position, whole_number
 
 CAPABILITY_ORIENTATIONS = 100_000
 """Number of orientations that gives the share at a position to about a thousandth."""
@@ -59,22 +58,10 @@ def orientation_share(
     seed: int = 0,
     tool: ArrayLike | None = None,
 ) -> OrientationShare:
-    """Return the share of all orientations that a position can have within the limits.
+    """Return the share of all orientations that a position can have, of n that stand for all.
 
-    The limits are those of `explorer.workspace.limits.valid_poses.violations`: lengths, guide, gap,
-    carriage order, box, margins with the home's sign triple, and swing demands.
-
-    Args:
-        design: The manipulator.
-        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
-        n: Number of orientations.
-        seed: Seed of the random rotations; the same seed gives the same result.
-        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
-            design units; None for b4.
-
-    Raises:
-        InputError: not a position or a tool point, no usable number of orientations, or no usable
-            seed.
+    The same seed of the random rotations gives the same result. Limits, position, tool and errors
+    are those of `orientations_within`.
     """
     p, t = one_position(position), one_tool(tool)
     n = whole_number("the number of orientations", n, 2, MOST_ORIENTATIONS)
@@ -122,20 +109,11 @@ def orientation_capability(
 def orientations_within(
     design: Design, position: ArrayLike, rotations: ArrayLike, tool: ArrayLike | None = None
 ) -> BoolArray:
-    """Return which orientations a position can have within all limits, shape (n,).
+    """Return which rotations (n, 3, 3) a position can have within the limits, shape (n,).
 
     The limits are those of `explorer.workspace.limits.valid_poses.violations`: lengths, guide, gap,
-    carriage order, box, margins with the home's sign triple, and swing demands.
-
-    Args:
-        design: The manipulator.
-        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
-        rotations: Rotations from platform to base, shape (n, 3, 3).
-        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
-            design units; None for b4.
-
-    Raises:
-        InputError: not a position, not rotations, or not a tool point.
+    carriage order, box, margins with the home's sign triple, and swing demands. Position, tool and
+    errors are those of `orientation_capability`.
     """
     p, r, t = one_position(position), checked_rotation(rotations), one_tool(tool)
     if r.ndim != 3 or not len(r):

@@ -20,13 +20,13 @@ from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.mechanism.tool_point import one_tool
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
 from explorer.workspace.limits.valid_poses import Rules
-from explorer.workspace.orientations.inputs import (
+from explorer.workspace.orientations.least_tilts import least_tilt_rows
+from explorer.workspace.orientations.sets import (
     MOST_ANGLES,
     even_angles,
     one_angle,
     one_position,
 )
-from explorer.workspace.orientations.least_tilts import least_tilt_rows
 from explorer.workspace.orientations.turns import NO_LIMIT, limit_names, tilt_rows
 
 AZIMUTHS = 72
@@ -85,17 +85,8 @@ def tilt_map(
 ) -> TiltMap:
     """Return the greatest tilt of a position in each azimuth, and the limit that ends it.
 
-    Args:
-        design: The manipulator.
-        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
-        torsion: Torsion in degrees; that of the home pose if None.
-        azimuths: Azimuths in degrees, shape (n,), or their number, at equal distances from 0 on.
-        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
-            design units; None for b4.
-
-    Raises:
-        InputError: not a position or a tool point, angles that are not finite, or no usable
-            number of azimuths.
+    The azimuths are in degrees, shape (n,), or their number, at equal distances from 0 on. The
+    other arguments and the errors are those of `greatest_tilt`.
     """
     p, sigma = one_position(position), checked_torsion(design, torsion)
     array = np.asarray(azimuths)
@@ -108,20 +99,20 @@ def tilt_map(
                 f"azimuths must be 1 to {MOST_ANGLES:,} angles; got the shape {directions.shape}"
             )
     count = len(directions)
-    tilts, limits = np.empty((1, count)), np.empty((1, count), dtype=np.int64)
+    tilts, limits = np.empty(count), np.empty(count, dtype=np.int64)
     rules = Rules.of(design).without_clearances()
     tilt_rows(
         ROWS_OF_TURN * count,
         rules.row,
         rules.demands,
-        for_kernel(p[None]),
+        for_kernel(p),
         one_tool(tool),
         math.radians(sigma),
         np.radians(directions),
         tilts,
         limits,
     )
-    return TiltMap(sigma, directions, in_degrees(tilts[0]), names_of(design, limits[0].tolist()))
+    return TiltMap(sigma, directions, in_degrees(tilts), names_of(design, limits.tolist()))
 
 
 def greatest_tilt(
@@ -173,12 +164,10 @@ def greatest_tilts(
         position: Positions of b4 or the tool in the base frame, in design units, shape (..., 3).
         torsion: Torsions in degrees, shape (...); that of the home pose if None.
         azimuths: Number of azimuths from which the least tilt is searched, 3 or more.
-        tool: Point of the platform that has the positions, in the platform frame, shape (3,), in
-            design units; None for b4.
+        tool: As in `greatest_tilt`.
 
     Raises:
-        InputError: not positions or a tool point, torsions that are not finite or do not broadcast
-            with the positions, or no usable number of azimuths.
+        InputError: as there, or positions and torsions that do not broadcast.
     """
     p = finite_array("position", position, (3,))
     sigma = np.asarray(checked_torsion(design, None))
@@ -197,11 +186,7 @@ def greatest_tilts(
 
 
 def checked_torsion(design: Design, torsion: float | None) -> float:
-    """Return a torsion in degrees after checking it; that of the home pose if None.
-
-    Raises:
-        InputError: The torsion is not finite, or there are several.
-    """
+    """Return one torsion in degrees after checking it; that of the home pose if None."""
     if torsion is None:
         return tilt_torsion_of(design.home_pose.rotation).torsion
     return one_angle("torsion", torsion)

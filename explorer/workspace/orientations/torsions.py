@@ -1,18 +1,20 @@
-"""The torsions that a position can have, and the greatest tilt at each of them."""
+"""The torsions that a position can have, the greatest tilt at each of them, and connections."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
+from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion, tilt_torsion_of
 from explorer.mechanism.tool_point import one_tool
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, for_kernel
 from explorer.workspace.limits.valid_poses import Rules
-from explorer.workspace.orientations.inputs import even_angles, one_angle, one_position
+from explorer.workspace.orientations.sets import even_angles, one_angle, one_position
 from explorer.workspace.orientations.tilts import (
     AZIMUTHS_OF_ONE,
     GreatestTilt,
@@ -21,6 +23,7 @@ from explorer.workspace.orientations.tilts import (
     greatest_tilts,
     in_degrees,
     names_of,
+    tilt_map,
 )
 from explorer.workspace.orientations.turns import turn_rows
 
@@ -76,17 +79,8 @@ def torsion_range(
 ) -> TorsionRange:
     """Return the torsions that a position can have without a gap from one torsion, at a tilt.
 
-    Args:
-        design: The manipulator.
-        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
-        torsion: Torsion in degrees that the range starts from; that of the home pose if None.
-        azimuth: Azimuth in degrees, which stays the same.
-        tilt: Tilt in degrees, which stays the same.
-        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
-            design units; None for b4.
-
-    Raises:
-        InputError: not a position, not a tool point, or angles that are not finite.
+    The azimuth and the tilt, in degrees, stay the same. The range starts from the torsion. Other
+    arguments and errors are those of `greatest_tilt`.
     """
     p, sigma = one_position(position), checked_torsion(design, torsion)
     r = rotation_from_tilt_torsion([one_angle("azimuth", azimuth), one_angle("tilt", tilt), sigma])
@@ -119,19 +113,10 @@ def tilt_by_torsion(
     torsions: int = TORSIONS,
     tool: ArrayLike | None = None,
 ) -> TiltByTorsion:
-    """Return the greatest tilt in every azimuth of a position at torsions once around.
+    """Return the greatest tilt in every azimuth of a position at a number of torsions once around.
 
-    The best of them is searched between the neighbours of the best one of the row.
-
-    Args:
-        design: The manipulator.
-        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
-        torsions: Number of torsions, 3 or more.
-        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
-            design units; None for b4.
-
-    Raises:
-        InputError: not a position, not a tool point, or no usable number of torsions.
+    The best of them is searched between the neighbours of the best one of the row. There are three
+    torsions or more. Other arguments and errors are those of `greatest_tilt`.
     """
     p = one_position(position)
     angles = even_angles("torsions", torsions) - 180.0
@@ -157,8 +142,7 @@ def _end_of_turns(
     """Return the angles (n,) in radians at which turns (n, 3, 3, 3) end, and their limits."""
     angles, limits = np.empty(len(turns)), np.empty(len(turns), dtype=np.int64)
     rules = Rules.of(design).without_clearances()
-    positions = np.full((len(turns), 3), position)
-    given = (positions, one_tool(tool), turns)
+    given = for_kernel(position), one_tool(tool), turns
     turn_rows(len(turns), rules.row, rules.demands, *given, angles, limits)
     return angles, limits.tolist()
 
@@ -174,3 +158,38 @@ def _turn_about_z(rotation: FloatArray, sign: float) -> FloatArray:
 
 def _turned_half(rotation: FloatArray) -> FloatArray:
     return rotation * np.array([-1.0, -1.0, 1.0])
+
+
+# Error of an angle that is computed in two ways, in degrees.
+ANGLE_TOLERANCE = 1e-7
+
+
+def is_connected(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    other: ArrayLike | None = None,
+    tool: ArrayLike | None = None,
+) -> bool:
+    """Return whether an orientation is connected to tilt zero by a tilt without a gap.
+
+    The tilt keeps azimuth and torsion. At tilt 180°, where many torsions give one orientation, it
+    is that of torsion 0. With a second orientation the question is whether a tilt from the first
+    one to tilt zero, a change of the torsion there and a tilt to the second one connect the two.
+    Position, tool and errors are those of `greatest_tilt`; orientations are rotations (3, 3).
+    """
+    p = one_position(position)
+    ends = [
+        tilt_torsion_of(checked_rotation(each)) for each in (rotation, other) if each is not None
+    ]
+    for azimuth, tilt, torsion in ends:
+        reached = tilt_map(design, p, torsion, [azimuth], tool).tilts[0]
+        if not reached >= tilt - ANGLE_TOLERANCE:
+            return False
+    if other is None:
+        return True
+    span = torsion_range(design, p, ends[0].torsion, tool=tool)
+    if math.isnan(span.low):
+        return False
+    turn = (ends[1].torsion - span.low + ANGLE_TOLERANCE) % 360.0 - ANGLE_TOLERANCE
+    return turn <= span.high - span.low + ANGLE_TOLERANCE

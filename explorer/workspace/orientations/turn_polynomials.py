@@ -9,6 +9,7 @@ array (3, 3, 3): for each entry of the rotation the coefficients of (1 − u)²,
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.bernstein import (
@@ -36,17 +37,29 @@ BINOMIALS_4 = (1.0, 4.0, 6.0, 4.0, 1.0)
 BINOMIALS_8 = (1.0, 8.0, 28.0, 56.0, 70.0, 56.0, 28.0, 8.0, 1.0)
 
 
+class TurnSearch(NamedTuple):
+    """A turn in the search for its first limit.
+
+    Attributes:
+        row, demands: Those of `Rules`.
+        p: Position of the tool, shape (3,).
+        tool: Tool point in platform coordinates, shape (3,).
+        turn: Coefficients of the rotation, shape (3, 3, 3).
+        scratch: Array of the shape `SCRATCH`.
+    """
+
+    row: FloatArray
+    demands: FloatArray
+    p: FloatArray
+    tool: FloatArray
+    turn: FloatArray
+    scratch: FloatArray
+
+
 @helper
 def angle_at(u: float) -> float:
     """Return the angle of the turn at a place u of [0, 1], in radians."""
     return 2.0 * math.atan2(u, 1.0 - u)
-
-
-@helper
-def place_of(angle: float) -> float:
-    """Return the place in [0, 1] of an angle of at most half a turn."""
-    c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
-    return s / (c + s)
 
 
 @helper
@@ -91,23 +104,22 @@ def turned(turn: FloatArray, i: int, k: int, arm: Vector) -> float:
 
 
 @helper
-def write_leg(
-    row: FloatArray, leg: int, p: FloatArray, arm: Vector, turn: FloatArray, scratch: FloatArray
-) -> None:
+def write_leg(search: TurnSearch, leg: int) -> None:
     """Write the coordinates of a leg from base to platform, polynomials of degree 2 each.
 
     Legs 2 and 3, from 0 on numbers 1 and 2, start at their carriages, so they have no x.
     """
+    arm = arm_of(search.row, leg, search.tool)
     for i in range(3):
         for k in range(3):
-            value = turned(turn, i, k, arm)
+            value = turned(search.turn, i, k, arm)
             if k != 1:
-                value += p[i]
+                value += search.p[i]
                 if leg == 3 and i < 2:
-                    value -= row[A3 + i]
+                    value -= search.row[A3 + i]
             if i == 0 and 1 <= leg <= 2:
                 value = 0.0
-            scratch[LEG_ROW + i, k] = value
+            search.scratch[LEG_ROW + i, k] = value
 
 
 @helper
@@ -122,8 +134,7 @@ def add_product(a: FloatArray, b: FloatArray, degree: int, out: FloatArray) -> N
 def nearer_end(degree: int, end: float, scratch: FloatArray) -> float:
     """Return the first place before `end` where the searched polynomial turns negative.
 
-    Returns:
-        The place; `end` if there is none; -1 if the polynomial is negative at the start.
+    It is `end` if there is none, and -1 if the polynomial is negative at the start.
     """
     b = scratch[POLYNOMIAL]
     if is_negative_nowhere(b, degree):

@@ -1,4 +1,4 @@
-"""The first limit that a turn of the platform about one axis meets, the tool held in its place.
+"""The first limit that a turn of the platform about one axis meets, the tool kept in its place.
 
 Each limit is a polynomial along the turn (`explorer.workspace.orientations.turn_polynomials`): of
 degree 2 for l1, l4, the guide, the gap, the carriage order, the box and the margins, of degree 4
@@ -14,11 +14,19 @@ import numpy as np
 
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.bernstein import (
+    MOST_DEGREE,
+    STACK,
+    is_negative_nowhere,
+    keep_left,
+    keep_right,
+)
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector
 from explorer.workspace.limits.quantities import (
     A3,
     ANGLE,
+    AXIS_X,
     B2,
     B3,
     D1,
@@ -26,33 +34,42 @@ from explorer.workspace.limits.quantities import (
     DELTA1,
     DELTA3,
     GAP,
+    HIGH,
     L1,
+    LEG,
     LOW,
     QUANTITY,
+    TURNS,
     X,
     Z,
 )
 from explorer.workspace.limits.table import by_quantity, demands_of
-from explorer.workspace.orientations.turn_cones import end_in_cone
 from explorer.workspace.orientations.turn_polynomials import (
+    ALONG,
+    BINOMIALS_2,
     BINOMIALS_4,
+    BINOMIALS_8,
     LEG_ROW,
+    LEG_SQUARE,
     POLYNOMIAL,
+    ROWS,
     SCRATCH,
+    SQUARE,
     START_IS_INVALID,
+    TurnSearch,
     add_product,
     angle_at,
     arm_of,
     nearer_end,
     nearer_linear_end,
-    place_of,
     turned,
+    write_leg,
     write_tilt,
 )
 
 NO_LIMIT = -1
-# Angle over which a turn is searched.
-HALF_TURN = math.pi
+# Length of a part of the turn in u below which the search for the end of a cone ends.
+LEAST_PART = 1e-13
 
 
 def limit_names(design: Design) -> tuple[str, ...]:
@@ -63,18 +80,11 @@ def limit_names(design: Design) -> tuple[str, ...]:
 
 @helper
 def nearer_end_of_length(
-    row: FloatArray,
-    leg: int,
-    p: FloatArray,
-    tool: FloatArray,
-    turn: FloatArray,
-    bound: float,
-    sign: float,
-    end: float,
-    scratch: FloatArray,
+    search: TurnSearch, leg: int, bound: float, sign: float, end: float
 ) -> float:
-    """Return what `nearer_end` does for a bound of a length, with sign 1 for a maximum."""
-    limit, arm = bound * bound, arm_of(row, leg, tool)
+    """Return the first place at which a leg meets a bound as `nearer_end`; sign 1 for a maximum."""
+    row, p, turn, limit = search.row, search.p, search.turn, bound * bound
+    arm = arm_of(row, leg, search.tool)
     if leg % 3 == 0:
         # The square of the length of q + R arm is that of q, that of the arm, and 2 q·(R arm).
         q = (p[0], p[1], p[2])
@@ -94,22 +104,23 @@ def nearer_end_of_length(
     # Most bounds are beyond what any orientation needs.
     if radius + length <= bound if sign > 0.0 else radius - length >= bound:
         return end
-    polynomial = scratch[POLYNOMIAL]
+    polynomial = search.scratch[POLYNOMIAL]
     for k in range(5):
         polynomial[k] = -limit * (1.0 if k % 4 == 0 else (2.0 if k == 2 else 0.0))
     for i in range(1, 3):
-        leg_row = scratch[LEG_ROW + i]
+        leg_row = search.scratch[LEG_ROW + i]
         for k in range(3):
             leg_row[k] = turned(turn, i, k, arm) + (0.0 if k == 1 else p[i])
         add_product(leg_row, leg_row, 2, polynomial)
     for k in range(5):
         polynomial[k] *= -sign / BINOMIALS_4[k]
-    return nearer_end(4, end, scratch)
+    return nearer_end(4, end, search.scratch)
 
 
 @helper
-def margin_at(index: int, k: int, p: FloatArray, tool: FloatArray, turn: FloatArray) -> float:
+def margin_at(search: TurnSearch, index: int, k: int) -> float:
     """Return a coefficient of a margin's polynomial."""
+    p, tool, turn = search.p, search.tool, search.turn
     constant = 0.0 if k == 1 else 1.0
     if index == 0:
         normal = p[0] * turn[0, 2, k] + p[1] * turn[1, 2, k] + p[2] * turn[2, 2, k]
@@ -121,20 +132,19 @@ def margin_at(index: int, k: int, p: FloatArray, tool: FloatArray, turn: FloatAr
 
 
 @helper
-def coefficients_of(
-    row: FloatArray, kind: int, p: FloatArray, tool: FloatArray, turn: FloatArray
-) -> Vector:
+def coefficients_of(search: TurnSearch, kind: int) -> Vector:
     """Return the coefficients of the polynomial of a quantity that is of degree 2."""
+    row, p, turn = search.row, search.p, search.turn
     if DELTA1 <= kind <= DELTA3:
         index = kind - DELTA1
         return (
-            margin_at(index, 0, p, tool, turn),
-            margin_at(index, 1, p, tool, turn),
-            margin_at(index, 2, p, tool, turn),
+            margin_at(search, index, 0),
+            margin_at(search, index, 1),
+            margin_at(search, index, 2),
         )
     if kind <= D3:
         i, leg = (kind - X, 3) if kind <= Z else (0, kind - D1 + 1)
-        arm = arm_of(row, leg, tool)
+        arm = arm_of(row, leg, search.tool)
         return (
             p[i] + turned(turn, i, 0, arm),
             turned(turn, i, 1, arm),
@@ -148,61 +158,139 @@ def coefficients_of(
 
 
 @helper
-def first_limit(
-    row: FloatArray,
-    demands: FloatArray,
-    p: FloatArray,
-    tool: FloatArray,
-    turn: FloatArray,
-    most: float,
-    scratch: FloatArray,
-) -> tuple[float, int]:
-    """Return the angle at which a turn meets its first limit, and the number of that limit.
+def end_in_cone(search: TurnSearch, index: int, end: float) -> float:
+    """Return the first place before `end` where a leg leaves the cone of a demand, as `nearer_end`.
 
-    Args:
-        row: Row of `Rules`.
-        demands: Demands of `Rules`.
-        p: Position of the tool, shape (3,).
-        tool: Tool point in platform coordinates, shape (3,).
-        turn: Coefficients of the rotation, shape (3, 3, 3): those of (1 − u)², (1 − u) u and u².
-        most: Angle in radians, at most half a turn, beyond which limits do not count.
-        scratch: Array of the shape `SCRATCH`.
-
-    Returns:
-        The angle in radians and the limit: `most` and `NO_LIMIT` if the turn meets none, a
-        negative angle and the first limit of the list if its start violates one.
+    The cosine of the leg's angle to the axis of the cone, times the leg's length, is a polynomial
+    of degree 4, so the leg is on the cone where one of degree 8 vanishes.
     """
-    limit, end = NO_LIMIT, place_of(most)
-    for index in range(demands.shape[0]):
-        kind = int(demands[index, QUANTITY])
+    demand, turn, scratch = search.demands[index], search.turn, search.scratch
+    half_angle = demand[HIGH]
+    if half_angle < 0.0:
+        return START_IS_INVALID
+    # Half a turn is no bound.
+    if half_angle >= math.pi:
+        return end
+    cosine = math.cos(half_angle)
+    write_leg(search, int(demand[LEG]))
+    for row in range(ALONG, LEG_SQUARE + 1):
+        for k in range(MOST_DEGREE + 1):
+            scratch[row, k] = 0.0
+    axis = scratch[POLYNOMIAL]
+    for i in range(3):
+        for k in range(3):
+            if demand[TURNS] > 0.0:
+                axis[k] = 0.0
+                for j in range(3):
+                    axis[k] += turn[i, j, k] * demand[AXIS_X + j]
+            else:
+                axis[k] = 0.0 if k == 1 else demand[AXIS_X + i]
+        add_product(scratch[LEG_ROW + i], axis, 2, scratch[ALONG])
+        add_product(scratch[LEG_ROW + i], scratch[LEG_ROW + i], 2, scratch[LEG_SQUARE])
+    add_product(scratch[ALONG], scratch[ALONG], 4, scratch[SQUARE])
+    if cosine > 0.0:
+        for k in range(5):
+            scratch[POLYNOMIAL, k] = scratch[ALONG, k] / BINOMIALS_4[k]
+        end = nearer_end(4, end, scratch)
+        if end < 0.0:
+            return end
+    # The square of the leg has to have the same degree, so it is multiplied by 1.
+    share = cosine * cosine
+    for k in range(MOST_DEGREE + 1):
+        square = 0.0
+        for j in range(3):
+            if 0 <= k - 2 * j <= 4:
+                square += BINOMIALS_2[j] * scratch[LEG_SQUARE, k - 2 * j]
+        scratch[POLYNOMIAL, k] = (scratch[SQUARE, k] - share * square) / BINOMIALS_8[k]
+    if cosine > 0.0:
+        return nearer_end(8, end, scratch)
+    return first_outside_wide_cone(end, scratch)
+
+
+@helper
+def first_outside_wide_cone(end: float, scratch: FloatArray) -> float:
+    """Return what `end_in_cone` does for a half-angle of 90° or more.
+
+    A leg is outside where it points backwards and its searched polynomial, the square of the
+    length along the axis less that on the cone, is positive.
+    """
+    pieces, second = scratch[ROWS:], ROWS + STACK[0]
+    others = scratch[second:]
+    for i in range(MOST_DEGREE + 1):
+        pieces[0, i] = -scratch[POLYNOMIAL, i]
+        others[0, i] = scratch[ALONG, i] / BINOMIALS_4[i] if i < 5 else 0.0
+    keep_left(pieces[0], 8, end)
+    keep_left(others[0], 4, end)
+    if pieces[0, 0] < 0.0 and others[0, 0] < 0.0:
+        return START_IS_INVALID
+    low, width = MOST_DEGREE + 1, MOST_DEGREE + 2
+    pieces[0, low], pieces[0, width] = 0.0, end
+    top = 0
+    while top >= 0:
+        piece, other = pieces[top], others[top]
+        if is_negative_nowhere(piece, 8) or is_negative_nowhere(other, 4):
+            top -= 1
+            continue
+        if (piece[0] < 0.0 and other[0] < 0.0) or piece[width] < LEAST_PART:
+            return piece[low]
+        half, other_half = pieces[top + 1], others[top + 1]
+        for i in range(MOST_DEGREE + 1):
+            half[i], other_half[i] = piece[i], other[i]
+        half[width] = piece[width] = 0.5 * piece[width]
+        half[low] = piece[low]
+        piece[low] += piece[width]
+        keep_right(piece, 8, 0.5)
+        keep_right(other, 4, 0.5)
+        keep_left(half, 8, 0.5)
+        keep_left(other_half, 4, 0.5)
+        top += 1
+    return end
+
+
+@helper
+def first_limit(search: TurnSearch) -> tuple[float, int]:
+    """Return the angle within half a turn at which a turn meets its first limit, and its number.
+
+    They are π and `NO_LIMIT` if the turn meets none, a negative angle and the first limit of the
+    list if its start violates one.
+    """
+    limit, end = NO_LIMIT, 1.0
+    for index in range(search.demands.shape[0]):
+        demand = search.demands[index]
+        kind = int(demand[QUANTITY])
         a = b = c = 0.0
         if kind < L1:
-            a, b, c = coefficients_of(row, kind, p, tool, turn)
+            a, b, c = coefficients_of(search, kind)
         for side in range(2):
-            bound, sign, found = demands[index, LOW + side], 1.0 - 2.0 * side, end
+            bound, sign, found = demand[LOW + side], 1.0 - 2.0 * side, end
             if kind == ANGLE:
                 if side == 1:
-                    found = end_in_cone(row, demands[index], p, tool, turn, end, scratch)
+                    found = end_in_cone(search, index, end)
             elif math.isinf(bound) or (kind >= L1 and side == 0 and bound <= 0.0):
                 continue
             elif kind < L1:
                 found = nearer_linear_end(sign * (a - bound), sign * b, sign * (c - bound), end)
             else:
-                found = nearer_end_of_length(
-                    row, kind - L1, p, tool, turn, bound, -sign, end, scratch
-                )
+                found = nearer_end_of_length(search, kind - L1, bound, -sign, end)
             if found < end:
                 end, limit = found, 2 * index + side
             if found < 0.0:
                 return START_IS_INVALID, limit
-    return (most if limit == NO_LIMIT else angle_at(end)), limit
+    return (math.pi if limit == NO_LIMIT else angle_at(end)), limit
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,:,:,::1], f8[::1], i8[::1])")
+@helper
+def tilt_in(search: TurnSearch, azimuth: float, torsion: float) -> tuple[float, int]:
+    """Return the greatest tilt of a position in one azimuth and its limit, in radians."""
+    write_tilt(azimuth, torsion, search.turn)
+    return first_limit(search)
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[:,:,:,::1], f8[::1], i8[::1])")
 def turn_rows(
     row: FloatArray,
     demands: FloatArray,
-    positions: FloatArray,
+    p: FloatArray,
     tool: FloatArray,
     turns: FloatArray,
     angles: FloatArray,
@@ -210,28 +298,23 @@ def turn_rows(
 ) -> None:
     """Write the angles and first limits of n turns, shape (n, 3, 3, 3), as `first_limit` does."""
     scratch = np.zeros(SCRATCH)
-    for index in range(positions.shape[0]):
-        angles[index], limits[index] = first_limit(
-            row, demands, positions[index], tool, turns[index], HALF_TURN, scratch
-        )
+    for index in range(turns.shape[0]):
+        search = TurnSearch(row, demands, p, tool, turns[index], scratch)
+        angles[index], limits[index] = first_limit(search)
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8, f8[::1], f8[:,::1], i8[:,::1])")
+@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], i8[::1])")
 def tilt_rows(
     row: FloatArray,
     demands: FloatArray,
-    positions: FloatArray,
+    p: FloatArray,
     tool: FloatArray,
     torsion: float,
     azimuths: FloatArray,
     tilts: FloatArray,
     limits: IntArray,
 ) -> None:
-    """Write the greatest tilts of n positions in m azimuths, shape (n, m), angles in radians."""
-    scratch, turn = np.zeros(SCRATCH), np.zeros((3, 3, 3))
-    for index in range(positions.shape[0]):
-        for k in range(azimuths.shape[0]):
-            write_tilt(azimuths[k], torsion, turn)
-            tilts[index, k], limits[index, k] = first_limit(
-                row, demands, positions[index], tool, turn, HALF_TURN, scratch
-            )
+    """Write the greatest tilts of a position in m azimuths, shape (m,), angles in radians."""
+    search = TurnSearch(row, demands, p, tool, np.zeros((3, 3, 3)), np.zeros(SCRATCH))
+    for k in range(azimuths.shape[0]):
+        tilts[k], limits[k] = tilt_in(search, azimuths[k], torsion)
