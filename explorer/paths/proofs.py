@@ -24,7 +24,7 @@ from explorer.paths.loads import DemandedLoad
 from explorer.workspace.limits.valid_moves import (
     DEFAULT_TOLERANCE,
     count_steps,
-    make_scratch,
+    make_check,
     moves_are_valid,
 )
 from explorer.workspace.limits.valid_poses import Rules
@@ -126,7 +126,7 @@ def divide_line(
         shares: Output, shares of the line at which its pieces end, shape (MOST_MOVES,).
         count: Output, number of pieces, 0 if the line is not proven valid, shape (1,).
     """
-    scratch = make_scratch()
+    check = make_check(row, demands, tool)
     p, r, q, s = np.zeros(3), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
     corner = np.zeros(6)
     count[0] = 0
@@ -137,7 +137,7 @@ def divide_line(
         for i in range(6):
             corner[i] = (1.0 - high) * first[i] + high * last[i]
         write_pose(corner, q, s)
-        steps = count_steps(row, demands, p, r, q, s, tool, tolerance, left, scratch)
+        steps = count_steps(check, p, r, q, s, tolerance, left)
         left -= abs(steps)
         if steps > 0:
             if pieces == shares.shape[0]:

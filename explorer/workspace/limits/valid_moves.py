@@ -1,20 +1,24 @@
 """Validity of straight moves: whether all demands of a design hold all along, with a proof.
 
-No demand can fail within the safe share of a move (`explorer.workspace.limits.safe_shares`), so
-the next pose to check is at the end of that share (conservative advancement; Mirtich 2000).
-Along a limit the safe shares would be tiny, so a limit may be exceeded by a small tolerance
-between two poses that satisfy it. A clearance, or a margin of which only the sign is demanded,
-must hold everywhere.
+The slack of each limit and each clearance shrinks no faster than its quantity changes, and
+`write_speeds` bounds these speeds over the whole move. So no demand can fail within some safe share
+of the move, and the next pose to check is at the end of that share (conservative advancement;
+Mirtich 2000). Along a limit the safe shares would be tiny, so a limit may be exceeded by a small
+tolerance between two poses that satisfy it. A clearance, or a margin of which only the sign is
+demanded, must hold everywhere.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.legs.segments import closest_shares, square_at
 from explorer.mechanism.design import Design
+from explorer.mechanism.margins import margins_of
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import (
     BoolArray,
@@ -25,38 +29,35 @@ from explorer.numerics.arrays import (
     rows_for_kernel,
 )
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import Vector, column, cross3, dot3, minus, vector
 from explorer.workspace.limits.quantities import (
     A3,
+    ANGLE,
+    BENDS,
+    DELTA1,
+    DELTA3,
+    HIGH,
+    L1,
+    LEG,
+    LOW,
+    QUANTITY,
+    RADII,
     SPEEDS,
+    TURNS,
+    angle_at,
+    quantity_at,
     write_ends,
     write_speeds,
 )
-from explorer.workspace.limits.safe_shares import (
-    LEAST_SHARE,
-    rates_of_margins,
-    safe_share_of_clearances,
-    safe_share_of_limits,
-)
 from explorer.workspace.limits.valid_poses import Rules, is_valid
 
-# The share of the reach by which a limit may be exceeded between poses that satisfy it.
-DEFAULT_TOLERANCE = 1e-4
+# The share of the reach by which a limit may be exceeded between poses that satisfy it, and the
+# share of this tolerance that signs and clearances must exceed on the way, to be certain.
+DEFAULT_TOLERANCE, LEAST_SHARE = 1e-4, 0.01
 # The largest turn of a move, in radians: of half a turn neither way is the shorter one.
 LARGEST_TURN = math.pi - 1e-9
 # A move that needs more steps than this is refused; most such moves follow a limit all the way.
 MOST_STEPS = 20_000
-
-Scratch = tuple[
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-    FloatArray,
-]
 
 
 def moves_are_valid(
@@ -70,19 +71,16 @@ def moves_are_valid(
     tolerance: float | None = None,
     tool: ArrayLike | None = None,
 ) -> BoolArray:
-    """Return whether straight moves satisfy all limits, margins and clearances, shape (...).
+    """Return whether straight moves are proven to satisfy all limits and clearances, shape (...).
 
-    One point of the platform moves on a straight line and the platform turns about one axis the
-    shorter way, as in `explorer.legs.moves`. True is a proof, but for the tolerance. A move whose
-    clearances or signs hold by less than a 100th of the tolerance may be refused, and one of half a
-    turn, which has no shorter way, is.
+    A move that turns by half a turn is not valid, since neither way is the shorter one.
 
     Args:
         design: The manipulator.
         start_position: b4 in the base frame, shape (..., 3), in design units.
         start_rotation: Platform to base, shape (..., 3, 3).
-        end_position: b4 at the end, shape (..., 3), in design units.
-        end_rotation: Platform to base at the end, shape (..., 3, 3).
+        end_position: As the start.
+        end_rotation: As the start.
         rules: Rules of the design, if they have been computed before.
         tolerance: Length by which limits may be exceeded on the way, in design units; a
             10,000th of the reach if None.
@@ -97,153 +95,57 @@ def moves_are_valid(
         for name, value in (("start position", start_position), ("end position", end_position))
     )
     r, s = checked_rotation(start_rotation), checked_rotation(end_rotation)
-    batch = batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
-    rows = [
-        rows_for_kernel(value, batch, trailing)
-        for value, trailing in ((p, 1), (r, 2), (q, 1), (s, 2))
-    ]
-    valid = np.empty(len(rows[0]), dtype=np.bool_)
-    design_rules = rules or Rules.of(design)
-    limit_tolerance = DEFAULT_TOLERANCE * design.reach if tolerance is None else tolerance
-    point = np.zeros(3) if tool is None else for_kernel(finite_array("tool", tool, (3,)))
-    valid_move_rows(
-        20 * len(rows[0]),
-        design_rules.row,
-        design_rules.demands,
-        rows[0],
-        rows[1],
-        rows[2],
-        rows[3],
-        point,
-        limit_tolerance,
-        valid,
+    ends = (p, 1), (r, 2), (q, 1), (s, 2)
+    batch = batch_shape(*ends)
+    start, turn, end, last_turn = (
+        rows_for_kernel(value, batch, trailing) for value, trailing in ends
     )
+    valid = np.empty(len(start), dtype=np.bool_)
+    rules = rules or Rules.of(design)
+    most = DEFAULT_TOLERANCE * design.reach if tolerance is None else tolerance
+    point = np.zeros(3) if tool is None else for_kernel(finite_array("tool", tool, (3,)))
+    move = start, turn, end, last_turn
+    valid_move_rows(20 * len(start), rules.row, rules.demands, *move, point, most, valid)
     return valid.reshape(batch)
 
 
-@helper
-def write_turn(r: FloatArray, s: FloatArray, axis: FloatArray) -> float:
-    """Write the unit axis, in the base frame, that turns r into s; return the angle in radians."""
-    turn = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            turn[i, j] = s[i, 0] * r[j, 0] + s[i, 1] * r[j, 1] + s[i, 2] * r[j, 2]
-    x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
-    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-    cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
-    angle = math.atan2(sine, cosine)
-    if cosine < -0.5:
-        # Near half a turn the longest column of the symmetric part gives the axis best.
-        best = 0
-        for k in range(1, 3):
-            if turn[k, k] > turn[best, best]:
-                best = k
-        off = -math.cos(angle)
-        columns = (
-            0.5 * (turn[0, best] + turn[best, 0]),
-            0.5 * (turn[1, best] + turn[best, 1]),
-            0.5 * (turn[2, best] + turn[best, 2]),
-        )
-        a = columns[0] + (off if best == 0 else 0.0)
-        b = columns[1] + (off if best == 1 else 0.0)
-        c = columns[2] + (off if best == 2 else 0.0)
-        if a * x + b * y + c * z < 0.0:
-            a, b, c = -a, -b, -c
-        x, y, z = a, b, c
-    length = math.sqrt(x * x + y * y + z * z)
-    if length == 0.0:
-        axis[0], axis[1], axis[2] = 1.0, 0.0, 0.0
-        return 0.0
-    axis[0], axis[1], axis[2] = x / length, y / length, z / length
-    return angle
+class MoveCheck(NamedTuple):
+    """Rules and a tool, with the arrays that the check of a move writes into.
 
-
-@helper
-def write_pose_at(
-    t: float,
-    p: FloatArray,
-    r: FloatArray,
-    step: FloatArray,
-    axis: FloatArray,
-    angle: float,
-    p_out: FloatArray,
-    r_out: FloatArray,
-) -> None:
-    """Write the pose at a share of a move."""
-    c, s = math.cos(t * angle), math.sin(t * angle)
-    x, y, z = axis[0], axis[1], axis[2]
-    for j in range(3):
-        a, b, d = r[0, j], r[1, j], r[2, j]
-        along = (1.0 - c) * (x * a + y * b + z * d)
-        r_out[0, j] = c * a + s * (y * d - z * b) + along * x
-        r_out[1, j] = c * b + s * (z * a - x * d) + along * y
-        r_out[2, j] = c * d + s * (x * b - y * a) + along * z
-    for i in range(3):
-        p_out[i] = p[i] + t * step[i]
-
-
-@helper
-def move_by_arm(share: float, r: FloatArray, arm: FloatArray, p: FloatArray) -> None:
-    """Add a share of a vector in platform coordinates to a position."""
-    for i in range(3):
-        p[i] += share * (r[i, 0] * arm[0] + r[i, 1] * arm[1] + r[i, 2] * arm[2])
-
-
-@helper
-def write_line(
-    start: FloatArray,
-    start_rotation: FloatArray,
-    end: FloatArray,
-    end_rotation: FloatArray,
-    tool: FloatArray,
-    first: FloatArray,
-    step: FloatArray,
-) -> None:
-    """Write where the tool starts on a straight move, and how far it goes, shape (3,) each.
-
-    Start and end are positions of b4; the tool is in platform coordinates.
+    Attributes:
+        row, demands: Those of `Rules`.
+        tool: Point that moves straight, in platform coordinates, shape (3,).
+        base, ends: Ends of the legs in a pose, shape (4, 3).
+        p, r: Position, first of the tool and then of b4, and rotation of that pose.
+        first, step: Place of the tool at the start, and how far it goes, shape (3,).
+        axis: Axis about which the platform turns, shape (3,).
+        speeds: Speeds over the move, see `write_speeds`.
     """
-    for i in range(3):
-        first[i], step[i] = start[i], end[i]
-    move_by_arm(1.0, start_rotation, tool, first)
-    move_by_arm(1.0, end_rotation, tool, step)
-    for i in range(3):
-        step[i] -= first[i]
+
+    row: FloatArray
+    demands: FloatArray
+    tool: FloatArray
+    base: FloatArray
+    ends: FloatArray
+    p: FloatArray
+    r: FloatArray
+    first: FloatArray
+    step: FloatArray
+    axis: FloatArray
+    speeds: FloatArray
 
 
 @helper
-def write_velocity(
-    t: float,
-    first: FloatArray,
-    step: FloatArray,
-    axis: FloatArray,
-    angle: float,
-    p: FloatArray,
-    velocity: FloatArray,
-) -> None:
-    """Write the velocity of b4 at p per share of a move, at a share t of it."""
-    # From the tool, which goes straight, to b4.
-    a = p[0] - first[0] - t * step[0]
-    b = p[1] - first[1] - t * step[1]
-    c = p[2] - first[2] - t * step[2]
-    velocity[0] = step[0] + angle * (axis[1] * c - axis[2] * b)
-    velocity[1] = step[1] + angle * (axis[2] * a - axis[0] * c)
-    velocity[2] = step[2] + angle * (axis[0] * b - axis[1] * a)
-
-
-@helper
-def make_scratch() -> Scratch:
-    """Return arrays that `count_steps` writes into.
-
-    They are the legs' base ends and platform ends, a position, a rotation, the step and the axis
-    of the move, the start of the tool, the velocity of b4, and the speeds.
-    """
-    return (
+def make_check(row: FloatArray, demands: FloatArray, tool: FloatArray) -> MoveCheck:
+    """Return a check of moves."""
+    return MoveCheck(
+        row,
+        demands,
+        tool,
         np.zeros((4, 3)),
         np.zeros((4, 3)),
         np.zeros(3),
         np.zeros((3, 3)),
-        np.zeros(3),
         np.zeros(3),
         np.zeros(3),
         np.zeros(3),
@@ -252,47 +154,228 @@ def make_scratch() -> Scratch:
 
 
 @helper
+def lasting_share(slack: float, rate: float) -> float:
+    """Return the share of a move after which a slack that shrinks at a rate is zero."""
+    return slack / rate if rate > 0.0 else math.inf
+
+
+@helper
+def safe_share(slack: float, rate: float, tolerance: float) -> float:
+    """Return the share of a move over which a limit holds to a tolerance; −1 if it fails here."""
+    # Half of the tolerance remains for a step.
+    if slack < -0.5 * tolerance:
+        return -1.0
+    return lasting_share(slack + tolerance, rate)
+
+
+@helper
+def rising_share(slack: float, rate: float, bend: float) -> float:
+    """Return the share over which a slack lasts, given its rate here and a bound of its bending."""
+    if rate < 0.0:
+        return 2.0 * slack / (math.sqrt(rate * rate + 2.0 * bend * slack) - rate)
+    return (rate + math.sqrt(rate * rate + 2.0 * bend * slack)) / bend if bend > 0.0 else math.inf
+
+
+@helper
+def safe_share_of_margin(
+    least: float, slack: float, rate: float, speed: float, bend: float, tolerance: float
+) -> float:
+    """Return the share of a move over which a margin keeps to a least magnitude; −1 if not here."""
+    if least < 2.0 * tolerance:
+        # Only the sign is demanded, and it must be certain.
+        if slack < LEAST_SHARE * tolerance:
+            return -1.0
+    elif slack < -0.5 * tolerance:
+        return -1.0
+    else:
+        slack += tolerance
+    return max(lasting_share(slack, speed), rising_share(slack, rate, bend))
+
+
+@helper
+def safe_share_of_angle(
+    slack: float, length: float, turning: float, speed: float, tolerance: float
+) -> float:
+    """Return the share of a move over which an angle of a leg holds to a tolerance in radians.
+
+    It is −1 if the angle fails in the pose given, or the leg has no length there.
+    """
+    if length == 0.0:
+        return -1.0
+    # Until its length has halved, the leg turns at most twice as fast.
+    return min(
+        lasting_share(0.5 * length, speed),
+        safe_share(slack, turning + 2.0 * speed / length, tolerance),
+    )
+
+
+@helper
+def safe_share_of_limits(
+    check: MoveCheck, rates: Vector, tolerance: float, angle_tolerance: float
+) -> float:
+    """Return the share of a move from a pose on over which all limits hold to a tolerance.
+
+    It is −1 if a limit fails in that pose. A margin is bounded on one side of zero, and has one of
+    the rates in that pose.
+    """
+    demands, p, r, base, ends = check.demands, check.p, check.r, check.base, check.ends
+    speeds, share = check.speeds, math.inf
+    for index in range(demands.shape[0]):
+        kind, low, high = int(demands[index, QUANTITY]), demands[index, LOW], demands[index, HIGH]
+        if kind == ANGLE:
+            leg, value = int(demands[index, LEG]), angle_at(demands, index, r, base, ends)
+            found = safe_share_of_angle(
+                min(value - low, high - value),
+                quantity_at(L1 + leg, p, r, base, ends),
+                demands[index, TURNS] * speeds[ANGLE],
+                speeds[L1 + leg],
+                angle_tolerance,
+            )
+        else:
+            value = quantity_at(kind, p, r, base, ends)
+            slack, speed = min(value - low, high - value), speeds[kind]
+            if DELTA1 <= kind <= DELTA3:
+                rate, bend = rates[kind - DELTA1], speeds[BENDS + kind - DELTA1]
+                rate = rate if low > -math.inf else -rate
+                found = safe_share_of_margin(max(low, -high), slack, rate, speed, bend, tolerance)
+            else:
+                found = safe_share(slack, speed, tolerance)
+        if found <= 0.0:
+            return -1.0
+        share = min(share, found)
+    return share
+
+
+@helper
+def safe_share_of_clearances(check: MoveCheck, least: float) -> float:
+    """Return the share of a move over which no legs collide; −1 if they are closer than `least`."""
+    base, ends, speeds = check.base, check.ends, check.speeds
+    share = math.inf
+    pair = RADII
+    for i in range(3):
+        for j in range(i + 1, 4):
+            radius = check.row[pair]
+            pair += 1
+            if radius < 0.0:
+                continue
+            first, second = vector(base, i), vector(base, j)
+            u, v = minus(vector(ends, i), first), minus(vector(ends, j), second)
+            w = minus(first, second)
+            s, t = closest_shares(u, v, w)
+            clearance = math.sqrt(square_at(s, t, u, v, w)) - radius
+            if clearance < least:
+                return -1.0
+            share = min(share, lasting_share(clearance, speeds[L1 + i] + speeds[L1 + j]))
+    return share
+
+
+@helper
+def vector_of(values: FloatArray) -> Vector:
+    """Return an array (3,) as a vector."""
+    return (values[0], values[1], values[2])
+
+
+@helper
+def write_turn(r: FloatArray, s: FloatArray, axis: FloatArray) -> float:
+    """Write the unit axis, in the base frame, that turns r into s; return the angle in radians."""
+    turn = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            turn[i, j] = dot3(vector(s, i), vector(r, j))
+    across = (turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])
+    axis[0], axis[1], axis[2] = across
+    cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
+    angle = math.atan2(0.5 * math.sqrt(dot3(across, across)), cosine)
+    if cosine < -0.5:
+        # Near half a turn the longest column of the symmetric part gives the axis best.
+        best = 0
+        for k in range(1, 3):
+            if turn[k, k] > turn[best, best]:
+                best = k
+        for k in range(3):
+            axis[k] = 0.5 * (turn[k, best] + turn[best, k])
+        axis[best] -= math.cos(angle)
+        if dot3(vector_of(axis), across) < 0.0:
+            for k in range(3):
+                axis[k] = -axis[k]
+    length = math.sqrt(dot3(vector_of(axis), vector_of(axis)))
+    if length == 0.0:
+        axis[0] = 1.0
+        return 0.0
+    for k in range(3):
+        axis[k] /= length
+    return angle
+
+
+@helper
+def write_pose_at(check: MoveCheck, t: float, start_rotation: FloatArray, angle: float) -> None:
+    """Write the pose at a share t of a move."""
+    c, s, axis = math.cos(t * angle), math.sin(t * angle), vector_of(check.axis)
+    for j in range(3):
+        u = column(start_rotation, j)
+        across, along = cross3(axis, u), (1.0 - c) * dot3(axis, u)
+        for i in range(3):
+            check.r[i, j] = c * u[i] + s * across[i] + along * axis[i]
+    for i in range(3):
+        arm = dot3(vector(check.r, i), vector_of(check.tool))
+        check.p[i] = check.first[i] + t * check.step[i] - arm
+
+
+@helper
+def rates_of_margins(check: MoveCheck, t: float, angle: float) -> Vector:
+    """Return the rates of the margins in the pose at a share t of a move, per share of it."""
+    place, axis = vector_of(check.p), vector_of(check.axis)
+    # b4 turns about the tool, which goes straight.
+    tool = (
+        check.first[0] + t * check.step[0],
+        check.first[1] + t * check.step[1],
+        check.first[2] + t * check.step[2],
+    )
+    turn = (angle * axis[0], angle * axis[1], angle * axis[2])
+    swing, u, n = cross3(turn, minus(place, tool)), column(check.r, 0), column(check.r, 2)
+    pace = (check.step[0] + swing[0], check.step[1] + swing[1], check.step[2] + swing[2])
+    going, turning = margins_of(pace, u, n), margins_of(place, cross3(turn, u), cross3(turn, n))
+    return (going[0] + turning[0], going[1] + turning[1], going[2])
+
+
+@helper
 def count_steps(
-    row: FloatArray,
-    demands: FloatArray,
+    check: MoveCheck,
     start: FloatArray,
     start_rotation: FloatArray,
     end: FloatArray,
     end_rotation: FloatArray,
-    tool: FloatArray,
     tolerance: float,
     most: int,
-    scratch: Scratch,
 ) -> int:
     """Return the number of steps that prove a move valid, or 0 or less if they do not.
 
     A move is valid if it satisfies all rules, limits to a tolerance in design units. Start and end
-    are positions of b4; the tool, in platform coordinates, moves straight. The magnitude is that of
-    the steps made, `most` at most.
+    are positions of b4. The magnitude is that of the steps made, `most` at most.
     """
-    base, ends, p, r, step, axis, first, velocity, speeds = scratch
+    row, demands, base, ends, step = check.row, check.demands, check.base, check.ends, check.step
     if not is_valid(row, demands, end, end_rotation, base, ends):
         return 0
     if not is_valid(row, demands, start, start_rotation, base, ends):
         return 0
-    write_line(start, start_rotation, end, end_rotation, tool, first, step)
-    angle = write_turn(start_rotation, end_rotation, axis)
+    for i in range(3):
+        check.first[i] = start[i] + dot3(vector(start_rotation, i), vector_of(check.tool))
+        last = end[i] + dot3(vector(end_rotation, i), vector_of(check.tool))
+        step[i] = last - check.first[i]
+    angle = write_turn(start_rotation, end_rotation, check.axis)
     if angle > LARGEST_TURN:
         return 0
-    write_speeds(row, first, start_rotation, step, axis, angle, tool, speeds)
+    write_speeds(
+        row, check.first, start_rotation, step, check.axis, angle, check.tool, check.speeds
+    )
     t, angle_tolerance = 0.0, tolerance / math.hypot(row[A3], row[A3 + 1])
     for step_number in range(1, most + 1):
-        write_pose_at(t, first, start_rotation, step, axis, angle, p, r)
-        move_by_arm(-1.0, r, tool, p)
-        write_ends(row, p, r, base, ends)
-        write_velocity(t, first, step, axis, angle, p, velocity)
-        rates = rates_of_margins(p, r, velocity, axis, angle)
-        share = safe_share_of_limits(
-            demands, p, r, base, ends, rates, speeds, tolerance, angle_tolerance
-        )
+        write_pose_at(check, t, start_rotation, angle)
+        write_ends(row, check.p, check.r, base, ends)
+        rates = rates_of_margins(check, t, angle)
+        share = safe_share_of_limits(check, rates, tolerance, angle_tolerance)
         if share > 0.0:
-            least = LEAST_SHARE * tolerance
-            share = min(share, safe_share_of_clearances(row, base, ends, speeds, least))
+            share = min(share, safe_share_of_clearances(check, LEAST_SHARE * tolerance))
         if share <= 0.0:
             return -step_number
         t += share
@@ -316,8 +399,7 @@ def valid_move_rows(
     valid: BoolArray,
 ) -> None:
     """Write whether n moves are valid, see `count_steps`."""
-    scratch = make_scratch()
+    check = make_check(row, demands, tool)
     for index in range(start.shape[0]):
         first, last = (start[index], start_rotation[index]), (end[index], end_rotation[index])
-        steps = count_steps(row, demands, *first, *last, tool, tolerance, MOST_STEPS, scratch)
-        valid[index] = steps > 0
+        valid[index] = count_steps(check, *first, *last, tolerance, MOST_STEPS) > 0

@@ -111,15 +111,8 @@ def poses_are_valid(
     batch = batch_shape((p, 1), (r, 2))
     p_rows, r_rows = rows_for_kernel(p, batch, 1), rows_for_kernel(r, batch, 2)
     valid = np.empty(len(p_rows), dtype=np.bool_)
-    design_rules = rules or Rules.of(design)
-    valid_rows(
-        len(p_rows),
-        design_rules.row,
-        design_rules.demands,
-        p_rows,
-        r_rows,
-        valid,
-    )
+    rules = rules or Rules.of(design)
+    valid_rows(len(p_rows), rules.row, rules.demands, p_rows, r_rows, valid)
     return valid.reshape(batch)
 
 
