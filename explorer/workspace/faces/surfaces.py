@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,89 +14,48 @@ from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpac
 STEPS = 4
 # Share of steps that keeps them finite where surfaces touch.
 RIDGE = 1e-9
+# Least length that is divided by.
+TINY = 1e-300
 
 Smooth = BallOrCylinder | HalfSpace | Cone
 
 
 class Surfaces:
-    """The surfaces of limits, in arrays with one row for each.
+    """The surfaces of limits: level = steepness |s (p − origin)| + axis · s (p − origin).
 
-    Args:
-        limits: The limits.
+    The scale s of the axes is (0, 1, 1) for cylinders and wedges, otherwise 1.
     """
 
     def __init__(self, limits: Sequence[Smooth]) -> None:
-        count = len(limits)
         self._limits = limits
-        self._kind = np.zeros(count, dtype=np.int64)
-        # Centre, apex, or nothing; normal or axis; radius, offset or half-angle; the side.
-        self._origin, self._normal = np.zeros((count, 3)), np.zeros((count, 3))
-        self._size, self._side = np.zeros(count), np.ones(count)
-        self._axes = np.ones((count, 3))
-        for k, limit in enumerate(limits):
-            if isinstance(limit, HalfSpace):
-                length = float(np.linalg.norm(limit.normal))
-                self._normal[k], self._size[k] = limit.normal / length, limit.offset / length
-            elif isinstance(limit, BallOrCylinder):
-                self._kind[k] = 1
-                self._origin[k], self._size[k] = limit.centre, limit.radius
-                self._side[k] = 1.0 if limit.inside else -1.0
-                self._axes[k, 0] = 1.0 if limit.is_ball else 0.0
-            else:
-                self._kind[k] = 2
-                self._origin[k], self._normal[k] = limit.apex, limit.axis
-                self._size[k] = limit.half_angle
-                self._axes[k, 0] = 0.0 if limit.flat else 1.0
-        self._has_cones = bool((self._kind == 2).any())
+        # Origin, scale, axis, steepness and level of each.
+        self._rows = np.array([_row_of(limit) for limit in limits]).reshape(-1, 11)
 
     def is_repeated(self, index: int) -> bool:
         """Return whether an earlier limit is the same."""
-        rows = np.column_stack(
-            [self._kind, self._origin * self._axes, self._normal, self._size, self._side]
-        )
-        return bool((rows[:index] == rows[index]).all(axis=1).any())
+        return bool((self._rows[:index] == self._rows[index]).all(axis=1).any())
 
     def distances(self, points: FloatArray, which: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return signed distances (n,) of points (n, 3), positive inside, and their gradients.
 
         The gradients (n, 3) are unit normals that point inwards. Distances from cones are exact
-        on the cone and right to first order near it.
-
-        Args:
-            points: Points, shape (n, 3).
-            which: Index of the limit of each point, shape (n,).
+        on the cone and right to first order near it. The limits of the points are given by their
+        indices, shape (n,).
         """
-        kind, normal, size = self._kind[which], self._normal[which], self._size[which]
-        off = (points - self._origin[which]) * self._axes[which]
-        length = np.maximum(np.sqrt(dot(off, off)), 1e-300)
-        along = dot(off, normal)
-        is_plane, side = kind == 0, self._side[which]
-        distance = np.where(is_plane, size - along, side * (size - length))
-        outward = np.where(is_plane[:, None], normal, (side / length)[:, None] * off)
-        if self._has_cones:
-            cones = np.flatnonzero(kind == 2)
-            unit = off[cones] / length[cones, None]
-            axis = normal[cones] * self._axes[which][cones]
-            # The part of the axis across the leg points to smaller angles.
-            across = axis - dot(axis, unit)[:, None] * unit
-            sine = np.maximum(np.sqrt(dot(across, across)), 1e-300)
-            full = np.sqrt(np.maximum(1.0 - dot(normal[cones], unit) ** 2, 0.0))
-            angle = np.arctan2(full, dot(normal[cones], unit))
-            # A wedge's angle changes slower than the turn about its edge if its axis is tilted.
-            rate = np.maximum(sine / np.maximum(full, 1e-300), 1e-12)
-            distance[cones] = (size[cones] - angle) * length[cones] / rate
-            outward[cones] = -across / sine[:, None]
-        return distance, -outward
+        rows = self._rows[which]
+        scale, axis, steepness, level = rows[:, 3:6], rows[:, 6:9], rows[:, 9], rows[:, 10]
+        off = (points - rows[:, :3]) * scale
+        length = np.maximum(np.sqrt(dot(off, off)), TINY)
+        gradient = -(steepness / length)[:, None] * off - axis * scale
+        size = np.maximum(np.sqrt(dot(gradient, gradient)), TINY)
+        return (level - steepness * length - dot(axis, off)) / size, gradient / size[:, None]
 
     def distances_from(self, points: FloatArray, index: int) -> FloatArray:
         """Return signed distances (n,) of points (n, 3) from one surface, see `distances`."""
         limit = self._limits[index]
         slack = limit.slack(points)
-        if isinstance(limit, BallOrCylinder):
-            return slack
-        if isinstance(limit, HalfSpace):
-            return slack / float(np.linalg.norm(limit.normal))
-        return np.copysign(limit.distance(points), slack)
+        is_distance = isinstance(limit, BallOrCylinder)
+        return slack if is_distance else np.copysign(limit.distance(points), slack)
 
     def settle(
         self, points: FloatArray, which: IntArray, error: float
@@ -127,3 +87,19 @@ class Surfaces:
                 shares = np.linalg.solve(gram, distance[..., None])[..., 0]
             points = points - (shares[:, None, :] @ normal)[:, 0]
         return points, off
+
+
+def _row_of(limit: Smooth) -> list[float]:
+    match limit:
+        case HalfSpace():
+            length = float(np.linalg.norm(limit.normal))
+            return [*np.zeros(3), *np.ones(3), *limit.normal / length, 0.0, limit.offset / length]
+        case BallOrCylinder():
+            side, along = 1.0 if limit.inside else -1.0, 1.0 if limit.is_ball else 0.0
+            # Points of a cylinder's axis differ along x alone.
+            origin = limit.centre * [along, 1.0, 1.0]
+            return [*origin, along, 1.0, 1.0, *np.zeros(3), side, side * limit.radius]
+        case Cone():
+            along = 0.0 if limit.flat else 1.0
+            origin = limit.apex * [along, 1.0, 1.0]
+            return [*origin, along, 1.0, 1.0, *-limit.axis, math.cos(limit.half_angle), 0.0]

@@ -1,31 +1,107 @@
 """Breaks of a region: values of x at which its slices gain or lose an arc.
 
 Between two breaks the area of the slices is analytic. A break is at a pole of a sphere, where
-two curves of the slices touch, or at a vertex, where three surfaces meet. Circles and planes are
-rows of `explorer.workspace.limits.region`.
+two curves of the slices touch, or at a vertex (`explorer.workspace.slices.vertices`). Only points
+on the boundary of the region count; elsewhere surfaces may meet without effect. Rounding may move a
+point off the surfaces that it was computed from, so it may violate limits by a slack. The slack is
+wide, since one break too many costs time and one too few makes the volume wrong. Circles and planes
+are rows of `explorer.workspace.limits.region`.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-import numpy as np
-
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper
-from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, X, Y, Z
-from explorer.workspace.slices.break_points import (
-    Boundary,
-    add_break,
-    add_breaks_at_height,
-    real_roots,
-    region_size,
-    slack_at,
-)
-from explorer.workspace.slices.vertices import add_breaks_at_vertices
+from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
 
-# Breaks closer together than this share of the x-range are merged.
-SAME_BREAK = 1e-13
+# A point that violates a limit by less than this share of the region's size may lie on it.
+NEAR = 1e-7
+# The slack grows where surfaces meet at an angle whose sine is smaller than this.
+BLURRED = 1e-6
+
+
+class Boundary(NamedTuple):
+    """The surfaces of a region and the breaks found on them.
+
+    Attributes:
+        circles: Rows, shape (n, 6).
+        planes: Rows, shape (m, 4).
+        size: Bound of the region's size, see `region_size`.
+        breaks: Breaks; the first two are the ends of the x-range.
+        number: Number of breaks, shape (1,).
+    """
+
+    circles: FloatArray
+    planes: FloatArray
+    size: float
+    breaks: FloatArray
+    number: IntArray
+
+
+@helper
+def region_size(circles: FloatArray) -> float:
+    """Return the largest |coordinate| plus radius of a region's circles: a bound of its size."""
+    size = 0.0
+    for k in range(circles.shape[0]):
+        for axis in range(3):
+            size = max(size, abs(circles[k, axis]) + circles[k, RADIUS])
+    return size
+
+
+@helper
+def slack_at(boundary: Boundary, sine: float) -> float:
+    """Return the slack of a point where surfaces meet at an angle with the given sine."""
+    return NEAR * boundary.size * (1.0 + BLURRED / sine) if sine > 0.0 else math.inf
+
+
+@helper
+def add_break(boundary: Boundary, x: float, y: float, z: float, slack: float) -> None:
+    """Add a break at x if (x, y, z) satisfies all limits to within a slack."""
+    circles, planes, breaks = boundary.circles, boundary.planes, boundary.breaks
+    count = boundary.number[0]
+    if count + 1 == breaks.shape[0] or not breaks[0] < x < breaks[1]:
+        return
+    for k in range(circles.shape[0]):
+        dx, dy, dz = circles[k, IS_BALL] * (x - circles[k, X]), y - circles[k, Y], z - circles[k, Z]
+        excess = math.sqrt(dx * dx + dy * dy + dz * dz) - circles[k, RADIUS]
+        if circles[k, SIDE] * excess > slack:
+            return
+    for k in range(planes.shape[0]):
+        ax, ay, az = planes[k, X], planes[k, Y], planes[k, Z]
+        excess = ax * x + ay * y + az * z - planes[k, OFFSET]
+        if excess > slack * math.sqrt(ax * ax + ay * ay + az * az):
+            return
+    breaks[count] = x
+    boundary.number[0] = count + 1
+
+
+@helper
+def real_roots(a: float, b: float, c: float) -> tuple[float, float]:
+    """Return the real roots of a x² + b x + c, nan in place of each missing one."""
+    if a == 0.0:
+        return (-c / b if b != 0.0 else math.nan), math.nan
+    square = b * b - 4.0 * a * c
+    if square < 0.0:
+        return math.nan, math.nan
+    # This form avoids cancellation.
+    q = -0.5 * (b + math.copysign(math.sqrt(square), b))
+    return q / a, (c / q if q != 0.0 else math.nan)
+
+
+@helper
+def add_breaks_at_height(boundary: Boundary, ball: int, y: float, z: float, slack: float) -> None:
+    """Add breaks where the line along x through (y, z) meets a sphere."""
+    circles = boundary.circles
+    dy, dz = y - circles[ball, Y], z - circles[ball, Z]
+    square = circles[ball, RADIUS] * circles[ball, RADIUS] - dy * dy - dz * dz
+    if square >= 0.0:
+        half = math.sqrt(square)
+        x = circles[ball, X]
+        add_break(boundary, x - half, y, z, slack)
+        add_break(boundary, x + half, y, z, slack)
 
 
 @helper
@@ -100,30 +176,3 @@ def add_breaks_at_tangencies(boundary: Boundary) -> None:
             add_breaks_of_pair(boundary, j, k)
     for k in range(boundary.planes.shape[0]):
         add_breaks_of_line(boundary, k)
-
-
-@helper
-def find_breaks(
-    circles: FloatArray, planes: FloatArray, low: float, high: float, breaks: FloatArray
-) -> int:
-    """Write low, the breaks in between and high, in ascending order; return the count."""
-    breaks[0], breaks[1] = low, high
-    number = np.full(1, 2)
-    boundary = Boundary(circles, planes, region_size(circles), breaks, number)
-    add_breaks_at_tangencies(boundary)
-    add_breaks_at_vertices(boundary)
-    count = number[0]
-    for i in range(2, count):
-        x, j = breaks[i], i - 1
-        while breaks[j] > x:
-            breaks[j + 1] = breaks[j]
-            j -= 1
-        breaks[j + 1] = x
-    tolerance = SAME_BREAK * (high - low)
-    distinct = 1
-    for i in range(1, count - 1):
-        if breaks[distinct - 1] + tolerance < breaks[i] < high - tolerance:
-            breaks[distinct] = breaks[i]
-            distinct += 1
-    breaks[distinct] = high
-    return distinct + 1

@@ -17,8 +17,8 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
 from explorer.workspace.slices.arcs import LENGTH, MOMENT_Y, MOMENT_Z, Slicer, slice_area
-from explorer.workspace.slices.break_points import region_size
-from explorer.workspace.slices.breaks import find_breaks
+from explorer.workspace.slices.breaks import region_size
+from explorer.workspace.slices.vertices import find_breaks
 
 # The most breaks of one region, and the most pieces.
 MOST_BREAKS, MOST_PIECES = 1000, 1100

@@ -1,4 +1,4 @@
-"""Vertices of a region bounded by spheres, cylinders along x, and planes: three surfaces meet.
+"""Breaks of a region: its vertices, where three surfaces meet, with those where curves touch.
 
 Two planes meet in a line, and two cylinders, or a cylinder and a plane along x, in two lines
 along x. Their intersections with a third surface have closed forms. Two spheres, or a sphere and
@@ -16,11 +16,13 @@ import numpy as np
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
 from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, X, Y, Z
-from explorer.workspace.slices.break_points import (
+from explorer.workspace.slices.breaks import (
     Boundary,
     add_break,
     add_breaks_at_height,
+    add_breaks_at_tangencies,
     real_roots,
+    region_size,
     slack_at,
 )
 
@@ -28,6 +30,8 @@ from explorer.workspace.slices.break_points import (
 MOST_STEPS = 100
 # Planes and lines at an angle with a smaller sine count as parallel.
 PARALLEL = 1e-14
+# Breaks closer together than this share of the x-range are merged.
+SAME_BREAK = 1e-13
 # Columns of the direction of a line.
 DX, DY, DZ = 3, 4, 5
 
@@ -305,3 +309,30 @@ def add_breaks_at_vertices(boundary: Boundary) -> None:
     add_breaks_on_cylinders(boundary)
     add_breaks_of_planes(boundary, cuts)
     add_breaks_on_spheres(boundary, cuts)
+
+
+@helper
+def find_breaks(
+    circles: FloatArray, planes: FloatArray, low: float, high: float, breaks: FloatArray
+) -> int:
+    """Write low, the breaks in between and high, in ascending order; return the count."""
+    breaks[0], breaks[1] = low, high
+    number = np.full(1, 2)
+    boundary = Boundary(circles, planes, region_size(circles), breaks, number)
+    add_breaks_at_tangencies(boundary)
+    add_breaks_at_vertices(boundary)
+    count = number[0]
+    for i in range(2, count):
+        x, j = breaks[i], i - 1
+        while breaks[j] > x:
+            breaks[j + 1] = breaks[j]
+            j -= 1
+        breaks[j + 1] = x
+    tolerance = SAME_BREAK * (high - low)
+    distinct = 1
+    for i in range(1, count - 1):
+        if breaks[distinct - 1] + tolerance < breaks[i] < high - tolerance:
+            breaks[distinct] = breaks[i]
+            distinct += 1
+    breaks[distinct] = high
+    return distinct + 1
