@@ -12,9 +12,7 @@ import viser
 from desk import Desk
 from services import StubWorker, services_for
 
-from explorer.app.features.change.before import OVER, DesignChange
-from explorer.app.features.change.card import ChangeCard
-from explorer.app.features.change.scene import ChangeScene
+from explorer.app.features.history.change import OVER, ChangeCard, ChangeScene, DesignChange
 from explorer.app.features.workspace.volume import VolumeFeed
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import REDO, UNDO
@@ -107,7 +105,7 @@ def test_change_is_over_with_the_next_step_with_a_press_and_with_undo(
         watcher.do(SetPosition(0, 10.0 + 0.1 * value))
         watcher.do(SetVariable("a3y", value))
         assert change.before is not None
-        assert change.before.frame.state.pose.position[0] == 10.0 + 0.1 * value
+        assert change.before.state.pose.position[0] == 10.0 + 0.1 * value
         end()
         watcher.follow()
         assert change.before is None
@@ -120,4 +118,4 @@ def test_opened_design_is_no_change_and_new_limits_are_one(watcher: Watcher) -> 
     design = watcher.desk.state.design
     watcher.do(Set("design.limits", msgspec.structs.replace(design.limits, box=None)))
     assert watcher.change.before is not None
-    assert watcher.change.before.frame.state.design == design
+    assert watcher.change.before.state.design == design

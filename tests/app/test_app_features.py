@@ -31,7 +31,7 @@ from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
 from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
 from explorer.app.features.precision.budget import SetTolerances
 from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
-from explorer.app.features.view.camera_buttons import HINTS as CAMERA_HINTS
+from explorer.app.features.view.feature import CAMERA_HINTS
 from explorer.app.features.workspace.panel import KEYS as CHIP_KEYS
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Control

@@ -15,8 +15,6 @@ from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
 from explorer.app.features.feature import Services
-from explorer.app.features.ground.ground import shadow_outlines
-from explorer.app.features.ground.lighting import TO_SUN
 from explorer.app.features.mechanism.approach import FADE_FROM, FARTHEST, approaches
 from explorer.app.features.mechanism.bodies import BASE_RADIUS, PLATE_THICKNESS, platform_plate
 from explorer.app.features.mechanism.flags import Flags
@@ -31,6 +29,7 @@ from explorer.app.features.mechanism.marks import (
 from explorer.app.features.mechanism.tetrahedra import INSET, Tetrahedra
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum
 from explorer.app.features.singularity.distance import DistancePanel, distance_table
+from explorer.app.features.view.ground import TO_SUN, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import linear_colour, plate
 from explorer.app.state.actions import Open, SetJoint, SetPose

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from explorer.app.features.change.feature import CHANGE
 from explorer.app.features.compare.feature import COMPARE
 from explorer.app.features.designs.feature import DESIGNS
 from explorer.app.features.feature import Feature
 from explorer.app.features.forces.feature import FORCES
-from explorer.app.features.ground.feature import GROUND
 from explorer.app.features.help.feature import HELP
 from explorer.app.features.history.feature import HISTORY
 from explorer.app.features.legs.feature import LEGS
@@ -28,11 +26,9 @@ FEATURES: tuple[Feature, ...] = (
     DESIGNS,
     MECHANISM,
     MACHINE,
-    GROUND,
     HISTORY,
     VIEW,
     SINGULARITY,
-    CHANGE,
     WORKSPACE,
     ORIENTATION,
     LEGS,

@@ -1,1 +1,1 @@
-"""The form and the visible parts of the mechanism, and the views of the camera."""
+"""The form and the visible parts of the mechanism, the ground, and the views of the camera."""

@@ -1,7 +1,8 @@
-"""The ground under the mechanism: a grid, and on it the shadow of plates and legs.
+"""The lights, and the ground under the mechanism: its grid with a scale, and the shadow on it.
 
-The shadow is the outline of each body as the sun projects it on the ground, in closed form:
-shadow maps would cost a software renderer more than all that it draws besides.
+viser's own lighting, an environment map and shadow maps, takes a software renderer four times as
+long, and three.js may keep drawing a mesh of another shape than it has while shadow maps come
+and go. The shadow is the outline of each body as the sun projects it on the ground, in closed form.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.app.features.feature import Services
-from explorer.app.features.ground.lighting import TO_SUN
 from explorer.app.features.mechanism.bodies import (
     BASE_RADIUS,
     PLATE_THICKNESS,
@@ -19,12 +19,20 @@ from explorer.app.features.mechanism.bodies import (
     PLATFORM_SHIFT,
 )
 from explorer.app.features.mechanism.legs import PLATE_TOP, ROD_RADIUS, TUBE_RADIUS, TWIN
+from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import Rgb
 from explorer.numerics.arrays import FloatArray
 
+TO_SUN = np.array([-0.22, 0.3, 1.0])
+"""Direction from the scene to the sun, so that shadows fall towards the isometric camera."""
+
+# Colours of the light from above and from below, and the intensities of both lights.
+SKY: Rgb = (255, 255, 255)
+FROM_BELOW: Rgb = (112, 120, 150)
+SKY_INTENSITY, SUN_INTENSITY = 2.0, 3.0
 # The shadow lies below the lines of the grid, and both below the base plate.
 GRID_BELOW, SHADOW_BELOW = 0.01, 0.03
 # Colours of the grid's cells and sections, by whether the page is dark.
@@ -44,10 +52,28 @@ PROJECTION = np.column_stack([np.eye(2), -TO_SUN[:2] / TO_SUN[2]])
 
 
 class Ground(ScenePart):
-    """The grid and the shadow."""
+    """The lights, the grid with the size of its squares, and the shadow.
+
+    `labels.js` writes the size in a corner of the scene, or draws a bar of such a length where that
+    is the same at every depth.
+    """
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
+        scene.configure_environment_map(hdri=None)
+        scene.configure_default_lights(enabled=False, cast_shadow=False)
+        # Lights shine from where they are towards the origin.
+        scene.add_light_hemisphere(
+            "/lights/sky",
+            sky_color=SKY,
+            ground_color=FROM_BELOW,
+            intensity=SKY_INTENSITY,
+            position=(0.0, 0.0, 1.0),
+        )
+        scene.add_light_directional(
+            "/lights/sun", intensity=SUN_INTENSITY, cast_shadow=False, position=tuple(TO_SUN)
+        )
+        self._scale = add_label(scene, "/ground/scale", "")
         self._grid = scene.add_grid(
             "/grid",
             width=60.0,
@@ -75,6 +101,9 @@ class Ground(ScenePart):
         view = placed.frame.state.view
         lowest = ground_of(placed)
         yield self._grid, "visible", view.grid
+        yield self._scale, "visible", view.grid
+        # Of the sides of the squares, in millimetres.
+        yield self._scale, "text", f"{placed.square_mm:.6g}"
         cell, section = GRID[placed.dark]
         yield self._grid, "cell_color", cell
         yield self._grid, "section_color", section

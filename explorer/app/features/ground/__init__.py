@@ -1,1 +1,0 @@
-"""The lights of the scene, the ground with its grid, and the shadow on it."""
