@@ -17,14 +17,26 @@ from hypothesis import given, strategies as st
 from limited_designs import scaled_design
 from services import StubWorker, services_for
 
-from explorer.app.features.compare.actions import Pin, Unpin
-from explorer.app.features.compare.bars import DRAWN, bars
-from explorer.app.features.compare.columns import Column, best_of, columns_of, notes, value_text
-from explorer.app.features.compare.drawing import ComparedRequest, compared_drawing
-from explorer.app.features.compare.feed import LIVE, CompareFeed
-from explorer.app.features.compare.panel import ComparePanel
+from explorer.app.features.compare.panel import ComparePanel, Pin, Unpin
 from explorer.app.features.compare.scene import APART, ComparedScene
-from explorer.app.features.compare.table import table
+from explorer.app.features.compare.table import (
+    DRAWN,
+    Column,
+    bars,
+    best_of,
+    columns_of,
+    notes,
+    table,
+    value_text,
+)
+from explorer.app.features.compare.work import (
+    FEEDS,
+    LIVE,
+    ComparedRequest,
+    CompareFeed,
+    compared_drawing,
+    drawing_in,
+)
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import Placed
@@ -291,59 +303,64 @@ def test_drawing_with_a_tolerance_that_is_too_fine_keeps_its_numbers() -> None:
 
 
 @pytest.fixture
-def feed(services: Services) -> CompareFeed:
-    return services.get(CompareFeed)
+def feeds(services: Services) -> list[CompareFeed]:
+    return [services.get(feed) for feed in FEEDS]
+
+
+def follow(feeds: list[CompareFeed], state: State) -> None:
+    for feed in feeds:
+        feed.follow(Frame(state))
 
 
 def test_change_of_the_live_design_requests_its_drawing_alone(
-    feed: CompareFeed, worker: StubWorker
+    feeds: list[CompareFeed], worker: StubWorker
 ) -> None:
-    feed.follow(Frame(opened(OPTIMAL)))
+    follow(feeds, opened(OPTIMAL))
     assert worker.orders == []
     state = compared(INITIAL, variant(2), look=Look(overlay=True))
-    feed.follow(Frame(state))
+    follow(feeds, state)
     designs = [unnamed(each) for each in (OPTIMAL, INITIAL, variant(2))]
     assert [order.request.design for order in worker.orders] == designs
     assert len({order.key for order in worker.orders}) == 3
     worker.work()
-    assert feed.is_settled
-    found = columns_of(state, feed)
+    assert all(feed.is_settled for feed in feeds)
+    found = columns_of(state, feeds)
     assert [(each.letter, each.measured) for each in found] == [
         (letter, measured(design))
         for letter, design in zip(("live", "A", "B"), designs, strict=True)
     ]
-    feed.follow(Frame(SetVariable("b2", 2.3).apply(state)))
+    follow(feeds, SetVariable("b2", 2.3).apply(state))
     (order,) = worker.orders[3:]
     assert order.request.design == unnamed(OPTIMAL.with_variable("b2", 2.3))
     # Until it comes the last one is shown, and said to be old.
-    assert feed.drawing(LIVE) is not None
-    assert not feed.is_current(LIVE)
-    assert feed.is_current(1)
+    assert drawing_in(LIVE, feeds[LIVE]) is not None
+    assert not feeds[LIVE].is_current
+    assert feeds[1].is_current
 
 
 def test_place_with_another_design_shows_nothing_of_the_one_before(
-    feed: CompareFeed, worker: StubWorker
+    feeds: list[CompareFeed], worker: StubWorker
 ) -> None:
     state = compared(INITIAL)
-    feed.follow(Frame(state))
+    follow(feeds, state)
     worker.work()
-    assert feed.drawing(1) is not None
-    feed.follow(Frame(Pin(variant(2)).apply(Unpin(0).apply(state))))
-    assert feed.drawing(1) is None
+    assert drawing_in(1, feeds[1]) is not None
+    follow(feeds, Pin(variant(2)).apply(Unpin(0).apply(state)))
+    assert drawing_in(1, feeds[1]) is None
     worker.work()
-    assert feed.drawing(1) is not None
+    assert drawing_in(1, feeds[1]) is not None
 
 
 def test_workspaces_are_drawn_to_true_size_in_their_colours(
-    services: Services, feed: CompareFeed, worker: StubWorker
+    services: Services, feeds: list[CompareFeed], worker: StubWorker
 ) -> None:
     large = msgspec.structs.replace(INITIAL, unit_mm=25.0)
     state = compared(large, look=Look(overlay=True, outlines=True))
-    feed.follow(Frame(state))
+    follow(feeds, state)
     scene = ComparedScene(services)
     assigner = Assigner(services.server)
     worker.work()
-    feed.follow(Frame(state))
+    follow(feeds, state)
     placed = Placed(Frame(state))
     updates = scene.updates(placed)
     assigner.assign(updates)
@@ -354,7 +371,7 @@ def test_workspaces_are_drawn_to_true_size_in_their_colours(
     }
     assert {"/compared/live/workspace", "/compared/A/workspace", "/compared/A/outline"} <= {*shown}
     assert "/compared/live/outline" not in shown
-    drawing = feed.drawing(1)
+    drawing = drawing_in(1, feeds[1])
     assert drawing is not None
     assert drawing.shell is not None
     mesh = shown["/compared/A/workspace"]
@@ -366,7 +383,7 @@ def test_workspaces_are_drawn_to_true_size_in_their_colours(
     off = np.abs(np.asarray(mesh.vertices) - expected).max()
     assert 0.5 * close < off <= 1.001 * close
     hidden = Frame(compared(large, look=Look()))
-    feed.follow(hidden)
+    follow(feeds, hidden.state)
     assigner.assign(scene.updates(Placed(hidden)))
     assert not mesh.visible
 

@@ -32,7 +32,6 @@ from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, 
 from explorer.app.features.precision.budget import SetTolerances
 from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
 from explorer.app.features.view.feature import CAMERA_HINTS
-from explorer.app.features.workspace.panel import KEYS as CHIP_KEYS
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Control
 from explorer.app.inputs.controls import Controls
@@ -394,7 +393,6 @@ def test_every_key_belongs_to_a_command_and_not_to_browser_camera_or_palette(
     owned = keys_of(palette)
     assert len(CONTROL_KEYS) == sum(len(feature.keys) for feature in FEATURES)
     assert CONTROL_KEYS.items() <= owned.items()
-    assert set(CHIP_KEYS) <= set(owned)
     for key in itertools.chain.from_iterable(owned.values()):
         assert str(key) not in BROWSER_KEYS
         # viser's camera looks at the letter, whatever else is held down.

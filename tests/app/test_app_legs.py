@@ -27,7 +27,7 @@ from explorer.app.features.legs.swept import SweptTetrahedra
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.legs import Legs
 from explorer.app.features.workspace import regions
-from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.feeds import workspace_feed
 from explorer.app.features.workspace.panel import WorkspacePanel
 from explorer.app.features.workspace.slice_map import SliceMap
 from explorer.app.features.workspace.tasks import (
@@ -124,7 +124,7 @@ def answer(worker: StubWorker) -> None:
 
 
 def drawing_of(state: State) -> WorkspaceDrawing:
-    drawing = follow(state, WorkspaceFeed)[0].drawing
+    drawing = follow(state, workspace_feed)[0].drawing
     assert drawing is not None
     return drawing
 
@@ -138,7 +138,6 @@ def clearance_at(state: State, points: FloatArray) -> FloatArray:
 
 untyped_trimesh: Any = trimesh
 # Forces and moments of no load.
-UNLOADED = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 THICK = show(thick(opened(OPTIMAL), RADIUS))
 
 
@@ -148,12 +147,12 @@ THICK = show(thick(opened(OPTIMAL), RADIUS))
 def test_drawing_has_the_numbers_of_the_library() -> None:
     drawing = drawing_of(THICK)
     expected = accessible_workspace(THICK.design, tolerance=REACHED_TOLERANCE * OPTIMAL.reach)
-    assert drawing.accessible is not None
+    assert drawing.part is not None
     assert drawing.trouble is None
     assert drawing.volume == expected.volume
-    assert drawing.accessible.volume == expected.accessible_volume
-    assert drawing.accessible.node_count == expected.accessible_node_count
-    assert drawing.accessible.pairs == expected.pairs
+    assert drawing.part.volume == expected.accessible_volume
+    assert drawing.part.node_count == expected.accessible_node_count
+    assert drawing.part.pairs == expected.pairs
     assert drawing.nodes is not None
     assert drawing.nodes.count == expected.node_count
     assert drawing.mesh_volume == pytest.approx(expected.accessible_volume, rel=1e-3)
@@ -230,7 +229,9 @@ def inside(polygons: list[FloatArray], points: FloatArray) -> BoolArray:
 def test_cut_beyond_the_extent_goes_through_the_middle_and_one_within_stays() -> None:
     for level, found in ((-50.0, 10.0), (None, 10.0), (50.0, 10.0), (17.0, 17.0)):
         state = show(opened(OPTIMAL), region="limits", cut="x", level=level)
-        assert drawing_of(state).level == pytest.approx(found)
+        mapped = drawing_of(state).slice_map
+        assert mapped is not None
+        assert mapped.level == pytest.approx(found)
 
 
 def test_drawing_with_another_cut_colour_or_hull_computes_no_workspace_anew(
@@ -239,7 +240,7 @@ def test_drawing_with_another_cut_colour_or_hull_computes_no_workspace_anew(
     drawing_of(THICK)
     monkeypatch.setattr(regions, "accessible_workspace", pytest.fail)
     for changes in ({"cut": "x", "level": 3.0}, {"colour": "margin"}, {"hull": True}):
-        assert drawing_of(show(THICK, **changes)).accessible is not None
+        assert drawing_of(show(THICK, **changes)).part is not None
 
 
 @pytest.mark.parametrize(
@@ -252,13 +253,13 @@ def test_move_requests_a_drawing_only_if_paths_start_at_the_pose(
     services = services_for()
     state = show(THICK, start=start, region=region)
     for each in (state, SetPosition(2, 8.0).apply(state)):
-        services.get(WorkspaceFeed).follow(Frame(each))
+        services.get(workspace_feed).follow(Frame(each))
     assert isinstance(services.worker, StubWorker)
     assert len(services.worker.orders) == orders
 
 
 def test_failure_of_an_older_request_is_no_problem() -> None:
-    feed, worker = follow(THICK, WorkspaceFeed)
+    feed, worker = follow(THICK, workspace_feed)
     feed.follow(Frame(show(THICK, colour="margin")))
     first, second = worker.orders
     first.failed("too late")
@@ -289,13 +290,13 @@ def test_curve_is_requested_once_for_all_radii() -> None:
 
 def summary(state: State) -> str:
     """Return all that the panel says of the drawing of a state."""
-    frame, feed = Frame(state), follow(state, WorkspaceFeed)[0]
+    frame, feed = Frame(state), follow(state, workspace_feed)[0]
     return drawing_words(frame, feed) + workspace_details(frame, feed)
 
 
 def test_numbers_of_the_panel_are_those_of_the_library() -> None:
     drawing, html = drawing_of(THICK), summary(THICK)
-    accessible = drawing.accessible
+    accessible = drawing.part
     assert accessible is not None
     volume, percent = accessible.volume, 100.0 * accessible.volume / drawing.volume
     for text in (
@@ -316,7 +317,7 @@ def test_home_in_trouble_leaves_the_solid_and_says_what_would_do() -> None:
     home = np.array(state.pose.position)
     drawing, whole = drawing_of(state), drawing_of(show(state, region="limits"))
     trouble = drawing.trouble
-    assert drawing.accessible is None
+    assert drawing.part is None
     assert trouble is not None
     with pytest.raises(StartError) as refused:
         check_start(state.design, state.pose.rotation, home)
@@ -336,7 +337,7 @@ def test_button_of_a_home_in_trouble_goes_to_the_nearest_start(
     panel, before = WorkspacePanel(services), show(beyond_its_limits())
     desk.session.do(Set("design", before.design))
     desk.session.do(Set("view", before.view))
-    feed, worker = follow(before, WorkspaceFeed, services)
+    feed, worker = follow(before, workspace_feed, services)
     updates = list(panel.updates(Frame(before)))
     assert any("Nothing is accessible from the home position" in str(v) for *_, v in updates)
     (button,) = (
@@ -357,7 +358,7 @@ def test_button_of_a_home_in_trouble_goes_to_the_nearest_start(
     feed.follow(Frame(after))
     answer(worker)
     assert feed.drawing is not None
-    assert feed.drawing.accessible is not None
+    assert feed.drawing.part is not None
     assert (button, "visible", False) in list(panel.updates(Frame(after)))
 
 
@@ -365,7 +366,7 @@ def test_button_of_a_home_in_trouble_goes_to_the_nearest_start(
 def test_exported_mesh_has_the_volume_of_the_drawing(what: str) -> None:
     drawing = drawing_of(show(THICK, hull=True))
     tolerance = REACHED_TOLERANCE * OPTIMAL.reach
-    data = export_mesh(THICK.design, LEVEL, tolerance, "accessible", None, UNLOADED, what, "stl")
+    data = export_mesh(regions.Selection(THICK.design, LEVEL, "accessible"), tolerance, what, "stl")
     mesh = untyped_trimesh.load_mesh(io.BytesIO(data), file_type="stl")
     expected = drawing.mesh_volume if what == "workspace" else drawing.hull_volume
     assert expected is not None
@@ -391,7 +392,7 @@ def test_file_that_cannot_be_written_is_refused_with_what_would_work(
 ) -> None:
     design = with_limits(THICK, **limits).design
     with pytest.raises(InputError, match=reason):
-        export_mesh(design, LEVEL, 0.1, region, None, UNLOADED, what, file_format)
+        export_mesh(regions.Selection(design, LEVEL, region), 0.1, what, file_format)
 
 
 # The curve of radii

@@ -36,7 +36,7 @@ from explorer.app.features.orientation.tasks import (
     orientations_over,
 )
 from explorer.app.features.orientation.torsion_strip import LEFT, RIGHT, tilt_at, torsion_strip
-from explorer.app.features.workspace.feed import workspace_request
+from explorer.app.features.workspace.feeds import workspace_request
 from explorer.app.features.workspace.slice_map import AXES
 from explorer.app.features.workspace.tasks import draw_workspace
 from explorer.app.state.actions import Set, SetAngle, SetPosition

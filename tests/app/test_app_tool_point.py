@@ -21,9 +21,9 @@ from services import StubDownloads, StubWorker
 from strategies import Case, all_cases
 from workspace_feeds import draw
 
-from explorer.app.features.compare.actions import Pin
-from explorer.app.features.compare.feed import CompareFeed
+from explorer.app.features.compare.panel import Pin
 from explorer.app.features.compare.scene import ComparedScene
+from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
@@ -38,11 +38,15 @@ from explorer.app.features.paths.scene import PathScene
 from explorer.app.features.sharing.scene_html import caption_of
 from explorer.app.features.singularity.performance import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene
-from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_request
-from explorer.app.features.workspace.files import WorkspaceFiles
-from explorer.app.features.workspace.orientation import workspace_pose, workspace_start
+from explorer.app.features.workspace.feature import send_workspace
+from explorer.app.features.workspace.feeds import (
+    workspace_feed,
+    workspace_pose,
+    workspace_request,
+    workspace_start,
+)
 from explorer.app.features.workspace.panel import WorkspacePanel
-from explorer.app.features.workspace.regions import rows_of as matrix_rows
+from explorer.app.features.workspace.regions import Selection, rows_of as matrix_rows
 from explorer.app.features.workspace.scene import WorkspaceScene
 from explorer.app.features.workspace.tasks import WorkspaceDrawing, export_mesh
 from explorer.app.features.workspace.words import workspace_details
@@ -336,7 +340,7 @@ def draw_workspace_of(
     services: Services, state: State
 ) -> tuple[dict[str, dict[str, Any]], WorkspaceDrawing]:
     """Return the nodes of the workspace of a state, and its drawing."""
-    drawing = draw(services, WorkspaceFeed, state)
+    drawing = draw(services, workspace_feed, state)
     return by_name(WorkspaceScene(services).updates(Placed(Frame(state)))), drawing
 
 
@@ -369,7 +373,7 @@ def test_drawn_solid_and_hull_are_those_of_b4_moved_by_the_arm(
     ends = np.array([corners.min(axis=0), corners.max(axis=0)])
     box = WorkspaceScene(services).corners(Placed(Frame(state))) / scene_scale(state)
     np.testing.assert_allclose([box.min(axis=0), box.max(axis=0)], ends, atol=0.05)
-    rows = rows_of(workspace_details(Frame(state), services.get(WorkspaceFeed)))
+    rows = rows_of(workspace_details(Frame(state), services.get(workspace_feed)))
     extents = [row[1] for row in rows if row[0].startswith("Extent of the tool")]
     numbers = [[number(end) for end in text.split(" … ")] for text in extents]
     np.testing.assert_allclose(numbers, ends.T, atol=0.05)
@@ -469,11 +473,11 @@ def test_paths_start_where_the_tool_is() -> None:
 @pytest.mark.parametrize("what", ["workspace", "hull"])
 def test_file_holds_the_positions_of_the_tool(what: str) -> None:
     design, offset = with_tool(OPTIMAL), TILTED.rotation @ np.array(TOOL)
-    rows, no_load = matrix_rows(TILTED.rotation), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    selection = Selection(design, matrix_rows(TILTED.rotation))
     x, y, z = offset.tolist()
     bounds: list[FloatArray] = []
     for arm in (None, (x, y, z)):
-        data = export_mesh(design, rows, 0.8, "limits", None, no_load, what, "stl", arm)
+        data = export_mesh(selection, 0.8, what, "stl", arm)
         untyped: Any = trimesh
         mesh = untyped.load(io.BytesIO(data), file_type="stl")
         bounds.append(np.array(mesh.bounds) / design.unit_mm)
@@ -481,13 +485,13 @@ def test_file_holds_the_positions_of_the_tool(what: str) -> None:
 
 
 def test_file_of_the_workspace_is_named_after_the_tool(services: Services, desk: Desk) -> None:
-    files, downloads = WorkspaceFiles(services), services.downloads
+    downloads = services.downloads
     assert isinstance(downloads, StubDownloads)
     desk.session.do(Set("design", with_tool(OPTIMAL)))
     for at in ("b4", "tool"):
         desk.session.do(Set("view.at", at))
-        files.send("workspace", "stl", 1)
-        files.send_hull_at_home("stl", 1)
+        send_workspace(services, "workspace", "stl", 1)
+        send_workspace(services, "hull", "stl", 1, at_home=True)
     assert [name.removeprefix(f"{OPTIMAL.name}-") for _, name in downloads.sent] == [
         "workspace.stl",
         "hull.stl",
@@ -558,7 +562,8 @@ def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) 
     other = msgspec.structs.replace(initial, unit_mm=20.0)
     for at in ("b4", "tool"):
         state = Set("compared.look", Look(overlay=True)).apply(Pin(other).apply(state_at(at)))
-        services.get(CompareFeed).follow(Frame(state))
+        for feed in FEEDS:
+            services.get(feed).follow(Frame(state))
         assert isinstance(services.worker, StubWorker)
         services.worker.work()
         placed = Placed(Frame(state))

@@ -22,14 +22,18 @@ from services import StubDownloads, services_for
 from workspace_feeds import drawing_of, follow
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_request
-from explorer.app.features.workspace.files import FORMATS, WorkspaceFiles
-from explorer.app.features.workspace.orientation import workspace_rotation
+from explorer.app.features.workspace.feature import FORMATS, send_workspace
+from explorer.app.features.workspace.feeds import (
+    volume_feed,
+    workspace_feed,
+    workspace_request,
+    workspace_rotation,
+)
 from explorer.app.features.workspace.panel import COLOUR, SHOWN, WorkspacePanel
+from explorer.app.features.workspace.regions import Selection
 from explorer.app.features.workspace.slice_map import map_picture
 from explorer.app.features.workspace.tasks import STEP, WorkspaceDrawing, export_mesh
-from explorer.app.features.workspace.volume import VolumeFeed
-from explorer.app.features.workspace.words import drawing_words, volume_headline
+from explorer.app.features.workspace.words import drawing_words, volume_headline, volume_text
 from explorer.app.scene.bands import AT_LIMIT, PLAIN
 from explorer.app.state.actions import Open, Set, SetAngle, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
@@ -74,19 +78,19 @@ def with_workspace(state: State, **changes: Any) -> State:
 
 def test_volume_is_known_while_the_solid_is_not_shown() -> None:
     services, first = services_for(), opened(OPTIMAL)
-    feed = services.get(VolumeFeed)
-    assert feed.text.words == "–"
+    feed = services.get(volume_feed)
+    assert volume_text(feed.drawing) == "–"
     assert "computing" in volume_headline(Frame(first), feed)
     for state in (first, SetVariable("a3x", 17.0).apply(first)):
         feed.follow(Frame(state))
-        assert not feed.text.is_current
+        assert not feed.is_current
         follow(services, state)
         expected = workspace_volume(state.design, state.pose.rotation)
-        assert services.get(WorkspaceFeed).drawing is None
-        assert feed.text.is_current
-        assert feed.text.words == f"{format_number(expected.volume, 6)} units³"
+        assert services.get(workspace_feed).drawing is None
+        assert feed.is_current
+        assert volume_text(feed.drawing) == f"{format_number(expected.volume, 6)} units³"
         words = volume_headline(Frame(state), feed)
-        assert feed.text.words in words
+        assert volume_text(feed.drawing) in words
         # One unit of the design is a centimetre.
         litres = format_number(expected.volume, 4), format_number(0.001 * expected.volume, 4)
         assert f"{litres[0]} cm³ ({litres[1]} l)" in words
@@ -98,9 +102,9 @@ def test_volume_is_that_of_the_orientation_that_is_chosen() -> None:
     for orientation, words in (("pose", "present"), ("home", "home")):
         chosen = with_workspace(state, orientation=orientation)
         follow(services, chosen)
-        feed = services.get(VolumeFeed)
+        feed = services.get(volume_feed)
         expected = workspace_volume(OPTIMAL, workspace_rotation(Frame(chosen))).volume
-        assert feed.text.words == f"{format_number(expected, 6)} units³"
+        assert volume_text(feed.drawing) == f"{format_number(expected, 6)} units³"
         assert f"in the {words} orientation" in volume_headline(Frame(chosen), feed)
 
 
@@ -117,7 +121,7 @@ def test_empty_workspace_names_what_empties_it_instead_of_a_volume() -> None:
     limits = msgspec.structs.replace(OPTIMAL.limits, l1=(0.0, 1.0), box=((10.0,) * 3, (11.0,) * 3))
     services, state = services_for(), Set("design.limits", limits).apply(opened(OPTIMAL))
     follow(services, state)
-    words = volume_headline(Frame(state), services.get(VolumeFeed))
+    words = volume_headline(Frame(state), services.get(volume_feed))
     assert "The workspace is empty" in words
     assert "l1 maximum" in words
     assert drawing_of(with_workspace(state, solid=True, cut="x")).slice_map is None
@@ -177,7 +181,8 @@ def test_cut_shows_the_solid_and_goes_through_its_middle_on_every_axis(
         drawing = drawing_of(state)
         assert drawing.extent is not None
         low, high = (float(end["xyz".index(axis)]) for end in drawing.extent)
-        assert drawing.level == pytest.approx(0.5 * (low + high))
+        assert drawing.slice_map is not None
+        assert drawing.slice_map.level == pytest.approx(0.5 * (low + high))
         # The same axis again leaves the level where it is.
         desk.session.do(Set("view.workspace.level", 3.0))
         desk.press(services.buttons, "workspace.cut", axis)
@@ -201,7 +206,9 @@ def test_slider_of_the_cut_spans_the_extent_and_follows_the_design(services: Ser
         assert (found["min"], found["max"]) == pytest.approx((low, high), abs=0.01)
         assert found["value"] == pytest.approx(0.5 * (low + high))
     # A level that the new workspace leaves out gives way to the middle.
-    assert drawing_of(with_workspace(changed, level=high + 1.0)).level == found["value"]
+    mapped = drawing_of(with_workspace(changed, level=high + 1.0)).slice_map
+    assert mapped is not None
+    assert mapped.level == found["value"]
 
 
 @pytest.mark.parametrize("axis", AXES)
@@ -229,12 +236,12 @@ def test_switch_of_the_cut_keeps_the_other_side(services: Services, desk: Desk, 
     desk.press(services.buttons, "workspace.cut", "flip")
     assert desk.state.view.workspace.flipped
     far = drawing_of(desk.state)
-    assert near.level is not None
+    assert near.slice_map is not None
     # The camera's direction, by axis: see `explorer.app.scene.camera`.
     sign = (1.0, -1.0, 1.0)[index]
     for drawing, side in ((near, -sign), (far, sign)):
         corners = np.concatenate([shell.vertices for shell in drawing.surface.shells])[:, index]
-        assert (side * (corners - near.level)).min() == pytest.approx(0.0, abs=1e-9)
+        assert (side * (corners - near.slice_map.level)).min() == pytest.approx(0.0, abs=1e-9)
 
 
 # The map
@@ -257,7 +264,7 @@ def test_map_has_its_place_for_the_page(axis: Axis, angles: tuple[float, float, 
     picture = map_picture(drawing.slice_map, pose.position, OPTIMAL.reach)
     facts = facts_of(picture)
     assert facts["axis"] == "xyz".index(axis)
-    assert facts["level"] == drawing.level
+    assert facts["level"] == drawing.slice_map.level
     # Its own coordinates, placed in the picture, are the places that the page reads.
     (matrix,) = re.findall(r'<g transform="matrix\(([^)]*)\)" data-within', picture)
     a, b, c, d, e, f = map(float, matrix.split())
@@ -343,18 +350,18 @@ def test_press_without_a_position_goes_nowhere(services: Services, desk: Desk, t
 
 
 def test_files_are_sent_in_the_format_that_is_asked_for(services: Services, desk: Desk) -> None:
-    files, downloads = services.get(WorkspaceFiles), services.downloads
+    downloads = services.downloads
     assert isinstance(downloads, StubDownloads)
     for what, file_format in itertools.product(("workspace", "hull"), FORMATS):
-        files.send(what, file_format, CLIENT.client_id)
+        send_workspace(services, what, file_format, CLIENT.client_id)
         assert downloads.sent[-1] == (CLIENT.client_id, f"paper-optimal-{what}.{file_format}")
     desk.session.do(Set("view.workspace.region", "accessible"))
-    files.send("hull", "stl", CLIENT.client_id)
+    send_workspace(services, "hull", "stl", CLIENT.client_id)
     assert downloads.sent[-1][1] == "paper-optimal-accessible-hull.stl"
     desk.session.do(Set("view.workspace.region", "held"))
-    files.send("workspace", "3mf", CLIENT.client_id)
+    send_workspace(services, "workspace", "3mf", CLIENT.client_id)
     assert downloads.sent[-1][1] == "paper-optimal-workspace-that-holds-the-load.3mf"
-    files.send_hull_at_home("3mf", CLIENT.client_id)
+    send_workspace(services, "hull", "3mf", CLIENT.client_id, at_home=True)
     assert downloads.sent[-1][1] == "paper-optimal-hull.3mf"
 
 
@@ -527,7 +534,7 @@ def test_map_is_read_to_the_browser_that_asks(services: Services) -> None:
     for text in ("[12.5,5]", "[NaN,1,2]", place):
         services.buttons.press("workspace.read", text, client)
     (script,) = asking.scripts
-    drawing = services.get(WorkspaceFeed).drawing
+    drawing = services.get(workspace_feed).drawing
     assert drawing is not None
     assert drawing.slice_map is not None
     words = drawing.slice_map.words_at((12.5, 5.0, 7.25))
@@ -593,30 +600,31 @@ def test_colour_that_a_design_states_nothing_of_asks_for_what_it_needs(
 
 
 @pytest.fixture(scope="module")
-def feed() -> WorkspaceFeed:
+def feed() -> Any:
     """The feed after it has drawn the part that holds the load."""
     services = services_for()
     follow(services, load_state(region="held"))
-    return services.get(WorkspaceFeed)
+    return services.get(workspace_feed)
 
 
 @pytest.fixture(scope="module")
-def drawing(feed: WorkspaceFeed) -> WorkspaceDrawing:
+def drawing(feed: Any) -> WorkspaceDrawing:
     assert feed.drawing is not None
     return feed.drawing
 
 
 def test_part_that_holds_the_load_is_drawn_and_measured(
-    feed: WorkspaceFeed, drawing: WorkspaceDrawing
+    feed: Any, drawing: WorkspaceDrawing
 ) -> None:
     assert drawing.trouble is None
     rotation = np.array(drawing.request.rotation)
+    assert drawing.part is not None
     expected = held_workspace(LOADED, rotation, LOAD).held_volume
-    assert drawing.held_volume == pytest.approx(expected, rel=5e-3)
+    assert drawing.part.volume == pytest.approx(expected, rel=5e-3)
     assert 0.1 < expected / drawing.volume < 0.9
     words = drawing_words(Frame(load_state(region="held")), feed)
     assert "hold the load" in words
-    assert f"{100.0 * (drawing.held_volume or 0.0) / drawing.volume:.2f} %" in words
+    assert f"{100.0 * drawing.part.volume / drawing.volume:.2f} %" in words
     assert "(3, 0, −40) N at the tool, (0, 0.2, 0) N m, 0.5 kg of payload" in words
     assert {shell.colour for shell in drawing.surface.shells} == {PLAIN, AT_LIMIT}
     for shell in drawing.surface.shells:
@@ -630,7 +638,7 @@ def test_load_that_nothing_holds_names_the_part(services: Services) -> None:
     weak = msgspec.structs.replace(LOADED, actuators=Actuators(push_n=(2, 2, 2, 2, 2, 2)))
     state = load_state(weak, region="held")
     follow(services, state)
-    drawing = services.get(WorkspaceFeed).drawing
+    drawing = services.get(workspace_feed).drawing
     assert drawing is not None
     assert drawing.trouble is not None
     assert re.search(r"payload; actuator \w+ is at its limit there", drawing.trouble.reason)
@@ -641,13 +649,14 @@ def test_load_that_nothing_holds_names_the_part(services: Services) -> None:
 
 
 def test_file_holds_the_part_that_holds_the_load_or_says_why_not(drawing: WorkspaceDrawing) -> None:
-    rows = drawing.request.rotation
-    data = export_mesh(LOADED, rows, 0.02, "held", None, LOAD, "workspace", "stl")
+    held = Selection(LOADED, drawing.request.rotation, "held", load=LOAD)
+    data = export_mesh(held, 0.02, "workspace", "stl")
     untyped: Any = trimesh
     volume = untyped.load(io.BytesIO(data), file_type="stl").volume / LOADED.unit_mm**3
-    assert volume == pytest.approx(drawing.held_volume, rel=5e-3)
+    assert drawing.part is not None
+    assert volume == pytest.approx(drawing.part.volume, rel=5e-3)
     with pytest.raises(InputError, match="along which a part takes its limit consists of facets"):
-        export_mesh(LOADED, rows, 0.1, "held", None, LOAD, "workspace", STEP)
-    heavy = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0)
+        export_mesh(held, 0.1, "workspace", STEP)
+    heavy = replace(held, load=(0.0, 0.0, -1e6, 0.0, 0.0, 0.0))
     with pytest.raises(InputError, match="nothing holds the load: the best position found holds"):
-        export_mesh(LOADED, rows, 0.1, "held", None, heavy, "workspace", "stl")
+        export_mesh(heavy, 0.1, "workspace", "stl")

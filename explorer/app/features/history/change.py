@@ -9,12 +9,11 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.volume import (
+from explorer.app.features.workspace.feeds import volume_feed, volume_request
+from explorer.app.features.workspace.regions import Selection
+from explorer.app.features.workspace.tasks import (
     MeasuredVolume,
-    VolumeFeed,
-    VolumeRequest,
     measure_volume,
-    volume_request,
 )
 from explorer.app.scene.outline import outline
 from explorer.app.scene.part import ScenePart
@@ -45,9 +44,9 @@ class DesignChange:
     def __init__(self, services: Services) -> None:
         self.before: Frame | None = None
         self._session = services.session
-        self._now = services.get(VolumeFeed)
+        self._now = services.get(volume_feed)
         # Another page of the same state may not have measured the design before the change.
-        self._then = Feed[VolumeRequest, MeasuredVolume](
+        self._then = Feed[Selection, MeasuredVolume](
             services.worker,
             measure_volume,
             lambda _: None if self.before is None else volume_request(self.before),
@@ -91,7 +90,7 @@ class DesignChange:
             self._session.redraw()
 
 
-def _volume(feed: Feed[VolumeRequest, MeasuredVolume]) -> float | None:
+def _volume(feed: Feed[Selection, MeasuredVolume]) -> float | None:
     drawing = feed.drawing
     return None if drawing is None or not feed.is_current else drawing.measured.volume
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from explorer.app.features.feature import Services
 from explorer.app.features.legs.tasks import RadiusDrawing, RadiusRequest, draw_radius_curve
-from explorer.app.features.workspace.orientation import workspace_rows, workspace_start
+from explorer.app.features.workspace.feeds import workspace_rows, workspace_start
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.workspace.accessible.radii import with_radius

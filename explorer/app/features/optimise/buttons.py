@@ -21,7 +21,7 @@ from explorer.app.features.optimise.actions import (
     TakePaperProblem,
 )
 from explorer.app.features.optimise.problem import box_on_offer, find_refusals, liftable_limits
-from explorer.app.features.workspace.files import WorkspaceFiles
+from explorer.app.features.workspace.feature import send_workspace
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
 from explorer.app.state.state import State
@@ -142,7 +142,7 @@ class OptimiseButtons:
         self._downloads = services.downloads
         self._complain = services.complain
         self._sends: Mapping[str, Callable[[Who], None]] = {
-            HULL: partial(services.get(WorkspaceFiles).send_hull_at_home, "3mf"),
+            HULL: partial(send_workspace, services, "hull", "3mf", at_home=True),
             DESIGN: services.get(DesignFile).send,
             RECORD: self._send_record,
         }

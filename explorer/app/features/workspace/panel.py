@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -13,19 +13,22 @@ import viser
 from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import run_script, run_script_in
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.files import tolerance_of
-from explorer.app.features.workspace.load import drawn_measure, map_measure
-from explorer.app.features.workspace.orientation import workspace_pose
+from explorer.app.features.workspace.feeds import (
+    drawn_measure,
+    tolerance_of,
+    volume_feed,
+    workspace_feed,
+    workspace_pose,
+)
+from explorer.app.features.workspace.regions import Region
 from explorer.app.features.workspace.slice_map import Axis, SliceMap, level_within, map_picture
-from explorer.app.features.workspace.tasks import Region, WorkspaceDrawing
-from explorer.app.features.workspace.volume import VolumeFeed
+from explorer.app.features.workspace.tasks import WorkspaceDrawing, map_measure
 from explorer.app.features.workspace.words import (
     drawing_words,
     legend,
     load_words,
+    missing_input,
     nothing_words,
-    unstated_words,
     volume_headline,
     workspace_details,
 )
@@ -35,14 +38,13 @@ from explorer.app.inputs.ranges import coordinate_span, fine_step, round_up
 from explorer.app.inputs.tracks import Span
 from explorer.app.look import call_script, read_script
 from explorer.app.scene.bands import Measure
-from explorer.app.session.session import Session
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set, SetPose, StartThere
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Buttons, press_button
+from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect, turn
 from explorer.app.widgets.commands import Key, shift
 from explorer.app.widgets.markup import alert, box, note, sentence
@@ -52,26 +54,16 @@ from explorer.mechanism.margins import MARGIN_KINDS
 from explorer.mechanism.pose import Pose, Triple
 from explorer.workspace.position_bands import LOAD_MEASURES, MEASURE_WORDS
 
-KEYS: Mapping[str, tuple[Key, ...]] = {
-    "Workspace › Solid": (Key("V"),),
-    "Workspace › Convex hull": (shift("V"),),
-    "Workspace › Singular planes": (shift("P"),),
-    "Workspace › Cut open › across x": (Key("X"),),
-    "Workspace › Cut open › across y": (Key("Y"),),
-    "Workspace › Cut open › across z": (Key("Z"),),
-    "Workspace › Cut open › no cut": (Key("C"),),
-}
-"""Keys by the names of commands."""
-
 SHOWN = {
-    "solid": ("Solid", "Draw the positions within all limits at one orientation."),
-    "hull": ("Convex hull", "Draw the convex hull of the workspace."),
+    "solid": ("Solid", "Draw the positions within all limits at one orientation.", Key("V")),
+    "hull": ("Convex hull", "Draw the convex hull of the workspace.", shift("V")),
     "planes": (
         "Singular planes",
         "Draw the planes of singular positions, up to three, at the present orientation.",
+        shift("P"),
     ),
 }
-"""Words and hint of each part that can be shown."""
+"""Words, hint and key of each part that can be shown."""
 
 REGIONS: dict[str, tuple[Region, Literal["home", "pose"]]] = {
     "within the limits": ("limits", "home"),
@@ -94,13 +86,8 @@ ORIENTATIONS = {"of the present pose": "pose", "of the home pose": "home"}
 CUTS: dict[str, Axis | None] = {"none": None, "x": "x", "y": "y", "z": "z"}
 """Axis of the cut by the words on its button."""
 
-_POSITION = msgspec.json.Decoder(
-    tuple[
-        Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)],
-        Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)],
-        Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)],
-    ]
-)
+_Coordinate = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
+_POSITION = msgspec.json.Decoder(tuple[_Coordinate, _Coordinate, _Coordinate])
 
 
 class WorkspacePanel:
@@ -110,13 +97,12 @@ class WorkspacePanel:
         gui, session, buttons = services.gui, services.session, services.buttons
         self._controls = controls = Controls(gui, session)
         self._session = session
-        self._feed, self._volumes = services.get(WorkspaceFeed), services.get(VolumeFeed)
+        self._feed, self._volumes = services.get(workspace_feed), services.get(volume_feed)
         self._nearest_start: Pose | None = None
         # The drawing whose solid is cut, and its map where the page shows it.
         self._drawing: WorkspaceDrawing | None = None
         self._mapped: SliceMap | None = None
-        self._show = shown_chips(buttons, session)
-        self._cuts = cut_chips(buttons, session)
+        self._show, self._cuts = _shown_chips(services), _cut_chips(services)
         self._top = gui.add_html("")
         controls.dropdown(
             "Region",
@@ -179,15 +165,8 @@ class WorkspacePanel:
         """Yield the updates that show a frame."""
         drawing = self._drawing = self._feed.drawing
         state, view = frame.state, frame.state.view.workspace
-        yield (
-            self._top,
-            "content",
-            box(
-                volume_headline(frame, self._volumes),
-                drawing_words(frame, self._feed),
-                self._show.html(state),
-            ),
-        )
+        top = volume_headline(frame, self._volumes), drawing_words(frame, self._feed)
+        yield self._top, "content", box(*top, self._show.html(state))
         yield from self._controls.updates(frame)
         yield from self._under_way.updates()
         yield from self._show_trouble(drawing)
@@ -196,7 +175,7 @@ class WorkspacePanel:
         yield self._legend, "visible", view.colour != "plain" or mapped is not None
         words = ""
         if colour != view.colour:
-            words = unstated_words(view.colour, map(_colour_button, NEED_NO_LIMITS))
+            words = missing_input(view.colour, map(_colour_button, NEED_NO_LIMITS))
         if colour != "plain" or mapped is not None:
             measure = map_measure(state.design, colour, holds=view.region == "held")
             warn = warnings(state.design.reach, state.warn_below)
@@ -277,39 +256,37 @@ class WorkspacePanel:
             run_script_in(client, call_script("map", text, mapped.words_at(position)))
 
 
-def shown_chips(buttons: Buttons, session: Session) -> Chips:
+def _shown_chips(services: Services) -> Chips:
     """Return the switches of what is shown."""
+    chips = {
+        name: Chip(
+            words,
+            f"Workspace › {words}",
+            hint,
+            turn(f"view.workspace.{name}", words),
+            keys=(key,),
+        )
+        for name, (words, hint, key) in SHOWN.items()
+    }
+    return Chips(services.buttons, services.session, "workspace.show", "Show", chips)
 
-    def chip(name: str, words: str, hint: str) -> Chip:
-        command = f"Workspace › {words}"
-        return Chip(words, command, hint, turn(f"view.workspace.{name}", words), keys=KEYS[command])
 
-    chips = {name: chip(name, words, hint) for name, (words, hint) in SHOWN.items()}
-    return Chips(buttons, session, "workspace.show", "Show", chips)
-
-
-def cut_chips(buttons: Buttons, session: Session) -> Chips:
+def _cut_chips(services: Services) -> Chips:
     """Return the options of the cut, and the switch of the side that it keeps."""
 
     def chip(words: str, axis: Axis | None) -> Chip:
-        option = "no cut" if axis is None else f"across {axis}"
-        command = f"Workspace › Cut open › {option}"
-        hint = (
-            "Show the whole solid."
-            if axis is None
-            else f"Cut the workspace open across {axis}, in its middle, and show the map of the "
-            "slice."
+        option, hint, key = "no cut", "Show the whole solid.", Key("C")
+        if axis is not None:
+            option, key = f"across {axis}", Key(axis.upper())
+            hint = (
+                f"Cut the workspace open across {axis}, in its middle, and show the map of the "
+                "slice."
+            )
+        effect = Effect(
+            lambda state: _set_cut(state.view.workspace, axis, option),
+            lambda state: state.view.workspace.cut == axis,
         )
-        return Chip(
-            words,
-            command,
-            hint,
-            Effect(
-                lambda state: _set_cut(state.view.workspace, axis, option),
-                lambda state: state.view.workspace.cut == axis,
-            ),
-            keys=KEYS[command],
-        )
+        return Chip(words, f"Workspace › Cut open › {option}", hint, effect, keys=(key,))
 
     chips = {words: chip(words, axis) for words, axis in CUTS.items()}
     chips["flip"] = Chip(
@@ -319,7 +296,7 @@ def cut_chips(buttons: Buttons, session: Session) -> Chips:
         turn("view.workspace.flipped", "Other side of the cut"),
         lambda state: state.view.workspace.cut is not None,
     )
-    return Chips(buttons, session, "workspace.cut", "Cut", chips)
+    return Chips(services.buttons, services.session, "workspace.cut", "Cut", chips)
 
 
 def _set_cut(view: WorkspaceView, axis: Axis | None, words: str) -> Action:

@@ -1,10 +1,10 @@
-"""Regions of a workspace: its accessible part, and the part that holds a load, each cached."""
+"""A workspace's exact volume, and the parts of it: what is accessible, and what holds a load."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -16,15 +16,15 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.numerics.stages import Watch
 from explorer.workspace.accessible.start import StartError
-from explorer.workspace.accessible.workspace import (
-    AccessibleWorkspace,
-    PairCost,
-    accessible_workspace,
-)
+from explorer.workspace.accessible.workspace import PairCost, accessible_workspace
 from explorer.workspace.held import HeldWorkspace, held_workspace
+from explorer.workspace.slices.volume import Volume, workspace_volume
+from explorer.workspace.solids.solid import Solid
 
 Rows: TypeAlias = tuple[tuple[float, ...], ...]
 """Rows of a matrix."""
+
+Region = Literal["limits", "accessible", "held"]
 
 # Number of cached workspaces, so that a cut or another colour takes no time.
 CACHED = 4
@@ -37,6 +37,48 @@ def rows_of(matrix: FloatArray) -> Rows:
     return tuple(tuple(row) for row in matrix.tolist())
 
 
+@lru_cache(2 * CACHED)
+def exact_volume(design: Design, rotation: Rows) -> Volume:
+    """Return the exact volume of a workspace, computed once for its number and its drawing."""
+    return workspace_volume(design, np.array(rotation))
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The workspace or the part of it that is drawn or exported; lengths in design units.
+
+    Attributes:
+        design: The manipulator.
+        rotation: Rows of the matrix, platform to base.
+        region: All that is within the limits, its accessible part, or the part that holds the load.
+        start: Position where paths start; None for home.
+        load: (F; M) at the tool point besides the payload, base axes, in N and N × unit; None if
+            it does not matter.
+    """
+
+    design: Design
+    rotation: Rows
+    region: Region = "limits"
+    start: Triple | None = None
+    load: Six | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """The numbers of a part of a workspace.
+
+    Attributes:
+        volume: Volume in cubed design units.
+        node_count: Number of accessible nodes of the paper's grid; None if the grid is too fine.
+        pairs: Clearance and blocked volume of each pair of legs, in the order of `PAIRS`; () of the
+            part that holds a load.
+    """
+
+    volume: float
+    node_count: int | None = None
+    pairs: tuple[PairCost, ...] = ()
+
+
 @dataclass(frozen=True)
 class Trouble:
     """Why nothing is accessible, or holds the load.
@@ -47,85 +89,75 @@ class Trouble:
     """
 
     reason: str
-    nearest: Triple | None
+    nearest: Triple | None = None
 
 
-@dataclass(frozen=True)
-class AccessiblePart:
-    """The numbers of the accessible part of a workspace.
+_cache: dict[tuple[Selection, float], tuple[Part, Solid] | Trouble] = {}
 
-    Attributes:
-        volume: Volume in cubed design units.
-        node_count: Number of nodes of the paper's grid; None if the grid is too fine.
-        pairs: Clearance and blocked volume of each pair of legs, in the order of `PAIRS`.
+
+def find_part(selection: Selection, tolerance: float, watch: Watch) -> tuple[Part, Solid] | Trouble:
+    """Return the part of a workspace that a region names, or why there is none.
+
+    The newest few are cached.
+
+    Args:
+        selection: The workspace; its region is "accessible" or "held".
+        tolerance: Chord tolerance, in design units.
+        watch: Called with each stage.
     """
-
-    volume: float
-    node_count: int | None
-    pairs: tuple[PairCost, ...]
-
-
-_cache: dict[tuple[Design, Rows, Triple | None, float], AccessibleWorkspace | Trouble] = {}
-
-
-def find_accessible(
-    design: Design, rotation: Rows, start: Triple | None, tolerance: float, watch: Watch
-) -> AccessibleWorkspace | Trouble:
-    """Return the accessible workspace, or why there is none; cache the newest few."""
-    key = (design, rotation, start, tolerance)
+    key = selection, tolerance
     result = _cache.pop(key, None)
     if result is None:
-        try:
-            result = accessible_workspace(
-                design,
-                np.array(rotation),
-                start=start,
-                most_nodes=MOST_LIVE_NODES,
-                tolerance=tolerance,
-                watch=watch,
-            )
-        except ExplorerError as error:
-            result = trouble_of(error)
+        find = _find_accessible if selection.region == "accessible" else _find_held
+        result = find(selection, tolerance, watch)
     _cache[key] = result
     if len(_cache) > CACHED:
         del _cache[next(iter(_cache))]
     return result
 
 
+def _find_accessible(
+    selection: Selection, tolerance: float, watch: Watch
+) -> tuple[Part, Solid] | Trouble:
+    try:
+        found = accessible_workspace(
+            selection.design,
+            np.array(selection.rotation),
+            start=selection.start,
+            most_nodes=MOST_LIVE_NODES,
+            tolerance=tolerance,
+            watch=watch,
+        )
+    except ExplorerError as error:
+        return trouble_of(error)
+    part = Part(found.accessible_volume, found.accessible_node_count, found.pairs)
+    return part, found.solid
+
+
 def trouble_of(error: ExplorerError) -> Trouble:
     """Return an error of the library as a trouble."""
     nearest = error.nearest if isinstance(error, StartError) else None
     if nearest is None:
-        return Trouble(str(error), None)
+        return Trouble(str(error))
     x, y, z = nearest.tolist()
     return Trouble(str(error), (x, y, z))
 
 
-def accessible_part(workspace: AccessibleWorkspace) -> AccessiblePart:
-    """Return the numbers of an accessible workspace."""
-    return AccessiblePart(
-        workspace.accessible_volume,
-        workspace.accessible_node_count,
-        workspace.pairs,
-    )
-
-
-@lru_cache(CACHED)
-def hold_load(design: Design, rotation: Rows, load: Six, tolerance: float) -> HeldWorkspace:
-    """Return the part of a workspace that holds a load; cache the newest few."""
-    return held_workspace(design, np.array(rotation), load, tolerance=tolerance)
-
-
-def trouble_holding(held: HeldWorkspace) -> Trouble | None:
-    """Return why nothing holds a load; None if something does, or the workspace is empty."""
+def _find_held(selection: Selection, tolerance: float, _: Watch) -> tuple[Part, Solid] | Trouble:
+    load = (0.0,) * 6 if selection.load is None else selection.load
+    held = held_workspace(selection.design, np.array(selection.rotation), load, tolerance=tolerance)
+    # Without a factor something holds the load, or the workspace is empty.
     if held.factor is None:
-        return None
+        return Part(held.held_volume), held.solid
+    return Trouble(_reason(held, held.factor))
+
+
+def _reason(held: HeldWorkspace, factor: float) -> str:
     (part,) = held.solid.empty_because
-    if held.factor >= 1.0:
-        return Trouble("the positions that hold it are too few to be drawn", None)
-    percent = format_number(100.0 * held.factor, 3)
-    return Trouble(
+    if factor >= 1.0:
+        return "the positions that hold it are too few to be drawn"
+    percent = format_number(100.0 * factor, 3)
+    return (
         f"the best position found holds {percent} % of load and payload; {part} is at its limit "
-        "there",
-        None,
+        "there"
     )

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.orientation import workspace_position, workspace_rotation
-from explorer.app.features.workspace.tasks import WorkspaceDrawing, WorkspaceSurface
+from explorer.app.features.workspace.feeds import (
+    surface_of,
+    workspace_feed,
+    workspace_position,
+    workspace_rotation,
+)
+from explorer.app.features.workspace.tasks import (
+    WorkspaceDrawing,
+    WorkspaceRequest,
+    WorkspaceSurface,
+)
 from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Shell
 from explorer.app.scene.creases import Drawn
 from explorer.app.scene.labels import add_label
@@ -56,19 +65,13 @@ class WorkspaceScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
-        self._feed = services.get(WorkspaceFeed)
+        self._feed = services.get(workspace_feed)
         # Collisions are added first and so drawn first: surfaces before them let them through.
         colours = (COLLIDING, AT_LIMIT, PLAIN, *band_colours(), *SHARE_COLOURS, *STEP_COLOURS)
         self._colours: tuple[Rgb, ...] = tuple(dict.fromkeys(colours))
         self._shells = [
-            add_translucent(
-                scene,
-                f"/workspace/shell/{index}",
-                NO_MESH,
-                PLAIN_OPACITY,
-                colour=colour,
-            )
-            for index, colour in enumerate(self._colours)
+            add_translucent(scene, f"/workspace/shell/{i}", NO_MESH, PLAIN_OPACITY, colour=colour)
+            for i, colour in enumerate(self._colours)
         ]
         self._edges = add_lines(scene, "/workspace/edges", 1, EDGE_COLOURS[0], EDGE_THICKNESS)
         self._hull = scene.add_mesh_simple(
@@ -82,44 +85,37 @@ class WorkspaceScene(ScenePart):
         self._planes = [_SingularPlane(scene, index) for index in range(3)]
         self._broken = add_lines(scene, "/workspace/broken/lines", 1, OUTLINE, 4.0)
         self._broken_label = add_label(scene, "/workspace/broken/label", "limit", visible=False)
-        # What was scaled last, and the results.
-        self._surface: tuple[WorkspaceSurface | None, float] = None, 0.0
-        self._scaled: dict[Rgb, Drawn] = {}
-        self._scaled_edges: NDArray[np.float32] | None = None
-        self._drawn_hull: tuple[Shell | None, float] = None, 0.0
-        self._scaled_hull: Drawn | None = None
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the workspace of a frame."""
-        state, view = placed.frame.state, placed.frame.state.view.workspace
-        drawing, surface = self._feed.drawing, self._feed.surface
-        for drawn, handles in (
-            (surface, (*self._shells, self._edges)),
-            (drawing, (self._hull,)),
-        ):
-            if drawn is not None:
-                # The workspace of the tool point is that of b4, moved.
-                place = tuple((placed.scale * state.offset(drawn.request.rotation)).tolist())
-                for handle in handles:
-                    yield handle, "position", place
-        self._scale(surface, drawing, placed.scale)
+        view = placed.frame.state.view.workspace
+        drawing, surface = self._feed.drawing, surface_of(self._feed)
+        shells: dict[Rgb, Drawn] = {}
+        edges = hull = None
+        if surface is not None:
+            shells, edges = _scale_surface(surface, placed.scale)
+            # The workspace of the tool point is that of b4, moved.
+            place = _place(placed, surface.request)
+            for handle in (*self._shells, self._edges):
+                yield handle, "position", place
+        if drawing is not None:
+            hull = _scale_hull(drawing, placed.scale)
+            yield self._hull, "position", _place(placed, drawing.request)
         is_cut = surface is not None and surface.request.cut is not None
         for colour, handle in zip(self._colours, self._shells, strict=True):
-            shell = self._scaled.get(colour)
-            yield handle, "visible", view.solid and shell is not None
-            if view.solid and shell is not None:
+            shell = shells.get(colour) if view.solid else None
+            yield handle, "visible", shell is not None
+            if shell is not None:
                 yield handle, "opacity", _opacity(colour, is_cut=is_cut)
                 yield handle, "side", _side(colour, is_cut=is_cut)
                 yield handle, "vertices", shell[0]
                 yield handle, "faces", shell[1]
-        shows_edges = view.solid and self._scaled_edges is not None
-        yield self._edges, "visible", shows_edges
-        if shows_edges:
+        yield self._edges, "visible", view.solid and edges is not None
+        if view.solid and edges is not None:
             yield self._edges, "colors", np.array(EDGE_COLOURS[placed.dark], dtype=np.uint8)
-            yield self._edges, "points", self._scaled_edges
-        hull = self._scaled_hull if view.hull else None
-        yield self._hull, "visible", hull is not None
-        if hull is not None:
+            yield self._edges, "points", edges
+        yield self._hull, "visible", view.hull and hull is not None
+        if view.hull and hull is not None:
             yield self._hull, "vertices", hull[0]
             yield self._hull, "faces", hull[1]
         for plane in self._planes:
@@ -133,22 +129,6 @@ class WorkspaceScene(ScenePart):
             return NO_POINTS
         offset = placed.frame.state.offset(drawing.request.rotation)
         return corners_of(placed.scale * (np.array(drawing.extent) + offset))
-
-    def _scale(
-        self, surface: WorkspaceSurface | None, drawing: WorkspaceDrawing | None, scale: float
-    ) -> None:
-        """Scale what is new to scene units, once, so that updates compare it by identity."""
-        if self._surface[0] is not surface or self._surface[1] != scale:
-            self._surface = surface, scale
-            shells = () if surface is None else surface.shells
-            self._scaled = {shell.colour: _scaled(shell, scale) for shell in shells}
-            self._scaled_edges = None
-            if surface is not None and len(surface.edges):
-                self._scaled_edges = np.asarray(scale * surface.edges, dtype=np.float32)
-        hull = None if drawing is None else drawing.hull
-        if self._drawn_hull[0] is not hull or self._drawn_hull[1] != scale:
-            self._drawn_hull = hull, scale
-            self._scaled_hull = None if hull is None else _scaled(hull, scale)
 
     def _broken_limit(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw a line from p to the surface of the limit it breaks most.
@@ -225,6 +205,27 @@ def _opacity(colour: Rgb, *, is_cut: bool) -> float | None:
 def _side(colour: Rgb, *, is_cut: bool) -> str:
     """Return which sides of faces are drawn: of translucent bands only those in front."""
     return "double" if is_cut or colour in (PLAIN, COLLIDING, AT_LIMIT) else "front"
+
+
+def _place(placed: Placed, request: WorkspaceRequest) -> tuple[float, ...]:
+    offset = placed.frame.state.offset(request.rotation)
+    return tuple((placed.scale * offset).tolist())
+
+
+# Both are cached, so that updates compare what is drawn by identity.
+@lru_cache(2)
+def _scale_surface(
+    surface: WorkspaceSurface, scale: float
+) -> tuple[dict[Rgb, Drawn], NDArray[np.float32] | None]:
+    """Return the shells of a surface in scene units, by colour, and its edges; None for none."""
+    shells = {shell.colour: _scaled(shell, scale) for shell in surface.shells}
+    edges = np.asarray(scale * surface.edges, dtype=np.float32)
+    return shells, edges if len(edges) else None
+
+
+@lru_cache(2)
+def _scale_hull(drawing: WorkspaceDrawing, scale: float) -> Drawn | None:
+    return None if drawing.hull is None else _scaled(drawing.hull, scale)
 
 
 def _scaled(shell: Shell, scale: float) -> Drawn:

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
-from explorer.app.features.workspace.load import map_measure
 from explorer.app.features.workspace.regions import (
-    AccessiblePart,
-    Rows,
+    Part,
+    Region,
+    Selection,
     Trouble,
-    accessible_part,
-    find_accessible,
-    hold_load,
-    trouble_holding,
+    exact_volume,
+    find_part,
 )
 from explorer.app.features.workspace.slice_map import (
     AXES,
@@ -26,25 +23,22 @@ from explorer.app.features.workspace.slice_map import (
     level_within,
     slice_map,
 )
-from explorer.app.features.workspace.volume import exact_volume
 from explorer.app.scene.bands import PLAIN, Colouring, Measure, Shell
 from explorer.app.scene.creases import creased_faces
 from explorer.app.session.feed import watch_of
 from explorer.app.session.worker import Channel
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.stages import unwatched
+from explorer.statics.reactions import has_limits
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.faces.faces import Faces, workspace_faces
 from explorer.workspace.limits.constraints import HalfSpace, constraints
-from explorer.workspace.slices.volume import NodeCount, workspace_nodes
+from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import convex_hull, cut_solid, workspace_solid
-
-Region = Literal["limits", "accessible", "held"]
 
 # Chord tolerance of a live solid, as a share of the reach.
 LIVE_TOLERANCE = 0.004
@@ -55,14 +49,23 @@ STEP = "step"
 
 
 @dataclass(frozen=True)
-class WorkspaceRequest:
+class MeasuredVolume:
+    """The volume of a workspace within the limits with its error, in cubed design units."""
+
+    request: Selection
+    measured: Volume
+
+
+def measure_volume(request: Selection) -> MeasuredVolume:
+    """Return the exact volume of a workspace within the limits."""
+    return MeasuredVolume(request, exact_volume(request.design, request.rotation))
+
+
+@dataclass(frozen=True)
+class WorkspaceRequest(Selection):
     """Request to draw and measure a workspace; lengths in design units.
 
     Attributes:
-        design: The manipulator.
-        rotation: Rows of the matrix, platform to base.
-        region: All that is within the limits, its accessible part, or the part that holds the load.
-        start: Position where paths start; None for home.
         colour: Measure that colours the surface.
         cut: Axis across which the solid is cut open, or None.
         level: Coordinate of the cut; None, or one beyond the extent, for the middle.
@@ -70,25 +73,24 @@ class WorkspaceRequest:
         tolerance: Chord tolerance; None for a share of the reach.
         hull: Whether to make the convex hull.
         warn_below: Length below which margins raise a warning.
-        load: (F; M) at the tool point besides the payload, base axes, in N and N × unit; None if
-            it does not matter.
     """
 
-    design: Design
-    rotation: Rows
-    region: Region
-    start: Triple | None
-    colour: Measure
-    cut: Axis | None
-    level: float | None
-    flipped: bool
-    tolerance: float | None
-    hull: bool
-    warn_below: float
-    load: Six | None = None
+    colour: Measure = "plain"
+    cut: Axis | None = None
+    level: float | None = None
+    flipped: bool = False
+    tolerance: float | None = None
+    hull: bool = False
+    warn_below: float = 1.0
+
+    @property
+    def selection(self) -> Selection:
+        """The workspace alone, without how it is drawn; a load that only colours it left out."""
+        load = self.load if self.region == "held" else None
+        return Selection(self.design, self.rotation, self.region, self.start, load)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WorkspaceSurface:
     """What is drawn of a workspace; lengths in design units.
 
@@ -106,7 +108,7 @@ class WorkspaceSurface:
     coarse_edge: float | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WorkspaceDrawing:
     """A workspace drawn and measured; lengths in design units.
 
@@ -115,11 +117,8 @@ class WorkspaceDrawing:
         surface: What is drawn.
         hull: Convex hull, if requested.
         slice_map: Map of the slice, if the solid is cut.
-        level: Coordinate of the cut, if the solid is cut.
         volume: Exact volume within the limits, see `explorer.workspace.slices.volume`.
-        error: Bound of the error of that volume.
-        accessible: Numbers of the accessible part, if requested and there is no trouble.
-        held_volume: Volume of the part that holds the load, likewise.
+        part: Numbers of the part that is drawn; None for all within the limits.
         trouble: Why nothing is accessible or holds the load, if all within the limits is drawn
             instead.
         mesh_volume: Volume of the uncut solid.
@@ -127,7 +126,6 @@ class WorkspaceDrawing:
         hull_volume: Volume of the hull, if requested.
         extent: (lows, highs) of the solid; None if it is empty.
         nodes: The paper's node count within the limits; None if the grid is too fine.
-        empty_because: Names of the limits that empty the workspace.
         levels: The measure that colours the map at the edge of each band, see
             `explorer.workspace.position_bands.PositionBands`.
     """
@@ -136,24 +134,15 @@ class WorkspaceDrawing:
     surface: WorkspaceSurface
     hull: Shell | None
     slice_map: SliceMap | None
-    level: float | None
     volume: float
-    error: float
-    accessible: AccessiblePart | None
-    held_volume: float | None
+    part: Part | None
     trouble: Trouble | None
     mesh_volume: float
     mesh_agrees: bool | None
     hull_volume: float | None
     extent: tuple[FloatArray, FloatArray] | None
     nodes: NodeCount | None
-    empty_because: tuple[str, ...]
     levels: tuple[float, ...]
-
-    @property
-    def part_volume(self) -> float | None:
-        """Volume of the part that is drawn; None for all within the limits."""
-        return self.held_volume if self.accessible is None else self.accessible.volume
 
 
 def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) -> WorkspaceDrawing:
@@ -167,15 +156,14 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
     design, rotation = request.design, np.array(request.rotation)
     share = LIVE_TOLERANCE if request.region == "limits" else REACHED_TOLERANCE
     tolerance = request.tolerance or share * design.reach
-    watch = watch_of(channel)
     load = (0.0,) * 6 if request.load is None else request.load
     colouring = Colouring(design, rotation, request.colour, request.warn_below, np.array(load))
-    measure = map_measure(design, request.colour, holds=request.region == "held")
-    on_map = replace(colouring, measure=measure)
+    holds = request.region == "held"
+    on_map = replace(colouring, measure=map_measure(design, request.colour, holds=holds))
     limits = constraints(design, rotation)
 
-    def draw(faces: Faces, *, holds: bool = False) -> WorkspaceSurface:
-        shells, coarse_edge = colouring.shells(faces, holds=holds)
+    def draw(faces: Faces) -> WorkspaceSurface:
+        shells, coarse_edge = colouring.shells(faces, holds=holds and trouble is None)
         surface = WorkspaceSurface(request, shells, faces.edges, coarse_edge)
         if channel is not None:
             channel.send(surface)
@@ -187,34 +175,29 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         # It is waited for; it needs none of what follows.
         surface = draw(workspace_faces(limits))
     whole = workspace_solid(design, rotation, tolerance, volume=measured)
-    accessible = trouble = held_volume = part = None
-    if request.region == "accessible":
-        result = find_accessible(design, request.rotation, request.start, tolerance, watch)
-        accessible, trouble = (None, result) if isinstance(result, Trouble) else (result, None)
-        part = None if accessible is None else accessible.solid
-    elif request.region == "held":
-        held = hold_load(design, request.rotation, load, tolerance)
-        trouble = trouble_holding(held)
-        held_volume, part = (held.held_volume, held.solid) if trouble is None else (None, None)
-    solid = whole if part is None else part
-    shown, mapped, level = solid, None, None
+    solid, part, trouble = whole, None, None
+    if request.region != "limits":
+        found = find_part(request.selection, tolerance, watch_of(channel))
+        if isinstance(found, Trouble):
+            trouble = found
+        else:
+            part, solid = found
     whole_extent = None if whole.is_empty else extent_of(design, rotation)
     extent = whole_extent if part is None else _extent(solid)
-    cut = None
-    if request.cut is not None and extent is not None and whole_extent is not None:
+    shown, mapped, cut, level = solid, None, None, 0.0
+    if request.cut is not None and extent is not None:
         axis = AXES.index(request.cut)
         level = level_within(float(extent[0][axis]), float(extent[1][axis]), request.level)
         side = -1.0 if keeps_above(request.cut, request.flipped) else 1.0
-        cut = request.cut, level, HalfSpace(CUT, side * np.eye(3)[axis], side * level)
-        limits = (*limits, cut[2])
-        shown = solid if part is None else cut_solid(solid, cut[2])
+        cut = HalfSpace(CUT, side * np.eye(3)[axis], side * level)
+        limits = (*limits, cut)
+        shown = solid if part is None else cut_solid(solid, cut)
     if surface is None:
-        faces = workspace_faces(limits) if part is None else creased_faces(shown)
-        surface = draw(faces, holds=held_volume is not None)
-    if cut is not None and whole_extent is not None:
-        cut_solids = (None, None) if part is None else (cut_solid(whole, cut[2]), shown)
+        surface = draw(workspace_faces(limits) if part is None else creased_faces(shown))
+    if cut is not None and request.cut is not None and whole_extent is not None:
+        cut_solids = (None, None) if part is None else (cut_solid(whole, cut), shown)
         left_out = "load not held" if request.region == "held" else "not accessible"
-        mapped = slice_map(on_map, whole_extent, *cut[:2], *cut_solids, left_out)
+        mapped = slice_map(on_map, whole_extent, request.cut, level, *cut_solids, left_out)
     hull = convex_hull(solid) if request.hull and not solid.is_empty else None
     try:
         nodes = workspace_nodes(design, rotation)
@@ -225,29 +208,32 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         surface=surface,
         hull=None if hull is None else Shell(PLAIN, hull.vertices, hull.faces),
         slice_map=mapped,
-        level=level,
         volume=measured.volume,
-        error=measured.error,
-        accessible=None if accessible is None else accessible_part(accessible),
-        held_volume=held_volume,
+        part=part,
         trouble=trouble,
         mesh_volume=solid.volume,
         mesh_agrees=solid.agrees,
         hull_volume=None if hull is None else hull.volume,
         extent=extent,
         nodes=nodes,
-        empty_because=measured.empty_because,
         levels=on_map.bands.levels,
     )
 
 
+def map_measure(design: Design, colour: Measure, *, holds: bool) -> Measure:
+    """Return the measure of the map of a slice; "plain" for the margins.
+
+    Args:
+        design: The manipulator.
+        colour: Measure that colours the surface.
+        holds: Whether the part of the workspace that holds the load is shown.
+    """
+    return "share" if colour == "plain" and holds and has_limits(design) else colour
+
+
 def export_mesh(
-    design: Design,
-    rotation: Rows,
+    selection: Selection,
     tolerance: float,
-    region: Region,
-    start: Triple | None,
-    load: Six,
     what: str,
     file_format: str,
     offset: Triple | None = None,
@@ -255,12 +241,8 @@ def export_mesh(
     """Return a file of the workspace or of its hull, in millimetres.
 
     Args:
-        design: The manipulator.
-        rotation: Rows of the matrix, platform to base.
+        selection: The workspace or the part of it.
         tolerance: Chord tolerance, in design units.
-        region: All that is within the limits, its accessible part, or the part that holds the load.
-        start: Position where paths start; None for home.
-        load: The load of that part, as in `WorkspaceRequest`.
         what: "workspace" or "hull".
         file_format: A format of `explorer.export.mesh`, or `STEP`.
         offset: Vector from b4 to the tool point, of which the positions are; None for b4.
@@ -270,38 +252,33 @@ def export_mesh(
             library, or STEP of a solid without exact faces.
     """
     if file_format == STEP:
-        return _exact_file(design, rotation, region, what, offset)
+        return _exact_file(selection, what, offset)
     from explorer.export.mesh import mesh_bytes
 
+    design, region = selection.design, selection.region
     if region == "limits":
-        solid = workspace_solid(design, np.array(rotation), tolerance)
-    elif region == "held":
-        held = hold_load(design, rotation, load, tolerance)
-        trouble = trouble_holding(held)
-        if trouble is not None:
-            raise InputError(f"nothing holds the load: {trouble.reason}")
-        solid = held.solid
+        solid = workspace_solid(design, np.array(selection.rotation), tolerance)
     else:
-        accessible = find_accessible(design, rotation, start, tolerance, unwatched)
-        if isinstance(accessible, Trouble):
-            raise InputError(accessible.reason)
-        solid = accessible.solid
-    name = f"{design.name} {exported_name(region, what, offset)}"
+        found = find_part(selection, tolerance, unwatched)
+        if isinstance(found, Trouble):
+            cause = "nothing holds the load: " if region == "held" else ""
+            raise InputError(cause + found.reason)
+        _, solid = found
     made = convex_hull(solid) if what == "hull" else solid
     if offset is not None:
         made = made.shifted(np.array(offset))
+    name = f"{design.name} {exported_name(region, what, offset)}"
     return mesh_bytes(made, file_format, design, name)
 
 
-def _exact_file(
-    design: Design, rotation: Rows, region: Region, what: str, offset: Triple | None
-) -> bytes:
+def _exact_file(selection: Selection, what: str, offset: Triple | None) -> bytes:
     """Return a STEP file of the workspace within the limits.
 
     Raises:
         InputError: a hull, or a part of the workspace; neither has exact faces.
         ExplorerError: as of `explorer.export.step.exact_workspace`.
     """
+    design, region = selection.design, selection.region
     meshes = "export it as 3mf, stl, glb, obj or ply"
     if what == "hull":
         raise InputError(f"STEP takes exact faces, and a convex hull consists of facets; {meshes}")
@@ -313,7 +290,7 @@ def _exact_file(
         )
     from explorer.export.step import exact_workspace, step_bytes
 
-    solid = exact_workspace(design, np.array(rotation))
+    solid = exact_workspace(design, np.array(selection.rotation))
     if offset is None:
         return step_bytes(solid, f"workspace of {design.name}")
     moved = solid.shifted(design.unit_mm * np.array(offset))

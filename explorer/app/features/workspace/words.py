@@ -6,12 +6,15 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.orientation import orientation_word, turned_suffix
-from explorer.app.features.workspace.regions import AccessiblePart
-from explorer.app.features.workspace.tasks import WorkspaceDrawing
-from explorer.app.features.workspace.volume import MeasuredVolume, VolumeFeed, volume_text
+from explorer.app.features.workspace.feeds import orientation_word, turned_suffix
+from explorer.app.features.workspace.regions import Part, Selection
+from explorer.app.features.workspace.tasks import (
+    MeasuredVolume,
+    WorkspaceDrawing,
+    WorkspaceRequest,
+)
 from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Measure
+from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.blocks import content_of
@@ -47,7 +50,7 @@ from explorer.workspace.position_bands import (
 DEVIATIONS = (0.001, 0.01, 0.1, 1.0)
 
 
-def volume_headline(frame: Frame, feed: VolumeFeed) -> str:
+def volume_headline(frame: Frame, feed: Feed[Selection, MeasuredVolume]) -> str:
     """Return the volume within the limits in large type as HTML."""
     newest = feed.drawing
     if feed.problem is not None:
@@ -58,7 +61,7 @@ def volume_headline(frame: Frame, feed: VolumeFeed) -> str:
     return f'<div class="{look}">{_volume(newest, frame)}</div>'
 
 
-def drawing_words(frame: Frame, feed: WorkspaceFeed) -> str:
+def drawing_words(frame: Frame, feed: Feed[WorkspaceRequest, WorkspaceDrawing]) -> str:
     """Return why nothing is drawn, or the volume of the part that is drawn, as HTML; "" for none.
 
     While that part is computed, its progress is told.
@@ -77,18 +80,18 @@ def drawing_words(frame: Frame, feed: WorkspaceFeed) -> str:
 
 def _part_words(state: State, drawing: WorkspaceDrawing, waiting: str) -> str:
     """Return the volume of the part of the workspace that is drawn, as HTML."""
-    region, volume = drawing.request.region, drawing.part_volume
-    if volume is None:
+    region, part = drawing.request.region, drawing.part
+    if part is None:
         # The alert of the panel tells the trouble.
         return dim(waiting.capitalize())
     if drawing.volume <= 0.0:
         return ""
-    percent = 100.0 * volume / drawing.volume
+    percent = 100.0 * part.volume / drawing.volume
     does, rest = (
         ("accessible", COLLIDING) if region == "accessible" else ("hold the load", AT_LIMIT)
     )
     words = (
-        f'<div class="ex-line"><span>{format_number(volume, 6)} units³ {does}, '
+        f'<div class="ex-line"><span>{format_number(part.volume, 6)} units³ {does}, '
         f"{format_number(percent, 4)} %</span>{dim(waiting)}</div>" + meter(percent, PLAIN, rest)
     )
     if region == "accessible":
@@ -131,6 +134,16 @@ def load_words(state: State, *, any_direction: bool = True) -> str:
     return words
 
 
+def volume_text(drawing: MeasuredVolume | None) -> str:
+    """Return a volume with its unit, "empty", or "–" before the first one."""
+    if drawing is None:
+        return "–"
+    if drawing.measured.volume <= 0.0:
+        return "empty"
+    size = drawing.request.design.reach**3
+    return f"{format_number(drawing.measured.volume, 6, size=size)} units³"
+
+
 def _volume(newest: MeasuredVolume, frame: Frame) -> str:
     measured, design = newest.measured, newest.request.design
     if measured.volume <= 0.0:
@@ -155,7 +168,7 @@ def _litres(volume: float, design: Design) -> str:
     return f"{one} cm³ ({other} l)"
 
 
-def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
+def workspace_details(frame: Frame, feed: Feed[WorkspaceRequest, WorkspaceDrawing]) -> str:
     """Return the numbers of the drawn workspace as HTML."""
     drawing = feed.drawing
     if drawing is None:
@@ -170,9 +183,9 @@ def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
             )
         )
     parts.append(_numbers(drawing, frame.state))
-    if drawing.accessible is not None and drawing.volume > 0.0:
+    if drawing.part is not None and drawing.part.pairs and drawing.volume > 0.0:
         parts.append(
-            _pairs(drawing.accessible, drawing.request.design, is_coloured=view.colour == "plain")
+            _pairs(drawing.part, drawing.request.design, is_coloured=view.colour == "plain")
         )
     coarse_edge = drawing.surface.coarse_edge
     if coarse_edge is not None:
@@ -187,19 +200,19 @@ def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
 def _numbers(drawing: WorkspaceDrawing, state: State) -> str:
     """Return the table of nodes, extent and volumes."""
     rows: list[tuple[str, str, str]] = []
-    nodes, accessible, request = drawing.nodes, drawing.accessible, drawing.request
+    nodes, part, request = drawing.nodes, drawing.part, drawing.request
     if nodes is not None:
         count, volume = format_number(nodes.count), nodes.volume
         hint = "The paper's measure: grid nodes within the limits"
         volume_hint = "Nodes times step³; it overstates the volume"
         names = "Nodes", "Node volume"
-        if accessible is not None and accessible.node_count is not None:
-            count = f"{format_number(accessible.node_count)} of {count}"
-            volume = accessible.node_count * nodes.step**3
+        if part is not None and part.node_count is not None:
+            count = f"{format_number(part.node_count)} of {count}"
+            volume = part.node_count * nodes.step**3
             hint = "Nodes that collision-free steps of the grid lead to, of all within the limits"
             volume_hint = "Accessible nodes times step³, the paper's measure"
             names = "Accessible nodes", "Accessible node volume"
-        elif accessible is not None:
+        elif part is not None and part.pairs:
             hint += "; too many to check each step between them"
         rows += [
             (names[0], count, hint),
@@ -217,7 +230,7 @@ def _numbers(drawing: WorkspaceDrawing, state: State) -> str:
         rows.append(
             ("Hull volume", format_number(drawing.hull_volume, 6), "Volume of the convex hull")
         )
-    volume = drawing.volume if drawing.part_volume is None else drawing.part_volume
+    volume = drawing.volume if part is None else part.volume
     if volume > 0.0:
         rows.append(
             (
@@ -241,10 +254,10 @@ def deviation_text(deviation: float) -> str:
     )
 
 
-def _pairs(accessible: AccessiblePart, design: Design, *, is_coloured: bool) -> str:
+def _pairs(part: Part, design: Design, *, is_coloured: bool) -> str:
     """Return the clearance of each pair of legs, and the volume that it blocks."""
-    blocks = workspace_clearances(accessible.pairs, design)
-    is_marked = is_coloured and any(pair.blocked_volume > 0.0 for pair in accessible.pairs)
+    blocks = workspace_clearances(part.pairs, design)
+    is_marked = is_coloured and any(pair.blocked_volume > 0.0 for pair in part.pairs)
     mark = f'<div class="ex-dim">{swatch(COLLIDING)}legs collide</div>' if is_marked else ""
     return "".join(content_of(block, {}) for block in blocks) + mark
 
@@ -281,7 +294,7 @@ def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None
     if drawing is not None and drawing.slice_map is not None:
         if any(drawing.request.design.limits.leg_radii):
             marks += f"<span>{swatch(COLLIDING)}legs collide</span>"
-        if drawing.part_volume is not None:
+        if drawing.part is not None:
             faint = f"--opacity:{NOT_ACCESSIBLE_OPACITY:g}"
             left_out = "not held" if drawing.request.region == "held" else "not accessible"
             mark = f'<span class="ex-faint" style="{faint}">{swatch(NOT_ACCESSIBLE)}</span>'
@@ -302,8 +315,8 @@ def _levels(measure: Measure, drawing: WorkspaceDrawing | None) -> tuple[float, 
     return drawing.levels[:0:-1]
 
 
-def unstated_words(measure: Measure, buttons: Iterable[str]) -> str:
-    """Return what a design states nothing of, so that a measure is zero, and what helps.
+def missing_input(measure: Measure, buttons: Iterable[str]) -> str:
+    """Return a hint on the missing input that makes a measure zero.
 
     Args:
         measure: The measure, of which `explorer.workspace.position_bands.is_unstated` is true.

@@ -1,15 +1,24 @@
-"""The worker's task for comparing: measure a design, and draw its workspace and outline."""
+"""The measurements and drawings of the compared designs: the worker's task, and their feeds.
+
+Each column has a feed of its own, so that a slider requests the live design alone. Nothing is
+requested while there is nothing to compare.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from explorer.app.features.workspace.regions import Rows
+from explorer.app.features.workspace.regions import Rows, rows_of
 from explorer.app.scene.bands import Shell
 from explorer.app.scene.outline import outline
+from explorer.app.session.feed import Feed
+from explorer.app.state.compared import SLOTS, unnamed
+from explorer.app.state.frame import Frame
 from explorer.errors import ExplorerError
 from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
@@ -21,6 +30,13 @@ from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import Rgb
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import workspace_solid
+
+if TYPE_CHECKING:
+    # The process of the worker needs no viser.
+    from explorer.app.features.feature import Services
+
+LIVE = 0
+"""The column of the live design; those of the pinned ones follow."""
 
 # Number of cached measurements and solids: of the compared designs, and of the last changes.
 CACHED = 8
@@ -46,7 +62,7 @@ class ComparedRequest:
     tolerance: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ComparedDrawing:
     """A design measured and drawn; lengths in design units.
 
@@ -70,13 +86,6 @@ class ComparedDrawing:
         rotation = design.home_pose.rotation if rows is None else np.array(rows)
         return offset_of(design, rotation, at)
 
-    @cached_property
-    def extent(self) -> FloatArray | None:
-        """The lows and highs of the drawn workspace, shape (2, 3); None without one."""
-        if self.shell is None:
-            return None
-        return np.array([self.shell.vertices.min(axis=0), self.shell.vertices.max(axis=0)])
-
 
 def compared_drawing(request: ComparedRequest) -> ComparedDrawing:
     """Return the measurements of a design, and its workspace if requested."""
@@ -92,9 +101,8 @@ def compared_drawing(request: ComparedRequest) -> ComparedDrawing:
                 shell = Shell(NO_COLOUR, solid.vertices, solid.faces)
     except ExplorerError as error:
         problem = str(error)
-    return ComparedDrawing(
-        request, measurements, shell, outline(evaluate(design, design.home_pose)), problem
-    )
+    lines = outline(evaluate(design, design.home_pose))
+    return ComparedDrawing(request, measurements, shell, lines, problem)
 
 
 @lru_cache(maxsize=CACHED)
@@ -106,3 +114,46 @@ def _measure(design: Design) -> Measurements:
 def _solid(design: Design, rotation: Rows | None, tolerance: float | None) -> Solid:
     r = design.home_pose.rotation if rotation is None else np.array(rotation)
     return workspace_solid(design, r, tolerance or MESH_TOLERANCE * design.reach)
+
+
+CompareFeed: TypeAlias = Feed[ComparedRequest, ComparedDrawing]
+
+
+def _feed_of(column: int, services: Services) -> CompareFeed:
+    request, redraw = partial(_request_for, column), services.session.redraw
+    return Feed(services.worker, compared_drawing, request, redraw, key=("compared", column))
+
+
+FEEDS: tuple[Callable[[Services], CompareFeed], ...] = tuple(
+    partial(_feed_of, column) for column in range(1 + len(SLOTS))
+)
+"""The feeds by column: the live design, then the pinned ones."""
+
+
+def _request_for(column: int, frame: Frame) -> ComparedRequest | None:
+    state, compared = frame.state, frame.state.compared
+    design = state.design if column == LIVE else compared.pinned[column - 1]
+    if compared.is_empty or design is None:
+        return None
+    if not compared.look.overlay:
+        return ComparedRequest(unnamed(design))
+    tolerance = state.view.workspace.tolerance
+    if tolerance is not None:
+        # The tolerance in millimetres is that of the live design.
+        tolerance /= unit_ratio(design, state.design)
+    is_turned = column == LIVE and compared.look.at_pose
+    rotation = rows_of(frame.snapshot.rotation) if is_turned else None
+    return ComparedRequest(unnamed(design), drawn=True, rotation=rotation, tolerance=tolerance)
+
+
+def drawing_in(column: int, feed: CompareFeed) -> ComparedDrawing | None:
+    """Return the drawing of a column; of a pinned one only if the design is the same."""
+    drawing, request = feed.drawing, feed.request
+    if drawing is None or request is None:
+        return None
+    return drawing if column == LIVE or drawing.request.design == request.design else None
+
+
+def unit_ratio(design: Design, live: Design) -> float:
+    """Return one unit of a design in units of the live design."""
+    return design.unit_mm / live.unit_mm

@@ -1,0 +1,155 @@
+"""The requests for the workspace of a frame: its orientation, load and start, and the feeds.
+
+The workspace of the tool point is that of b4, moved by the vector between them. While one drawing
+is computed, only the newest request waits.
+"""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from explorer.app.features.feature import Services
+from explorer.app.features.forces.loads import load_of
+from explorer.app.features.workspace.regions import Rows, Selection, rows_of
+from explorer.app.features.workspace.tasks import (
+    LIVE_TOLERANCE,
+    MeasuredVolume,
+    WorkspaceDrawing,
+    WorkspaceRequest,
+    WorkspaceSurface,
+    draw_workspace,
+    measure_volume,
+)
+from explorer.app.scene.bands import Measure
+from explorer.app.session.feed import Feed
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.position_bands import LOAD_MEASURES, is_unstated
+
+# Rotations whose entries differ by less are the same.
+SAME = 1e-9
+
+
+def workspace_pose(frame: Frame) -> Pose:
+    """Return the pose whose orientation the workspace has: the present one, or that of home."""
+    state = frame.state
+    is_home = state.view.workspace.orientation == "home"
+    return state.design.home_pose if is_home else state.pose
+
+
+def orientation_word(frame: Frame) -> str:
+    """Return which orientation the workspace has: "present" or "home"."""
+    return "home" if frame.state.view.workspace.orientation == "home" else "present"
+
+
+def turned_suffix(design: Design, rotation: Rows) -> str:
+    """Return what follows the names of a workspace's measures; "" in the orientation of home."""
+    is_home = np.allclose(rotation, design.home_pose.rotation, atol=SAME)
+    return "" if is_home else ", turned"
+
+
+def workspace_rotation(frame: Frame) -> FloatArray:
+    """Return the orientation of the workspace that is shown, shape (3, 3)."""
+    return workspace_pose(frame).rotation
+
+
+def workspace_rows(frame: Frame) -> Rows:
+    """Return the rows of `workspace_rotation` as plain numbers."""
+    return rows_of(workspace_rotation(frame))
+
+
+def workspace_position(frame: Frame) -> Triple:
+    """Return b4 where the shown point is where it is, in the orientation of the workspace."""
+    state, pose = frame.state, workspace_pose(frame)
+    return pose.position if pose == state.pose else state.pose_at(state.position, pose).position
+
+
+def workspace_start(frame: Frame) -> Triple | None:
+    """Return the position of b4 where paths start; None for home."""
+    is_here = frame.state.view.workspace.start == "pose"
+    return workspace_position(frame) if is_here else None
+
+
+def tolerance_of(state: State) -> float:
+    """Return the chord tolerance in design units."""
+    return state.view.workspace.tolerance or LIVE_TOLERANCE * state.base.reach
+
+
+def loaded_design(state: State) -> Design:
+    """Return the design, without the mass of its payload if no weights count on the page."""
+    design = state.design
+    if state.view.forces.weighed != "none" or not design.payload.mass_kg:
+        return design
+    payload = msgspec.structs.replace(design.payload, mass_kg=0.0)
+    return msgspec.structs.replace(design, payload=payload)
+
+
+def drawn_measure(state: State) -> Measure:
+    """Return the measure that colours the surface; "plain" for one that would be zero everywhere.
+
+    Shares are zero without limits, errors without errors of actuators, and the deflection of a
+    rigid machine.
+    """
+    colour = state.view.workspace.colour
+    return "plain" if colour != "plain" and is_unstated(state.design, colour) else colour
+
+
+def volume_feed(services: Services) -> Feed[Selection, MeasuredVolume]:
+    """Return the feed of the volume within the limits, whether or not the solid is drawn.
+
+    It takes a tenth of the time of a drawing, and is followed before `workspace_feed`, so that it
+    never waits for the drawing of the same state.
+    """
+    return Feed(services.worker, measure_volume, volume_request, services.session.redraw)
+
+
+def volume_request(frame: Frame) -> Selection:
+    """Return the request for the volume of a frame's design."""
+    return Selection(frame.state.design, workspace_rows(frame))
+
+
+def workspace_feed(services: Services) -> Feed[WorkspaceRequest, WorkspaceDrawing]:
+    """Return the feed of the drawn workspace, whose surface arrives before the numbers."""
+    redraw = services.session.redraw
+    return Feed(services.worker, draw_workspace, workspace_request, redraw, has_stages=True)
+
+
+def surface_of(feed: Feed[WorkspaceRequest, WorkspaceDrawing]) -> WorkspaceSurface | None:
+    """Return the newest surface; None if there is none, none is requested, or it was cancelled."""
+    if isinstance(feed.part, WorkspaceSurface):
+        return feed.part
+    return None if feed.drawing is None else feed.drawing.surface
+
+
+def workspace_request(frame: Frame) -> WorkspaceRequest | None:
+    """Return the request for the workspace of a frame; None if none is shown."""
+    view = frame.state.view.workspace
+    if not (view.solid or view.hull):
+        return None
+    is_cut, level = view.cut is not None, view.level
+    if view.cut is not None and level is not None:
+        # The worker counts in coordinates of b4.
+        level -= float(frame.state.offset(workspace_rotation(frame))["xyz".index(view.cut)])
+    coloured = view.colour == "margin" or is_cut
+    colour = drawn_measure(frame.state)
+    # The load changes no drawing that does not show it.
+    is_loaded = colour in LOAD_MEASURES or view.region == "held"
+    return WorkspaceRequest(
+        design=loaded_design(frame.state) if is_loaded else frame.state.design,
+        rotation=workspace_rows(frame),
+        region=view.region,
+        start=workspace_start(frame) if view.region == "accessible" else None,
+        colour=colour,
+        cut=view.cut,
+        level=level if is_cut else None,
+        flipped=is_cut and view.flipped,
+        tolerance=view.tolerance,
+        hull=view.hull,
+        # The length changes no drawing that is not coloured by it.
+        warn_below=frame.state.warn_below if coloured else 1.0,
+        load=load_of(frame.state) if is_loaded else None,
+    )
