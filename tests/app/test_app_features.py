@@ -24,7 +24,7 @@ from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
 from explorer.app.features.forces.loads import SetForce, WeightsFeed
 from explorer.app.features.listed import FEATURES
-from explorer.app.features.machine.actions import SetToolAngle
+from explorer.app.features.machine.panel import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun, GiveUp
 from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
 from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed

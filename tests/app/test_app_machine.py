@@ -16,8 +16,7 @@ from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from explorer.app.features.feature import Services
-from explorer.app.features.machine.actions import SetToolAngle
-from explorer.app.features.machine.panel import MachinePanel
+from explorer.app.features.machine.panel import MachinePanel, SetToolAngle
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
 from explorer.app.features.machine.words import machine_words
 from explorer.app.scene.part import HALF_JOINT
@@ -179,12 +178,8 @@ def test_field_of_a_limit_is_visible_only_while_the_limit_is_on(hand: Hand) -> N
     assert not hand.controls["Largest stress (MPa)"].visible
 
 
-def test_values_of_single_actuators_differ_until_they_are_made_alike(
-    hand: Hand, desk: Desk
-) -> None:
-    alike, common = hand.controls["Make all six alike"], hand.controls["Push of each (N)"]
+def test_field_of_all_actuators_shows_what_counts_of_single_ones_and_sets_all(hand: Hand) -> None:
     hand.set("Limited forces", True)
-    assert (common.visible, alike.visible) == (True, False)
     for label, value in (
         ("push of d1 (N)", 250.0),
         ("push of l4 (N)", 80.0),
@@ -199,13 +194,13 @@ def test_values_of_single_actuators_differ_until_they_are_made_alike(
         error_mm=(0.03, 0.0, 0.0, 0.0, 0.0, 0.0),
         stiffness_n_mm=(500.0, 500.0, 500.0, 500.0, 500.0, 400.0),
     )
-    assert (common.visible, alike.visible) == (False, True)
-    assert not hand.controls["Error of each (mm)"].visible
-    desk.click(alike)
-    hand.show()
-    after = desk.state.design.actuators
-    assert after == Actuators(six(80.0), error_mm=six(0.03), stiffness_n_mm=six(400.0))
-    assert (common.visible, common.value, alike.visible) == (True, 80.0, False)
+    for label, value in (
+        ("Push of each (N)", 80.0),
+        ("Error of each (mm)", 0.03),
+        ("Stiffness of each (N/mm)", 400.0),
+    ):
+        assert hand.controls[label].value == value
+    assert hand.set("Push of each (N)", 90.0).actuators.push_n == six(90.0)
     assert hand.set("Elastic", False).actuators.stiffness_n_mm is None
 
 

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from html import escape
 
 import msgspec
 
 from explorer.app.features.feature import Services
-from explorer.app.features.machine.actions import ANGLES, SetToolAngle
-from explorer.app.features.machine.actuators import FORCE, ActuatorControls
-from explorer.app.features.machine.tolerances import add_tolerances
+from explorer.app.features.machine.actuators import (
+    FINE,
+    FORCE,
+    add_actuators,
+    add_field,
+    add_switch,
+)
 from explorer.app.features.machine.words import DIRECTIONS, direction_name, machine_words
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Condition
@@ -20,27 +25,65 @@ from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import platform_span
 from explorer.app.inputs.tracks import Span
 from explorer.app.state.action import Action
-from explorer.app.state.actions import Set
+from explorer.app.state.actions import FULL_TURN, Set, check_free
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.state.values import value_at
+from explorer.app.state.values import value_at, with_value
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import box, note
-from explorer.mechanism.machine import Struts
+from explorer.mechanism.machine import Struts, Tolerances
+from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import format_number
 
 # Limits that are switched on begin with these: N m and MPa; the tube in mm.
 MOMENT, STRESS = 10.0, 200.0
 OUTER, INNER = 12.0, 10.0
-# Steps of the number fields, which show no more decimals.
-FINE, MEDIUM = 0.001, 0.01
-# What each angle of the tool turns about, and its edge in degrees.
-TURNS = (
-    ("about the platform's z, the first of three", 180.0),
-    ("about the y that yaw turned, the second of three", 90.0),
-    ("about the tool's x, the third of three", 180.0),
+# Name of each angle of the tool, what it turns about, and its edge in degrees.
+ANGLES = (
+    ("yaw", "about the platform's z, the first of three", 180.0),
+    ("pitch", "about the y that yaw turned, the second of three", 90.0),
+    ("roll", "about the tool's x, the third of three", 180.0),
 )
+# Dimensions of three lengths that have tolerances, each with the words for its hint.
+LENGTHS = {
+    "a1": "the base joint of leg 1, along the axes of the base",
+    "a3": "the base joint of leg 4, along the axes of the base",
+    "guide": "the guide's offset, along the axes of the base",
+    "b1": "b1, along the axes of the platform",
+    "b2": "b2, along the axes of the platform",
+    "b3": "b3, along the axes of the platform",
+    "b4": "b4, along the axes of the platform",
+}
+EVERY_LENGTH, BOTH_TILTS = "Every length (± mm)", "Both tilts (± °)"
+TILTS = "design.tolerances.guide_tilt_deg"
+
+
+@dataclass(frozen=True)
+class SetToolAngle(Action):
+    """Set yaw, pitch or roll of the tool on the platform, 0 to 2, in degrees."""
+
+    axis: int
+    value: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state, which keeps the angles as they are.
+
+        Raises:
+            InputError: the angle is not finite, or the design is being optimised.
+        """
+        check_free(state)
+        angles = list(state.tool_angles)
+        angles[self.axis] = self.value
+        yaw, pitch, roll = angles
+        quaternion = Pose.of_yaw_pitch_roll((0.0, 0.0, 0.0), angles).quaternion
+        changed = with_value(state, "design.tool.quaternion", quaternion)
+        return replace(changed, set_tool_angles=(yaw, pitch, roll))
+
+    def words(self) -> str:
+        """Return what the action does."""
+        angle = format_number(self.value, 6, size=FULL_TURN)
+        return f"tool {ANGLES[self.axis][0]} = {angle}°"
 
 
 class MachinePanel:
@@ -53,27 +96,26 @@ class MachinePanel:
         with gui.add_folder("Tool on the platform (design units, degrees)"):
             self._add_tool()
         with gui.add_folder("Payload (design units, kg, N)"):
-            controls.number(
+            add_field(
+                controls,
                 "Mass (kg)",
                 "Mass that the platform carries.",
                 "design.payload.mass_kg",
-                least=0.0,
                 step=FINE,
-                small=True,
             )
             self._weight = gui.add_html("", visible=False)
             self._add_payload()
         with gui.add_folder("Gravity", expand_by_default=False):
             self._add_gravity()
         with gui.add_folder("Actuators", expand_by_default=False):
-            self._actuators = ActuatorControls(gui, controls)
+            add_actuators(gui, controls)
         with gui.add_folder("Struts of legs 2 and 3", expand_by_default=False):
             self._add_struts()
             self._moment = gui.add_html("")
         with gui.add_folder("Guide", expand_by_default=False):
             self._add_guide()
         with gui.add_folder("Tolerances", expand_by_default=False):
-            add_tolerances(controls)
+            self._add_tolerances()
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
@@ -82,12 +124,7 @@ class MachinePanel:
         yield self._summary, "content", box(_with_units(machine_words(design)))
         weight = design.payload.weight_n
         yield self._weight, "visible", weight > 0.0
-        yield (
-            self._weight,
-            "content",
-            note(f"Its weight is {format_number(weight)} N."),
-        )
-        yield from self._actuators.updates(frame)
+        yield self._weight, "content", note(f"Its weight is {format_number(weight)} N.")
         yield self._moment, "content", note(moment_words(design.struts))
         yield from self._controls.updates(frame)
 
@@ -99,12 +136,13 @@ class MachinePanel:
                 f"design.tool.position.{axis}",
                 platform_span,
             )
-        for axis, (about, edge) in enumerate(TURNS):
-            self._add_angle(axis, about, edge)
+        for axis in range(len(ANGLES)):
+            self._add_angle(axis)
 
-    def _add_angle(self, axis: int, about: str, edge: float) -> None:
+    def _add_angle(self, axis: int) -> None:
+        name, about, edge = ANGLES[axis]
         self._controls.slider(
-            f"tool {ANGLES[axis]} (°)",
+            f"tool {name} (°)",
             f"Rotation of the tool on the platform {about}, in degrees.",
             Bound(
                 lambda frame: frame.state.tool_angles[axis],
@@ -121,13 +159,11 @@ class MachinePanel:
                 f"design.payload.centre.{axis}",
                 platform_span,
             )
-        self._controls.number(
+        add_field(
+            self._controls,
             "Force on the tool (N)",
             "Largest force of the process, which acts at the tool point in any direction.",
             "design.payload.force_n",
-            least=0.0,
-            step=MEDIUM,
-            small=True,
         )
 
     def _add_gravity(self) -> None:
@@ -153,108 +189,118 @@ class MachinePanel:
         )
 
     def _add_struts(self) -> None:
-        controls = self._controls
-        controls.checkbox(
+        self._controls.checkbox(
             "Tubes",
             "Give the struts the size of a tube; off, they are rigid.",
             Bound(lambda frame: _is_tube(frame.state), _make_tubes),
         )
-        self._add_size("Outer diameter (mm)", "Outer diameter of the tube.", "outer_mm")
-        self._add_size("Inner diameter (mm)", "Inner diameter of the tube; 0 is a bar.", "inner_mm")
-        self._add_size(
-            "Young's modulus (GPa)", "Aluminium 70, steel 210, carbon 130.", "modulus_gpa"
-        )
+        for label, hint, name in (
+            ("Outer diameter (mm)", "Outer diameter of the tube.", "outer_mm"),
+            ("Inner diameter (mm)", "Inner diameter of the tube; 0 is a bar.", "inner_mm"),
+            ("Young's modulus (GPa)", "Aluminium 70, steel 210, carbon 130.", "modulus_gpa"),
+        ):
+            size = At(f"design.struts.{name}", default=lambda _: OUTER)
+            add_field(self._controls, label, hint, size, visible=_is_tube)
         self._add_limit(
             "Limited stress",
             "Limit the bending stress of the tube, and with it the moment.",
-            At("design.struts.stress_mpa", default=lambda _: STRESS),
             ("Largest stress (MPa)", "Largest bending stress of the tube."),
+            "design.struts.stress_mpa",
+            lambda _: STRESS,
             is_possible=_is_tube,
         )
         self._add_limit(
             "Moment given directly",
             "Give the largest bending moment itself, in place of that of tube and stress.",
-            At("design.struts.moment_nm", default=_first_moment),
             ("Largest moment (N m)", "Largest bending moment of a strut."),
-        )
-
-    def _add_size(self, label: str, hint: str, name: str) -> None:
-        self._controls.number(
-            label,
-            hint,
-            At(f"design.struts.{name}", default=lambda _: OUTER),
-            least=0.0,
-            step=MEDIUM,
-            small=True,
-            visible=_is_tube,
+            "design.struts.moment_nm",
+            _first_moment,
         )
 
     def _add_guide(self) -> None:
         self._add_limit(
             "Limited guide force",
             "Limit the force across the guide on each of its two carriages.",
-            At("design.guide.force_n", default=lambda _: FORCE),
             ("Largest force (N)", "Largest force across the guide on a carriage."),
+            "design.guide.force_n",
+            lambda _: FORCE,
         )
         self._add_limit(
             "Limited guide moment",
             "Limit the moment on the guide at each of its two carriages.",
-            At("design.guide.moment_nm", default=lambda _: MOMENT),
             ("Largest moment on it (N m)", "Largest moment on the guide at a carriage."),
+            "design.guide.moment_nm",
+            lambda _: MOMENT,
         )
 
     def _add_limit(
         self,
         switch: str,
         hint: str,
-        at: At,
-        number: tuple[str, str],
+        field: tuple[str, str],
+        path: str,
+        first: Callable[[State], float],
         *,
-        is_possible: Condition | None = None,
+        is_possible: Condition = lambda _: True,
     ) -> None:
-        """Add a switch for a limit, and a field for its value while it is on.
+        """Add a switch for a limit, as of `add_switch`, and a field for its value while it is on.
 
         Args:
             switch: Words beside the switch.
             hint: Sentence on what it does.
-            at: The limit, which the state has as None for none; its default is what it begins with.
-            number: Words beside the field, and its hint.
-            is_possible: Condition in which there can be a limit; None for always.
+            field: Words beside the field, and its hint.
+            path: Path of the limit in the state.
+            first: Function that returns the limit with which it begins.
+            is_possible: Condition in which there can be a limit.
         """
-
-        def is_on(state: State) -> bool:
-            return value_at(state, at.path) is not None
-
-        def write(state: State, on: bool) -> Action:
-            first = None if at.default is None else at.default(state)
-            return Set(at.path, first if on else None, switch, "on" if on else "off")
-
-        def can_be(state: State) -> bool:
-            return is_possible is None or is_possible(state)
-
-        self._controls.checkbox(
-            switch,
-            hint,
-            Bound(lambda frame: is_on(frame.state), write),
-            disabled=lambda state: not can_be(state),
+        add_switch(
+            self._controls, switch, hint, path, first, disabled=lambda state: not is_possible(state)
         )
-        self._controls.number(
-            *number,
-            at,
-            least=0.0,
-            step=MEDIUM,
-            small=True,
-            visible=lambda state: is_on(state) and can_be(state),
+        add_field(
+            self._controls,
+            *field,
+            At(path, default=first),
+            visible=lambda state: value_at(state, path) is not None and is_possible(state),
         )
+
+    def _add_tolerances(self) -> None:
+        """Add one number for all lengths, one for both tilts, and each by itself."""
+        add_field(
+            self._controls,
+            EVERY_LENGTH,
+            "Tolerance of all 21 lengths below; the field shows the largest of them.",
+            Bound(_largest_length, _set_lengths),
+            step=FINE,
+        )
+        add_field(
+            self._controls,
+            BOTH_TILTS,
+            "Tolerance of both tilts of the guide through a1; the field shows the larger one.",
+            Bound(
+                lambda frame: max(frame.state.design.tolerances.guide_tilt_deg),
+                lambda _, value: Set(TILTS, (value, value), BOTH_TILTS, format_number(value, 6)),
+            ),
+            step=FINE,
+        )
+        for name, meaning in LENGTHS.items():
+            self._controls.triple(
+                f"{name} (± mm)",
+                f"Tolerance of {meaning}.",
+                f"design.tolerances.{name}",
+                step=FINE,
+                small=True,
+            )
+        for index, axis in enumerate("yz"):
+            hint = f"Tolerance of the guide's turn about {axis} through a1."
+            label = f"guide tilt {axis} (± °)"
+            add_field(self._controls, label, hint, f"{TILTS}.{index}", step=FINE)
 
 
 def _with_units(words: str) -> str:
     """Return words as HTML in which no line ends between a number and its unit."""
-    return re.sub(r"(?<=\d) (kg|N m|N)\b", _joined_unit, escape(words))
-
-
-def _joined_unit(unit: re.Match[str]) -> str:
-    return unit[0].replace(" ", "&nbsp;")
+    return re.sub(
+        r"(?<=\d) (kg|N m|N)\b", lambda unit: unit[0].replace(" ", "&nbsp;"), escape(words)
+    )
 
 
 def moment_words(struts: Struts) -> str:
@@ -281,3 +327,14 @@ def _first_moment(state: State) -> float:
     """Return the moment to begin with: that of tube and stress, if there is one."""
     moment = state.design.struts.largest_moment
     return moment if math.isfinite(moment) else MOMENT
+
+
+def _largest_length(frame: Frame) -> float:
+    tolerances = frame.state.design.tolerances
+    return max(value for name in LENGTHS for value in getattr(tolerances, name))
+
+
+def _set_lengths(state: State, value: float) -> Action:
+    lengths = dict.fromkeys(LENGTHS, (value, value, value))
+    tolerances: Tolerances = msgspec.structs.replace(state.design.tolerances, **lengths)
+    return Set("design.tolerances", tolerances, EVERY_LENGTH, format_number(value, 6))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from explorer.mechanism.design import DOWN, Design
-from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
+from explorer.mechanism.machine import Actuators, Guide, Payload, Tool
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
@@ -24,24 +24,23 @@ DIRECTIONS: dict[str, Triple] = {
 
 # Difference of two coordinates of unit vectors up to which they are the same but for rounding.
 SAME_DIRECTION = 1e-12
-
-
+# Significant digits of the numbers in the line.
 DIGITS = 3
-"""Significant digits of the numbers in the line."""
 
 
 def machine_words(design: Design) -> str:
     """Return a line on the machine of a design, such as "Tool 3 units from b4; carries 2 kg"."""
+    moment = design.struts.largest_moment
     limits = {
-        "actuators": actuator_words(design.actuators),
-        "struts": strut_words(design.struts),
-        "guide": guide_words(design.guide),
+        "actuators": _actuator_words(design.actuators),
+        "struts": f"struts up to {_text(moment)} N m" if math.isfinite(moment) else "",
+        "guide": _guide_words(design.guide),
     }
     free = [name for name, words in limits.items() if not words]
     parts = [
-        tool_words(design.tool),
-        payload_words(design.payload),
-        gravity_words(design.gravity),
+        _tool_words(design.tool),
+        _payload_words(design.payload),
+        _gravity_words(design.gravity),
         *limits.values(),
         _free_words(free),
     ]
@@ -49,13 +48,12 @@ def machine_words(design: Design) -> str:
     return f"{line[:1].upper()}{line[1:]}."
 
 
-def tool_words(tool: Tool) -> str:
-    """Return where the tool is, "no tool" where it is b4 in the frame of the platform."""
+def _tool_words(tool: Tool) -> str:
     distance, turn = math.hypot(*tool.position), turn_of(tool)
     if distance == 0.0 and turn == 0.0:
         return "no tool"
-    place = "at b4" if distance == 0.0 else f"{text_of(distance)} units from b4"
-    return f"tool {place}" + (f", turned by {text_of(turn)}°" if turn else "")
+    place = "at b4" if distance == 0.0 else f"{_text(distance)} units from b4"
+    return f"tool {place}" + (f", turned by {_text(turn)}°" if turn else "")
 
 
 def turn_of(tool: Tool) -> float:
@@ -64,18 +62,16 @@ def turn_of(tool: Tool) -> float:
     return math.degrees(2.0 * math.atan2(math.hypot(*axis), abs(w)))
 
 
-def payload_words(payload: Payload) -> str:
-    """Return what the platform carries."""
-    mass = f"{text_of(payload.mass_kg)} kg" if payload.mass_kg else ""
-    force = f"a force of {text_of(payload.force_n)} N" if payload.force_n else ""
+def _payload_words(payload: Payload) -> str:
+    mass = f"{_text(payload.mass_kg)} kg" if payload.mass_kg else ""
+    force = f"a force of {_text(payload.force_n)} N" if payload.force_n else ""
     return f"carries {' and '.join(filter(None, (mass, force))) or 'nothing'}"
 
 
-def gravity_words(gravity: Triple) -> str:
-    """Return the direction of gravity; "" where it is down."""
+def _gravity_words(gravity: Triple) -> str:
     name = direction_name(gravity)
     if name is None:
-        return f"gravity along ({', '.join(map(text_of, gravity))})"
+        return f"gravity along ({', '.join(map(_text, gravity))})"
     return "" if gravity == DOWN else f"gravity {name}"
 
 
@@ -87,8 +83,7 @@ def direction_name(gravity: Triple) -> str | None:
     return None
 
 
-def actuator_words(actuators: Actuators) -> str:
-    """Return the largest forces of the actuators; "" where there is no limit."""
+def _actuator_words(actuators: Actuators) -> str:
     push, pull = actuators.limits
     if np.array_equal(push, pull):
         return f"actuators up to {_range(push)} N" if np.isfinite(push).all() else ""
@@ -97,23 +92,11 @@ def actuator_words(actuators: Actuators) -> str:
     return f"actuators {' and '.join(words)}"
 
 
-def strut_words(struts: Struts) -> str:
-    """Return the largest moment of the struts; "" where there is no limit."""
-    moment = struts.largest_moment
-    return f"struts up to {text_of(moment)} N m" if math.isfinite(moment) else ""
-
-
-def guide_words(guide: Guide) -> str:
-    """Return the limits of the guide; "" where there is none."""
-    force = "" if guide.force_n is None else f"{text_of(guide.force_n)} N"
-    moment = "" if guide.moment_nm is None else f"{text_of(guide.moment_nm)} N m"
+def _guide_words(guide: Guide) -> str:
+    force = "" if guide.force_n is None else f"{_text(guide.force_n)} N"
+    moment = "" if guide.moment_nm is None else f"{_text(guide.moment_nm)} N m"
     limits = " and ".join(filter(None, (force, moment)))
     return f"guide up to {limits}" if limits else ""
-
-
-def text_of(value: float) -> str:
-    """Return a number of the line."""
-    return format_number(value, DIGITS)
 
 
 def _free_words(free: list[str]) -> str:
@@ -124,7 +107,11 @@ def _free_words(free: list[str]) -> str:
     return f"{names} {'has' if free == ['guide'] else 'have'} no limit" if free else ""
 
 
+def _text(value: float) -> str:
+    return format_number(value, DIGITS)
+
+
 def _range(values: FloatArray) -> str:
     """Return the range of values, or the value if they are all the same."""
-    low, high = (text_of(float(value)) for value in (values.min(), values.max()))
+    low, high = (_text(float(value)) for value in (values.min(), values.max()))
     return low if low == high else f"{low}–{high}"
