@@ -16,8 +16,14 @@ from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.fold_sliders import colour_stops, fold_span
-from explorer.app.features.mechanism.leaves import RADIUS, Leaves, fold_arcs, leaf_corners
+from explorer.app.features.mechanism.folds import (
+    RADIUS,
+    Leaves,
+    colour_stops,
+    fold_arcs,
+    fold_span,
+    leaf_corners,
+)
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS, MovePanel
 from explorer.app.features.singularity.distance import fold_dial
 from explorer.app.scene.placing import Placed

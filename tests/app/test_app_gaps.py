@@ -15,18 +15,27 @@ from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.approach import FADE_FROM, FARTHEST, approaches
-from explorer.app.features.mechanism.bodies import BASE_RADIUS, PLATE_THICKNESS, platform_plate
-from explorer.app.features.mechanism.flags import Flags
-from explorer.app.features.mechanism.gaps import DASHES, Gaps, gap_text, shown_gaps
-from explorer.app.features.mechanism.legs import PLATE_TOP
+from explorer.app.features.mechanism.bodies import (
+    BASE_RADIUS,
+    PLATE_THICKNESS,
+    PLATE_TOP,
+    platform_plate,
+)
+from explorer.app.features.mechanism.gaps import (
+    DASHES,
+    INSET,
+    Gaps,
+    Tetrahedra,
+    gap_text,
+    shown_gaps,
+)
+from explorer.app.features.mechanism.incidences import FADE_FROM, FARTHEST, Flags, approaches
 from explorer.app.features.mechanism.marks import (
     CLEAR_HANDLE,
     FAINT_HANDLE,
     DragHandle,
     hides_a_gap,
 )
-from explorer.app.features.mechanism.tetrahedra import INSET, Tetrahedra
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum
 from explorer.app.features.singularity.distance import DistancePanel, distance_table
 from explorer.app.features.view.ground import TO_SUN, shadow_outlines

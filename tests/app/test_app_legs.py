@@ -24,8 +24,8 @@ from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.panel import LegsPanel, move_table
 from explorer.app.features.legs.radius_plot import chart_columns, radius_words, volume_at
 from explorer.app.features.legs.swept import SweptTetrahedra
+from explorer.app.features.mechanism.bodies import Legs
 from explorer.app.features.mechanism.design_panel import DesignPanel
-from explorer.app.features.mechanism.legs import Legs
 from explorer.app.features.workspace import regions
 from explorer.app.features.workspace.feeds import workspace_feed
 from explorer.app.features.workspace.panel import WorkspacePanel

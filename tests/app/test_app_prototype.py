@@ -15,9 +15,8 @@ from part_gaps import least_gap
 from services import StubWorker
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.bodies import Bodies
-from explorer.app.features.mechanism.flags import Flags
-from explorer.app.features.mechanism.legs import Legs
+from explorer.app.features.mechanism.bodies import Bodies, Legs
+from explorer.app.features.mechanism.incidences import Flags
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.files import ASSEMBLIES

@@ -16,9 +16,15 @@ from services import StubWorker, services_for
 from strategies import Case, all_cases
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.figures import limits_figure
-from explorer.app.features.mechanism.marks import Ghosts, ghost_points
-from explorer.app.features.mechanism.modes import MODES, HoveredMode, ModesPanel, modes_table
+from explorer.app.features.mechanism.feature import limits_figure
+from explorer.app.features.mechanism.modes import (
+    MODES,
+    Ghosts,
+    ModesPanel,
+    ghost_points,
+    hovered_mode,
+    modes_table,
+)
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum, stratum_name
 from explorer.app.features.singularity.distance import DistancePanel, distance_table
 from explorer.app.features.singularity.feed import StrataFeed
@@ -428,7 +434,7 @@ def test_pointer_on_a_row_shows_one_ghost_with_its_number_and_leaves_no_step(
 def test_pointer_is_on_a_mode_or_on_none_and_leaves_with_its_browser(
     services: Services, desk: Desk
 ) -> None:
-    hovered = services.get(HoveredMode)
+    hovered = services.get(hovered_mode)
     for text, row in (("9", None), ("-1", None), ("x", None), ("2", 2)):
         desk.press(services.buttons, "modes.hover", text)
         assert hovered.row == row

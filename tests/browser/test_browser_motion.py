@@ -8,8 +8,8 @@ from typing import TypedDict
 import numpy as np
 from tab import Tab
 
-from explorer.app.features.mechanism.leaves import fold_arcs, leaf_corners
-from explorer.app.features.mechanism.tetrahedra import EDGES, INSET
+from explorer.app.features.mechanism.folds import fold_arcs, leaf_corners
+from explorer.app.features.mechanism.gaps import EDGES, INSET
 from explorer.app.features.view.ground import ground_of, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Set, SetPose

@@ -14,7 +14,7 @@ from pictures import DESIGN, FOLDER, SCENES, draw
 from playwright.sync_api import Browser
 from scipy import ndimage
 
-from explorer.app.features.mechanism.legs import Telescopes
+from explorer.app.features.mechanism.bodies import Telescopes
 from explorer.app.scene.camera import DIRECTIONS
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import (

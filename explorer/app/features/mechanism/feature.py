@@ -6,19 +6,32 @@ import viser
 
 from explorer.app.features.designs.name import DesignName
 from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
-from explorer.app.features.mechanism.bodies import Bodies
+from explorer.app.features.mechanism.bodies import Bodies, Legs, TwinLegs
 from explorer.app.features.mechanism.design_panel import DesignPanel
-from explorer.app.features.mechanism.figures import limits_figure
-from explorer.app.features.mechanism.flags import Flags
-from explorer.app.features.mechanism.gaps import Gaps
-from explorer.app.features.mechanism.leaves import Leaves
-from explorer.app.features.mechanism.legs import Legs, TwinLegs
-from explorer.app.features.mechanism.marks import DragHandle, Ghosts, Labels
-from explorer.app.features.mechanism.modes import MODES
+from explorer.app.features.mechanism.folds import Leaves
+from explorer.app.features.mechanism.gaps import Gaps, Tetrahedra
+from explorer.app.features.mechanism.incidences import Flags
+from explorer.app.features.mechanism.marks import DragHandle, Labels
+from explorer.app.features.mechanism.modes import MODES, Ghosts
 from explorer.app.features.mechanism.pose_panel import MovePanel
-from explorer.app.features.mechanism.tetrahedra import Tetrahedra
 from explorer.app.state.actions import SetMode
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.commands import Key, shift
+
+
+def limits_figure(frame: Frame) -> str:
+    """Return how many limits the pose breaks, as HTML."""
+    broken = [str(each) for each in frame.snapshot.violations]
+    if broken:
+        hint = f"Outside the limits: {'; '.join(broken)}."
+        return figure("Design", "Limits", f"{len(broken)} broken", hint=hint, look="ex-beyond")
+    if frame.snapshot.is_singular:
+        hint = "The pose keeps all limits of the design, but it is singular."
+        return figure("Design", "Limits", "kept, but singular", hint=hint)
+    hint = "The pose keeps all limits of the design."
+    return figure("Design", "Limits", "kept", hint=hint, look="ex-within")
+
 
 MECHANISM = Feature(
     "mechanism",

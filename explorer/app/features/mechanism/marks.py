@@ -1,4 +1,4 @@
-"""Labels a1 … b4, ghosts of the other assembly modes, and the drag handle."""
+"""Labels a1 … b4, and the drag handle."""
 
 from __future__ import annotations
 
@@ -10,20 +10,16 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.approach import approaches
-from explorer.app.features.mechanism.bodies import platform_plate
-from explorer.app.features.mechanism.modes import MODES, HoveredMode, ghost_modes
+from explorer.app.features.mechanism.incidences import approaches
 from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import NO_POINTS, ScenePart, around
+from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed, scene_scale
-from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent
 from explorer.app.session.clock import Timer, now, start_timer
 from explorer.app.state.actions import SetPose
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import GHOST
 from explorer.errors import InputError
-from explorer.mechanism.pose import Pose, quaternion_from_rotation
+from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 
 BASE_LABELS = ("a1", "a2", "a3")
@@ -59,73 +55,6 @@ class Labels(ScenePart):
             points = placed.points if name in BASE_LABELS else placed.platform_points
             yield handle, "visible", shown
             yield handle, "position", tuple(points[name].tolist())
-
-
-class Ghosts(ScenePart):
-    """The other assembly modes of the same joints, each with its number and sign triple.
-
-    All seven are drawn, or the one on whose row in the table a pointer rests.
-    """
-
-    def __init__(self, services: Services) -> None:
-        scene, self._hovered = services.scene, services.get(HoveredMode)
-        # Instanced meshes cannot change their shape, and these follow the design.
-        self._plates = [
-            add_translucent(scene, f"/ghosts/platform/{i}", NO_MESH, 0.35, colour=GHOST)
-            for i in range(7)
-        ]
-        self._legs = add_lines(scene, "/ghosts/legs", 28, GHOST, 1.2)
-        self._names = [
-            add_label(scene, f"/ghosts/name/{i}", MODES[i], visible=False) for i in range(7)
-        ]
-
-    def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield the updates that draw the ghosts of this frame."""
-        modes = ghost_modes(placed.frame, self._hovered.row)
-        for index, (plate, label) in enumerate(zip(self._plates, self._names, strict=True)):
-            for handle in (plate, label):
-                yield handle, "visible", index < len(modes)
-        yield self._legs, "visible", bool(modes)
-        if not modes:
-            return
-        solution = placed.frame.snapshot.modes
-        positions = placed.scale * solution.position[modes]
-        vertices, faces = platform_plate(placed)
-        wxyzs = quaternion_from_rotation(solution.rotation[modes])
-        for plate, position, wxyz in zip(self._plates, positions, wxyzs, strict=False):
-            yield plate, "vertices", vertices.astype(np.float32)
-            yield plate, "faces", faces.astype(np.uint32)
-            yield plate, "position", tuple(position.tolist())
-            yield plate, "wxyz", tuple(wxyz.tolist())
-        tips = ghost_points(placed, modes)
-        # Legs that are not shown have no length.
-        lines = np.zeros((len(self._plates) * 4, 2, 3))
-        lines[: 4 * len(modes)] = self._leg_lines(placed, tips)
-        yield self._legs, "points", lines.astype(np.float32)
-        for label, mode, tip in zip(self._names, modes, tips[:, 0], strict=False):
-            yield label, "text", MODES[mode]
-            yield label, "position", tuple(tip.tolist())
-
-    def corners(self, placed: Placed) -> FloatArray:
-        """Return the corners of cubes about the joints of the ghosts."""
-        # A ghost that a pointer brings up does not move the camera.
-        modes = ghost_modes(placed.frame, None)
-        return around(ghost_points(placed, modes).reshape(-1, 3)) if modes else NO_POINTS
-
-    @staticmethod
-    def _leg_lines(placed: Placed, tips: FloatArray) -> FloatArray:
-        bases = np.zeros_like(tips)
-        bases[:, 1:3, 0] = tips[:, 1:3, 0]
-        bases[:, 3] = placed.points["a3"]
-        return np.stack([bases, tips], axis=2).reshape(-1, 2, 3)
-
-
-def ghost_points(placed: Placed, modes: list[int]) -> FloatArray:
-    """Return b1 … b4 of n assembly modes in the scene, shape (n, 4, 3)."""
-    solution = placed.frame.snapshot.modes
-    local = np.array(list(placed.platform_points.values()))
-    turned = np.einsum("mij,nj->mni", solution.rotation[modes], local)
-    return placed.scale * solution.position[modes][:, None] + turned
 
 
 class DragHandle(ScenePart):

@@ -1,22 +1,31 @@
-"""The eight assembly modes as a table: a press on a row goes there, a pointer on it shows it."""
+"""The eight assembly modes: a table, whose rows go there, and ghosts of the others in the scene."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
 
+import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.hovered import HoveredRow
+from explorer.app.features.mechanism.bodies import platform_plate
+from explorer.app.features.mechanism.incidences import HoveredRow
+from explorer.app.scene.labels import add_label
+from explorer.app.scene.part import NO_POINTS, ScenePart, around
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent
 from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chip, Chips, turn
+from explorer.app.widgets.colours import GHOST
 from explorer.app.widgets.commands import Key
 from explorer.app.widgets.markup import box
 from explorer.mechanism.margins import mode_name
+from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_fitted
 from explorer.workspace.limits.valid_poses import Violation
 
@@ -30,11 +39,9 @@ GHOSTS_LABEL = "Other modes as ghosts"
 SHORT = {"gap |d1 − d3|": "gap", "carriage order": "order"}
 
 
-class HoveredMode(HoveredRow):
-    """The mode on whose row a pointer rests, which the scene shows as a ghost."""
-
-    def __init__(self, services: Services) -> None:
-        super().__init__(services, HOVER, range(len(MODES)))
+def hovered_mode(services: Services) -> HoveredRow:
+    """Return the mode on whose row a pointer rests, which the scene shows as a ghost."""
+    return HoveredRow(services, HOVER, range(len(MODES)))
 
 
 class ModesPanel:
@@ -42,7 +49,7 @@ class ModesPanel:
 
     def __init__(self, services: Services) -> None:
         self._session, buttons = services.session, services.buttons
-        services.get(HoveredMode)
+        services.get(hovered_mode)
         self._table = services.gui.add_html("")
         buttons.on(GO, self._go, values=VALUES)
         ghosts = Chip(
@@ -146,3 +153,70 @@ def ghost_modes(frame: Frame, hovered: int | None) -> list[int]:
     if frame.state.view.ghosts:
         return [mode for mode in range(len(MODES)) if mode != here]
     return [] if hovered is None or hovered == here else [hovered]
+
+
+class Ghosts(ScenePart):
+    """The other assembly modes of the same joints, each with its number and sign triple.
+
+    All seven are drawn, or the one on whose row in the table a pointer rests.
+    """
+
+    def __init__(self, services: Services) -> None:
+        scene, self._hovered = services.scene, services.get(hovered_mode)
+        # Instanced meshes cannot change their shape, and these follow the design.
+        self._plates = [
+            add_translucent(scene, f"/ghosts/platform/{i}", NO_MESH, 0.35, colour=GHOST)
+            for i in range(7)
+        ]
+        self._legs = add_lines(scene, "/ghosts/legs", 28, GHOST, 1.2)
+        self._names = [
+            add_label(scene, f"/ghosts/name/{i}", MODES[i], visible=False) for i in range(7)
+        ]
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the ghosts of this frame."""
+        modes = ghost_modes(placed.frame, self._hovered.row)
+        for index, (plate, label) in enumerate(zip(self._plates, self._names, strict=True)):
+            for handle in (plate, label):
+                yield handle, "visible", index < len(modes)
+        yield self._legs, "visible", bool(modes)
+        if not modes:
+            return
+        solution = placed.frame.snapshot.modes
+        positions = placed.scale * solution.position[modes]
+        vertices, faces = platform_plate(placed)
+        wxyzs = quaternion_from_rotation(solution.rotation[modes])
+        for plate, position, wxyz in zip(self._plates, positions, wxyzs, strict=False):
+            yield plate, "vertices", vertices.astype(np.float32)
+            yield plate, "faces", faces.astype(np.uint32)
+            yield plate, "position", tuple(position.tolist())
+            yield plate, "wxyz", tuple(wxyz.tolist())
+        tips = ghost_points(placed, modes)
+        # Legs that are not shown have no length.
+        lines = np.zeros((len(self._plates) * 4, 2, 3))
+        lines[: 4 * len(modes)] = self._leg_lines(placed, tips)
+        yield self._legs, "points", lines.astype(np.float32)
+        for label, mode, tip in zip(self._names, modes, tips[:, 0], strict=False):
+            yield label, "text", MODES[mode]
+            yield label, "position", tuple(tip.tolist())
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the corners of cubes about the joints of the ghosts."""
+        # A ghost that a pointer brings up does not move the camera.
+        modes = ghost_modes(placed.frame, None)
+        return around(ghost_points(placed, modes).reshape(-1, 3)) if modes else NO_POINTS
+
+    @staticmethod
+    def _leg_lines(placed: Placed, tips: FloatArray) -> FloatArray:
+        bases = np.zeros_like(tips)
+        bases[:, 1:3, 0] = tips[:, 1:3, 0]
+        bases[:, 3] = placed.points["a3"]
+        return np.stack([bases, tips], axis=2).reshape(-1, 2, 3)
+
+
+def ghost_points(placed: Placed, modes: list[int]) -> FloatArray:
+    """Return b1 … b4 of n assembly modes in the scene, shape (n, 4, 3)."""
+    solution = placed.frame.snapshot.modes
+    local = np.array(list(placed.platform_points.values()))
+    turned = np.einsum("mij,nj->mni", solution.rotation[modes], local)
+    return placed.scale * solution.position[modes][:, None] + turned

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.fold_sliders import add_fold_sliders
+from explorer.app.features.mechanism.folds import add_fold_sliders
 from explorer.app.features.mechanism.modes import ModesPanel
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls

@@ -12,7 +12,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.legs import colliding_legs
+from explorer.app.features.mechanism.bodies import colliding_legs
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.parts import Parts
 from explorer.app.scene.creases import Drawn

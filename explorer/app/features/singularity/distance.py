@@ -13,7 +13,7 @@ from typing import get_args
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.approach import HOVER, HoveredMargin
+from explorer.app.features.mechanism.incidences import HOVER, hovered_margin
 from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.folds import FIRST_FOLD
@@ -49,7 +49,7 @@ class DistancePanel:
     def __init__(self, services: Services) -> None:
         gui, buttons = services.gui, services.buttons
         self._session = services.session
-        services.get(HoveredMargin)
+        services.get(hovered_margin)
         self._table = gui.add_html("")
         self._controls = Controls(gui, services.session)
         self._controls.dropdown(

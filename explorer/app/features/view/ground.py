@@ -15,10 +15,13 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import (
     BASE_RADIUS,
     PLATE_THICKNESS,
+    PLATE_TOP,
     PLATFORM_RADIUS,
     PLATFORM_SHIFT,
+    ROD_RADIUS,
+    TUBE_RADIUS,
+    TWIN,
 )
-from explorer.app.features.mechanism.legs import PLATE_TOP, ROD_RADIUS, TUBE_RADIUS, TWIN
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed

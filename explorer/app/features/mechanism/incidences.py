@@ -1,27 +1,164 @@
-"""The flags of base and platform, each a point, a line through it and a plane through the line.
+"""How near each incidence is, as the scene shows it, and the flags of base and platform.
 
-Each element has the colour of its incidence: a1 and the platform plane that of δ1, the two lines
-that of δ2, b4 and the base plane that of δ3. Lines and planes are drawn as far as the mechanism
-goes; where an incidence is near they reach out to its gap.
+An incidence is shown from twice its warning value on, and fully at the warning value and below:
+first the lines and planes of the flags reach out, and once they have arrived the gap between them
+is drawn. The row of its margin shows it too, while a pointer rests there.
+
+A flag is a point, a line through it and a plane through the line. Each element has the colour of
+its incidence: a1 and the platform plane that of δ1, the two lines that of δ2, b4 and the base plane
+that of δ3. Lines and planes are drawn as far as the mechanism goes; where an incidence is near they
+reach out to its gap.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.approach import Approach, HoveredMargin, approaches
-from explorer.app.features.mechanism.legs import guide_span
+from explorer.app.features.mechanism.bodies import guide_span
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Patch, cylinder, sphere, turned_to
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import proximity_colour
 from explorer.numerics.arrays import FloatArray
+
+
+class HoveredRow:
+    """The row of a table on which a pointer rests.
+
+    It is no part of the state: it is neither saved nor undone.
+
+    Args:
+        services: What the page offers.
+        name: Name under which buttons and rows report the pointer, see `press_button`.
+        rows: Numbers of the rows.
+
+    Attributes:
+        row: Number of the row; None if there is none.
+    """
+
+    def __init__(self, services: Services, name: str, rows: range) -> None:
+        self.row: int | None = None
+        self._session = services.session
+        self._client: int | None = None
+        services.buttons.on(name, self._hover, values={"", *map(str, rows)})
+        services.server.on_client_disconnect(self._forget)
+
+    def _hover(self, value: str, client: viser.ClientHandle) -> None:
+        self._client = client.client_id
+        self._show(int(value) if value else None)
+
+    def _forget(self, client: viser.ClientHandle) -> None:
+        # A browser that is closed does not report that the pointer has left.
+        if client.client_id == self._client:
+            self._show(None)
+
+    def _show(self, row: int | None) -> None:
+        if row != self.row:
+            self.row = row
+            self._session.redraw()
+
+
+HOVER = "margins.hover"
+# Level, in warning values, from which on an incidence fades in.
+FADE_FROM = 2.0
+# Presence at which lines and planes have reached the ends of the gap.
+ARRIVED = 0.5
+# Farthest that an end of a gap may be from its flag's point, and the longest gap, in reaches.
+FARTHEST = 2.0
+# Length of a gap, as a share of the reach, up to which its ends are one point to the eye.
+CLOSED = 1e-6
+
+
+@dataclass(frozen=True)
+class Approach:
+    """How near one incidence is.
+
+    Attributes:
+        level: Its level, see `explorer.measures.verdict`.
+        presence: How much of it is shown: 0 where it is far, 1 at the warning value and below.
+        is_hovered: Whether a pointer rests on the row of its margin.
+        is_filled: Whether its tetrahedron is filled: that of the row that is pointed at, otherwise
+            the nearest one, once it fades in.
+        is_touching: Whether the incidence holds and its gap is closed; parallel lines leave one.
+        ends: Ends of its gap on the base flag and on the platform flag, in the scene, shape (2, 3);
+            None if they are too far away to be drawn.
+    """
+
+    level: float
+    presence: float
+    is_hovered: bool
+    is_filled: bool
+    is_touching: bool
+    ends: FloatArray | None
+
+    @property
+    def arrival(self) -> float:
+        """The share of the way to the ends of the gap that lines and planes have reached out."""
+        return min(1.0, self.presence / ARRIVED)
+
+    @property
+    def has_gap(self) -> bool:
+        """Whether the gap is shown."""
+        return self.presence >= ARRIVED
+
+    @property
+    def has_label(self) -> bool:
+        """Whether the gap has a label, in place of the name of the tetrahedron."""
+        return self.has_gap and (self.is_filled or self.level < 1.0)
+
+
+def hovered_margin(services: Services) -> HoveredRow:
+    """Return the margin, 1 to 3, on whose row a pointer rests; the scene shows its incidence."""
+    return HoveredRow(services, HOVER, range(1, 4))
+
+
+def approaches(placed: Placed, hovered: int | None) -> tuple[Approach, Approach, Approach]:
+    """Return how near the three incidences are.
+
+    Args:
+        placed: The frame that is drawn.
+        hovered: Number 1 to 3 of the margin on whose row a pointer rests, if any.
+    """
+    levels, snapshot = placed.frame.verdict.levels, placed.frame.snapshot
+    nearest = min(range(3), key=levels.__getitem__)
+    if hovered is not None:
+        filled = hovered - 1
+    else:
+        filled = nearest if levels[nearest] < FADE_FROM else None
+    gaps, reach = snapshot.gaps, snapshot.design.reach
+    ends = placed.scale * np.stack([gaps.base, gaps.platform], axis=1)
+    ways = np.stack([gaps.base, gaps.platform - snapshot.points.b4, gaps.platform - gaps.base])
+    farthest = np.abs(ways).max(axis=(0, 2)).tolist()
+
+    def approach(index: int) -> Approach:
+        level, is_hovered = levels[index], index + 1 == hovered
+        faded_in = min(1.0, max(0.0, (FADE_FROM - level) / (FADE_FROM - 1.0)))
+        return Approach(
+            level,
+            1.0 if is_hovered else faded_in,
+            is_hovered,
+            index == filled,
+            level == 0.0 and gaps.lengths[index] <= CLOSED * reach,
+            ends[index] if farthest[index] <= FARTHEST * reach else None,
+        )
+
+    return approach(0), approach(1), approach(2)
+
+
+def is_shown(placed: Placed, index: int, approach: Approach) -> bool:
+    """Whether the tetrahedron of a margin and its gap are shown at all."""
+    # Like the flags, they would stand among parts that are drawn apart.
+    if placed.is_apart:
+        return False
+    return placed.frame.state.view.tetrahedra[index] or approach.is_hovered
+
 
 POINT_RADIUS = 0.36
 LINE_RADIUS = 0.075
@@ -98,7 +235,7 @@ class Flags(ScenePart):
     """The base's flag and the platform's."""
 
     def __init__(self, services: Services) -> None:
-        scene, self._hovered = services.scene, services.get(HoveredMargin)
+        scene, self._hovered = services.scene, services.get(hovered_margin)
         self._base = Flag(scene, "/base", deltas=(0, 1, 2))
         self._platform = Flag(scene, "/platform", deltas=(2, 1, 0))
 
