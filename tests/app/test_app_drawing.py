@@ -189,11 +189,12 @@ TYPE_HEIGHT = 11.0
 @given(designs())
 def test_texts_of_a_sketch_are_within_it_and_do_not_overlap(design: Design) -> None:
     for figure, left in zip(figures(design), (0.0, WIDTH - FIGURE_WIDTH), strict=True):
-        for word in figure.words:
+        words = (*figure.words, *(each.word for each in figure.dimensions))
+        for word in words:
             assert left <= word.left
             assert word.left + word.width <= left + FIGURE_WIDTH + 1e-9
             assert 0.5 * TYPE_HEIGHT <= word.at[1] <= HEIGHT - 0.5 * TYPE_HEIGHT
-        for one, other in itertools.combinations(figure.words, 2):
+        for one, other in itertools.combinations(words, 2):
             right = min(one.left + one.width, other.left + other.width)
             across = right - max(one.left, other.left)
             assert across <= 0.0 or abs(one.at[1] - other.at[1]) >= TYPE_HEIGHT, (one, other)
@@ -204,7 +205,7 @@ def test_dimension_is_as_long_as_its_variable_in_one_scale(design: Design) -> No
     values: dict[str, float] = dict(zip(VARIABLES, design.variables, strict=True))
     measured: dict[str, float] = {}
     for figure in figures(design):
-        lengths = {each.word.variable: each.line for each in figure.dimensions}
+        lengths = {each.word.text: each.line for each in figure.dimensions}
         # One scale for each figure: that of its longest dimension.
         longest = max(lengths, key=lambda name: abs(values[name]))
         drawn = {

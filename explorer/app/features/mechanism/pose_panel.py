@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import viser
 
@@ -13,7 +13,6 @@ from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import joint_span, position_span
 from explorer.app.inputs.tracks import Span
-from explorer.app.session.session import Session
 from explorer.app.state.actions import (
     GoHome,
     Set,
@@ -24,13 +23,11 @@ from explorer.app.state.actions import (
 )
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.state.view import Coordinates
+from explorer.app.state.values import value_at
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.chips import Chip, Chips, Effect
 from explorer.app.widgets.markup import alert, box, note, remark
 from explorer.mechanism.design import JOINTS
-from explorer.mechanism.tool_point import Point
 
 JOINT_HINTS = {
     "l1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
@@ -53,6 +50,29 @@ ANGLES = (
     ("pitch", "about the y that yaw turned, the second of three", 90.0),
     ("roll", "about the platform's x, the third of three", 180.0),
 )
+COORDINATES: dict[str, tuple[str, str]] = {
+    "position": (
+        "Position and angles",
+        "Show and set the position of a point, and yaw, pitch and roll.",
+    ),
+    "folds": (
+        "Folds",
+        (
+            "Show and set a distance, two angles and the three folds, each of which changes one "
+            "margin alone. The ends of the sliders are singular."
+        ),
+    ),
+}
+POINTS: dict[str, tuple[str, str]] = {
+    "b4": ("b4", "Show and set the position of b4, and turn about it."),
+    "tool": (
+        "tool point",
+        (
+            "Show and set the position of the tool point, and turn about it. It is b4 until the "
+            "design has a tool elsewhere."
+        ),
+    ),
+}
 
 
 class MovePanel:
@@ -73,8 +93,15 @@ class MovePanel:
                 icon=viser.Icon.MAGNET,
                 main=True,
             )
-        self._coordinates = coordinate_chips(services.buttons, services.session)
-        self._points = point_chips(services.buttons, services.session)
+        self._coordinates = _choice(
+            services, ("pose.coordinates", "Set as", "view.coordinates"), COORDINATES
+        )
+        self._points = _choice(
+            services,
+            ("pose.point", "Position of", "view.at"),
+            POINTS,
+            lambda state, at: at == "b4" or any(state.design.tool.position),
+        )
         self._pose = gui.add_folder("")
         with self._pose:
             self._choices = gui.add_html("")
@@ -146,65 +173,31 @@ def _is_by_position(state: State) -> bool:
     return state.view.coordinates == "position"
 
 
-def coordinate_chips(buttons: Buttons, session: Session) -> Chips:
-    """Return the choice of the coordinates by which the pose is shown and set."""
+def _choice(
+    services: Services,
+    row: tuple[str, str, str],
+    options: Mapping[str, tuple[str, str]],
+    is_ready: Callable[[State, str], bool] = lambda _, __: True,
+) -> Chips:
+    """Return the options of a value of the state.
 
-    def chip(value: Coordinates, words: str, hint: str) -> Chip:
-        return Chip(
-            words,
-            f"Pose › Set as › {words}",
-            hint,
-            Effect(
-                lambda _: Set("view.coordinates", value, "Set as", words),
-                lambda state: state.view.coordinates == value,
-            ),
+    Args:
+        services: Services of the page.
+        row: Name of the row among the buttons, its title, and path of the value.
+        options: Words and hint of each option, by its value.
+        is_ready: Function that tells whether a state allows an option.
+    """
+    name, title, path = row
+
+    def chip(value: str, words: str, hint: str) -> Chip:
+        effect = Effect(
+            lambda _: Set(path, value, title, words), lambda state: value_at(state, path) == value
         )
+        command = f"Pose › {title} › {words}"
+        return Chip(words, command, hint, effect, lambda state: is_ready(state, value))
 
-    return Chips(
-        buttons,
-        session,
-        "pose.coordinates",
-        "Set as",
-        {
-            "position": chip(
-                "position",
-                "Position and angles",
-                "Show and set the position of a point, and yaw, pitch and roll.",
-            ),
-            "folds": chip(
-                "folds",
-                "Folds",
-                "Show and set a distance, two angles and the three folds, each of which changes "
-                "one margin alone. The ends of the sliders are singular.",
-            ),
-        },
-    )
-
-
-def point_chips(buttons: Buttons, session: Session) -> Chips:
-    """Return the choice of the point whose position is shown and set."""
-
-    def chip(at: Point, words: str, hint: str, is_ready: Callable[[State], bool]) -> Chip:
-        return Chip(
-            words,
-            f"Pose › Position of › {words}",
-            hint,
-            Effect(
-                lambda _: Set("view.at", at, "Position of", words),
-                lambda state: state.view.at == at,
-            ),
-            is_ready,
-        )
-
-    b4 = chip("b4", "b4", "Show and set the position of b4, and turn about it.", lambda _: True)
-    tool = chip(
-        "tool",
-        "tool point",
-        "Show and set the position of the tool point, and turn about it. It is b4 until the "
-        "design has a tool elsewhere.",
-        lambda state: any(state.design.tool.position),
-    )
-    return Chips(buttons, session, "pose.point", "Position of", {"b4": b4, "tool": tool})
+    chips = {value: chip(value, words, hint) for value, (words, hint) in options.items()}
+    return Chips(services.buttons, services.session, name, title, chips)
 
 
 def message(state: State) -> str:

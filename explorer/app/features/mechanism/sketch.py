@@ -8,11 +8,9 @@ column keep texts apart whatever the design.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from html import escape
-from itertools import pairwise
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from explorer.mechanism.design import Design
 
@@ -32,21 +30,20 @@ CHARACTER, SHORTEST = 6.4, 28.0
 TICK = 3.0
 
 
-@dataclass(frozen=True)
-class Word:
+class Word(NamedTuple):
     """A text of the sketch.
 
     Attributes:
-        text: The text.
+        text: The text; on a dimension the design variable.
         at: Place of its anchor and of its middle, in pixels, y downwards.
         anchor: End of the text that stands there.
-        variable: Design variable that it names; "" for a point or a caption.
+        look: Class of the text.
     """
 
     text: str
     at: Xy
     anchor: Anchor = "middle"
-    variable: str = ""
+    look: str = ""
 
     @property
     def left(self) -> float:
@@ -58,49 +55,67 @@ class Word:
         """The width, in pixels, no less than it is drawn."""
         return CHARACTER * len(self.text)
 
+    @property
+    def markup(self) -> str:
+        """The text as SVG."""
+        x, y = self.at
+        return (
+            f'<text{_class(self.look)} x="{x:.1f}" y="{y:.1f}" text-anchor="{self.anchor}">'
+            f"{escape(self.text)}</text>"
+        )
 
-@dataclass(frozen=True)
-class Dimension:
-    """A dimension line with its text and the lines from what it measures.
 
-    Attributes:
-        word: Its text, which names the variable.
-        line: The line.
-        extensions: Thin lines from the points to the ends of the line.
-    """
+class Dimension(NamedTuple):
+    """A dimension line with its text, and thin lines from what it measures to its ends."""
 
     word: Word
     line: tuple[Xy, Xy]
-    extensions: tuple[tuple[Xy, Xy], ...]
+    extensions: tuple[tuple[Xy, Xy], tuple[Xy, Xy]]
+
+    @property
+    def markup(self) -> str:
+        """The dimension as SVG, with ticks across its ends at half a right angle."""
+        ticks = "".join(_line("", (x - TICK, y + TICK), (x + TICK, y - TICK)) for x, y in self.line)
+        extensions = "".join(_line("is-thin", *each) for each in self.extensions)
+        return (
+            f'<g data-variable="{self.word.text}">{extensions}{_line("", *self.line)}{ticks}'
+            f"{self.word.markup}</g>"
+        )
 
 
-@dataclass(frozen=True)
-class Figure:
+class Figure(NamedTuple):
     """One of the two figures, in pixels.
 
     Attributes:
-        caption: Its name.
         triangle: Its corners.
         axis: Ends of the line through its origin.
         points: Its points.
-        names: Names of the points.
+        words: Its caption and the names of the points.
         dimensions: Its dimensions.
     """
 
-    caption: Word
     triangle: tuple[Xy, ...]
     axis: tuple[Xy, Xy]
     points: tuple[Xy, ...]
-    names: tuple[Word, ...]
+    words: tuple[Word, ...]
     dimensions: tuple[Dimension, ...]
 
     @property
-    def words(self) -> Iterator[Word]:
-        """All its texts."""
-        yield self.caption
-        yield from self.names
-        for dimension in self.dimensions:
-            yield dimension.word
+    def markup(self) -> str:
+        """The figure as SVG."""
+        corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in self.triangle)
+        dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.2"/>' for x, y in self.points)
+        texts = "".join(each.markup for each in (*self.dimensions, *self.words))
+        return f'<polygon points="{corners}"/>{_line("is-axis", *self.axis)}{dots}{texts}'
+
+
+def _class(look: str) -> str:
+    return f' class="{look}"' if look else ""
+
+
+def _line(look: str, start: Xy, end: Xy) -> str:
+    (x1, y1), (x2, y2) = start, end
+    return f'<line{_class(look)} x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"/>'
 
 
 def figures(design: Design) -> tuple[Figure, Figure]:
@@ -126,7 +141,7 @@ def figures(design: Design) -> tuple[Figure, Figure]:
 
 def sketch(design: Design) -> str:
     """Return the sketch of a design as SVG."""
-    drawn = "".join(map(_drawn, figures(design)))
+    drawn = "".join(figure.markup for figure in figures(design))
     return (
         f'<svg class="ex-sketch" width="{WIDTH}" height="{HEIGHT}" role="img" '
         f'aria-label="Base and platform from above, with the design variables">{drawn}</svg>'
@@ -187,25 +202,22 @@ def _figure(
     middle = axis_y + up * max(0.5 * height, 0.5 * ROW)
     dimensions.append(
         Dimension(
-            Word(f"{name}y", (column - BESIDE, middle), "end", f"{name}y"),
+            Word(f"{name}y", (column - BESIDE, middle), "end"),
             ((column, axis_y), (column, tip[1])),
             ((place(min(xs)), (column, axis_y)), (tip, (column, tip[1]))),
         )
     )
-    names = _apart(
-        [
-            Word(each, (at[0] - BESIDE + 1.0 if each == "a1" else at[0], axis_y - up * OFF_AXIS))
-            for each, at in points.items()
-        ],
-        left,
-    )
+    name_y = axis_y - up * OFF_AXIS
+    names = {each: at[0] - (BESIDE - 1.0) * (each == "a1") for each, at in points.items()}
+    words = [Word(title, (left, 0.5 * ROW), "start")]
+    words += [Word(each, (x, name_y), look="is-point") for each, x in _spread(names, left).items()]
+    words.append(Word(name, (tip[0], tip[1] + up * OFF_AXIS), look="is-point"))
     ends = sorted((origin[0], *(at[0] for at in points.values())))
     return Figure(
-        caption=Word(title, (left, 0.5 * ROW), "start"),
         triangle=(tip, points[corners[0]], points[corners[1]]),
         axis=((ends[0], axis_y), (ends[-1], axis_y)),
         points=(*points.values(), tip),
-        names=(*names, Word(name, (tip[0], tip[1] + up * OFF_AXIS))),
+        words=tuple(words),
         dimensions=tuple(dimensions),
     )
 
@@ -213,13 +225,13 @@ def _figure(
 def _along(name: str, origin: Xy, end: Xy, row_y: float, left: float) -> Dimension:
     """Return a dimension along the axis, in a row."""
     (from_x, from_y), (to_x, to_y) = origin, end
-    word = Word(name, (0.5 * (from_x + to_x), row_y), "middle", name)
+    word = Word(name, (0.5 * (from_x + to_x), row_y))
     if abs(to_x - from_x) < SHORTEST:
         # There is no room on the line: the text stands beside it, at the right if it fits.
         after = max(from_x, to_x) + BESIDE
-        word = Word(name, (after, row_y), "start", name)
+        word = Word(name, (after, row_y), "start")
         if after + word.width > left + FIGURE_WIDTH:
-            word = Word(name, (min(from_x, to_x) - BESIDE, row_y), "end", name)
+            word = Word(name, (min(from_x, to_x) - BESIDE, row_y), "end")
     return Dimension(
         word,
         ((from_x, row_y), (to_x, row_y)),
@@ -227,54 +239,15 @@ def _along(name: str, origin: Xy, end: Xy, row_y: float, left: float) -> Dimensi
     )
 
 
-def _apart(names: list[Word], left: float) -> list[Word]:
-    """Return names in one row, moved along it until none overlaps, in their order along it."""
-    order = sorted(range(len(names)), key=lambda index: names[index].at[0])
-    step = names[0].width + 2.0
-    xs = [names[index].at[0] for index in order]
-    for before, after in pairwise(range(len(xs))):
-        xs[after] = max(xs[after], xs[before] + step)
+def _spread(names: Mapping[str, float], left: float) -> dict[str, float]:
+    """Return the places of names in one row, moved along it until none overlaps, in their order."""
+    order = sorted(names, key=names.__getitem__)
+    step = CHARACTER * len(order[0]) + 2.0
+    xs = [names[each] for each in order]
+    for after in range(1, len(xs)):
+        xs[after] = max(xs[after], xs[after - 1] + step)
     last = left + FIGURE_WIDTH - 0.5 * step
-    for after in range(len(xs) - 1, -1, -1):
+    for after in reversed(range(len(xs))):
         xs[after] = min(xs[after], last)
         last = xs[after] - step
-    moved = dict(zip(order, xs, strict=True))
-    return [Word(word.text, (moved[i], word.at[1])) for i, word in enumerate(names)]
-
-
-def _drawn(figure: Figure) -> str:
-    corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in figure.triangle)
-    dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.2"/>' for x, y in figure.points)
-    return (
-        f'<polygon points="{corners}"/>{_line("is-axis", *figure.axis)}{dots}'
-        + "".join(map(_dimension, figure.dimensions))
-        + "".join(_text(word, "is-point") for word in figure.names)
-        + _text(figure.caption)
-    )
-
-
-def _dimension(dimension: Dimension) -> str:
-    (x1, y1), (x2, y2) = dimension.line
-    # Ticks across the line at its ends, at half a right angle.
-    ticks = "".join(
-        _line("", (x - TICK, y + TICK), (x + TICK, y - TICK)) for x, y in ((x1, y1), (x2, y2))
-    )
-    extensions = "".join(_line("is-thin", *each) for each in dimension.extensions)
-    line = _line("", *dimension.line)
-    name = dimension.word.variable
-    return f'<g data-variable="{name}">{extensions}{line}{ticks}{_text(dimension.word)}</g>'
-
-
-def _line(look: str, start: Xy, end: Xy) -> str:
-    (x1, y1), (x2, y2) = start, end
-    classes = f' class="{look}"' if look else ""
-    return f'<line{classes} x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"/>'
-
-
-def _text(word: Word, look: str = "") -> str:
-    x, y = word.at
-    classes = f' class="{look}"' if look else ""
-    return (
-        f'<text{classes} x="{x:.1f}" y="{y:.1f}" text-anchor="{word.anchor}">'
-        f"{escape(word.text)}</text>"
-    )
+    return dict(zip(order, xs, strict=True))

@@ -6,13 +6,11 @@ from collections.abc import Iterator, Mapping
 
 from explorer.app.features.feature import Services
 from explorer.app.inputs.controls import Controls
-from explorer.app.session.session import Session
 from explorer.app.state.actions import draw_as
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import DrawnAs
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.chips import Chip, Chips, Effect
 from explorer.app.widgets.commands import Key, shift
 from explorer.app.widgets.markup import box
@@ -70,7 +68,7 @@ class ViewPanel:
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
-        self._forms = form_chips(services.buttons, services.session)
+        self._forms = _form_chips(services)
         self._form_row = gui.add_html("")
         self._controls = controls = Controls(gui, services.session)
         with gui.add_folder("Layers"):
@@ -91,7 +89,7 @@ class ViewPanel:
         yield from self._controls.updates(frame)
 
 
-def form_chips(buttons: Buttons, session: Session) -> Chips:
+def _form_chips(services: Services) -> Chips:
     """Return the options of what the mechanism is drawn as; a press on one again goes back."""
 
     def chip(form: DrawnAs) -> Chip:
@@ -100,12 +98,8 @@ def form_chips(buttons: Buttons, session: Session) -> Chips:
         def is_on(state: State) -> bool:
             return state.view.drawn_as == form
 
-        return Chip(
-            form.capitalize(),
-            f"Show › Drawn as › {form}",
-            hint,
-            Effect(lambda state: draw_as("schematic" if is_on(state) else form), is_on),
-            keys=keys,
-        )
+        effect = Effect(lambda state: draw_as("schematic" if is_on(state) else form), is_on)
+        return Chip(form.capitalize(), f"Show › Drawn as › {form}", hint, effect, keys=keys)
 
-    return Chips(buttons, session, "view.form", "Drawn as", {form: chip(form) for form in FORMS})
+    chips = {form: chip(form) for form in FORMS}
+    return Chips(services.buttons, services.session, "view.form", "Drawn as", chips)
