@@ -20,7 +20,7 @@ from explorer.app.features.optimise.actions import (
     StartRun,
 )
 from explorer.app.features.paths.actions import Go, Play, SetPathTime
-from explorer.app.features.studies.actions import BrushAxis
+from explorer.app.features.studies.actions import BrushAxes
 from explorer.app.session.gestures import UserAction
 from explorer.app.state.action import Action
 from explorer.app.state.actions import (
@@ -38,7 +38,7 @@ from explorer.app.state.compared import Look
 from explorer.app.state.folds import SetFold
 from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
 from explorer.app.state.state import Run, State, opened
-from explorer.app.state.studies import Studies
+from explorer.app.state.studies import Brush, Studies
 from explorer.app.state.values import value_at, with_value
 from explorer.app.state.view import PrecisionView, PrototypeView, SingularView, View, WorkspaceView
 from explorer.errors import ExplorerError
@@ -204,7 +204,7 @@ MAKERS: tuple[Make, ...] = (
     lambda state, i, share: Pin(state.design),
     lambda state, i, share: Unpin(i % 3),
     lambda state, i, share: Change("compared.look", {"millimetres": i > 2, "overlay": share < 0.5}),
-    lambda state, i, share: BrushAxis("volume", ((share, 10.0),)),
+    lambda state, i, share: BrushAxes((Brush("volume", ((share, 10.0),)),)),
 )
 
 
@@ -284,7 +284,7 @@ def rich_state() -> State:
         Change("", {"studies": varied(Studies())}),
         Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
         Change("", {"set_tool_angles": (1 / 3, 90.0, -50.0)}),
-        BrushAxis("volume", ((1 / 3, 10.0),)),
+        BrushAxes((Brush("volume", ((1 / 3, 10.0),)),)),
         Change(
             "optimisation.request",
             {"held": True, "error": 1 / 3, "deflection": 2 / 3, "tilt": 10 / 3},

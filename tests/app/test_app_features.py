@@ -30,7 +30,7 @@ from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
 from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
 from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
 from explorer.app.features.precision.budget import SetTolerances
-from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
+from explorer.app.features.studies.actions import BrushAxes, PickDesign
 from explorer.app.features.view.feature import CAMERA_HINTS
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Control
@@ -263,7 +263,7 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
 
 OF_VALUES = (
     SetJoint, SetPosition, SetAngle, SetPose, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
-    SetFold, SetVariable, SetName, SetPathTime, PickDesign, BrushAxis, BrushBox,
+    SetFold, SetVariable, SetName, SetPathTime, PickDesign, BrushAxes,
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map or a handle gives."""
 

@@ -178,7 +178,7 @@ def test_design_is_picked_and_brushed_by_clicks_and_drags_in_the_plots(
     assert_left_out(tab, results)
     assert 0 < len(tab.page.evaluate(LEFT_OUT)) < COUNT
 
-    tab.page.get_by_title("Clear all brushes").click()
+    tab.page.get_by_title("Free all axes.").click()
     tab.wait_for(lambda: not studies_of(tab).brushes, "no brush")
     wait_for_plots(tab)
     drawing = panel_of(tab).feed.drawing

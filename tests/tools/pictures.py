@@ -26,7 +26,7 @@ from explorer.app.browser.headless import headless_browser
 from explorer.app.features.compare.panel import Pin
 from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.sharing.reporting import make_report
-from explorer.app.features.studies.actions import BrushAxis, OpenStudy, PickDesign
+from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign
 from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import open_page, picture, settle, stable_picture
@@ -308,8 +308,8 @@ def draw_studies(browser: Browser) -> bytes:
             run_study(study, folder, workers)
         results = load_results(folder)
         # The largest clearance among the designs within the brush.
-        brush = BrushAxis("volume", ((4000.0, 7000.0),))
-        inside = results.front() & within(results.columns, (Brush(brush.axis, brush.ranges),))
+        brushes = (Brush("volume", ((4000.0, 7000.0),)),)
+        inside = results.front() & within(results.columns, brushes)
         rows = np.flatnonzero(inside)
         row = int(rows[results.columns["clearance"][rows].argmax()])
         index = int(results.columns["index"][row])
@@ -319,7 +319,7 @@ def draw_studies(browser: Browser) -> bytes:
             session.do(bare())
             session.do(OpenStudy(study.name))
             session.do(PickDesign(results.design_of_row(row), index=index, study=study.name))
-            session.do(brush)
+            session.do(BrushAxes(brushes))
             session.wait_until_idle()
             assert panel.feed.wait_until_idle(60.0)
             page, client = open_page(browser, running, (1280, 1000))

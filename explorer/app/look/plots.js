@@ -4,6 +4,10 @@ window.explorer.plots ??= (() => {
     const line = JSON.stringify({ study: plot.layout.meta.study, ...event });
     window.explorer.press("studies.plot", line);
   };
+  const brush = (plot, ranges) => {
+    const brushes = plot.layout.meta.axes.map((axis, k) => ({ axis, ranges: ranges[k] }));
+    tell(plot, { brushes });
+  };
   const ordered = ([a, b]) => (a <= b ? [a, b] : [b, a]);
   const rangesOf = ({ constraintrange: given }) =>
     !given || !given.length ? [] : Array.isArray(given[0]) ? given : [given];
@@ -42,16 +46,14 @@ window.explorer.plots ??= (() => {
     scatter(plot) {
       plot.on("plotly_click", ({ points }) => {
         const index = Number(points[points.length - 1].customdata);
-        if (Number.isInteger(index)) tell(plot, { do: "pick", index });
+        if (Number.isInteger(index)) tell(plot, { index });
       });
       plot.on("plotly_selected", (event) => {
         if (!event || !event.range) return;
-        const box = [ordered(event.range.x), ordered(event.range.y)];
-        tell(plot, { do: "box", axes: plot.layout.meta.axes, box });
+        const { x, y } = event.range;
+        brush(plot, [[ordered(x)], [ordered(y)]]);
       });
-      plot.on("plotly_deselect", () =>
-        tell(plot, { do: "box", axes: plot.layout.meta.axes, box: null }),
-      );
+      plot.on("plotly_deselect", () => brush(plot, [[], []]));
     },
     parallel(plot) {
       let pressed = null;
@@ -60,7 +62,7 @@ window.explorer.plots ??= (() => {
         if (!e.target.classList.contains("gl-canvas") || !pressed) return;
         if (Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) > 4) return;
         const row = lineAt(plot, e.clientX, e.clientY);
-        if (row !== null) tell(plot, { do: "pick", index: plot.layout.meta.designs[row] });
+        if (row !== null) tell(plot, { index: plot.layout.meta.designs[row] });
       });
       plot.on("plotly_restyle", ([changes]) => {
         for (const key of Object.keys(changes)) {
@@ -68,7 +70,7 @@ window.explorer.plots ??= (() => {
           if (!found) continue;
           const dimension = plot.data[0].dimensions[Number(found[1])];
           const ranges = rangesOf(dimension).map((each) => ordered(Array.from(each)));
-          tell(plot, { do: "brush", axis: dimension.name, ranges });
+          tell(plot, { brushes: [{ axis: dimension.name, ranges }] });
         }
       });
     },

@@ -9,7 +9,7 @@ from typing import ClassVar
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Open
 from explorer.app.state.state import State
-from explorer.app.state.studies import Range, Studies, label_of
+from explorer.app.state.studies import Brush, Studies, label_of
 from explorer.app.state.values import with_value
 from explorer.errors import InputError
 from explorer.numerics.number_text import format_number
@@ -36,11 +36,10 @@ class OpenStudy(Action):
 
 
 @dataclass(frozen=True)
-class BrushAxis(Action):
-    """Select designs within ranges of an axis; no ranges free it."""
+class BrushAxes(Action):
+    """Select designs within ranges of some axes; an axis without ranges is freed."""
 
-    axis: str
-    ranges: tuple[Range, ...]
+    brushes: tuple[Brush, ...]
 
     def apply(self, state: State) -> State:
         """Return the next state.
@@ -48,51 +47,21 @@ class BrushAxis(Action):
         Raises:
             InputError: too many ranges, or one without numbers.
         """
-        ranges = _check_ranges(self.axis, self.ranges)
-        return replace(state, studies=state.studies.with_ranges(self.axis, ranges))
+        studies = state.studies
+        for brush in self.brushes:
+            _check_ranges(brush)
+            studies = studies.with_ranges(brush.axis, brush.ranges)
+        return replace(state, studies=studies)
 
     def words(self) -> str:
         """Return what the action does."""
-        return f"{'Brush' if self.ranges else 'Free'} {label_of(self.axis)}"
+        verb = "Brush" if any(brush.ranges for brush in self.brushes) else "Free"
+        return f"{verb} {' and '.join(label_of(brush.axis) for brush in self.brushes)}"
 
 
-@dataclass(frozen=True)
-class BrushBox(Action):
-    """Select designs within a box of the scatter plot; None frees both axes."""
-
-    template: ClassVar[str] = "Brush {action.spoken}"
-
-    across: str
-    up: str
-    box: tuple[Range, Range] | None
-
-    @property
-    def spoken(self) -> str:
-        """The names of both axes on the page."""
-        return f"{label_of(self.across)} and {label_of(self.up)}"
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: ranges without numbers.
-        """
-        studies = state.studies
-        for index, axis in enumerate((self.across, self.up)):
-            ranges = () if self.box is None else (self.box[index],)
-            studies = studies.with_ranges(axis, _check_ranges(axis, ranges))
-        return replace(state, studies=studies)
-
-
-@dataclass(frozen=True)
-class ClearBrushes(Action):
-    """Free all axes."""
-
-    template: ClassVar[str] = "Clear all brushes"
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return with_value(state, "studies.brushes", ())
+def free_axes(state: State) -> BrushAxes:
+    """Return the action that frees all axes."""
+    return BrushAxes(tuple(Brush(brush.axis, ()) for brush in state.studies.brushes))
 
 
 @dataclass(frozen=True)
@@ -120,13 +89,13 @@ class PickDesign(Open):
         return with_value(super().apply(state), "studies.picked", self.index)
 
 
-def _check_ranges(axis: str, ranges: tuple[Range, ...]) -> tuple[Range, ...]:
-    if len(ranges) > MOST_RANGES:
-        raise InputError(f"an axis takes {MOST_RANGES} ranges; {axis} was given {len(ranges)}")
-    for low, high in ranges:
+def _check_ranges(brush: Brush) -> None:
+    if len(brush.ranges) > MOST_RANGES:
+        count = len(brush.ranges)
+        raise InputError(f"an axis takes {MOST_RANGES} ranges; {brush.axis} was given {count}")
+    for low, high in brush.ranges:
         if not (math.isfinite(low) and math.isfinite(high) and low <= high):
             raise InputError(
-                f"a range of {axis} goes from low to high; "
+                f"a range of {brush.axis} goes from low to high; "
                 f"got {format_number(low)} to {format_number(high)}"
             )
-    return ranges

@@ -6,6 +6,7 @@ import viser
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.studies.panel import StudiesPanel
+from explorer.app.features.studies.words import BUTTONS
 from explorer.app.features.studies.work import study_runner
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import press_button, running
@@ -27,7 +28,7 @@ class StudyChip:
             "studies.cancel",
             "",
             "Cancel",
-            hint="End the study; finished designs are kept.",
+            hint=BUTTONS["cancel"][1],
             class_name="ex-button",
             is_disabled=run.is_cancelled,
         )

@@ -6,7 +6,6 @@ A thread of its own reads and draws them, so that the controls of the page stay 
 from __future__ import annotations
 
 import itertools
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -141,9 +140,7 @@ class StudyFeed:
         self._redraw = redraw
         self._version = itertools.count(1)
         self._revision = itertools.count(1)
-        self._lock = threading.Lock()
         self._computed = 0
-        self._seen: tuple[Studies, int, bool] | None = None
         self._request: Request | None = None
         self._drawing: StudyDrawing | None = None
         # Results that were read last; only the thread uses them.
@@ -168,12 +165,6 @@ class StudyFeed:
     def follow(self, frame: Frame, *, dark: bool = False) -> None:
         """Draw the study of a frame, unless it is drawn already."""
         studies = frame.state.studies
-        seen = (studies, self._computed, dark)
-        if self._seen is not None and all(
-            a is b or a == b for a, b in zip(seen, self._seen, strict=True)
-        ):
-            return
-        self._seen = seen
         if studies.name is None:
             self._request = self._drawing = self.problem = None
             return
@@ -188,8 +179,7 @@ class StudyFeed:
 
     def refresh(self) -> None:
         """Draw again, since there are new results."""
-        with self._lock:
-            self._computed = next(self._version)
+        self._computed = next(self._version)
         self._redraw()
 
     def wait_until_idle(self, timeout: float = 10.0) -> bool:

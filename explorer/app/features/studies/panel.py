@@ -8,14 +8,10 @@ from typing import Literal
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.studies.actions import (
-    ClearBrushes,
-    OpenStudy,
-    PickDesign,
-)
+from explorer.app.features.studies.actions import OpenStudy, PickDesign, free_axes
 from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.plots import HINT, StudyPlots
-from explorer.app.features.studies.words import ALONG, acts, chips, head, legend, table
+from explorer.app.features.studies.words import ALONG, BUTTONS, acts, chips, head, legend, table
 from explorer.app.features.studies.work import Run, study_feed, study_runner
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Control
@@ -32,6 +28,7 @@ from explorer.app.state.studies import (
     MOST,
     MOST_PERCENT,
     Studies,
+    StudyPlan,
     label_of,
 )
 from explorer.app.widgets.assigning import Update
@@ -211,39 +208,19 @@ class StudiesPanel:
         self.chips = gui.add_html("")
 
     def _add_buttons(self, buttons: Buttons) -> None:
-        buttons.on("studies.start", self._start)
-        buttons.on("studies.cancel", lambda _, _client: self.runner.cancel())
-        buttons.on("studies.continue", self._go_on)
-        buttons.on("studies.new", self._ask_for_new, values=("on", "off"))
+        handlers: dict[str, tuple[Does, Callable[[], bool]]] = {
+            "start": (self._start, lambda: self.runner.run is None),
+            "cancel": (lambda _, __: self.runner.cancel(), lambda: self.runner.run is not None),
+            "continue": (self._go_on, self._can_go_on),
+            "new": (self._ask_for_new, lambda: True),
+            "clear": (self._clear, lambda: bool(self._session.state.studies.brushes)),
+        }
+        for name, (handle, is_ready) in handlers.items():
+            words, hint = BUTTONS[name]
+            value = "on" if name == "new" else ""
+            buttons.on(f"studies.{name}", handle, values=("", "on", "off"))
+            buttons.offer(f"Studies › {words}", hint, f"studies.{name}", value, is_ready)
         buttons.on("studies.along", self._step, values=tuple(map(str, ALONG.values())))
-        buttons.on("studies.pick", self._pick_row)
-        buttons.on("studies.vary", self._switch("variable"), values=NAMES)
-        buttons.on("studies.measure", self._switch("measure"), values=measures_in("studies"))
-        buttons.on("studies.clear", self._clear)
-        buttons.offer(
-            "Studies › Start study",
-            "Compute a small study around the live design, as it is set up.",
-            "studies.start",
-            is_ready=lambda: self.runner.run is None,
-        )
-        buttons.offer(
-            "Studies › Cancel study",
-            "End the study; finished designs are kept.",
-            "studies.cancel",
-            is_ready=lambda: self.runner.run is not None,
-        )
-        buttons.offer(
-            "Studies › Continue the study",
-            "Compute the designs of the open study that are missing.",
-            "studies.continue",
-            is_ready=self._can_go_on,
-        )
-        buttons.offer(
-            "Studies › New study",
-            "Set up a small study around the live design.",
-            "studies.new",
-            "on",
-        )
         for words, step in ALONG.items():
             buttons.offer(
                 f"Studies › {words} design of the front",
@@ -252,12 +229,11 @@ class StudiesPanel:
                 str(step),
                 self._has_front,
             )
-        buttons.offer(
-            "Studies › Clear brushes",
-            "Free all axes.",
-            "studies.clear",
-            is_ready=lambda: bool(self._session.state.studies.brushes),
-        )
+        buttons.on("studies.pick", self._pick_row)
+        buttons.on("studies.vary", self._switch(StudyPlan.with_variable_toggled), values=NAMES)
+        measures = measures_in("studies")
+        turn = self._switch(StudyPlan.with_measure_advanced)
+        buttons.on("studies.measure", turn, values=measures)
 
     def _start(self, _: str, client: viser.ClientHandle) -> None:
         self._is_new_asked = False
@@ -295,16 +271,15 @@ class StudiesPanel:
             self.pick(int(index), client.client_id)
 
     def _clear(self, _: str, client: viser.ClientHandle) -> None:
-        self._session.do(ClearBrushes(), who=client.client_id)
+        self._session.do(free_axes, who=client.client_id)
 
-    def _switch(self, what: Literal["variable", "measure"]) -> Does:
+    def _switch(self, turn: Callable[[StudyPlan, str], StudyPlan]) -> Does:
         def press(name: str, client: viser.ClientHandle) -> None:
-            def change(state: State) -> Action:
-                plan = state.studies.plan
-                is_variable = what == "variable"
-                turn = plan.with_variable_toggled if is_variable else plan.with_measure_advanced
-                return Set("studies.plan", turn(name), "New study", label_of(name))
-
-            self._session.do(change, who=client.client_id)
+            self._session.do(
+                lambda state: Set(
+                    "studies.plan", turn(state.studies.plan, name), "New study", label_of(name)
+                ),
+                who=client.client_id,
+            )
 
         return press

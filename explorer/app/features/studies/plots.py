@@ -17,11 +17,11 @@ import viser
 from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
-from explorer.app.features.studies.actions import MOST_RANGES, BrushAxis, BrushBox
+from explorer.app.features.studies.actions import BrushAxes
 from explorer.app.features.studies.feed import PlotJson, StudyDrawing
 from explorer.app.look import read_script
 from explorer.app.session.session import Who
-from explorer.app.state.studies import Range
+from explorer.app.state.studies import Brush
 from explorer.app.widgets.assigning import Update
 
 # Height over width.
@@ -90,53 +90,29 @@ class StudyPlots:
         # An event in the plot of another study is out of date.
         if event is None or event.study != self._session.state.studies.name:
             return
-        match event:
-            case Picked(index=index):
-                self._pick(index, client.client_id)
-            case Brushed(axis=axis, ranges=ranges):
-                self._session.do(BrushAxis(axis, ranges), who=client.client_id)
-            case Boxed(axes=(across, up), box=box):
-                self._session.do(BrushBox(across, up, box), who=client.client_id)
+        if event.index is not None:
+            self._pick(event.index, client.client_id)
+        elif event.brushes:
+            self._session.do(BrushAxes(event.brushes), who=client.client_id)
 
 
-Word = Annotated[str, msgspec.Meta(max_length=200)]
-Ranges = Annotated[tuple[Range, ...], msgspec.Meta(max_length=MOST_RANGES)]
-Index = Annotated[int, msgspec.Meta(ge=0, le=2**31)]
-
-
-class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="do"):
-    """An event in a plot.
+class PlotEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A click on a design in a plot, or a change of its brushes.
 
     Attributes:
         study: Name of the study of the plot.
+        index: Index of the design; None for a brush.
+        brushes: New ranges of axes; an axis without ranges is freed.
     """
 
-    study: Word
+    study: str
+    index: Annotated[int, msgspec.Meta(ge=0, le=2**31)] | None = None
+    brushes: tuple[Brush, ...] = ()
 
 
-class Picked(Event, frozen=True, tag="pick"):
-    """A click on a design."""
-
-    index: Index
+_DECODER = msgspec.json.Decoder(PlotEvent)
 
 
-class Brushed(Event, frozen=True, tag="brush"):
-    """A brush along an axis of the parallel lines; no ranges free it."""
-
-    axis: Word
-    ranges: Ranges
-
-
-class Boxed(Event, frozen=True, tag="box"):
-    """A box drawn in the scatter plot; None frees both axes."""
-
-    axes: tuple[Word, Word]
-    box: tuple[Range, Range] | None
-
-
-_DECODER = msgspec.json.Decoder(Picked | Brushed | Boxed)
-
-
-def event_of(line: str) -> Picked | Brushed | Boxed | None:
+def event_of(line: str) -> PlotEvent | None:
     """Return the event in a line of JSON; None if the script did not write it."""
     return decode_text(line, _DECODER)

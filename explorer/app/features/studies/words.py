@@ -26,7 +26,7 @@ from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import decimals_for, format_number
 from explorer.optimise.problem import REACH, YAW
 from explorer.sweep.machine import MACHINE
-from explorer.sweep.study import NAMES, Sense, Study
+from explorer.sweep.study import NAMES, Study
 
 ROWS = 10
 """Rows of the table of the front."""
@@ -37,7 +37,18 @@ MOST_REASONS = 4
 MOST_COLUMNS = 9
 ALONG = {"Previous": -1, "Next": 1}
 """Steps along the front."""
-ARROWS: dict[Sense, str] = {"max": "↑", "min": "↓"}
+ARROWS: dict[str, str] = {"max": "↑", "min": "↓"}
+BUTTONS = {
+    "start": (
+        "Start study",
+        "Compute a small study around the live design; its results go to the data folder.",
+    ),
+    "cancel": ("Cancel study", "End the study; finished designs are kept."),
+    "continue": ("Continue the study", "Compute the designs of the open study that are missing."),
+    "new": ("New study", "Set up a small study around the live design."),
+    "clear": ("Clear brushes", "Free all axes."),
+}
+"""Words and hint of each button, by its name."""
 
 
 def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
@@ -54,9 +65,8 @@ def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
     if study.objectives:
         parts.append(f"{_dot(FRONT)}<b>{format_number(front)}</b> on the Pareto front")
     if drawing.request.studies.brushes:
-        clear = press_button(
-            "studies.clear", "", "clear", hint="Clear all brushes", class_name="ex-link"
-        )
+        hint = BUTTONS["clear"][1]
+        clear = press_button("studies.clear", "", "clear", hint=hint, class_name="ex-link")
         parts.append(f"<b>{format_number(inside)}</b> within the brushes {clear}")
     plotted = drawing.plotted
     if plotted is not None and plotted.count > MOST_ROWS:
@@ -94,7 +104,10 @@ def failures(drawing: StudyDrawing) -> str:
     failed = sum(count for *_, count in drawing.reasons)
     if not failed:
         return ""
-    listed = [_reason(*counted) for counted in drawing.reasons[:MOST_REASONS]]
+    listed = [
+        f"{format_number(count)} {status}{f' ({reason})' if reason else ''}"
+        for status, reason, count in drawing.reasons[:MOST_REASONS]
+    ]
     rest = drawing.reasons[MOST_REASONS:]
     if rest:
         others = format_number(sum(count for *_, count in rest))
@@ -103,10 +116,6 @@ def failures(drawing: StudyDrawing) -> str:
         f'<div class="ex-beyond ex-small">{format_number(failed)} not done: '
         f"{escape('; '.join(listed))}</div>"
     )
-
-
-def _reason(status: str, reason: str, count: int) -> str:
-    return f"{format_number(count)} {status}{f' ({reason})' if reason else ''}"
 
 
 def run_words(run: Run) -> str:
@@ -156,39 +165,23 @@ def acts(*, is_new: bool, is_open: bool, is_complete: bool, run: Run | None) -> 
         is_complete: Whether all of its designs are computed.
         run: The study that is being computed; None if none is.
     """
-    buttons: list[str] = []
     if run is not None:
-        buttons.append(
-            _button("cancel", "Cancel study", "End the study; finished designs are kept")
-        )
+        buttons = _button("cancel")
     elif is_new:
-        if is_open:
-            buttons.append(_button("new", "Back", "Return to the open study", value="off"))
-        buttons.append(
-            _button(
-                "start",
-                "Start study",
-                "Compute the study in the background; its results go to the data folder",
-                is_main=True,
-            )
+        back = press_button(
+            "studies.new", "off", "Back", hint="Return to the open study", class_name="ex-button"
         )
+        buttons = back * is_open + _button("start", is_main=True)
     else:
-        if is_open and not is_complete:
-            hint = "Compute the designs that are missing"
-            buttons.append(_button("continue", "Continue the study", hint, is_main=True))
-        hint = "Set up another small study, around the live design"
-        buttons.append(_button("new", "New study", hint, value="on"))
-    return box(f'<div class="ex-ends ex-acts-line">{"".join(buttons)}</div>')
+        can_go_on = is_open and not is_complete
+        buttons = _button("continue", is_main=True) * can_go_on + _button("new", value="on")
+    return box(f'<div class="ex-ends ex-acts-line">{buttons}</div>')
 
 
-def _button(name: str, words: str, hint: str, *, value: str = "", is_main: bool = False) -> str:
-    return press_button(
-        f"studies.{name}",
-        value,
-        words,
-        hint=hint,
-        class_name=f"ex-button{' is-main' if is_main else ''}",
-    )
+def _button(name: str, *, value: str = "", is_main: bool = False) -> str:
+    words, hint = BUTTONS[name]
+    look = "ex-button is-main" if is_main else "ex-button"
+    return press_button(f"studies.{name}", value, words, hint=hint, class_name=look)
 
 
 def duration(seconds: float) -> str:
@@ -319,12 +312,12 @@ def chips(plan: StudyPlan, design: Design) -> str:
         press_button(
             "studies.measure",
             name,
-            escape(label_of(name)) + _sense(plan.sense_of(name)),
+            escape(label_of(name)) + (f" <b>{ARROWS[sense]}</b>" if sense else ""),
             hint=_hint(name),
             class_name="ex-chip",
             is_on=name in plan.measures,
         )
-        for name in measures
+        for name, sense in ((name, plan.sense_of(name)) for name in measures)
     )
     return box(
         _title("Variables that vary; press to choose"),
@@ -338,14 +331,8 @@ def _title(words: str) -> str:
     return f'<div class="ex-caption ex-small ex-after">{words}</div>'
 
 
-def _sense(sense: Sense | None) -> str:
-    return "" if sense is None else f" <b>{ARROWS[sense]}</b>"
-
-
 def _arrow(study: Study, name: str) -> str:
-    senses: dict[str, Sense] = {
-        objective.measure: objective.sense for objective in study.objectives
-    }
+    senses = {objective.measure: objective.sense for objective in study.objectives}
     return f" {ARROWS[senses[name]]}" if name in senses else ""
 
 
