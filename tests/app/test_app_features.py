@@ -26,8 +26,7 @@ from explorer.app.features.forces.loads import SetForce, WeightsFeed
 from explorer.app.features.listed import FEATURES
 from explorer.app.features.machine.panel import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun, GiveUp
-from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
-from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
+from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
 from explorer.app.features.precision.budget import SetTolerances
 from explorer.app.features.studies.actions import BrushAxes, PickDesign
@@ -255,8 +254,9 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
         page.session.do(Set("view.orientation", OrientationView(tilts=True, over="inclusive")))
         page.session.do(Set("view.forces.weighed", "payload and legs"))
         assert page.session.wait_until_idle()
-        kinds: tuple[type[Feed[Any, Any]], ...] = (TiltsFeed, RangeFeed, WeightsFeed)
-        assert all(page.services.get(kind).request is not None for kind in kinds)
+        get = page.services.get
+        feeds: tuple[Feed[Any, Any], ...] = (get(TILTS_FEED), get(RANGE_FEED), get(WeightsFeed))
+        assert all(feed.request is not None for feed in feeds)
     finally:
         running.stop()
 

@@ -25,7 +25,7 @@ from explorer.app.features.mechanism.folds import (
     leaf_corners,
 )
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS, MovePanel
-from explorer.app.features.singularity.distance import fold_dial
+from explorer.app.features.singularity.panel import fold_dial
 from explorer.app.scene.placing import Placed
 from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO

@@ -37,7 +37,7 @@ from explorer.app.features.mechanism.marks import (
     hides_a_gap,
 )
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum
-from explorer.app.features.singularity.distance import DistancePanel, distance_table
+from explorer.app.features.singularity.panel import SingularityPanel, distance_table
 from explorer.app.features.view.ground import TO_SUN, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import linear_colour, plate
@@ -272,7 +272,7 @@ def test_row_that_is_pointed_at_fills_its_tetrahedron_until_the_pointer_leaves(
     services: Services, desk: Desk, incidence: int
 ) -> None:
     tetrahedra, gaps = services.get(Tetrahedra), services.get(Gaps)
-    DistancePanel(services)
+    SingularityPanel(services)
     html = distance_table(Frame(desk.state))
     assert f'data-hover="margins.hover" data-value="{incidence}"' in html
     before, steps = desk.state, desk.session.history

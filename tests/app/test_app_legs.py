@@ -19,11 +19,15 @@ from hypothesis import given, strategies as st
 from services import StubWorker, services_for
 
 from explorer.app.features.feature import Feed, Services
-from explorer.app.features.legs.clearance import ClearanceScene
-from explorer.app.features.legs.feed import RadiusFeed
-from explorer.app.features.legs.panel import LegsPanel, move_table
-from explorer.app.features.legs.radius_plot import chart_columns, radius_words, volume_at
-from explorer.app.features.legs.swept import SweptTetrahedra
+from explorer.app.features.legs.panel import (
+    LegsPanel,
+    chart_columns,
+    move_table,
+    radius_words,
+    volume_at,
+)
+from explorer.app.features.legs.scene import ClearanceScene, SweptTetrahedra
+from explorer.app.features.legs.work import RADIUS_FEED
 from explorer.app.features.mechanism.bodies import Legs
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.workspace import regions
@@ -272,7 +276,7 @@ def test_failure_of_an_older_request_is_no_problem() -> None:
 
 
 def test_curve_is_requested_once_for_all_radii() -> None:
-    feed, worker = follow(opened(OPTIMAL), RadiusFeed)
+    feed, worker = follow(opened(OPTIMAL), RADIUS_FEED)
     state = show_curve(opened(OPTIMAL))
     narrow = with_limits(state, margin=1.0)
     for each, orders in (
@@ -399,14 +403,14 @@ def test_file_that_cannot_be_written_is_refused_with_what_would_work(
 
 
 def curve_of(state: State) -> RadiusCurve:
-    drawing = follow(show_curve(state), RadiusFeed)[0].drawing
+    drawing = follow(show_curve(state), RADIUS_FEED)[0].drawing
     assert drawing is not None
     assert drawing.curve is not None
     return drawing.curve
 
 
 def words_of(state: State) -> str:
-    return radius_words(Frame(state), follow(show_curve(state), RadiusFeed)[0])
+    return radius_words(Frame(state), follow(show_curve(state), RADIUS_FEED)[0])
 
 
 @given(st.lists(st.floats(1.0, 1e3), min_size=2, max_size=30), st.none() | st.floats(0.0, 2.0))
@@ -452,7 +456,7 @@ def test_words_of_the_curve_show_its_radii_shares_and_first_contacts() -> None:
 
 
 def test_chart_appears_once_its_curve_is_computed(services: Services, worker: StubWorker) -> None:
-    panel, feed = LegsPanel(services), services.get(RadiusFeed)
+    panel, feed = LegsPanel(services), services.get(RADIUS_FEED)
     state = show_curve(opened(OPTIMAL))
 
     def chart(state: State) -> dict[str, Any]:

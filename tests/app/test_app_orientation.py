@@ -15,27 +15,33 @@ import pytest
 from services import StubWorker, services_for
 
 from explorer.app.features.feature import Services
-from explorer.app.features.orientation import tasks
-from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
+from explorer.app.features.orientation import work
 from explorer.app.features.orientation.feature import ORIENTATION
-from explorer.app.features.orientation.feeds import PositionFeed, RangeFeed, TiltsFeed
-from explorer.app.features.orientation.panel import best_words, range_words, strip_words, summary
-from explorer.app.features.orientation.polar_map import (
+from explorer.app.features.orientation.maps import (
     CENTRE,
+    LEFT,
     RADIUS,
+    RIGHT,
     colour_of,
     edge_of,
     legend,
     polar_map,
+    tilt_at,
+    torsion_strip,
 )
+from explorer.app.features.orientation.panel import best_words, range_words, strip_words, summary
 from explorer.app.features.orientation.scene import kept_nodes
-from explorer.app.features.orientation.tasks import (
+from explorer.app.features.orientation.work import (
     ORIENTATIONS,
+    POSITION_FEED,
+    RANGE_FEED,
+    TILTS_FEED,
+    GoToTilt,
     RangeRequest,
+    SetTiltTorsion,
     TiltsDrawing,
     orientations_over,
 )
-from explorer.app.features.orientation.torsion_strip import LEFT, RIGHT, tilt_at, torsion_strip
 from explorer.app.features.workspace.feeds import workspace_request
 from explorer.app.features.workspace.slice_map import AXES
 from explorer.app.features.workspace.tasks import draw_workspace
@@ -72,9 +78,9 @@ def facts_of(markup: str, name: str = "tilts") -> dict[str, Any]:
 def tilts() -> Generator[TiltsDrawing]:
     """The tilts over the workspace at fewer nodes than the page has."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tasks, "NODES", 8)
+        patch.setattr(work, "NODES", 8)
         services, worker = services_and_worker()
-        feed = services.get(TiltsFeed)
+        feed = services.get(TILTS_FEED)
         feed.follow(Frame(show(opened(OPTIMAL), tilts=True)))
         worker.work()
         assert feed.drawing is not None
@@ -150,7 +156,7 @@ def test_position_feed_computes_share_and_torsions() -> None:
     worker.work()
     # Nothing else is shown.
     assert [order.task.__name__ for order in worker.orders] == ["orientations_at"]
-    drawing = services.get(PositionFeed).drawing
+    drawing = services.get(POSITION_FEED).drawing
     assert drawing is not None
     assert drawing.share == orientation_share(OPTIMAL, state.pose.position)
     assert drawing.by_torsion.best == tilt_by_torsion(OPTIMAL, state.pose.position).best
@@ -165,7 +171,7 @@ def test_tilts_over_positions_are_the_greatest_of_each(tilts: TiltsDrawing) -> N
 def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(tasks, "ORIENTATIONS", 8)
+    monkeypatch.setattr(work, "ORIENTATIONS", 8)
     rotations = cone_of_directions(OPTIMAL.home_pose.rotation, 15.0, 8)
     volumes: dict[str, float] = {}
     for over, make, bound in (
@@ -173,7 +179,7 @@ def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
         ("inclusive", inclusive_solid, "at least "),
     ):
         services, worker = services_and_worker()
-        feed = services.get(RangeFeed)
+        feed = services.get(RANGE_FEED)
         feed.follow(Frame(show(opened(OPTIMAL), over=over, range=15.0)))
         worker.work()
         assert feed.drawing is not None
@@ -185,9 +191,9 @@ def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
 
 def test_range_turns_the_tilted_orientations_either_way() -> None:
     home = OPTIMAL.home_pose
-    tilted = orientations_over(RangeRequest(OPTIMAL, home, 15.0, 0.0, "total"))
+    tilted = orientations_over(RangeRequest(OPTIMAL, 15.0, 0.0, "total"))
     np.testing.assert_array_equal(tilted, cone_of_directions(home.rotation, 15.0, ORIENTATIONS))
-    turned = orientations_over(RangeRequest(OPTIMAL, home, 15.0, 10.0, "total"))
+    turned = orientations_over(RangeRequest(OPTIMAL, 15.0, 10.0, "total"))
     angles = tilt_torsion_from_rotation(home.rotation.T @ turned)
     assert angles[:, 1].max() == pytest.approx(15.0, abs=1e-9)
     torsions, counts = np.unique(angles[:, 2].round(6), return_counts=True)
@@ -254,7 +260,7 @@ def test_angles_stay_as_they_were_set_at_tilts_that_do_not_determine_them() -> N
 
 def test_panel_marks_values_of_an_older_position_as_outdated_and_shows_a_failure() -> None:
     services, worker = services_and_worker()
-    state, feed = opened(OPTIMAL), services.get(PositionFeed)
+    state, feed = opened(OPTIMAL), services.get(POSITION_FEED)
 
     def text_at(state: State) -> str:
         here = state.tilt_torsion

@@ -18,13 +18,19 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import Bodies, Legs
 from explorer.app.features.mechanism.incidences import Flags
 from explorer.app.features.mechanism.marks import DragHandle
-from explorer.app.features.prototype.feed import PartsFeed
-from explorer.app.features.prototype.files import ASSEMBLIES
+from explorer.app.features.prototype.feature import ASSEMBLIES
 from explorer.app.features.prototype.panel import FIT, PrototypePanel, trouble_of
-from explorer.app.features.prototype.parts import Parts, PartsRequest, parts_drawing
-from explorer.app.features.prototype.parts_list import Bar, stock_of
 from explorer.app.features.prototype.scene import PrototypeScene, shown_places
-from explorer.app.features.prototype.tasks import export_assembly
+from explorer.app.features.prototype.work import (
+    PARTS_FEED,
+    Parts,
+    PartsFeed,
+    PartsRequest,
+    drawn_parts,
+    export_assembly,
+    parts_drawing,
+    stock_of,
+)
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Open, SetPose, SetPosition, SetVariable, draw_as
 from explorer.app.state.frame import Frame
@@ -52,7 +58,7 @@ def worker() -> Generator[StubWorker]:
 
 @pytest.fixture
 def feed(services: Services) -> PartsFeed:
-    return services.get(PartsFeed)
+    return services.get(PARTS_FEED)
 
 
 @pytest.fixture(scope="module")
@@ -83,9 +89,9 @@ def states(count: int, **changes: Any) -> list[State]:
 
 def placed_with_parts(services: Services, state: State) -> Placed:
     """Return the state as the page places it once its parts are made."""
-    feed = services.get(PartsFeed)
+    feed = services.get(PARTS_FEED)
     feed.follow(Frame(state))
-    return Placed(Frame(state), floor=feed.floor)
+    return Placed(Frame(state), floor=parts.floor if (parts := drawn_parts(feed)) else None)
 
 
 def in_scene(nodes: dict[str, dict[str, Any]], path: str) -> np.ndarray[Any, Any]:
@@ -233,11 +239,11 @@ def test_parts_are_made_again_when_the_design_changes_and_not_else(
         count = len(orders)
         feed.follow(Frame(state))
         assert len(orders) == count + 1
-        drawn, expected = feed.parts, make_prototype(state.design)
+        drawn, expected = drawn_parts(feed), make_prototype(state.design)
         assert drawn is not None
         assert np.array_equal(drawn.prototype.parts[0].vertices, expected.parts[0].vertices)
     feed.follow(Frame(viewed(with_prototype(), drawn_as="6-4 twin")))
-    assert feed.parts is None
+    assert drawn_parts(feed) is None
 
 
 def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed) -> None:
@@ -247,7 +253,7 @@ def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed
     frame = Frame(state)
     assert "Making the parts" in (trouble_of(frame, feed) or "")
     feed.follow(frame)
-    assert feed.parts is None
+    assert drawn_parts(feed) is None
     trouble = trouble_of(frame, feed) or ""
     assert str(refusal.value)[1:] in trouble
     assert "carriages 2 and 3" in trouble
@@ -255,10 +261,10 @@ def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed
     home = Pose.of_yaw_pitch_roll((10, 5, 9), (90, 0, 0))
     turned = Frame(with_prototype(opened(msgspec.structs.replace(OPTIMAL, home=home))))
     feed.follow(turned)
-    assert feed.parts is None
+    assert drawn_parts(feed) is None
     assert FIT not in (trouble_of(turned, feed) or "")
     feed.follow(Frame(with_prototype()))
-    assert feed.parts is not None
+    assert drawn_parts(feed) is not None
     assert trouble_of(Frame(with_prototype()), feed) is None
 
 
@@ -270,14 +276,14 @@ def test_press_sets_the_unit_with_which_the_parts_fit(
     tight = msgspec.structs.replace(OPTIMAL, unit_mm=3.0)
     desk.session.do(Open(tight))
     feed.follow(Frame(desk.state))
-    assert feed.parts is None
+    assert drawn_parts(feed) is None
     words = " ".join(str(value) for _, _, value in panel.updates(Frame(desk.state)))
     desk.press(services.buttons, FIT)
     unit = desk.state.design.unit_mm
     assert unit > tight.unit_mm
     assert f"Set the unit to {unit:g} mm" in words
     feed.follow(Frame(desk.state))
-    assert feed.parts is not None
+    assert drawn_parts(feed) is not None
     # Without a refusal a late press does nothing.
     before = desk.state
     desk.press(services.buttons, FIT)
@@ -287,8 +293,9 @@ def test_press_sets_the_unit_with_which_the_parts_fit(
 def test_pose_beyond_the_joint_limits_of_the_parts_is_reported(feed: PartsFeed) -> None:
     state = SetPosition(2, 17.0).apply(with_prototype())
     feed.follow(Frame(state))
-    assert feed.parts is not None
-    hindrances = feed.parts.prototype.broken_joint_limits(state.pose.position, state.pose.rotation)
+    parts = drawn_parts(feed)
+    assert parts is not None
+    hindrances = parts.prototype.broken_joint_limits(state.pose.position, state.pose.rotation)
     assert hindrances
     trouble = trouble_of(Frame(state), feed) or ""
     assert "do not take this pose" in trouble
@@ -325,13 +332,14 @@ def test_stock_holds_the_part(parts: Parts) -> None:
     for part in parts.prototype.parts:
         stock = stock_of(part, unit)
         size = np.ptp(part.vertices, axis=0) * unit
-        if not isinstance(stock, Bar):
-            assert [stock.x, stock.y, stock.z] == pytest.approx(size.tolist())
+        if len(stock) == 3:
+            assert [*stock] == pytest.approx(size.tolist())
             continue
+        diameter, length = stock
         axis = 0 if part.kind == "carriage" else 2
-        assert stock.length == pytest.approx(size[axis])
+        assert length == pytest.approx(size[axis])
         across = np.delete(size, axis)
-        assert across.max() * (1.0 - 1e-9) <= stock.diameter <= np.hypot(*across)
+        assert across.max() * (1.0 - 1e-9) <= diameter <= np.hypot(*across)
 
 
 def test_files_of_the_assembly_are_those_of_the_library(monkeypatch: pytest.MonkeyPatch) -> None:

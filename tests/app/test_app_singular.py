@@ -26,21 +26,25 @@ from explorer.app.features.mechanism.modes import (
     modes_table,
 )
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum, stratum_name
-from explorer.app.features.singularity.distance import DistancePanel, distance_table
-from explorer.app.features.singularity.feed import StrataFeed
-from explorer.app.features.singularity.freedom import (
+from explorer.app.features.singularity.panel import (
+    SingularityPanel,
+    distance_table,
+    performance_table,
+    summary,
+)
+from explorer.app.features.singularity.scene import (
     AMPLITUDE,
     FRAME_SECONDS,
     PERIOD,
     PERIODS,
+    BallScene,
+    EllipsoidScene,
     FreeMotion,
+    NearestGhost,
     show_button,
 )
-from explorer.app.features.singularity.panel import SingularityPanel, summary
-from explorer.app.features.singularity.performance import performance_table
-from explorer.app.features.singularity.scene import BallScene, EllipsoidScene, NearestGhost
 from explorer.app.features.singularity.strata import GOALS, StrataPanel, distances_of
-from explorer.app.features.singularity.tasks import StrataRequest, strata_distances
+from explorer.app.features.singularity.work import STRATA_FEED, StrataRequest, strata_distances
 from explorer.app.scene.placing import Placed
 from explorer.app.session import clock
 from explorer.app.session.session import UNDO
@@ -122,7 +126,7 @@ def test_diagram_has_a_node_for_each_stratum_and_is_made_only_while_it_is_open(
         return [str(value) for _, name, value in updates if name == "content"]
 
     desk.session.do(Set("view.singular.strata", value=False))
-    services.get(StrataFeed).follow(Frame(desk.state))
+    services.get(STRATA_FEED).follow(Frame(desk.state))
     assert worker.orders == []
     assert len(contents()) == 1
     desk.session.do(Set("view.singular.strata", value=True))
@@ -136,7 +140,7 @@ def test_diagram_has_a_node_for_each_stratum_and_is_made_only_while_it_is_open(
 
 def test_distances_come_from_the_worker_but_those_of_one_incidence_at_once() -> None:
     state = viewed(random_states(1)[0], strata=True)
-    feed = StrataFeed(services_for())
+    feed = STRATA_FEED(services_for())
     known = distances_of(Frame(state), feed)
     assert set(known) == {GENERIC, *OF_INCIDENCES}
     every = strata_distances(StrataRequest(state.design, state.pose)).distances
@@ -184,7 +188,7 @@ def test_distances_and_their_ghosts_are_those_of_the_nearest_poses(
 def test_buttons_lead_to_the_nearest_pose_and_refuse_where_it_is_reached(
     services: Services, desk: Desk
 ) -> None:
-    DistancePanel(services)
+    SingularityPanel(services)
     expected = nearest_singularities(OPTIMAL, desk.state.pose)[1].pose
     desk.press(services.buttons, "singular.go", "2")
     assert desk.state.pose == expected

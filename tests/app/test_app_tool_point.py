@@ -28,15 +28,14 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.mechanism.pose_panel import MovePanel
-from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
-from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
 from explorer.app.features.orientation.panel import OrientationPanel
 from explorer.app.features.orientation.scene import OrientationScene
+from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.panel import TYPED, PathsPanel, end_numbers
 from explorer.app.features.paths.scene import PathScene
 from explorer.app.features.sharing.scene_html import caption_of
-from explorer.app.features.singularity.performance import performance_table
+from explorer.app.features.singularity.panel import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene
 from explorer.app.features.workspace.feature import send_workspace
 from explorer.app.features.workspace.feeds import (
@@ -505,7 +504,7 @@ def test_file_of_the_workspace_is_named_after_the_tool(services: Services, desk:
 
 def test_nodes_of_tilts_are_where_the_tool_is_at_tilt_zero(services: Services) -> None:
     state = Set("view.orientation.tilts", True).apply(state_at())
-    drawing = draw(services, TiltsFeed, state)
+    drawing = draw(services, TILTS_FEED, state)
     scene, scale = OrientationScene(services), scene_scale(state)
 
     def nodes(state: State) -> FloatArray:
@@ -540,7 +539,7 @@ def test_tab_of_tilts_has_the_largest_tilt_about_the_tool(services: Services) ->
         return re.findall(r'ex-large">([\d.]+)°', markup)[0]
 
     over = Set("view.orientation.over", "total").apply(state)
-    assert draw(services, RangeFeed, over).request.tool == (0.5, 0.0, 2.0)
+    assert draw(services, RANGE_FEED, over).request.tool == (0.5, 0.0, 2.0)
     text = largest_tilt(state)
     assert largest_tilt(Set("view.at", "b4").apply(state)) != text
     inside, beyond = (

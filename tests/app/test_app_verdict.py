@@ -16,10 +16,9 @@ from strategies import Case, all_cases
 
 from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.singularity.actions import GoToSingularity
-from explorer.app.features.singularity.distance import distance_table
-from explorer.app.features.singularity.feed import StrataFeed
-from explorer.app.features.singularity.panel import summary
+from explorer.app.features.singularity.panel import distance_table, summary
 from explorer.app.features.singularity.strata import distances_of, neighbours
+from explorer.app.features.singularity.work import STRATA_FEED
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
@@ -221,7 +220,7 @@ def test_distances_of_deeper_strata_are_shown_at_a_singular_pose_without_the_dia
     singular = GoToSingularity(2).apply(opened(OPTIMAL))
     frame = Frame(Set("view.singular.strata", value=False).apply(singular))
     worker = StubWorker(at_once=True)
-    feed = StrataFeed(services_for(worker=worker))
+    feed = STRATA_FEED(services_for(worker=worker))
     feed.follow(frame)
     distances = distances_of(frame, feed)
     assert set(COVERED[OF_INCIDENCES[1]]) <= set(distances)

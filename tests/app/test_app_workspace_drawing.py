@@ -16,7 +16,7 @@ import pytest
 from desk import viewed
 from services import StubWorker, services_for
 
-from explorer.app.features.legs.tasks import RadiusRequest, draw_radius_curve
+from explorer.app.features.legs.work import RadiusRequest, draw_radius_curve
 from explorer.app.features.workspace.feeds import surface_of, workspace_feed
 from explorer.app.features.workspace.regions import MOST_LIVE_NODES
 from explorer.app.features.workspace.tasks import (

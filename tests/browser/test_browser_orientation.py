@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Locator, expect
 from tab import Tab
 
-from explorer.app.features.orientation.polar_map import RADIUS, WIDTH, edge_of
+from explorer.app.features.orientation.maps import RADIUS, WIDTH, edge_of
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.workspace.orientations.tilts import tilt_map
 

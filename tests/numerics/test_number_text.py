@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from explorer.app.features.singularity.actions import GoToSingularity
-from explorer.app.features.singularity.distance import distance_table
-from explorer.app.features.singularity.panel import measures_table, summary
+from explorer.app.features.singularity.panel import distance_table, measures_table, summary
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.widgets.markup import signed

@@ -9,6 +9,7 @@ from typing import Generic, Protocol, TypeVar
 
 from explorer.app.session.clock import Timer, now, start_timer
 from explorer.app.session.jobs import LONG_SECONDS, Worker
+from explorer.app.session.session import Session
 from explorer.app.session.worker import CANCELLED, Channel
 from explorer.app.state.frame import Frame
 from explorer.numerics.stages import Watch, unwatched
@@ -225,3 +226,25 @@ class Feed(Generic[Request, Drawing]):
         self._order = None
         if self._stage_timer is not None:
             self._stage_timer.cancel()
+
+
+class _Page(Protocol):
+    @property
+    def worker(self) -> Worker: ...
+
+    @property
+    def session(self) -> Session: ...
+
+
+def feed_of(
+    task: Callable[[Request], Drawing] | Callable[[Request, Channel], Drawing],
+    request_of: Callable[[Frame], Request | None],
+    *,
+    has_stages: bool = False,
+) -> Callable[[_Page], Feed[Request, Drawing]]:
+    """Declare a feed, which a page makes once; see `Feed` for the arguments."""
+
+    def make(page: _Page) -> Feed[Request, Drawing]:
+        return Feed(page.worker, task, request_of, page.session.redraw, has_stages=has_stages)
+
+    return make

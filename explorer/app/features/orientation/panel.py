@@ -12,11 +12,25 @@ import viser
 from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
-from explorer.app.features.orientation.actions import ANGLES, GoToTilt, SetTiltTorsion
-from explorer.app.features.orientation.feeds import PositionFeed, RangeFeed, TiltsFeed
-from explorer.app.features.orientation.polar_map import legend, polar_map
-from explorer.app.features.orientation.scale import scale_of_tilts
-from explorer.app.features.orientation.torsion_strip import SAME_TILT, tilt_at, torsion_strip
+from explorer.app.features.orientation.maps import (
+    SAME_TILT,
+    legend,
+    polar_map,
+    scale_of_tilts,
+    tilt_at,
+    torsion_strip,
+)
+from explorer.app.features.orientation.work import (
+    ANGLES,
+    POSITION_FEED,
+    RANGE_FEED,
+    TILTS_FEED,
+    GoToTilt,
+    PositionFeed,
+    RangeFeed,
+    SetTiltTorsion,
+    TiltsFeed,
+)
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.tracks import Span
@@ -66,8 +80,8 @@ class OrientationPanel:
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
-        self._here = services.get(PositionFeed)
-        self._tilts, self._ranges = services.get(TiltsFeed), services.get(RangeFeed)
+        self._here = services.get(POSITION_FEED)
+        self._tilts, self._ranges = services.get(TILTS_FEED), services.get(RANGE_FEED)
         self._controls = controls = Controls(gui, services.session)
         self._top = gui.add_html("")
         self._map = gui.add_html("")

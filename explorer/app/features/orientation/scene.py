@@ -7,9 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.app.features.feature import Services
-from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
-from explorer.app.features.orientation.scale import colours_of, most_of
-from explorer.app.features.orientation.tasks import RangeDrawing, TiltsDrawing
+from explorer.app.features.orientation.maps import colours_of, most_of
+from explorer.app.features.orientation.work import (
+    RANGE_FEED,
+    TILTS_FEED,
+    TiltsDrawing,
+)
 from explorer.app.features.workspace.slice_map import AXES, keeps_above, level_within
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
@@ -31,7 +34,7 @@ class OrientationScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
-        self._tilts, self._ranges = services.get(TiltsFeed), services.get(RangeFeed)
+        self._tilts, self._ranges = services.get(TILTS_FEED), services.get(RANGE_FEED)
         self._points = scene.add_point_cloud(
             "/orientation/tilts",
             np.zeros((1, 3), dtype=np.float32),
@@ -41,41 +44,25 @@ class OrientationScene(ScenePart):
             visible=False,
         )
         self._solid = add_translucent(scene, "/orientation/range", NO_MESH, OPACITY)
-        # What was scaled last, so that updates compare it by identity.
-        self._drawn: tuple[TiltsDrawing | None, tuple[object, ...]] = None, ()
-        self._cloud = np.zeros((0, 3), dtype=np.float32), np.zeros((0, 3), dtype=np.uint8)
-        self._ranged: tuple[RangeDrawing | None, float] = None, 0.0
-        self._mesh = np.zeros((0, 3), dtype=np.float32), np.zeros((0, 3), dtype=np.uint32)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw tilts and range of a frame."""
         view, scale = placed.frame.state.view.orientation, placed.scale
-        drawing = self._tilts.drawing if view.tilts else None
-        cut = placed.frame.state.view.workspace
-        where = scale, cut.cut, cut.level, cut.flipped
-        if self._drawn[0] is not drawing or self._drawn[1] != where:
-            self._drawn = drawing, where
-            if drawing is not None:
-                kept = kept_nodes(drawing, cut)
-                positions = np.asarray(scale * drawing.positions[kept], dtype=np.float32)
-                self._cloud = positions, colours_of(drawing.tilts[kept], most_of(drawing))
-        is_shown = drawing is not None and len(self._cloud[0]) > 0
-        yield self._points, "visible", is_shown
-        if drawing is not None and is_shown:
-            yield self._points, "points", self._cloud[0]
-            yield self._points, "colors", self._cloud[1]
-            yield self._points, "point_size", POINT_SHARE * scale * drawing.step
-        solid, ranged = self._solid, self._ranges.drawing
-        is_drawn = ranged is not None and not ranged.solid.is_empty and view.over != "none"
-        if ranged is not None and self._ranged != (ranged, scale):
-            self._ranged = ranged, scale
-            vertices = np.asarray(scale * ranged.solid.vertices, dtype=np.float32)
-            self._mesh = vertices, np.asarray(ranged.solid.faces, dtype=np.uint32)
-        yield solid, "visible", is_drawn
-        if ranged is not None and is_drawn:
-            yield solid, "color", COLOURS[ranged.request.over]
-            yield solid, "vertices", self._mesh[0]
-            yield solid, "faces", self._mesh[1]
+        tilts = self._tilts.drawing if view.tilts else None
+        kept = None if tilts is None else kept_nodes(tilts, placed.frame.state.view.workspace)
+        has_points = kept is not None and bool(kept.any())
+        yield self._points, "visible", has_points
+        if tilts is not None and kept is not None and has_points:
+            yield self._points, "points", (scale * tilts.positions[kept]).astype(np.float32)
+            yield self._points, "colors", colours_of(tilts.tilts[kept], most_of(tilts))
+            yield self._points, "point_size", POINT_SHARE * scale * tilts.step
+        over = self._ranges.drawing if view.over != "none" else None
+        has_solid = over is not None and not over.solid.is_empty
+        yield self._solid, "visible", has_solid
+        if over is not None and has_solid:
+            yield self._solid, "color", COLOURS[over.request.over]
+            yield self._solid, "vertices", (scale * over.solid.vertices).astype(np.float32)
+            yield self._solid, "faces", over.solid.faces.astype(np.uint32)
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of the boxes about the nodes and about the solid of the range."""

@@ -8,8 +8,7 @@ from html import escape
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.prototype.feed import PartsFeed
-from explorer.app.features.prototype.parts_list import PartsList
+from explorer.app.features.prototype.work import PARTS_FEED, PartsFeed, PartsList, drawn_parts
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.tracks import Span
@@ -29,7 +28,7 @@ class PrototypePanel:
     """Controls that draw, explode and list the parts."""
 
     def __init__(self, services: Services) -> None:
-        gui, self._feed = services.gui, services.get(PartsFeed)
+        gui, self._feed = services.gui, services.get(PARTS_FEED)
         self._controls = controls = Controls(gui, services.session)
         controls.checkbox(
             "Show the parts",
@@ -76,7 +75,7 @@ class PrototypePanel:
         if trouble is not None:
             yield self._trouble, "content", trouble
         # A failure in the worker takes the parts away at any time.
-        parts = feed.parts
+        parts = drawn_parts(feed)
         yield self._folder, "visible", parts is not None
         if parts is not None:
             density = frame.state.view.prototype.density
@@ -122,7 +121,7 @@ def parts_table(listed: PartsList, density: float) -> str:
         row(
             escape(line.name),
             f"{line.count}",
-            f'<span class="ex-whole">{line.stock}</span>',
+            f'<span class="ex-whole">{stock_words(line.stock)}</span>',
             _grams(line.mass(density)),
         )
         for line in listed.lines
@@ -148,6 +147,11 @@ def parts_table(listed: PartsList, density: float) -> str:
         if all(map(_is_enough, listed.actuators))
         else f'<div class="ex-dim ex-after">{remark}</div>',
     )
+
+
+def stock_words(stock: tuple[float, ...]) -> str:
+    """Return the diameter and length of a bar, or the sides of a block, in words."""
+    return ("Ø " if len(stock) == 2 else "") + " × ".join(map(_mm, stock))
 
 
 def _is_enough(actuator: Actuator) -> bool:

@@ -13,8 +13,7 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import colliding_legs
-from explorer.app.features.prototype.feed import PartsFeed
-from explorer.app.features.prototype.parts import Parts
+from explorer.app.features.prototype.work import PARTS_FEED, Parts, drawn_parts
 from explorer.app.scene.creases import Drawn
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
@@ -57,7 +56,7 @@ class PrototypeScene(ScenePart):
     """The parts, assembled or exploded."""
 
     def __init__(self, services: Services) -> None:
-        scene, self._feed = services.scene, services.get(PartsFeed)
+        scene, self._feed = services.scene, services.get(PARTS_FEED)
         self._nodes: dict[str, viser.MeshHandle] = {}
         for name in NAMES:
             # The platform is the parent of the balls, so that they move with it.
@@ -71,7 +70,7 @@ class PrototypeScene(ScenePart):
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the parts of a frame."""
-        view, parts = placed.frame.state.view, self._feed.parts
+        view, parts = placed.frame.state.view, drawn_parts(self._feed)
         for name, node in self._nodes.items():
             switch = view.bodies if name in ON_BODIES or name in BALLS else view.legs
             yield node, "visible", switch and parts is not None
@@ -87,7 +86,7 @@ class PrototypeScene(ScenePart):
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of boxes about the parts."""
-        parts = self._feed.parts
+        parts = drawn_parts(self._feed)
         if parts is None:
             return NO_POINTS
         places, seen = shown_places(placed, parts), list[FloatArray]()

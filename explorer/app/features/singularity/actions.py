@@ -68,11 +68,9 @@ class GoToSingularity(Action):
             InputError: the pose has that incidence already.
         """
         poses = nearest_singularities(state.design, state.pose)
-        nearest = (
-            min(poses, key=lambda pose: pose.distance)
-            if self.incidence is None
-            else poses[self.incidence - 1]
-        )
+        nearest = min(poses, key=lambda pose: pose.distance)
+        if self.incidence is not None:
+            nearest = poses[self.incidence - 1]
         if nearest.distance == 0.0:
             index = nearest.incidence
             raise InputError(f"the pose has δ{index} = 0 already: {INCIDENCES[index - 1]}")

@@ -1,8 +1,10 @@
-"""The nearest singular pose, the ellipsoids, and the largest singularity-free ball."""
+"""The nearest singular pose, the ellipsoids, the singularity-free ball, and the free motions."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import viser
@@ -14,13 +16,19 @@ from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent, sphere
+from explorer.app.session.clock import now, start_timer
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import FAR, GHOST, SINGULAR, Rgb, proximity_colour
 from explorer.measures.blocks.block import Number
 from explorer.measures.blocks.singularity import finite_gain
+from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.singularity.freedoms import FreeTurn
 from explorer.singularity.nearest import NearestSingularity
 
 GHOST_OPACITY, BALL_OPACITY = 0.4, 0.14
@@ -31,15 +39,18 @@ THINNEST, LONGEST = 0.02, 8.0
 TOUCH_RADIUS = 0.2
 SPEED: Rgb = (24, 128, 118)
 FORCE: Rgb = (92, 60, 156)
+SHOW = "singular.show"
+SHOW_HINT = "Swing a ghost of the platform about this line, by up to 5 % of the reach."
+# Seconds of a swing to and fro, number of swings, and seconds between two frames.
+PERIOD, PERIODS, FRAME_SECONDS = 1.8, 2, 0.04
+# Way of the fastest of b1 to b4 from its place, over the reach, and the largest angle.
+AMPLITUDE, LARGEST_ANGLE = 0.05, math.radians(30.0)
+# Length of the axis beyond the points of the mechanism, over the reach.
+OVERHANG = 0.15
 
 
 class PlatformGhost:
-    """The platform in another pose than the present one, and its legs.
-
-    Args:
-        scene: Where they are added.
-        name: Their node.
-    """
+    """The platform in another pose than the present one, and its legs, below a node."""
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
         self._plate = add_translucent(
@@ -156,10 +167,10 @@ class BallScene(ScenePart):
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the ball of this frame."""
         frame = placed.frame
-        shown = frame.state.view.singular.ball and not frame.snapshot.is_singular
+        is_visible = frame.state.view.singular.ball and not frame.snapshot.is_singular
         for handle in (self._ball, self._touch, self._line, self._label):
-            yield handle, "visible", shown
-        if not shown:
+            yield handle, "visible", is_visible
+        if not is_visible:
             return
         ball = frame.free_ball
         centre, touch = placed.point, placed.scale * ball.touches + placed.offset
@@ -172,3 +183,107 @@ class BallScene(ScenePart):
         distance = format_number(ball.radius, size=frame.state.design.reach)
         yield self._label, "text", f"δ{ball.incidence} = 0: {distance} away"
         yield self._label, "position", tuple(touch.tolist())
+
+
+@dataclass(frozen=True)
+class _Swing:
+    """A turn of the platform in a frame that is free, since a time of the clock."""
+
+    frame: Frame
+    turn: FreeTurn
+    start: float
+
+    @property
+    def is_over(self) -> bool:
+        return now() - self.start >= PERIODS * PERIOD
+
+    def is_of(self, state: State) -> bool:
+        """Whether a state has its design and pose."""
+        own = self.frame.state
+        return state.pose == own.pose and state.design == own.design
+
+    @property
+    def angle(self) -> float:
+        """The angle of the ghost at present, in radians."""
+        points = self.frame.snapshot.points
+        arms = np.array([points.b1, points.b2, points.b3, points.b4]) - self.turn.point
+        longest = float(np.linalg.norm(np.cross(arms, self.turn.direction), axis=1).max())
+        way = AMPLITUDE * self.frame.state.design.reach
+        largest = way / longest if way < LARGEST_ANGLE * longest else LARGEST_ANGLE
+        return largest * math.sin(2.0 * math.pi * (now() - self.start) / PERIOD)
+
+
+class FreeMotion(ScenePart):
+    """A ghost of the platform that swings about the line of a motion, in a singular pose.
+
+    Locked actuators allow the motion. The swing is no part of the state, and ends once the platform
+    or the design is another one.
+    """
+
+    def __init__(self, services: Services) -> None:
+        scene, self._session = services.scene, services.session
+        self._ghost = PlatformGhost(scene, "/freedom")
+        self._axis = add_lines(scene, "/freedom/axis", 1, SINGULAR, 3.0)
+        self._label = add_label(scene, "/freedom/label", "", visible=False)
+        self._frame: Frame | None = None
+        self._swing: _Swing | None = None
+        services.buttons.on(SHOW, self._begin, values={"1", "2", "3"})
+        for incidence, line in enumerate(FOLD_LINES, 1):
+            services.buttons.offer(
+                f"Singularity › Show the turn about the {line}",
+                f"{SHOW_HINT} It is one that locked actuators allow where δ{incidence} = 0.",
+                SHOW,
+                str(incidence),
+                lambda incidence=incidence: self._swing_of(incidence) is not None,
+            )
+        services.at_end(lambda: setattr(self, "_swing", None))
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the motion at this time."""
+        self._frame, swing = placed.frame, self._swing
+        if swing is not None and (swing.is_over or not swing.is_of(placed.frame.state)):
+            swing = self._swing = None
+        yield from self._ghost.show(swing is not None)
+        yield self._axis, "visible", swing is not None
+        yield self._label, "visible", swing is not None
+        if swing is None:
+            return
+        yield from self._ghost.draw(placed, swing.turn.move(swing.frame.state.pose, swing.angle))
+        # The line goes beyond all points beside it.
+        foot, direction = placed.scale * swing.turn.point, swing.turn.direction
+        along = (np.array(list(placed.points.values())) - foot) @ direction
+        overhang = OVERHANG * placed.reach
+        ends = [float(along.min()) - overhang, float(along.max()) + overhang]
+        axis = foot + np.outer(ends, direction)
+        yield self._axis, "points", axis[None].astype(np.float32)
+        yield self._label, "text", f"turns about {swing.turn.line_name}"
+        yield self._label, "position", tuple(axis[1].tolist())
+
+    def _swing_of(self, incidence: int) -> _Swing | None:
+        """Return a swing that begins now in the last frame; None if the turn is not free there."""
+        frame = self._frame
+        if frame is None or not frame.snapshot.is_singular:
+            return None
+        turns = frame.snapshot.freedoms.turns
+        turn = next((turn for turn in turns if turn.incidence == incidence), None)
+        return None if turn is None else _Swing(frame, turn, now())
+
+    def _begin(self, value: str, _: viser.ClientHandle) -> None:
+        swing = self._swing_of(int(value))
+        if swing is not None:
+            self._swing = swing
+            self._draw_on(swing)
+
+    def _draw_on(self, swing: _Swing) -> None:
+        """Draw a swing again and again until it is over, or another one has begun."""
+        self._session.redraw()
+        if swing is self._swing and not swing.is_over:
+            start_timer(FRAME_SECONDS, self._draw_on, swing)
+
+
+def show_button(incidence: int) -> str:
+    """Return the button that shows the turn of an incidence, as HTML."""
+    label = f"Show the motion: turn about the {FOLD_LINES[incidence - 1]}"
+    return press_button(
+        SHOW, incidence, "Show the motion", hint=SHOW_HINT, label=label, class_name="ex-link"
+    )

@@ -10,7 +10,7 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.singularity.actions import GoToStratum, stratum_name
-from explorer.app.features.singularity.feed import StrataFeed
+from explorer.app.features.singularity.work import STRATA_FEED, StrataFeed
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
@@ -38,7 +38,7 @@ class StrataPanel:
 
     def __init__(self, services: Services) -> None:
         gui, self._session, buttons = services.gui, services.session, services.buttons
-        self._feed = services.get(StrataFeed)
+        self._feed = services.get(STRATA_FEED)
         self._words = gui.add_html("")
         self._controls = Controls(gui, services.session)
         self._controls.checkbox(
@@ -56,10 +56,10 @@ class StrataPanel:
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
         yield from self._controls.updates(frame)
-        shown = frame.state.view.singular.strata
-        yield self._diagram, "visible", shown
+        is_visible = frame.state.view.singular.strata
+        yield self._diagram, "visible", is_visible
         distances = distances_of(frame, self._feed)
-        if shown:
+        if is_visible:
             yield self._diagram, "content", diagram(frame, distances)
         yield self._words, "content", neighbours(frame, distances)
 
@@ -102,12 +102,12 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
     warn = DISTANCE_SHARE * frame.state.warn_below
     levels = {w: distance / warn for w, distance in distances.items()}
 
-    def distance_text(stratum: Stratum) -> str:
-        return _distance(distances.get(stratum), frame)
-
     # One incidence has one colour all over the page.
     levels.update(zip(OF_INCIDENCES, frame.verdict.levels, strict=True))
-    nodes = "".join(_node(w, distance_text(w), levels.get(w), is_here=w == here) for w in STRATA)
+    nodes = "".join(
+        _node(w, _distance(distances.get(w), frame), levels.get(w), is_here=w == here)
+        for w in STRATA
+    )
     ranks = "".join(
         f'<span style="--top:{_top(d) + 8}px" title="Dimension {d}">{d}</span>' for d in range(7)
     )
@@ -127,7 +127,11 @@ def neighbours(frame: Frame, distances: Mapping[Stratum, float]) -> str:
     """
     here = frame.snapshot.stratum
     covered = COVERED[here] if here != GENERIC else ()
-    rows = "".join(_neighbour(w, _distance(distances.get(w), frame)) for w in covered)
+    rows = "".join(
+        f'<div class="ex-line"><span>{escape(_sentence(w))}</span>'
+        f"<span>{_distance(distances.get(w), frame)}</span></div>"
+        for w in covered
+    )
     rest = (
         '<div class="ex-line ex-dim ex-after"><span>With one more incidence</span>'
         f"<span>mm</span></div>{rows}"
@@ -151,12 +155,6 @@ def _distance(distance: float | None, frame: Frame) -> str:
         return "…"
     design = frame.state.design
     return format_fitted(distance * design.unit_mm, design.reach * design.unit_mm, 4)
-
-
-def _neighbour(stratum: Stratum, value: str) -> str:
-    return (
-        f'<div class="ex-line"><span>{escape(_sentence(stratum))}</span><span>{value}</span></div>'
-    )
 
 
 def _node(stratum: Stratum, below: str, level: float | None, *, is_here: bool) -> str:

@@ -1,22 +1,21 @@
-"""The worker's task for the legs: the accessible volume over their radius."""
+"""The accessible volume over the radius of the legs, computed by the worker while it is shown."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
-from explorer.app.features.workspace.regions import (
-    Rows,
-    Trouble,
-    trouble_of,
-)
-from explorer.app.session.feed import watch_of
+from explorer.app.features.workspace.feeds import workspace_rows, workspace_start
+from explorer.app.features.workspace.regions import Rows, Trouble, trouble_of
+from explorer.app.session.feed import Feed, feed_of, watch_of
 from explorer.app.session.worker import Channel
+from explorer.app.state.frame import Frame
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
-from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
+from explorer.workspace.accessible.radii import RadiusCurve, radius_curve, with_radius
 
 
 @dataclass(frozen=True)
@@ -36,13 +35,7 @@ class RadiusRequest:
 
 @dataclass(frozen=True)
 class RadiusDrawing:
-    """The accessible volume over the radius of the legs.
-
-    Attributes:
-        request: The request.
-        curve: The curve; None if it could not be computed.
-        trouble: Reason why there is no curve; None if there is one.
-    """
+    """The accessible volume over the radius of the legs, or why there is no curve."""
 
     request: RadiusRequest
     curve: RadiusCurve | None
@@ -57,3 +50,14 @@ def draw_radius_curve(request: RadiusRequest, channel: Channel | None = None) ->
     except ExplorerError as error:
         return RadiusDrawing(request, None, trouble_of(error))
     return RadiusDrawing(request, curve, None)
+
+
+def _request_for(frame: Frame) -> RadiusRequest | None:
+    if not frame.state.view.radius_curve:
+        return None
+    thin = with_radius(frame.state.design, 0.0)
+    return RadiusRequest(thin, workspace_rows(frame), workspace_start(frame))
+
+
+RadiusFeed: TypeAlias = Feed[RadiusRequest, RadiusDrawing]
+RADIUS_FEED = feed_of(draw_radius_curve, _request_for, has_stages=True)

@@ -1,22 +1,31 @@
-"""The worker's tasks: orientations of a position, tilts over the workspace, ranges of tilts."""
+"""Actions on the orientation, and the worker's tasks on the tilts of positions and of ranges."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.app.features.workspace.tasks import LIVE_TOLERANCE
-from explorer.app.session.feed import watch_of
+from explorer.app.session.feed import Feed, feed_of, watch_of
 from explorer.app.session.worker import Channel
+from explorer.app.state.action import Action
+from explorer.app.state.actions import moved
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose, Triple
-from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
+from explorer.mechanism.pose import Triple
+from explorer.mechanism.tilt_torsion import (
+    TiltTorsion,
+    pose_of_tilt_torsion,
+    rotation_from_tilt_torsion,
+)
 from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.orientations.sets import cone_of_directions
 from explorer.workspace.orientations.share import OrientationShare, orientation_share
@@ -25,11 +34,59 @@ from explorer.workspace.orientations.torsions import TiltByTorsion, tilt_by_tors
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import inclusive_solid, total_solid
 
+ANGLES = ("azimuth", "tilt", "torsion")
+FULL_TURN = 360.0
+
+
+@dataclass(frozen=True)
+class SetTiltTorsion(Action):
+    """Set azimuth, tilt or torsion, 0 to 2, in degrees."""
+
+    axis: int
+    value: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        angles = list(state.tilt_torsion)
+        angles[self.axis] = self.value
+        return _tilted(state, TiltTorsion(*angles))
+
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"{ANGLES[self.axis]} = {format_number(self.value, 6, size=FULL_TURN)}°"
+
+
+@dataclass(frozen=True)
+class GoToTilt(Action):
+    """Tilt the platform in an azimuth at its present torsion; angles in degrees."""
+
+    azimuth: float
+    tilt: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return _tilted(state, TiltTorsion(self.azimuth, self.tilt, state.tilt_torsion.torsion))
+
+    def words(self) -> str:
+        """Return what the action does."""
+        tilt, azimuth = (format_number(angle, 4) for angle in (self.tilt, self.azimuth))
+        return f"Tilt {tilt}° towards {azimuth}°"
+
+
+def _tilted(state: State, angles: TiltTorsion) -> State:
+    """Return the state with azimuth, tilt and torsion in degrees, which it keeps as they are."""
+    orientation = pose_of_tilt_torsion(state.pose.position, angles)
+    pose = state.pose_at(state.position, orientation)
+    return replace(moved(state, pose), set_tilt_torsion=angles)
+
+
 NODES = 20
 """Number of nodes on each axis of the extent, at which tilts are computed."""
 
 # Number of parts of the nodes, between which progress is reported.
 PARTS = 10
+# Digits of a torsion in degrees beyond which tilts are not computed again.
+DIGITS = 3
 
 ORIENTATIONS = 33
 """Number of orientations that stand for a range of tilts."""
@@ -40,13 +97,7 @@ TURNED_ORIENTATIONS = 17
 
 @dataclass(frozen=True)
 class PositionRequest:
-    """A request for the orientations that a position can have.
-
-    Attributes:
-        design: The manipulator.
-        position: Position of b4 or of the tool point.
-        tool: The tool point in the platform frame; None for b4.
-    """
+    """A request for the orientations that a position of b4, or of a tool point, can have."""
 
     design: Design
     position: Triple
@@ -55,13 +106,7 @@ class PositionRequest:
 
 @dataclass(frozen=True)
 class PositionDrawing:
-    """The orientations that a position can have.
-
-    Attributes:
-        request: The request.
-        share: Share of all orientations.
-        by_torsion: Greatest tilt in every azimuth at each torsion.
-    """
+    """The share of orientations that a position can have, and the greatest tilts by torsion."""
 
     request: PositionRequest
     share: OrientationShare
@@ -77,13 +122,7 @@ def orientations_at(request: PositionRequest) -> PositionDrawing:
 
 @dataclass(frozen=True)
 class TiltsRequest:
-    """A request for the greatest tilts over the workspace of one torsion.
-
-    Attributes:
-        design: The manipulator.
-        torsion: Torsion, in degrees.
-        tool: Tool point that has the positions, in the platform frame; None for b4.
-    """
+    """A request for the greatest tilts over the workspace of one torsion, in degrees."""
 
     design: Design
     torsion: float
@@ -95,7 +134,6 @@ class TiltsDrawing:
     """The greatest tilts in every azimuth at the nodes of a grid.
 
     Attributes:
-        request: The request.
         positions: Nodes at which tilt zero keeps all limits, shape (n, 3), in design units.
         tilts: Greatest tilts there, shape (n,), in degrees.
         step: Largest distance of neighbouring nodes, in design units.
@@ -139,16 +177,12 @@ class RangeRequest:
     """A request for a workspace over a range of tilts from the orientation of home.
 
     Attributes:
-        design: The manipulator.
-        home: Its home pose.
         tilt: Largest tilt, in degrees.
         turn: Largest change of the torsion either way, in degrees.
         over: Whether positions have one of the orientations at least, or all of them.
-        tool: Tool point that has the positions, in the platform frame; None for b4.
     """
 
     design: Design
-    home: Pose
     tilt: float
     turn: float
     over: Literal["inclusive", "total"]
@@ -165,7 +199,7 @@ class RangeDrawing:
 
 def orientations_over(request: RangeRequest) -> FloatArray:
     """Return the orientations that stand for a range, shape (n, 3, 3)."""
-    rotation, turn = request.home.rotation, math.radians(request.turn)
+    rotation, turn = request.design.home_pose.rotation, math.radians(request.turn)
     if turn == 0.0:
         return cone_of_directions(rotation, request.tilt, ORIENTATIONS)
     tilted = cone_of_directions(rotation, request.tilt, TURNED_ORIENTATIONS)
@@ -180,3 +214,30 @@ def range_solid(request: RangeRequest) -> RangeDrawing:
     tolerance = LIVE_TOLERANCE * design.reach
     solid = make(design, orientations_over(request), tolerance, request.tool)
     return RangeDrawing(request, solid)
+
+
+def _position_of(frame: Frame) -> PositionRequest:
+    state = frame.state
+    return PositionRequest(state.design, state.position, state.tool)
+
+
+def _tilts_of(frame: Frame) -> TiltsRequest | None:
+    if not frame.state.view.orientation.tilts:
+        return None
+    torsion = round(frame.state.tilt_torsion.torsion, DIGITS)
+    return TiltsRequest(frame.state.design, torsion, frame.state.tool)
+
+
+def _range_of(frame: Frame) -> RangeRequest | None:
+    view = frame.state.view.orientation
+    if view.over == "none":
+        return None
+    return RangeRequest(frame.state.design, view.range, view.turn, view.over, frame.state.tool)
+
+
+PositionFeed: TypeAlias = Feed[PositionRequest, PositionDrawing]
+TiltsFeed: TypeAlias = Feed[TiltsRequest, TiltsDrawing]
+RangeFeed: TypeAlias = Feed[RangeRequest, RangeDrawing]
+POSITION_FEED = feed_of(orientations_at, _position_of)
+TILTS_FEED = feed_of(tilts_at_nodes, _tilts_of, has_stages=True)
+RANGE_FEED = feed_of(range_solid, _range_of)

@@ -1,0 +1,206 @@
+"""The parts of the prototype, made in the worker: meshes, list for a workshop, and files.
+
+They are made again when the design changes, not when the pose does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import msgspec
+import numpy as np
+
+from explorer.app.scene.creases import Drawn, creased
+from explorer.app.session.feed import Feed, feed_of
+from explorer.app.state.frame import Frame
+from explorer.errors import ExplorerError, TooTightError
+from explorer.mechanism.design import Design
+from explorer.prototype.assembly import Actuator, Prototype, bill_of_materials, make_prototype
+from explorer.prototype.shapes import Part
+
+# Axis of the round bar in the frame of the part, for the kinds cut from one.
+ROUND = {"cylinder": 2, "rod": 2, "ball": 2, "carriage": 0}
+# Kinds in the order of assembly.
+ORDER = ("base", "carriage", "cross", "cylinder", "rod", "ball", "platform")
+# Significant digits in which volume and stock of parts that are alike agree.
+DIGITS = 6
+
+
+@dataclass(frozen=True)
+class Line:
+    """Parts that are alike.
+
+    Attributes:
+        kind: Kind of part, such as "rod".
+        legs: Legs that have one; () for base and platform.
+        stock: Diameter and length of the round bar that each is cut from, or the sides of the block
+            along the axes of its frame, in mm.
+        volume: Volume of each, in mm³.
+    """
+
+    kind: str
+    legs: tuple[int, ...]
+    stock: tuple[float, ...]
+    volume: float
+
+    @property
+    def count(self) -> int:
+        """The number of these parts."""
+        return max(len(self.legs), 1)
+
+    @property
+    def name(self) -> str:
+        """The kind, and the legs."""
+        return f"{self.kind} {', '.join(map(str, self.legs))}".strip()
+
+    def mass(self, density: float) -> float:
+        """Return the mass of all of them in grams, at a density in kg/m³."""
+        return self.count * density * self.volume * 1e-6
+
+
+@dataclass(frozen=True)
+class PartsList:
+    """Parts and actuators of a prototype."""
+
+    lines: tuple[Line, ...]
+    actuators: tuple[Actuator, ...]
+
+    def mass(self, density: float) -> float:
+        """Return the mass of all parts in grams, at a density in kg/m³."""
+        return sum(line.mass(density) for line in self.lines)
+
+    def moving_mass(self, density: float) -> float:
+        """Return the mass of all but the base in grams, at a density in kg/m³."""
+        return sum(line.mass(density) for line in self.lines if line.kind != "base")
+
+
+def parts_list(prototype: Prototype) -> PartsList:
+    """Return the list of a prototype's parts, one line for those that are alike."""
+    bill = bill_of_materials(prototype, 1.0)
+    lines: dict[object, Line] = {}
+    for part, item in zip(prototype.parts, bill.items, strict=True):
+        stock = stock_of(part, prototype.design.unit_mm)
+        rounded = (
+            round(value, DIGITS - 1 - math.floor(math.log10(value)))
+            for value in (item.volume, *stock)
+        )
+        key = part.kind, *rounded
+        legs = lines[key].legs if key in lines else ()
+        leg = part.name.partition(" ")[2]
+        if leg:
+            legs = (*legs, int(leg))
+        lines[key] = Line(part.kind, legs, stock, item.volume)
+    in_order = sorted(lines.values(), key=lambda line: ORDER.index(line.kind))
+    return PartsList(tuple(in_order), bill.actuators)
+
+
+def stock_of(part: Part, unit_mm: float) -> tuple[float, ...]:
+    """Return the stock of a part as in `Line`; `unit_mm` is the millimetres in a design unit."""
+    points = part.vertices * unit_mm
+    lows, highs = points.min(axis=0), points.max(axis=0)
+    sides = (highs - lows).tolist()
+    axis = ROUND.get(part.kind)
+    if axis is None:
+        return tuple(sides)
+    off = np.delete(points - 0.5 * (lows + highs), axis, axis=1)
+    return 2.0 * float(np.hypot(off[:, 0], off[:, 1]).max()), sides[axis]
+
+
+@dataclass(frozen=True)
+class PartsRequest:
+    """Request to make the parts of a design; its name does not count."""
+
+    design: Design
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The parts of a design.
+
+    Attributes:
+        prototype: Parts with their places in a pose.
+        meshes: Meshes of the parts, in their order and frames, in design units.
+        listed: List of the parts for the workshop.
+    """
+
+    prototype: Prototype
+    meshes: tuple[Drawn, ...]
+    listed: PartsList
+
+    @cached_property
+    def floor(self) -> float:
+        """Height of the lowest point of the base, in design units."""
+        return float(self.meshes[0][0][:, 2].min())
+
+
+@dataclass(frozen=True)
+class PartsDrawing:
+    """The parts of a design, or why it has none and what would fit."""
+
+    request: PartsRequest
+    parts: Parts | None
+    refusal: ExplorerError | None
+
+    @property
+    def fitting_unit_mm(self) -> float | None:
+        """Millimetres in one design unit with which the parts fit; None if no unit helps."""
+        return self.refusal.fitting_unit_mm if isinstance(self.refusal, TooTightError) else None
+
+
+def parts_drawing(request: PartsRequest) -> PartsDrawing:
+    """Return the parts of a design, ready to be drawn."""
+    try:
+        prototype = make_prototype(request.design)
+    except ExplorerError as error:
+        return PartsDrawing(request, None, error)
+    meshes = tuple(creased(part.vertices, part.faces) for part in prototype.parts)
+    return PartsDrawing(request, Parts(prototype, meshes, parts_list(prototype)), None)
+
+
+def _request_for(frame: Frame) -> PartsRequest | None:
+    if frame.state.view.drawn_as != "prototype":
+        return None
+    return PartsRequest(msgspec.structs.replace(frame.state.design, name=""))
+
+
+PartsFeed: TypeAlias = Feed[PartsRequest, PartsDrawing]
+PARTS_FEED = feed_of(parts_drawing, _request_for)
+
+
+def drawn_parts(feed: PartsFeed) -> Parts | None:
+    """Return the parts to draw; None while there are none or none are requested."""
+    return None if feed.drawing is None else feed.drawing.parts
+
+
+def export_assembly(design: Design, file_format: str) -> bytes:
+    """Return a file of the prototype, assembled in the home pose.
+
+    Args:
+        design: The manipulator.
+        file_format: A format of `explorer.export.assembly`, or "step".
+
+    Raises:
+        ExplorerError: a design too tight for the parts, or a missing library.
+    """
+    from explorer.export.assembly import assembly_bytes
+
+    if file_format == "step":
+        from explorer.export.step import assembly_step
+        from explorer.prototype.fitting import sizes_of
+
+        return assembly_step(sizes_of(design))
+    return assembly_bytes(make_prototype(design), file_format)
+
+
+def export_simulation(design: Design, density: float) -> bytes:
+    """Return the model for physics engines as MJCF; `density` of its bodies in kg/m³.
+
+    Raises:
+        ExplorerError: a design without a model, such as one with legs of length zero.
+    """
+    from explorer.export.simulation import simulation_mjcf
+
+    return simulation_mjcf(design, density).encode()
