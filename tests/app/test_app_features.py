@@ -25,7 +25,7 @@ from explorer.app.features.feature import Feature, Services, StateCommand, Tab
 from explorer.app.features.forces.loads import SetForce, WeightsFeed
 from explorer.app.features.listed import FEATURES
 from explorer.app.features.machine.panel import SetToolAngle
-from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun, GiveUp
+from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
 from explorer.app.features.precision.budget import SetTolerances
@@ -267,7 +267,7 @@ OF_VALUES = (
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map or a handle gives."""
 
-OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, GiveUp, Compare, TakePlan)
+OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
 OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")} | {

@@ -20,7 +20,7 @@ from services import StubWorker
 from explorer.app.browser.browser_facts import BrowserFacts, decode_facts
 from explorer.app.browser.downloads import Downloads
 from explorer.app.features.designs.name import UNSAVED
-from explorer.app.features.help.tour import STEPS, start_tour
+from explorer.app.features.help.tour import STEPS, Tour
 from explorer.app.layout import is_narrow
 from explorer.app.server import Running, start
 from explorer.app.state.frame import Frame
@@ -142,7 +142,7 @@ def test_only_a_file_of_the_same_name_and_browser_without_a_notice_is_replaced(
 @pytest.mark.parametrize("design", PRESETS.values(), ids=str)
 def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(design: Design) -> None:
     state = start = opened(design)
-    tour = start_tour(Frame(state))
+    tour = Tour(0, Frame(state))
     assert tour.step_by(-1, Frame(state)).at == 0
     for index, step in enumerate(STEPS):
         assert tour.at == index

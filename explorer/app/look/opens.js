@@ -1,10 +1,8 @@
 // Opens what [data-opens=title] names: a tab of a panel, or a dialog; "commands" is the palette.
-// Closes the dialog or the card on top at Escape, at a click beside it, and at its button.
+// Closes the dialog at Escape, at a click beside it, and at its button.
 window.explorer.opens ??= (() => {
   const DIALOG = "[data-floating-window][data-ex=dialog]",
-    OPEN = `${DIALOG}[data-ex-open]`,
-    CARD = ".mantine-Modal-content",
-    AROUND = ".mantine-Modal-inner, .mantine-Modal-overlay";
+    OPEN = `${DIALOG}[data-ex-open]`;
   // viser opens its palette at this key, which nothing on the server can press.
   const PALETTE_KEY = { key: "k", code: "KeyK", ctrlKey: true, bubbles: true };
   const ENTER = { key: "Enter", code: "Enter", bubbles: true };
@@ -56,37 +54,17 @@ window.explorer.opens ??= (() => {
   addEventListener("click", ({ target }) => {
     if (target.closest?.("[data-closes] [data-press]")) closeDialogs();
   });
-  const closeCard = () => {
-    const card = [...document.querySelectorAll(`${CARD} [data-closed-by]`)].at(-1);
-    if (card) document.getElementById(card.getAttribute("data-closed-by"))?.click();
-    else closeDialogs();
-  };
   addEventListener(
     "keydown",
     ({ key, target }) => {
-      // The palette may lie over a card, and is closed first; a list in a dialog too.
+      // The palette may lie over a dialog, and is closed first; a list in a dialog too.
       const isOver = target.closest?.(".mantine-Spotlight-content, [aria-expanded=true]");
-      if (key === "Escape" && !isOver) closeCard();
+      if (key === "Escape" && !isOver) closeDialogs();
     },
     true,
   );
-  // A pointer that is pressed on a card and released beside it, as to select text, closes nothing.
-  const isBeside = (it) => it === shade || (!!it.closest?.(AROUND) && !it.closest(CARD));
-  let isPressedBeside = false;
-  addEventListener(
-    "pointerdown",
-    ({ target }) => {
-      isPressedBeside = isBeside(target);
-    },
-    true,
-  );
-  addEventListener(
-    "click",
-    ({ target }) => {
-      if (isPressedBeside && isBeside(target)) closeCard();
-    },
-    true,
-  );
+  // A pointer pressed in a dialog and released beside it, as to select text, closes nothing.
+  shade.addEventListener("click", closeDialogs);
   window.explorer.open = open;
   return true;
 })();

@@ -2,13 +2,141 @@
 
 from __future__ import annotations
 
-from explorer.app.features.feature import Feature, InBar, Tab
-from explorer.app.features.help.bar import HelpButtons, HelpDialog
-from explorer.app.features.help.tour_panel import TourGuide
+from collections.abc import Callable, Iterable, Iterator
+from html import escape
+
+import viser
+
+from explorer.app.browser.viser_gaps import run_script_in
+from explorer.app.features.feature import Feature, InBar, Services, Tab
+from explorer.app.features.help.manual import ManualReader
+from explorer.app.features.help.tour import TourGuide
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import open_button, press_button
+from explorer.app.widgets.commands import PAGE, PALETTE_KEY, STEP, Key, shift, with_keys
+from explorer.app.widgets.markup import box, caption, dim
+from explorer.app.widgets.palette import Command, group_of
+
+PRESS = "page"
+KEYS = {"Theme": (shift("L"),), "Keys": (Key("K"),)}
+HINTS = {
+    "Tour": "Do five steps, from the first move to an optimised design.",
+    "Manual": "Read the manual beside the scene.",
+    "Keys": "Show all keys.",
+    "Theme": "Turn the page dark, or light again.",
+}
+# Keys and pointers with which viser moves the camera.
+CAMERA = (
+    ("drag, arrows", "Turn"),
+    ("right drag", "Move"),
+    ("wheel", "Zoom"),
+    ("W A S D Q E", "Fly"),
+)
+
+
+class HelpButtons:
+    """The palette, the theme and the help, as buttons of the bar."""
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+        presses: dict[str, Callable[[viser.ClientHandle], None]] = {
+            "Tour": services.get(TourGuide).begin,
+            "Manual": services.get(ManualReader).toggle,
+            "Keys": lambda client: run_script_in(client, 'window.explorer.open("Keys")'),
+            "Theme": self._toggle_theme,
+        }
+        buttons = services.buttons
+        buttons.on(PRESS, lambda name, client: presses[name](client), values=presses)
+        for name in presses:
+            keys = KEYS.get(name, ())
+            buttons.offer(f"{PAGE}{STEP}{name}", HINTS[name], PRESS, name, keys=keys)
+        commands = open_button(
+            "commands",
+            f"Commands {keycap(str(PALETTE_KEY))}",
+            hint="Search for anything that can be done, and do it.",
+            class_name="ex-tool ex-commands",
+        )
+        theme = press_button(
+            PRESS, "Theme", "◐", hint=hint_of("Theme"), label="Theme", class_name="ex-tool"
+        )
+        help_ = open_button("Help", "Help", hint="Tour, manual and keys.", class_name="ex-tool")
+        self._markup = f"{commands}{theme}{help_}"
+
+    def __call__(self, _: Frame) -> str:
+        """Return the buttons as HTML."""
+        return self._markup
+
+    def _toggle_theme(self, client: viser.ClientHandle) -> None:
+        theme = self._services.theme
+        theme.choose(dark=not theme.is_dark)
+        self._services.remember(client.client_id, dark=theme.is_dark)
+
+
+class HelpDialog:
+    """A row for each kind of help."""
+
+    def __init__(self, services: Services) -> None:
+        buttons = {
+            "Tour": press_button(PRESS, "Tour", "Tour", class_name="ex-button"),
+            "Manual": press_button(PRESS, "Manual", "Manual", class_name="ex-button"),
+            "Keys": open_button("Keys", "Keys", class_name="ex-button"),
+        }
+        rows = "".join(
+            f'<div class="ex-row">{button}{dim(hint_of(name))}</div>'
+            for name, button in buttons.items()
+        )
+        services.gui.add_html(box(f"<div data-closes>{rows}</div>"))
+
+    def updates(self, _: Frame) -> Iterator[Update]:
+        """Yield nothing: the dialog stays as it is."""
+        return iter(())
+
+
+class KeysDialog:
+    """All keys of the page."""
+
+    def __init__(self, services: Services) -> None:
+        self._html = services.gui.add_html("")
+        self._services = services
+        self._table = ""
+
+    def updates(self, _: Frame) -> Iterator[Update]:
+        """Yield the table of all keys, which are known once all features are made."""
+        self._table = self._table or keys_table(self._services.commands())
+        yield self._html, "content", self._table
+
+
+def hint_of(name: str) -> str:
+    """Return what a button does, with its keys."""
+    return with_keys(HINTS[name], KEYS.get(name, ()))
+
+
+def keycap(key: str) -> str:
+    """Return a drawn key, as HTML."""
+    return f'<kbd class="ex-keycap">{escape(key)}</kbd>'
+
+
+def keys_table(commands: Iterable[Command]) -> str:
+    """Return all keys as HTML, in the groups of their commands and in two columns."""
+    groups = {PAGE: [_row("Search all commands", keycap(str(PALETTE_KEY)))]}
+    for command in commands:
+        if command.keys:
+            caps = " ".join(keycap(str(key)) for key in command.keys)
+            words = command.label.partition(STEP)[2].replace(STEP, ", ")
+            groups.setdefault(group_of(command), []).append(_row(words, caps))
+    groups["Camera"] = [_row(words, keycap(keys)) for keys, words in CAMERA]
+    blocks = (f"<div>{caption(name)}{''.join(rows)}</div>" for name, rows in groups.items())
+    return f'<div class="ex-keys">{"".join(blocks)}</div>'
+
+
+def _row(words: str, caps: str) -> str:
+    return f'<div class="ex-line"><span>{escape(words)}</span><span>{caps}</span></div>'
+
 
 HELP = Feature(
     "help",
-    tabs=(Tab("dialog", "Help", HelpDialog),),
+    tabs=(Tab("dialog", "Help", HelpDialog), Tab("dialog", "Keys", KeysDialog)),
     bar=(InBar("right", HelpButtons),),
     runners=(TourGuide,),
 )

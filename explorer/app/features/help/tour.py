@@ -3,18 +3,32 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from html import escape
 
+import viser
+
+from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import StartRun
 from explorer.app.state.action import Action
 from explorer.app.state.actions import GoHome, Set, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State
+from explorer.app.widgets.buttons import open_button, press_button
 
 # What "Show me" does: the stride of the platform in reaches, the height over the base plane in
 # warning lengths, and the factor on a variable.
 STRIDE, NEAR, GROWTH = 0.1, 0.5, 1.1
+# Place of the card from the upper left corner of the scene, and its width, in pixels.
+PLACE, WIDTH = (14, 14), 330
+PRESS = "tour"
+BUTTONS = {
+    "Skip": "End the tour; the command Tour begins it again.",
+    "Back": "Go back to the step before.",
+    "Show me": "Let the explorer do what this step asks for.",
+    "Next": "Go on to the next step, or end the tour.",
+}
 
 
 @dataclass(frozen=True)
@@ -38,18 +52,6 @@ class Step:
     after: Action | None = None
 
 
-def _is_moved(before: Frame, now: Frame) -> bool:
-    return before.state.pose != now.state.pose
-
-
-def _move(frame: Frame) -> Action:
-    return SetPosition(1, frame.state.position[1] + STRIDE * frame.state.design.reach)
-
-
-def _is_near(_: Frame, now: Frame) -> bool:
-    return now.verdict.kind != "clear"
-
-
 def _approach(frame: Frame) -> Action:
     """Lower b4 towards the base plane: δ3 is its height."""
     state = frame.state
@@ -57,40 +59,20 @@ def _approach(frame: Frame) -> Action:
     return SetPosition(2, height + float(state.offset(state.pose.rotation)[2]))
 
 
-def _is_changed(before: Frame, now: Frame) -> bool:
-    return before.state.design.variables != now.state.design.variables
-
-
-def _change(frame: Frame) -> Action:
-    return SetVariable("a3x", GROWTH * frame.state.design.variables[0])
-
-
-def _is_solid(_: Frame, now: Frame) -> bool:
-    return now.state.view.workspace.solid
-
-
-def _show_solid(_: Frame) -> Action:
-    return Set("view.workspace.solid", True, "Solid")
-
-
-def _is_optimised(before: Frame, now: Frame) -> bool:
-    return now.state.optimisation.count > before.state.optimisation.count
-
-
 STEPS = (
     Step(
         "Move the platform",
         "Drag an arrow or an arc at b4, or a slider of Pose. The legs and the pose stay in step.",
         "Pose",
-        _is_moved,
-        _move,
+        lambda before, now: before.state.pose != now.state.pose,
+        lambda now: SetPosition(1, now.state.position[1] + STRIDE * now.state.design.reach),
     ),
     Step(
         "Come close to a singularity",
         "Lower z. The two flags turn from blue to orange as they come close: where they meet, the "
         "mechanism is singular. Singularity, on the right, tells how far it is.",
         "Pose",
-        _is_near,
+        lambda _, now: now.verdict.kind != "clear",
         _approach,
         GoHome(),
     ),
@@ -98,24 +80,23 @@ STEPS = (
         "Change the design",
         "Move a slider of Design, such as a3x. The pose is held, or the lengths of the legs.",
         "Design",
-        _is_changed,
-        _change,
+        lambda before, now: before.state.design.variables != now.state.design.variables,
+        lambda now: SetVariable("a3x", GROWTH * now.state.design.variables[0]),
     ),
     Step(
         "See the workspace",
         "Press Solid in Workspace: all positions of b4 within the limits. Cut it open, or colour "
         "it by the smallest margin.",
         "Workspace",
-        _is_solid,
-        _show_solid,
+        lambda _, now: now.state.view.workspace.solid,
+        lambda _: Set("view.workspace.solid", True, "Solid"),
     ),
     Step(
         "Optimise, and take it with you",
-        "Press Optimise, and accept what it finds; what you do not accept is put back. Export, on "
-        "top of the page, has files for CAD, simulation and print. Ctrl-Z undoes what you "
-        "changed.",
+        "Press Optimise, and accept what it finds, or revert to your design. Export, on top of the "
+        "page, has files for CAD, simulation and print. Ctrl-Z undoes what you changed.",
         "Optimise",
-        _is_optimised,
+        lambda before, now: now.state.optimisation.count > before.state.optimisation.count,
         lambda _: StartRun(),
     ),
 )
@@ -127,14 +108,12 @@ class Tour:
 
     Attributes:
         at: Index of the step.
-        began: Frame in which the step began.
-        searches: Number of searches before the tour began.
+        start: Frame in which the step began.
         is_done: Whether the user has done the step.
     """
 
     at: int
-    began: Frame
-    searches: int
+    start: Frame
     is_done: bool = False
 
     @property
@@ -149,23 +128,117 @@ class Tour:
 
     def after_frame(self, frame: Frame) -> Tour:
         """Return the tour after a frame, in which the step may be done."""
-        if self.is_done or not self.step.is_done(self.began, frame):
-            return self
-        return replace(self, is_done=True)
-
-    def left_search(self, state: State) -> int | None:
-        """Return the number of a search that the tour led to and whose result is not accepted."""
-        run = state.optimisation.run
-        if run is None or run.accepted or run.number <= self.searches:
-            return None
-        return run.number
+        return replace(self, is_done=self.is_done or self.step.is_done(self.start, frame))
 
     def step_by(self, steps: int, frame: Frame) -> Tour:
         """Return the tour some steps on or back, within its first and last."""
-        at = min(max(self.at + steps, 0), len(STEPS) - 1)
-        return Tour(at, frame, self.searches)
+        return Tour(min(max(self.at + steps, 0), len(STEPS) - 1), frame)
 
 
-def start_tour(frame: Frame) -> Tour:
-    """Return the tour at its first step."""
-    return Tour(0, frame, frame.state.optimisation.count)
+@dataclass
+class _Card:
+    """The tour of one browser, in a panel over its scene."""
+
+    tour: Tour
+    panel: viser.PanelHandle
+    html: viser.GuiHtmlHandle
+
+
+class TourGuide(Runner):
+    """Leads users through the tour, each in a browser of their own."""
+
+    def __init__(self, services: Services) -> None:
+        self._services, self._session = services, services.session
+        preferences = services.preferences
+        self._is_seen = preferences is None or preferences.chosen.tour_seen
+        # Presses, frames and browsers come on threads of their own.
+        self._lock = threading.RLock()
+        self._cards: dict[int, _Card] = {}
+        services.buttons.on(PRESS, self._press, values=BUTTONS)
+        services.server.on_client_connect(
+            lambda client: None if self._is_seen else self.begin(client)
+        )
+        services.server.on_client_disconnect(self._forget)
+
+    def begin(self, client: viser.ClientHandle) -> None:
+        """Begin the tour, or begin it again."""
+        with self._lock:
+            self._end(client)
+            tour = Tour(0, Frame(self._session.state))
+            panel = client.gui.add_panel()
+            panel.float(x=PLACE[0], y=PLACE[1], width=WIDTH)
+            with panel.add_tab("Tour"):
+                html = client.gui.add_html(card_words(tour))
+            self._cards[client.client_id] = _Card(tour, panel, html)
+
+    def follow(self, frame: Frame) -> None:
+        """Mark the steps that a frame shows as done."""
+        with self._lock:
+            for card in tuple(self._cards.values()):
+                _show(card, card.tour.after_frame(frame))
+
+    def _forget(self, client: viser.ClientHandle) -> None:
+        self._cards.pop(client.client_id, None)
+
+    def _end(self, client: viser.ClientHandle) -> None:
+        card = self._cards.pop(client.client_id, None)
+        if card is not None:
+            card.panel.remove()
+
+    def _press(self, name: str, client: viser.ClientHandle) -> None:
+        card = self._cards.get(client.client_id)
+        if card is None:
+            return
+        tour = card.tour
+        if name == "Show me":
+            show = tour.step.show
+            self._session.do(lambda state: show(Frame(state)), who=client.client_id)
+        elif name == "Skip" or (name == "Next" and tour.is_last):
+            with self._lock:
+                self._end(client)
+            self._is_seen = True
+            self._services.remember(None, tour_seen=True)
+        else:
+            if name == "Next" and tour.step.after is not None:
+                self._session.do(tour.step.after, who=client.client_id)
+            with self._lock:
+                frame = Frame(self._session.state)
+                _show(card, tour.step_by(1 if name == "Next" else -1, frame))
+
+
+def _show(card: _Card, tour: Tour) -> None:
+    if tour != card.tour:
+        card.tour = tour
+        card.html.content = card_words(tour)
+
+
+def card_words(tour: Tour) -> str:
+    """Return the card as HTML: the progress of the tour, its step, and the buttons."""
+    step = tour.step
+    dots = "".join(
+        f'<span class="ex-dot{"" if i <= tour.at else " is-ahead"}"></span>'
+        for i in range(len(STEPS))
+    )
+    done = '<span class="ex-within ex-strong">Done</span>' if tour.is_done else ""
+    opens = open_button(step.tab, f"Open the tab {escape(step.tab)}", class_name="ex-link")
+    first = "" if tour.at == 0 else _button("Back")
+    show = "" if tour.is_done else _button("Show me")
+    last = _button("Next", "Finish" if tour.is_last else "Next", look="is-main")
+    return (
+        '<div class="ex-card"><div class="ex-line ex-dim">'
+        f"<span>{dots}</span><span>step {tour.at + 1} of {len(STEPS)}</span></div>"
+        f"<h4>{escape(step.title)}</h4><div>{escape(step.text)}</div>"
+        f"<div>{opens} {done}</div>"
+        f'<div class="ex-ends">{_button("Skip", "Skip the tour", look="is-quiet")}'
+        f"{first}{show}{last}</div></div>"
+    )
+
+
+def _button(name: str, words: str | None = None, *, look: str = "") -> str:
+    return press_button(
+        PRESS,
+        name,
+        escape(words or name),
+        hint=BUTTONS[name],
+        class_name=f"ex-button {look}".rstrip(),
+    )

@@ -249,22 +249,6 @@ class Revert(Action):
         return _restore_own(with_value(state, "optimisation.run", None), run.own)
 
 
-@dataclass(frozen=True)
-class GiveUp(Action):
-    """Cancel a run that goes on, or revert its result unless it was accepted."""
-
-    template: ClassVar[str] = "Revert to {design}"
-
-    number: int
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        run = state.optimisation.run
-        if run is None or run.number != self.number:
-            return state
-        return (CancelRun() if state.optimisation.is_on else Revert()).apply(state)
-
-
 def _with_run(state: State, change: Callable[[Run], Run]) -> State:
     optimisation = state.optimisation
     if optimisation.run is None or not optimisation.is_on:

@@ -10,7 +10,7 @@ from typing import get_args
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.approach import HOVER
+from explorer.app.features.mechanism.incidences import HOVER, hovered_margin
 from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.features.singularity.scene import show_button
 from explorer.app.features.singularity.strata import StrataPanel
