@@ -157,9 +157,9 @@ class Monkey:
                 saved.wait_until_idle()
             shelves[0].entries = shelves[1].entries
             shelves[0].last_deleted = shelves[1].last_deleted
-            # The part of the list that is shown and the question in it are no state.
+            # The question in the list is no state.
             lists = [each.services.get(DesignsPanel) for each in (fresh.page, page)]
-            lists[0].first, lists[0].asked = lists[1].first, lists[1].asked
+            lists[0].asked = lists[1].asked
             session.redraw()
             assert fresh.page.wait_until_drawn(PATIENCE_SECONDS)
             self.report.drift += differences(shown_by(self.running), shown_by(fresh))

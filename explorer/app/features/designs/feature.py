@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from explorer.app.features.designs.files import DesignFile
 from explorer.app.features.designs.panel import DesignsPanel
-from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.designs.saved_designs import SavedDesigns, send_design
 from explorer.app.features.feature import Export, Feature, Tab
 
 DESIGNS = Feature(
@@ -15,7 +14,7 @@ DESIGNS = Feature(
             "Design",
             "A file to open again, here or with explorer --design.",
             ("JSON",),
-            lambda services: lambda _, who: services.get(DesignFile).send(who),
+            lambda services: lambda _, who: send_design(services, who),
         ),
     ),
     passing=lambda services: services.get(SavedDesigns).commands,

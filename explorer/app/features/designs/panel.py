@@ -1,16 +1,15 @@
-"""The user's designs by name: save, open, duplicate, rename, delete, upload and download."""
+"""The user's designs by name: the name in the bar, and a list to save, open, copy and delete."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 
 import viser
 
-from explorer.app.features.designs.files import DesignFile
-from explorer.app.features.designs.name import saved_words
-from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.designs.saved_designs import SavedDesigns, send_design
 from explorer.app.features.feature import Services
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
@@ -19,19 +18,67 @@ from explorer.app.state.actions import Open, SetName
 from explorer.app.state.frame import Frame
 from explorer.app.storage.library import Entry
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Does, press_button
+from explorer.app.widgets.buttons import Does, open_button, press_button
 from explorer.app.widgets.markup import box, note
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, PRESETS
 from explorer.numerics.number_text import format_number
 
-# Number of rows on a page of the list.
-ROWS = 24
-TURNS = {
-    "newer": ("Newer designs", "Show the previous page of the list."),
-    "older": ("Older designs", "Show the next page of the list."),
-}
-"""Ways to turn the pages of the list, with the words and the hint of their buttons."""
+# Name of the button that shows why the session is not saved, and its label.
+UNSAVED, UNSAVED_LABEL = "session.unsaved", "Session not saved"
+
+
+class DesignName:
+    """The name, a button that opens the dialog Designs, and a warning while saving fails."""
+
+    def __init__(self, services: Services) -> None:
+        self._saved = None if services.user_data is None else services.get(SavedDesigns)
+        self._autosaver = services.autosaver
+        services.buttons.on(UNSAVED, lambda _, client: self._show_problem(client))
+
+    def __call__(self, frame: Frame) -> str:
+        """Return the name for a frame, as HTML."""
+        live = frame.state.design
+        name = f'<b class="ex-cut">{escape(live.name)}</b>'
+        if self._saved is None:
+            return f'<span class="ex-name">{name}</span>'
+        mark, words = saved_words(live, self._saved.find(live.name))
+        content = f'{name}<span class="ex-dim">{mark}</span>'
+        hint = f"{words} Save, rename, open or upload designs."
+        return open_button("Designs", content, hint=hint, class_name="ex-name") + self._warning()
+
+    def _warning(self) -> str:
+        """Return the button that warns of an unsaved session, as HTML; "" while it is saved."""
+        problem = self._problem
+        if problem is None:
+            return ""
+        look = "ex-tool ex-outlined ex-beyond"
+        return press_button(UNSAVED, "", UNSAVED_LABEL, hint=problem, class_name=look)
+
+    def _show_problem(self, client: viser.ClientHandle) -> None:
+        problem = self._problem
+        if problem is not None:
+            client.add_notification(UNSAVED_LABEL, problem, color="orange")
+
+    @property
+    def _problem(self) -> str | None:
+        return None if self._autosaver is None else self._autosaver.problem
+
+
+def saved_words(live: Design, saved: Design | None) -> tuple[str, str]:
+    """Return whether a design is saved, in a word and in a sentence.
+
+    Args:
+        live: The live design.
+        saved: The saved design of the same name; None if there is none.
+    """
+    if saved == live:
+        return "saved", "Saved."
+    if live == PRESETS.get(live.name):
+        return "preset", "An unchanged preset."
+    if saved is None:
+        return "not saved", "Not saved under a name yet; it comes back with the session."
+    return "changed", "Changed since it was saved."
 
 
 @dataclass(frozen=True)
@@ -69,7 +116,7 @@ class DesignsPanel:
             "Save": lambda who: saved.save(session.settled().design, who),
             "Save a copy": lambda who: saved.save_copy(session.settled().design, who),
             "Rename": self._rename,
-            "Download": services.get(DesignFile).send,
+            "Download": partial(send_design, services),
         }
         self._buttons = gui.add_button_group(
             "Design",
@@ -103,20 +150,11 @@ class DesignsPanel:
         buttons.on("designs.delete", self._for_row(self._ask))
         buttons.on("designs.confirm", self._for_row(self._delete))
         buttons.on("designs.keep", self._for_row(lambda _, __: self._set_asked(None)))
-        buttons.on("designs.turn", self._turn, values=TURNS)
-        for way, (label, hint) in TURNS.items():
-            buttons.offer(
-                f"Designs › {label}",
-                hint,
-                "designs.turn",
-                way,
-                lambda way=way: self._can_turn(way),
-            )
-        # Rows of the present page, index of its first row, and number of all rows.
         self.rows: tuple[Row, ...] = ()
-        self.first = self._total = 0
         # Name of the design that the page asks whether to delete.
         self.asked: str | None = None
+        self._listed: tuple[object, ...] = ()
+        self._markup = ""
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame and the saved designs."""
@@ -125,12 +163,11 @@ class DesignsPanel:
         live, base = frame.state.design, frame.state.base
         _, words = saved_words(live, self._saved.find(live.name))
         yield self.status, "content", note(words)
-        rows = rows_of(self._saved.entries)
-        first = min(self.first, (len(rows) - 1) // ROWS * ROWS)
-        self.first, self._total, self.rows = first, len(rows), rows[first : first + ROWS]
-        ways = [way for way in TURNS if self._can_turn(way)]
-        foot = _foot(first, len(self.rows), len(rows), ways) if len(rows) > ROWS else ""
-        yield self.list, "content", list_designs(self.rows, base.name, self.asked, foot)
+        listed = self._saved.entries, base.name, self.asked
+        if listed != self._listed:
+            self._listed, self.rows = listed, rows_of(self._saved.entries)
+            self._markup = list_designs(self.rows, base.name, self.asked)
+        yield self.list, "content", self._markup
         deleted = self._saved.last_deleted
         yield self.restore, "visible", deleted is not None
         if deleted is not None:
@@ -165,14 +202,6 @@ class DesignsPanel:
         self.asked = name
         self._session.redraw()
 
-    def _can_turn(self, way: str) -> bool:
-        return self.first > 0 if way == "newer" else self.first + ROWS < self._total
-
-    def _turn(self, way: str, _: viser.ClientHandle) -> None:
-        if self._can_turn(way):
-            self.first += -ROWS if way == "newer" else ROWS
-            self._session.redraw()
-
     def _for_row(self, action: Callable[[Row, Who], None]) -> Does:
         def press(name: str, client: viser.ClientHandle) -> None:
             row = next((row for row in self.rows if row.name == name), None)
@@ -189,14 +218,13 @@ def rows_of(entries: Sequence[Entry]) -> tuple[Row, ...]:
     return (*own, *presets)
 
 
-def list_designs(rows: Sequence[Row], current: str, asked: str | None, foot: str = "") -> str:
+def list_designs(rows: Sequence[Row], current: str, asked: str | None) -> str:
     """Return the list in HTML, with the buttons of each row.
 
     Args:
         rows: The rows.
         current: Name of the design that is open.
         asked: Name of the design whose row asks whether to delete it; None for no question.
-        foot: Line below the list, HTML.
     """
     head = (
         '<div class="ex-row ex-dim ex-small"><span class="ex-fill">Designs, the last saved on top'
@@ -205,19 +233,7 @@ def list_designs(rows: Sequence[Row], current: str, asked: str | None, foot: str
     lines = "".join(
         _line(row, is_current=row.name == current, is_asked=row.name == asked) for row in rows
     )
-    return box(head, lines, foot)
-
-
-def _foot(first: int, count: int, total: int, ways: Iterable[str]) -> str:
-    """Return the line below the list: the rows that are shown, and links to other pages."""
-    turns = "".join(
-        press_button("designs.turn", way, TURNS[way][0], hint=TURNS[way][1], class_name="ex-link")
-        for way in ways
-    )
-    return (
-        f'<div class="ex-row"><span class="ex-fill ex-dim">{first + 1} to {first + count} '
-        f"of {total}</span>{turns}</div>"
-    )
+    return box(head, f'<div class="ex-designs">{lines}</div>')
 
 
 def _line(row: Row, *, is_current: bool, is_asked: bool) -> str:

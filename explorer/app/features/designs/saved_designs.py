@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import viser
 
@@ -21,7 +21,7 @@ from explorer.app.storage.library import Entry, copy_name
 from explorer.app.widgets.palette import Command
 from explorer.errors import ExplorerError, InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.design_file import PRESETS, decode_design
+from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 
 # Seconds between two checks of the folder.
 CHECK_SECONDS = 1.0
@@ -29,8 +29,13 @@ CHECK_SECONDS = 1.0
 MOST_COMMANDS = 200
 
 
-@dataclass(frozen=True)
-class _Request:
+def send_design(services: Services, who: Who) -> None:
+    """Send the live design to one browser, as a design file."""
+    design = services.session.settled().design
+    services.downloads.send(who, f"{design.name}.json", encode_design(design))
+
+
+class _Request(NamedTuple):
     work: Callable[[], object]
     who: Who
 

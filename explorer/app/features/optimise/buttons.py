@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
-from explorer.app.features.designs.files import DesignFile
+from explorer.app.features.designs.saved_designs import send_design
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise.actions import (
     Accept,
@@ -143,7 +143,7 @@ class OptimiseButtons:
         self._complain = services.complain
         self._sends: Mapping[str, Callable[[Who], None]] = {
             HULL: partial(send_workspace, services, "hull", "3mf", at_home=True),
-            DESIGN: services.get(DesignFile).send,
+            DESIGN: partial(send_design, services),
             RECORD: self._send_record,
         }
         for name, each in BUTTONS.items():
