@@ -7,7 +7,7 @@ from typing import Any
 
 from client import Client, client_of, press_update, wait_for
 
-from explorer.app.features.sharing.files import SharedFiles
+from explorer.app.features.sharing.feature import send_picture
 from explorer.app.features.view.panel import FORMS, LAYERS
 from explorer.app.server import Running
 from explorer.app.state.view import View
@@ -73,12 +73,11 @@ def test_form_of_the_mechanism_is_chosen_by_a_press_and_given_up_by_another(
 def test_picture_of_an_impossible_size_is_refused_to_the_tab_that_asks_alone(
     running: Running,
 ) -> None:
-    files = running.page.services.get(SharedFiles)
     with client_of(running) as client, client_of(running) as other:
-        files.picture((9, 100), transparent=False, client_id=client.client_id)
+        send_picture(running.page.services, (9, 100), client.client_id)
         messages: list[dict[str, Any]] = []
         while not any("pixels; got 9" in text for _, text in notices(messages)):
             messages += client.read()
         (text,) = (text for _, text in notices(messages) if "got 9" in text)
-        assert "the width of a picture is 16 to 8192 pixels; got 9" in text
+        assert "the width of a picture is 16 to 4096 pixels; got 9" in text
         assert not any("got 9" in text for _, text in notices(other.read_all_sent(running)))

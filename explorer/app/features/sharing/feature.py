@@ -1,12 +1,33 @@
-"""The dialog of all files, and those of the view, the scene and the report."""
+"""The dialog of all files that the page offers, and those of the view, the scene and the report."""
 
 from __future__ import annotations
 
-from explorer.app.features.feature import Export, Feature, InBar, Tab
-from explorer.app.features.sharing.files import SharedFiles
-from explorer.app.features.sharing.panel import ExportDialog, export_button
-from explorer.app.features.sharing.reporting import ReportFormat
+import datetime as dt
+from collections.abc import Callable, Iterator
+from functools import partial
+from html import escape
 
+import viser
+
+from explorer.app.browser.downloads import File
+from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
+from explorer.app.features.mechanism.marks import HANDLE_NAME
+from explorer.app.features.sharing.reporting import ReportFormat, make_report
+from explorer.app.features.sharing.scene_html import FileCamera, scene_html
+from explorer.app.features.sharing.view_picture import (
+    LEAST,
+    MOST,
+    check_size,
+    scaled_size,
+    view_picture,
+)
+from explorer.app.session.session import Who
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import open_button, press_button
+from explorer.app.widgets.markup import box
+
+PRESS = "export"
 PICTURES: dict[str, tuple[int, int] | float] = {
     "PNG 1920 × 1080": (1920, 1080),
     "PNG 3840 × 2160": (3840, 2160),
@@ -14,6 +35,120 @@ PICTURES: dict[str, tuple[int, int] | float] = {
 }
 """Formats of pictures: width and height, or a factor on the size in the browser."""
 REPORTS: dict[str, ReportFormat] = {"HTML": "html", "PDF": "pdf"}
+# Background of the scene on viser's page, by whether it is dark.
+BACKGROUNDS = {False: (255, 255, 255), True: (20, 20, 20)}
+
+
+def send_picture(
+    services: Services, size: tuple[float, float] | float, who: Who, *, transparent: bool = False
+) -> None:
+    """Send the view of a browser as PNG, drawn by that browser.
+
+    Args:
+        services: Services of the page.
+        size: Width and height in pixels, or a factor on the size in the browser.
+        who: Client of the browser.
+        transparent: Whether the scene has no background.
+    """
+
+    def make(client: viser.ClientHandle) -> File:
+        sides = check_size(*size) if isinstance(size, tuple) else scaled_size(client, size)
+        background = None if transparent else BACKGROUNDS[services.theme.is_dark]
+        data = view_picture(client, sides, background, without=(HANDLE_NAME,))
+        return f"{services.session.state.design.name}-{sides[0]}x{sides[1]}.png", data
+
+    services.downloads.make(who, "Drawing the picture", make)
+
+
+def send_scene(services: Services, who: Who) -> None:
+    """Send the scene as an HTML file with the present camera of the browser."""
+
+    def make(client: viser.ClientHandle) -> File:
+        state, date = services.session.settled(), dt.datetime.now().astimezone().date()
+        data = scene_html(services.server, state, FileCamera.of(client), date=date)
+        return f"{state.design.name}-scene.html", data
+
+    services.downloads.make(who, "Packing the scene", make)
+
+
+def send_report(services: Services, file_format: ReportFormat, who: Who) -> None:
+    """Send the report of the design in its present pose."""
+    state = services.session.settled()
+    services.downloads.compute(
+        who,
+        f"{state.design.name}-report.{file_format}",
+        make_report,
+        (state.design, state.pose, state.optimisation.record, file_format),
+        ("Writing the report", "This takes some seconds."),
+    )
+
+
+class ExportDialog:
+    """A row for each thing, with a button for each format; then pictures of any size."""
+
+    def __init__(self, services: Services) -> None:
+        gui, buttons = services.gui, services.buttons
+        sends: dict[str, Callable[[Who], None]] = {}
+        for each in services.exports:
+            send = each.sender(services)
+            for name in each.formats:
+                value = f"{each.title} as {name}"
+                sends[value] = partial(send, name)
+                buttons.offer(f"Export › {each.title} › {name}", each.hint, PRESS, value)
+        buttons.on(PRESS, lambda value, client: sends[value](client.client_id), values=sends)
+        gui.add_html(box("".join(_row(each) for each in services.exports)))
+        with gui.add_folder("Picture of another size", expand_by_default=False):
+            hint = f"{LEAST} to {MOST} pixels."
+            sides = [
+                gui.add_number(f"{side} (px)", pixels, min=LEAST, max=MOST, step=1, hint=hint)
+                for side, pixels in (("Width", 1600), ("Height", 1200))
+            ]
+            transparent = gui.add_checkbox(
+                "Transparent", initial_value=False, hint="Leave out the background."
+            )
+            button = gui.add_button(
+                "Download picture",
+                icon=viser.Icon.PHOTO,
+                hint="PNG of the scene with its labels, from your camera.",
+            )
+        button.on_click(
+            lambda event: send_picture(
+                services,
+                (sides[0].value, sides[1].value),
+                event.client_id,
+                transparent=transparent.value,
+            )
+        )
+
+    def updates(self, _: Frame) -> Iterator[Update]:
+        """Yield nothing: the dialog stays as it is."""
+        return iter(())
+
+
+def _row(export: Export) -> str:
+    """Return a thing and the buttons of its formats, as HTML."""
+    buttons = "".join(
+        press_button(
+            PRESS,
+            f"{export.title} as {name}",
+            escape(name),
+            label=f"Export {export.title} as {name}",
+            class_name="ex-button",
+        )
+        for name in export.formats
+    )
+    return (
+        f'<div class="ex-export"><div><b>{escape(export.title)}</b>'
+        f'<div class="ex-dim">{escape(export.hint)}</div></div>'
+        f'<div class="ex-flow">{buttons}</div></div>'
+    )
+
+
+def export_button(_: Frame) -> str:
+    """Return the button of the bar that opens the dialog, as HTML."""
+    hint = "Download the workspace, the mechanism, pictures, reports and more."
+    return open_button("Export", "Export", hint=hint, class_name="ex-tool ex-outlined")
+
 
 SHARING = Feature(
     "sharing",
@@ -24,23 +159,19 @@ SHARING = Feature(
             "Report",
             "The design in its pose on a few pages: drawings, slices, tables, limits.",
             tuple(REPORTS),
-            lambda services: lambda name, who: services.get(SharedFiles).report(REPORTS[name], who),
+            lambda services: lambda name, who: send_report(services, REPORTS[name], who),
         ),
         Export(
             "Picture",
             "The scene with its labels, from your camera.",
             tuple(PICTURES),
-            lambda services: (
-                lambda name, who: services.get(SharedFiles).picture(
-                    PICTURES[name], transparent=False, client_id=who
-                )
-            ),
+            lambda services: lambda name, who: send_picture(services, PICTURES[name], who),
         ),
         Export(
             "Scene",
             "One file to turn and zoom in any browser, without network.",
             ("HTML",),
-            lambda services: lambda _, who: services.get(SharedFiles).scene(who),
+            lambda services: lambda _, who: send_scene(services, who),
         ),
     ),
 )

@@ -70,8 +70,8 @@ class FileCamera:
         return [
             {"type": f"SetCamera{part}Message", field: value, "initial": True}
             for part, field, value in (
-                ("Position", "position", _triple(self.position)),
-                ("LookAt", "look_at", _triple(self.look_at)),
+                ("Position", "position", tuple(self.position.tolist())),
+                ("LookAt", "look_at", tuple(self.look_at.tolist())),
                 ("UpDirection", "position", (0.0, 0.0, 1.0)),
                 ("Fov", "fov", self.fov),
             )
@@ -92,7 +92,9 @@ def scene_html(
     scripts: list[SceneMessage] = [
         {"type": "RunJavascriptMessage", "source": read_script(name)} for name in SCRIPTS
     ]
-    page = scene_as_html(server, lambda all_: [*shown(all_), *camera.messages(), *scripts])
+    page = scene_as_html(
+        server, lambda all_: [*visible_messages(all_), *camera.messages(), *scripts]
+    )
     title = f"{state.design.name} – flagged 4-4 manipulator"
     head, title_of_viser, rest = page.partition("<title>Viser</title>")
     body, end, after = rest.rpartition("</body>")
@@ -104,14 +106,16 @@ def scene_html(
     return f"{head}<title>{escape(title)}</title>{body}{caption}{end}{after}".encode()
 
 
-def shown(messages: Iterable[SceneMessage]) -> list[SceneMessage]:
+def visible_messages(messages: Iterable[SceneMessage]) -> list[SceneMessage]:
     """Return the messages of the visible nodes of a scene, without the drag handle."""
     all_ = list(messages)
     hidden = {m["name"] for m in all_ if m["type"] == VISIBILITY and not m["visible"]}
     hidden |= {m["name"] for m in all_ if m["type"] == HANDLE}
     seen: set[str] = set()
     for message in all_:
-        if "props" in message and not _is_scaffold(message):
+        # A frame without axes is invisible, there only for its children.
+        is_frame = message["type"] == "FrameMessage" and not message["props"]["show_axes"]
+        if "props" in message and not is_frame:
             lineage = _lineage(message["name"])
             if hidden.isdisjoint(lineage):
                 seen.update(lineage)
@@ -136,17 +140,7 @@ def caption_of(state: State, date: dt.date) -> str:
     )
 
 
-def _is_scaffold(message: SceneMessage) -> bool:
-    """Whether a message makes an invisible frame, there only for its children."""
-    return message["type"] == "FrameMessage" and not message["props"]["show_axes"]
-
-
 def _lineage(name: str) -> list[str]:
     """Return the names of a node of the scene and of its ancestors."""
     parts = name.split("/")
     return ["/".join(parts[: count + 1]) for count in range(len(parts))]
-
-
-def _triple(values: FloatArray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return (x, y, z)
