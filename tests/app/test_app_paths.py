@@ -31,16 +31,6 @@ from explorer.app.features.paths.actions import (
     ends_of,
     goal_of,
 )
-from explorer.app.features.paths.incidence_plots import (
-    FOLDS,
-    MARGINS,
-    IncidencePlot,
-    Quantity,
-    columns_of,
-    crossing_time,
-    crossing_words,
-)
-from explorer.app.features.paths.loads import PathShares
 from explorer.app.features.paths.panel import (
     ENDS,
     MODES,
@@ -50,9 +40,19 @@ from explorer.app.features.paths.panel import (
     end_numbers,
     plan_words,
 )
+from explorer.app.features.paths.plots import (
+    FOLDS,
+    MARGINS,
+    IncidencePlot,
+    PathShares,
+    Quantity,
+    crossing_time,
+    crossing_words,
+    incidence_columns,
+)
 from explorer.app.features.paths.runner import DIED, PathRunner
 from explorer.app.features.paths.scene import PathScene
-from explorer.app.features.paths.tasks import plan
+from explorer.app.features.paths.work import plan
 from explorer.app.scene.placing import Placed
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set, SetPose, SetPosition, SetVariable
@@ -265,7 +265,7 @@ def test_chart_shows_margins_or_folds_of_the_poses_over_time(
     quantity: Quantity, value_of: Callable[[Pose], FloatArray], first: int, last: int
 ) -> None:
     journey = journey_of(SetPathTime(3.0).apply(start_between(first, last)))
-    x, *curves, singular, now = columns_of(journey, quantity)
+    x, *curves, singular, now = incidence_columns(journey, quantity)
     assert (np.diff(x) >= 0.0).all()
     shown, is_singular = np.stack(curves, axis=1), np.isfinite(singular)
     for t, values in zip(x[~is_singular], shown[~is_singular], strict=True):

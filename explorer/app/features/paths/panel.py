@@ -19,14 +19,17 @@ from explorer.app.features.paths.actions import (
     goal_of,
     pose_of_end,
 )
-from explorer.app.features.paths.incidence_plots import (
+from explorer.app.features.paths.plots import (
     FOLDS,
     MARGINS,
     IncidencePlot,
+    JourneyLoads,
+    LoadPlot,
+    PathShares,
     crossing_words,
+    demand_note,
+    load_words,
 )
-from explorer.app.features.paths.load_plot import LoadPlot
-from explorer.app.features.paths.loads import JourneyLoads, PathShares, demand_note, load_words
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.tracks import Span

@@ -7,8 +7,8 @@ import time
 
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.forces.loads import load_of
-from explorer.app.features.paths import tasks
 from explorer.app.features.paths.actions import Advance, TakePlan
+from explorer.app.features.paths.work import PlanRequest, plan
 from explorer.app.session.jobs import Worker
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
@@ -27,7 +27,7 @@ class PathRunner(Runner):
     """Plays and plans paths as the frames request."""
 
     def __init__(self, services: Services) -> None:
-        self.worker = Worker(services.tell, preload=[tasks.__name__], died=DIED)
+        self.worker = Worker(services.tell, preload=[plan.__module__], died=DIED)
         self._session = services.session
         services.at_end(self.stop)
         self._stopped = threading.Event()
@@ -64,12 +64,16 @@ class PathRunner(Runner):
         request, design, paths = self._request, state.design, state.paths
         if paths.planning is None:
             return
-        tool, load = state.tool, None
-        if paths.holds_load:
-            view = state.view
-            density = view.prototype.density
-            load = tasks.LoadRequest(load_of(state), view.forces.weighed, density)
-        wanted = tasks.PlanRequest(design, *paths.planning, paths.seconds, tool, load)
+        tool, view = state.tool, state.view
+        wanted = PlanRequest(
+            design,
+            *paths.planning,
+            paths.seconds,
+            tool,
+            load_of(state) if paths.holds_load else None,
+            view.forces.weighed,
+            view.prototype.density,
+        )
 
         def take_path(path: PlannedPath) -> None:
             moves = len(path.poses) - 1
@@ -79,7 +83,7 @@ class PathRunner(Runner):
 
         self._order = self.worker.submit(
             "plan",
-            tasks.plan,
+            plan,
             (wanted,),
             take_path,
             lambda problem: self._finish(request, None, problem),

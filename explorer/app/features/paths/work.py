@@ -14,21 +14,6 @@ from explorer.statics.loaded import LoadedPose
 
 
 @dataclass(frozen=True)
-class LoadRequest:
-    """A load that a path has to hold.
-
-    Attributes:
-        load: (F; M) at the tool point, base axes, in N and N × unit.
-        weighed: Bodies whose weights act besides.
-        density: Density of the parts, in kg/m³.
-    """
-
-    load: Six
-    weighed: Weighed
-    density: float
-
-
-@dataclass(frozen=True)
 class PlanRequest:
     """A request for a path.
 
@@ -38,7 +23,10 @@ class PlanRequest:
         goal: Pose at the end.
         seconds: Longest time of the search, in seconds.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
-        load: Load that the path has to hold; None for none.
+        load: (F; M) at the tool point, base axes, in N and N × unit, that the path has to hold;
+            None for none.
+        weighed: Bodies whose weights act besides the load.
+        density: Density of the parts, in kg/m³.
     """
 
     design: Design
@@ -46,25 +34,26 @@ class PlanRequest:
     goal: Pose
     seconds: float
     tool: Triple | None = None
-    load: LoadRequest | None = None
+    load: Six | None = None
+    weighed: Weighed = "none"
+    density: float = 0.0
 
 
 def plan(request: PlanRequest) -> PlannedPath:
     """Return a path between two poses, see `explorer.paths.planning`."""
     design, start, load = request.design, request.start, request.load
-    forces, weights = None, None
+    weights = None
     if load is not None:
         own = None
-        if load.weighed == "payload and legs":
-            own = weights_of_parts(WeightsRequest(design, load.density)).weights
-        forces = load.load
-        weights = LoadedPose(design, start, forces, own, load.weighed != "none").weights
+        if request.weighed == "payload and legs":
+            own = weights_of_parts(WeightsRequest(design, request.density)).weights
+        weights = LoadedPose(design, start, load, own, request.weighed != "none").weights
     return plan_path(
         design,
         start,
         request.goal,
         seconds=request.seconds,
         tool=request.tool,
-        load=forces,
+        load=load,
         weights=weights,
     )

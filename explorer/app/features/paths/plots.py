@@ -1,0 +1,373 @@
+"""The charts over the time of a path: margins, folds, and shares of the limits under a load."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterable, Iterator
+from html import escape
+from typing import Any, NamedTuple
+
+import numpy as np
+import viser
+from numpy.typing import ArrayLike, NDArray
+from viser import uplot
+
+from explorer.app.features.feature import Services
+from explorer.app.features.forces.loads import Loads
+from explorer.app.state.frame import Frame
+from explorer.app.state.paths import Journey
+from explorer.app.state.state import State
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.charts import (
+    BLUE,
+    NEUTRAL,
+    ORANGE,
+    add_chart,
+    axis,
+    dots,
+    level_axis,
+    line,
+)
+from explorer.app.widgets.colours import MARGIN_COLOURS
+from explorer.app.widgets.markup import margin_name, note, signed, swatch
+from explorer.measures.blocks.block import MOST_SHARE, Share
+from explorer.mechanism.folds import to_folds
+from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins
+from explorer.mechanism.pose import Pose, rotation_from_quaternion
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_decimals, format_number
+from explorer.paths.loads import DemandedLoad, PathLoads
+from explorer.statics.reactions import PART_NAMES, has_limits
+
+# Dashes of the incidences' lines beside their colours, and the marks of the legend.
+DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
+STROKES = ("ex-stroke", "ex-stroke is-dashed", "ex-stroke is-dotted")
+# Room above and below the values of a chart, as a share of their span.
+ROOM = 0.08
+# Heights of the charts between their axes, in pixels.
+INCIDENCE_HEIGHT, LOAD_HEIGHT = 78, 62
+# Number of crossings that are listed; the others are counted.
+MOST_LISTED = 4
+# Least and greatest top of the chart, in percent; beyond it shares leave the chart.
+LEAST_TOP, MOST_TOP = 120.0, 250.0
+
+
+def add_time_chart(
+    gui: viser.GuiApi,
+    series: tuple[uplot.Series, ...],
+    vertical: uplot.Axis,
+    levels: uplot.Axis,
+    *,
+    height: int,
+    has_times: bool = True,
+) -> viser.GuiUplotHandle:
+    """Add a chart without words at its axis of time, which the slider above it names.
+
+    Args:
+        gui: Controls of the page.
+        series: Its lines and dots, without the line at the present time.
+        vertical: Its vertical axis.
+        levels: The axis of its levels, at the right.
+        height: Height between its axes, in pixels.
+        has_times: Whether the axis of time has numbers; those of a chart below serve it too.
+    """
+    room = 26 if has_times else 8
+    time = axis("", label_size=0, size=room)
+    if not has_times:
+        time["values"] = ()
+    return add_chart(
+        gui,
+        (*series, line("now", NEUTRAL, width=1.5)),
+        (time, vertical, levels),
+        height=8 + height + room,
+        padding=(8, 0, 0, 0),
+    )
+
+
+def time_columns(
+    times: FloatArray, curves: Iterable[FloatArray], now: float, span: tuple[float, float]
+) -> tuple[NDArray[Any], ...]:
+    """Return the columns of a chart: times in their order, the curves, the line at the present.
+
+    Args:
+        times: Times of the rows, shape (n,), in seconds.
+        curves: Values of the rows, and twice that at the present time, shape (n + 2,) each.
+        now: The present time, in seconds.
+        span: Values at the bottom and the top of the chart, between which the line goes.
+    """
+    x = np.concatenate([times, [now, now]])
+    order = np.argsort(x, kind="stable")
+    present = np.concatenate([np.full(len(times), np.nan), span])
+    return tuple(column[order] for column in (x, *curves, present))
+
+
+@functools.cache
+def blank_columns(curves: int, span: tuple[float, float]) -> tuple[NDArray[Any], ...]:
+    """Return the columns of a chart while there is no path: a second without values."""
+    return time_columns(np.ones(1), np.full((curves, 3), np.nan), 0.0, span)
+
+
+def time_updates(
+    chart: viser.GuiUplotHandle, columns: tuple[NDArray[Any], ...]
+) -> Iterator[Update]:
+    """Yield the updates that make a chart show its columns."""
+    duration = max(float(columns[0][-1]), 1e-9)
+    span = float(np.nanmin(columns[-1])), float(np.nanmax(columns[-1]))
+    yield chart, "scales", {"x": {"time": False, "range": (0.0, duration)}, "y": {"range": span}}
+    yield chart, "data", columns
+
+
+class JourneyLoads(NamedTuple):
+    """The shares of the limits along a path over time.
+
+    Attributes:
+        time: Times of the samples, in seconds, shape (n,).
+        path: The shares along the path.
+    """
+
+    time: FloatArray
+    path: PathLoads
+
+    @property
+    def seconds(self) -> float:
+        """Time at which the largest share occurs."""
+        return float(np.interp(self.path.place, self.path.at, self.time))
+
+
+class PathShares:
+    """The shares along the path of the present frame, computed anew if path or load change."""
+
+    def __init__(self, services: Services) -> None:
+        self._loads = services.get(Loads)
+        self._key: tuple[object, ...] = ()
+        self._shares: JourneyLoads | None = None
+
+    def of(self, frame: Frame) -> JourneyLoads | None:
+        """Return the shares along the path of a frame; None without a path or without limits."""
+        journey, loaded = frame.state.journey, self._loads.of(frame)
+        if journey is None or not has_limits(loaded.design):
+            return None
+        path = journey.kind, journey.design, journey.poses, journey.tool
+        key = *path, loaded.load, loaded.weights
+        if key != self._key:
+            demanded = DemandedLoad.of(journey.design, loaded.load, loaded.weights)
+            along, timed = demanded.over(journey.margins, journey.tool), journey.trajectory
+            self._shares = JourneyLoads(np.interp(along.at, timed.at, timed.time), along)
+            self._key = key
+        return self._shares
+
+
+def load_words(loads: JourneyLoads) -> str:
+    """Return the largest share of a limit along a path, its bound and its place, as HTML."""
+    share, bound, part = loads.path.share, loads.path.bound, loads.path.part
+    at = f"at {format_decimals(loads.seconds, 2)} s"
+    hint = ""
+    if part is None:
+        words = f"Nothing holds a load {at}: singular" if share else "No part bears a load"
+    else:
+        number = f"{format_number(100.0 * share, 3)} %" if share < MOST_SHARE else "∞"
+        most = "no bound" if math.isinf(bound) else f"{format_number(100.0 * bound, 3)} % at most"
+        words = f"Largest share {number} ({most}): {PART_NAMES[part]}, {at}"
+        hint = f"That of {len(loads.time)} samples; in parentheses a bound of all between them"
+    return f'<div class="ex-{Share(share).look}" title="{hint}">{escape(words)}</div>'
+
+
+def demand_note(state: State) -> str:
+    """Return what the demand for a load means if nothing has a limit, as HTML; "" otherwise."""
+    paths = state.paths
+    if has_limits(state.design) or not paths.holds_load or paths.kind != "planned":
+        return ""
+    return note("No part has a limit, so every load is held: see the tab Machine.")
+
+
+class Quantity(NamedTuple):
+    """A number of each incidence that a chart shows.
+
+    Attributes:
+        name: Its name, with braces for the number of the incidence.
+        vertical: The vertical axis.
+        flat: Its values where a fold is flat.
+        decimals: Decimals of its values in the legend.
+        unit: Unit behind them.
+        of: Returns the values, shape (..., 3), of positions (..., 3) and rotations (..., 3, 3).
+    """
+
+    name: str
+    vertical: uplot.Axis
+    flat: tuple[float, ...]
+    decimals: int
+    unit: str
+    of: Callable[[ArrayLike, ArrayLike], FloatArray]
+
+
+def fold_magnitudes(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """Return the folds without their signs, in degrees, shape (..., 3).
+
+    Args:
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+    """
+    return np.degrees(np.abs(to_folds(position, rotation)[..., 3:]))
+
+
+MARGINS = Quantity(
+    "δ{}", axis("δ (units)", label_size=18, size=40, space=18), (0.0,), 2, "", margins
+)
+FOLDS = Quantity(
+    "|φ{}|",
+    axis("fold |φ| (°)", label_size=18, size=40) | {"splits": (0.0, 90.0, 180.0)},
+    (0.0, 180.0),
+    0,
+    "°",
+    fold_magnitudes,
+)
+
+
+class IncidencePlot:
+    """The chart of a quantity and its legend, empty while there is no path.
+
+    Args:
+        gui: Controls of the page.
+        quantity: What it shows.
+        has_times: Whether the axis of time has numbers; those of a chart below serve it too.
+    """
+
+    def __init__(self, gui: viser.GuiApi, quantity: Quantity, *, has_times: bool = True) -> None:
+        self._quantity = quantity
+        self._legend = gui.add_html("", visible=False)
+        lines = (
+            line(quantity.name.format(index), colour, dash=dash)
+            for index, colour, dash in zip((1, 2, 3), MARGIN_COLOURS, DASHES, strict=True)
+        )
+        self._chart = add_time_chart(
+            gui,
+            (*lines, dots("singular", ORANGE, 9)),
+            quantity.vertical,
+            level_axis(quantity.flat, "flat", ORANGE),
+            height=INCIDENCE_HEIGHT,
+            has_times=has_times,
+        )
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the chart and its legend show the frame."""
+        journey, quantity = frame.state.journey, self._quantity
+        yield from time_updates(self._chart, incidence_columns(journey, quantity))
+        # viser's chart draws no numbers below it if it appears while it is given data time after
+        # time; so it does not wait for a path that is played at once.
+        yield self._chart, "visible", True
+        yield self._legend, "visible", journey is not None
+        if journey is not None:
+            yield self._legend, "content", legend(journey.pose, quantity)
+
+
+def incidence_columns(journey: Journey | None, quantity: Quantity) -> tuple[NDArray[Any], ...]:
+    """Return the columns of the chart: time, the three values, singular poses, present time."""
+    if journey is None:
+        return blank_columns(4, span_of(quantity.flat))
+    timed, crossings = journey.trajectory, journey.margins.crossings
+    poses = [*(crossing.pose for crossing in crossings), journey.pose, journey.pose]
+    values = quantity.of(
+        np.concatenate([timed.position, [pose.position for pose in poses]]),
+        np.concatenate(
+            [rotation_from_quaternion(timed.quaternion), [pose.rotation for pose in poses]]
+        ),
+    )
+    singular = np.full(len(values), np.nan)
+    for row, crossing in enumerate(crossings, start=len(timed.time)):
+        singular[row] = values[row, crossing.incidence - 1]
+    crossing_times = [crossing_time(journey, index) for index in range(len(crossings))]
+    times = np.concatenate([timed.time, crossing_times])
+    # Without the present pose: the axis must not change while the path is played.
+    span = span_of(np.append(values[: len(times)], quantity.flat))
+    return time_columns(times, (*values.T, singular), journey.at, span)
+
+
+def span_of(values: ArrayLike) -> tuple[float, float]:
+    """Return the bottom and the top of a chart of some values, with room beyond them."""
+    low, high = float(np.min(values)), float(np.max(values))
+    room = ROOM * (high - low) or 1.0
+    return low - room, high + room
+
+
+def crossing_time(journey: Journey, index: int) -> float:
+    """Return the time of a crossing of the path, in seconds."""
+    crossing, trajectory = journey.margins.crossings[index], journey.trajectory
+    return float(np.interp(crossing.move + crossing.share, trajectory.at, trajectory.time))
+
+
+def legend(pose: Pose, quantity: Quantity) -> str:
+    """Return the lines of the chart with the values of a pose, in one line of HTML."""
+    values = quantity.of(pose.position, pose.rotation).tolist()
+    parts = (
+        f'<span class="ex-whole" title="{escape(incidence)}">{swatch(colour, look)}'
+        f"{margin_name(index, quantity.name)} "
+        f"<b>{signed(value, quantity.decimals)}{quantity.unit}</b></span>"
+        for index, colour, look, incidence, value in zip(
+            (1, 2, 3), MARGIN_COLOURS, STROKES, INCIDENCES, values, strict=True
+        )
+    )
+    return f'<div class="ex-note ex-thirds">{"".join(parts)}</div>'
+
+
+def crossing_words(journey: Journey) -> str:
+    """Return where the path is singular, in one line of HTML."""
+    along_path = journey.margins
+    places = [
+        f"δ{c.incidence} = 0 at {format_decimals(crossing_time(journey, i), 2)} s"
+        f"{'' if c.changes_sign else ', only touched'}"
+        for i, c in enumerate(along_path.crossings)
+    ]
+    places += [f"δ{index} = 0 along a whole move" for index in along_path.lies_in]
+    if not places:
+        index = int(np.argmin(along_path.least))
+        return (
+            f'<div class="ex-within" title="{MARGIN_KINDS}">No singular pose; '
+            f"least |δ{index + 1}| = {format_number(along_path.least[index], 3)} units</div>"
+        )
+    more = len(places) - MOST_LISTED
+    listed = "; ".join(places[:MOST_LISTED]) + (f"; and {more} more" if more > 0 else "")
+    times = "once" if len(places) == 1 else f"{len(places)} times"
+    dot = swatch(ORANGE, "ex-dot")
+    return f"<div>{dot}Singular {times}: {listed}</div>"
+
+
+class LoadPlot:
+    """The chart, for designs with limits."""
+
+    def __init__(self, gui: viser.GuiApi, shares: PathShares) -> None:
+        self._shares = shares
+        self._chart = add_time_chart(
+            gui,
+            (line("share", BLUE), line("beyond the limit", ORANGE)),
+            axis("share (%)", label_size=18, size=40, space=22),
+            level_axis((100.0,), "limit", NEUTRAL),
+            height=LOAD_HEIGHT,
+        )
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the chart show the frame."""
+        journey, loads = frame.state.journey, self._shares.of(frame)
+        if journey is None or loads is None:
+            columns = blank_columns(2, (0.0, LEAST_TOP))
+        else:
+            columns = load_columns(loads, journey.at)
+        yield from time_updates(self._chart, columns)
+        # It does not wait for a path, as those of margins and folds.
+        yield self._chart, "visible", has_limits(frame.state.design)
+
+
+def load_columns(loads: JourneyLoads, now: float) -> tuple[NDArray[Any], ...]:
+    """Return the columns of the chart: time, share, share beyond the limit, and present time.
+
+    Args:
+        loads: The shares over time.
+        now: The present time, in seconds.
+    """
+    # Room above the largest share and the limit, in percent.
+    top = float(np.clip(115.0 * loads.path.share, LEAST_TOP, MOST_TOP))
+    # Far above the chart a line is as good as at infinity.
+    percent: FloatArray = np.minimum(100.0 * loads.path.shares.max(axis=1), 4.0 * top)
+    share = np.append(percent, np.interp([now, now], loads.time, percent))
+    beyond = np.where(share > 100.0, share, np.nan)
+    return time_columns(loads.time, (share, beyond), now, (0.0, top))
