@@ -36,22 +36,26 @@ from explorer.app.features.optimise.actions import (
     TakePaperBox,
 )
 from explorer.app.features.optimise.buttons import ACCEPT, CANCEL, HULL, LIFT, PAPER, REVERT, START
-from explorer.app.features.optimise.limits import limit_rows
-from explorer.app.features.optimise.panel import OptimisePanel
-from explorer.app.features.optimise.plots import curves_of, data_of
-from explorer.app.features.optimise.problem import (
+from explorer.app.features.optimise.feature import edges_of, visible_box
+from explorer.app.features.optimise.panel import OptimisePanel, charted_iterates, data_of
+from explorer.app.features.optimise.runner import Optimiser
+from explorer.app.features.optimise.words import (
+    comparison_table,
+    limit_rows,
+    result_words,
+    search_notice,
+)
+from explorer.app.features.optimise.work import (
     box_within,
+    compare,
     find_refusals,
     liftable_limits,
+    optimise,
     problem_of,
     requested_box,
     requested_reach,
     requested_volume,
 )
-from explorer.app.features.optimise.runner import Optimiser
-from explorer.app.features.optimise.scene import FARTHEST, box_shown, edges_of, single
-from explorer.app.features.optimise.tasks import compare, optimise
-from explorer.app.features.optimise.words import comparison_table, result_words, search_notice
 from explorer.app.session.session import UNDO
 from explorer.app.session.worker import Channel
 from explorer.app.state.action import Action
@@ -72,6 +76,7 @@ from explorer.errors import InputError
 from explorer.measures.size import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
+from explorer.optimise.curves import curves_of
 from explorer.optimise.defaults import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
@@ -533,30 +538,18 @@ def test_limits_in_force_are_listed_and_no_others() -> None:
 
 
 def test_required_box_is_drawn_where_it_is() -> None:
-    assert box_shown(own_state()) is None
+    assert visible_box(own_state()) is None
     state = start(replace(MARGIN, free=(PLACE,)))
     box = requested_box(state)
-    assert box_shown(state) == box
+    assert visible_box(state) == box
     edges = edges_of(box)
     sides = np.ptp(np.array(box), axis=0)
     assert np.sort(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)) == pytest.approx(
         np.sort(np.repeat(sides, 4))
     )
     shifted = replace(iterates_of(state, 1)[0], values=(0.5, -0.25, 1.0))
-    assert np.array(box_shown(end(state, (shifted,)))) == pytest.approx(
+    assert np.array(visible_box(end(state, (shifted,)))) == pytest.approx(
         np.array(box) + shifted.values
-    )
-
-
-@pytest.mark.parametrize("scale", [1.0, 1e-6, 1e9])
-@pytest.mark.parametrize("size", [1.0, 1e39, 1.7e308])
-def test_required_box_beyond_single_precision_is_drawn_at_its_end(
-    size: float, scale: float
-) -> None:
-    points = single(np.array([[-size, 0.0, size]]), scale)
-    assert np.isfinite(points).all()
-    assert points[0].tolist() == pytest.approx(
-        [-min(size * scale, FARTHEST), 0.0, min(size * scale, FARTHEST)], rel=1e-6
     )
 
 
@@ -582,11 +575,12 @@ def test_table_shows_old_and_new_and_their_difference(found: State) -> None:
 def test_charts_are_of_one_start_and_of_the_demands() -> None:
     state = start(ENDLESS)
     run = run_of(state)
-    assert curves_of(run) == []
+    assert charted_iterates(run) == []
     iterates = iterates_of(state, 8)
     assert {each.run for each in iterates} == {0, 1}
     last = [each for each in iterates if each.run == 1]
-    reach, volume, spare = curves_of(run_of(Advance(run.number, iterates).apply(state)))
+    drawn = charted_iterates(run_of(Advance(run.number, iterates).apply(state)))
+    reach, volume, spare = curves_of(run.problem, drawn)
     assert reach.values.tolist() == [each.objective for each in last]
     assert volume.values.tolist() == [each.volume for each in last]
     assert (volume.level, spare.level) == (7053.0, 0.0)
@@ -596,5 +590,6 @@ def test_charts_are_of_one_start_and_of_the_demands() -> None:
     # An exact match is drawn as the least power.
     small = start()
     first, second = iterates_of(small, 2)
-    powers = curves_of(run_of(end(small, (first, replace(second, objective=0.0)))))[0].values
+    ended = run_of(end(small, (first, replace(second, objective=0.0))))
+    powers = curves_of(ended.problem, charted_iterates(ended))[0].values
     assert powers.tolist() == [np.log10(first.value), -16.0]

@@ -12,8 +12,8 @@ from report_page import read
 
 from explorer.app.features.compare.table import Column, table
 from explorer.app.features.compare.work import ComparedRequest, compared_drawing
-from explorer.app.features.optimise.tasks import compare
 from explorer.app.features.optimise.words import measure_rows
+from explorer.app.features.optimise.work import compare
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.words import chips
 from explorer.app.state.compared import unnamed

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import msgspec
 
-from explorer.app.features.optimise.problem import find_refusals, problem_of
+from explorer.app.features.optimise.work import find_refusals, problem_of
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Open, Set, check_free, moved
 from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult

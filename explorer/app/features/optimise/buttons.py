@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
+import viser
+
 from explorer.app.features.designs.saved_designs import send_design
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise.actions import (
@@ -20,12 +22,12 @@ from explorer.app.features.optimise.actions import (
     TakePaperBox,
     TakePaperProblem,
 )
-from explorer.app.features.optimise.problem import box_on_offer, find_refusals, liftable_limits
+from explorer.app.features.optimise.work import box_on_offer, find_refusals, liftable_limits
 from explorer.app.features.workspace.feature import send_workspace
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
 from explorer.app.state.state import State
-from explorer.app.widgets.buttons import Does, press_button
+from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.commands import Key, shift, with_keys
 from explorer.optimise.record import encode_record
 
@@ -134,44 +136,40 @@ BUTTONS: Mapping[str, Button] = {
 """The buttons by their names."""
 
 
-class OptimiseButtons:
-    """Registers the buttons of the optimiser, and offers them in the palette."""
+def add_buttons(services: Services) -> None:
+    """Register the buttons of the optimiser, and offer them in the palette."""
+    session = services.session
 
-    def __init__(self, services: Services) -> None:
-        self._session = services.session
-        self._downloads = services.downloads
-        self._complain = services.complain
-        self._sends: Mapping[str, Callable[[Who], None]] = {
-            HULL: partial(send_workspace, services, "hull", "3mf", at_home=True),
-            DESIGN: partial(send_design, services),
-            RECORD: self._send_record,
-        }
-        for name, each in BUTTONS.items():
-            handler = self._send(name) if each.action is None else self._do(each.action)
-            services.buttons.on(name, handler)
-            services.buttons.offer(
-                f"Optimise › {each.label}",
-                each.hint,
-                name,
-                is_ready=lambda each=each: each.is_ready(self._session.state),
-                keys=each.keys,
-            )
-
-    def _send(self, name: str) -> Does:
-        return lambda _, client: self._sends[name](client.client_id)
-
-    def _do(self, action: Callable[[State, str], Action]) -> Does:
-        return lambda value, client: self._session.do(
-            lambda state: action(state, value), who=client.client_id
-        )
-
-    def _send_record(self, who: Who) -> None:
-        state = self._session.state
+    def send_record(who: Who) -> None:
+        state = session.state
         record = state.optimisation.record
         if record is None:
-            self._complain("a search that had to be ended leaves no record", who)
+            services.complain("a search that had to be ended leaves no record", who)
             return
-        self._downloads.send(who, f"{state.design.name}.record.json", encode_record(record))
+        services.downloads.send(who, f"{state.design.name}.record.json", encode_record(record))
+
+    sends: Mapping[str, Callable[[Who], None]] = {
+        HULL: partial(send_workspace, services, "hull", "3mf", at_home=True),
+        DESIGN: partial(send_design, services),
+        RECORD: send_record,
+    }
+
+    def press(name: str, value: str, client: viser.ClientHandle) -> None:
+        action = BUTTONS[name].action
+        if action is None:
+            sends[name](client.client_id)
+        else:
+            session.do(lambda state: action(state, value), who=client.client_id)
+
+    for name, each in BUTTONS.items():
+        services.buttons.on(name, partial(press, name))
+        services.buttons.offer(
+            f"Optimise › {each.label}",
+            each.hint,
+            name,
+            is_ready=lambda each=each: each.is_ready(session.state),
+            keys=each.keys,
+        )
 
 
 def button(

@@ -1,33 +1,42 @@
-"""The tab that optimises the design: its problem, the search with its result, and the charts.
-
-The three are columns side by side, as many as the tab has room for.
-"""
+"""The tab that optimises the design: its problem, the search with its result, and three charts."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from html import escape
+from itertools import zip_longest
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from viser import uplot
 
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise.actions import SetObjective, SetRequest
-from explorer.app.features.optimise.buttons import OptimiseButtons
-from explorer.app.features.optimise.plots import OptimisePlots
-from explorer.app.features.optimise.problem import (
+from explorer.app.features.optimise.buttons import add_buttons
+from explorer.app.features.optimise.words import result_words
+from explorer.app.features.optimise.work import (
     requested_box,
     requested_reach,
     requested_volume,
 )
-from explorer.app.features.optimise.words import result_words
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.optimisation import PLACE
-from explorer.app.state.state import State
+from explorer.app.state.state import Run, State
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.charts import BLUE, FONT, ORANGE, add_chart, line
+from explorer.app.widgets.colours import css
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.pose import Triple
-from explorer.optimise.problem import OVER_BOX, YAW, ObjectiveName
+from explorer.numerics.number_text import format_number
+from explorer.optimise.curves import CALLED, GOALS, Curve, curves_of
+from explorer.optimise.outcome import Iterate
+from explorer.optimise.problem import OVER_BOX, YAW, ObjectiveName, Problem
 from explorer.statics.compliance import is_elastic
 
 OBJECTIVES: dict[str, ObjectiveName] = {
@@ -48,6 +57,10 @@ FREE_LABELS = {YAW: "yaw of home", PLACE: "place of the box"}
 STEP = 0.001
 COLUMNS = '<div class="ex-columns"></div>'
 """Markup that makes the stylesheet put what follows it in a tab side by side."""
+# Height of a chart, in pixels.
+HEIGHT = 96
+# Padding of an axis beyond the values, as a share of their span.
+PADDING = 0.12
 
 
 class OptimisePanel:
@@ -55,7 +68,7 @@ class OptimisePanel:
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
-        services.get(OptimiseButtons)
+        add_buttons(services)
         self._controls = Controls(gui, services.session)
         gui.add_html(COLUMNS)
         with gui.add_folder("Problem, in design units"):
@@ -196,3 +209,89 @@ class OptimisePanel:
 def _label(measure: str) -> str:
     """Return the label of a demand: that of the measure which it bounds."""
     return CATALOGUE[measure].label.capitalize()
+
+
+class OptimisePlots:
+    """Captions and charts in a folder; hidden until there is a run."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        values: uplot.Series = {
+            "label": "value",
+            "stroke": css(BLUE),
+            "width": 2.0,
+            # uPlot shows points only where they do not touch.
+            "points": {"size": 5, "fill": css(BLUE)},
+        }
+        series = values, line("level", ORANGE, width=1.0, dash=(4, 4))
+        plain: uplot.Axis = {"gap": 3, "ticks": {"size": 4}, "font": FONT}
+        axes: tuple[uplot.Axis, ...] = (
+            {**plain, "size": 20, "space": 40},
+            {**plain, "size": 50, "space": 16},
+        )
+        self._folder = gui.add_folder("Course of the search", visible=False)
+        with self._folder:
+            self._charts = [
+                (
+                    gui.add_html("", visible=False),
+                    add_chart(gui, series, axes, height=HEIGHT, padding=(6, 14, 0, 0)),
+                )
+                for _ in range(3)
+            ]
+
+    def updates(self, run: Run | None) -> Iterator[Update]:
+        """Yield the updates that show a run."""
+        iterates = [] if run is None else charted_iterates(run)
+        drawn = [] if run is None or not iterates else curves_of(run.problem, iterates)
+        yield self._folder, "visible", bool(drawn)
+        for (caption, chart), curve in zip_longest(self._charts, drawn):
+            yield caption, "visible", curve is not None
+            yield chart, "visible", curve is not None
+            if run is not None and curve is not None:
+                name = escape(_name(run.problem, iterates[-1], curve))
+                yield caption, "content", f'<div class="ex-note ex-dim ex-cut">{name}</div>'
+                yield chart, "scales", _scales(curve)
+                yield chart, "data", data_of(curve)
+
+
+def charted_iterates(run: Run) -> list[Iterate]:
+    """Return the iterates of the present start; once the run has ended, of the best one."""
+    if not run.iterates:
+        return []
+    start = (run.best or run.iterates[-1]).run
+    return [iterate for iterate in run.iterates if iterate.run == start]
+
+
+def _name(problem: Problem, last: Iterate, curve: Curve) -> str:
+    """Return the name of the values of a curve, with the last one."""
+    if curve.kind == "spare":
+        return f"Worst constraint, broken below 0: {last.worst or 'none'}"
+    if curve.kind == "volume":
+        target = "" if curve.level is None else f", required {format_number(curve.level, 6)}"
+        return f"Volume (units³): {format_number(last.volume, 6)}{target}"
+    if curve.powers:
+        value = format_number(last.value, 2, size=1.0)
+        return f"log10 of F = |1 − V / V′|; F = {value}"
+    name = CALLED[problem.objective].capitalize()
+    unit = CATALOGUE[GOALS[problem.objective]].unit_in("units")
+    return f"{name}{f' ({unit})' if unit else ''}: {format_number(last.value, 6)}"
+
+
+def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:
+    """Return the columns of a chart: iterations, values, and the level or nothing."""
+    x = np.arange(len(curve.values), dtype=np.float64)
+    level = np.full(len(x), np.nan if curve.level is None else curve.level)
+    return x, curve.values, level
+
+
+def _scales(curve: Curve) -> dict[str, uplot.Scale]:
+    last = max(1.0, len(curve.values) - 1.0)
+    levels = [] if curve.level is None else [curve.level]
+    heights = [value for value in (*curve.values.tolist(), *levels) if math.isfinite(value)]
+    low, high = min(heights, default=0.0), max(heights, default=0.0)
+    if curve.powers:
+        low = math.floor(low)
+        edges = float(low), float(max(math.ceil(high), low + 1))
+    else:
+        room = PADDING * (high - low) or 0.05 * abs(high) or 1.0
+        edges = low - room, high + room
+    return {"x": {"time": False, "range": (0.0, last)}, "y": {"range": edges}}

@@ -11,8 +11,8 @@ import threading
 import time
 
 from explorer.app.features.feature import Runner, Services
-from explorer.app.features.optimise import tasks
 from explorer.app.features.optimise.actions import Advance, Compare, EndRun
+from explorer.app.features.optimise.work import compare, optimise
 from explorer.app.features.workspace.feeds import workspace_feed
 from explorer.app.session.jobs import Worker
 from explorer.app.state.action import Action
@@ -38,7 +38,7 @@ class Optimiser(Runner):
     """Runner that starts and cancels searches as the state requests, and shows their iterates."""
 
     def __init__(self, services: Services) -> None:
-        self.worker = Worker(services.tell, preload=[tasks.__name__], died=DIED)
+        self.worker = Worker(services.tell, preload=[optimise.__module__], died=DIED)
         self._session = services.session
         # The drawings tell whether the page shows all of the last iterate.
         self._drawings = services.get(workspace_feed)
@@ -92,7 +92,7 @@ class Optimiser(Runner):
             self._is_cancelled, self._advanced = False, 0.0
         self._order = self.worker.submit(
             "optimise",
-            tasks.optimise,
+            optimise,
             (run.problem, run.starts),
             self._ended,
             self._ended,
@@ -153,7 +153,7 @@ class Optimiser(Runner):
         boxes = (box, None if box is None else problem.required_box_at(best.values))
         self.worker.submit(
             "compare",
-            tasks.compare,
+            compare,
             (run.own.design, best.design, margin, boxes),
             lambda comparison: self._session.do(Compare(run.number, comparison)),
             lambda _: None,

@@ -1,4 +1,4 @@
-"""The search as HTML: what prevents it, its progress, its verdict and the comparison."""
+"""The search as HTML: what prevents it, its progress, its verdict, and the limits in force."""
 
 from __future__ import annotations
 
@@ -21,20 +21,30 @@ from explorer.app.features.optimise.buttons import (
     START,
     button,
 )
-from explorer.app.features.optimise.limits import limits_table
-from explorer.app.features.optimise.problem import (
+from explorer.app.features.optimise.work import (
     box_on_offer,
     find_refusals,
     liftable_limits,
 )
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import Run, State
-from explorer.app.widgets.markup import alert, box, dim, meter, row, sentence, signed, status, table
+from explorer.app.widgets.markup import (
+    alert,
+    box,
+    caption,
+    dim,
+    meter,
+    row,
+    sentence,
+    signed,
+    status,
+    table,
+)
 from explorer.measures.blocks.block import Look
 from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.clearance import CERTAIN
 from explorer.measures.measurements import Measurements
-from explorer.mechanism.design import VARIABLES
+from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.number_text import decimals_for, format_decimals, format_number
 from explorer.optimise.conflicts import Conflict
 from explorer.optimise.curves import CALLED, GOALS
@@ -48,6 +58,8 @@ from explorer.optimise.problem import (
     YAW,
     Problem,
 )
+from explorer.workspace.limits.limit import DIGITS as LIMIT_DIGITS
+from explorer.workspace.limits.table import limits_in_force
 
 TITLES = {
     "converged": "Converged",
@@ -65,7 +77,7 @@ LACKING = {
 # Limits of refusals without a problem that could be searched.
 NO_PROBLEM = ("", SWING_LIMIT, MAXIMA, *LACKING)
 # Significant digits of the larger of two compared numbers.
-DIGITS = 6
+COMPARED_DIGITS = 6
 
 
 @dataclass(frozen=True)
@@ -339,11 +351,11 @@ def _row(line: Row, *, is_first: bool = False) -> str:
     """Return a row of the table; the first of a group has a line above."""
     both = (line.before, line.after)
     finite = [value for value in both if value is not None and math.isfinite(value)]
-    largest = max(map(abs, finite), default=0.0)
-    digits = 0 if line.is_whole else decimals_of(largest)
+    digits = 0 if line.is_whole else decimals_of(max(map(abs, finite), default=0.0))
     change = ""
     if len(finite) == 2 and not line.names:
-        change = _change(finite[1] - finite[0], digits)
+        change = format_decimals(finite[1] - finite[0], digits, signed=True)
+        change = change if change.strip("0.") else "0"
     if line.look is not None:
         change = f'<span class="ex-{line.look}">{change}</span>'
     name, _, unit = line.name.partition(", ")
@@ -358,8 +370,8 @@ def _row(line: Row, *, is_first: bool = False) -> str:
 
 
 def decimals_of(size: float) -> int:
-    """Return the decimals with which a number of a size has `DIGITS` digits, 4 at most."""
-    return min(4, decimals_for(size, DIGITS)) if size > 0.0 else 1
+    """Return the decimals with which a number of a size has `COMPARED_DIGITS` digits, 4 at most."""
+    return min(4, decimals_for(size, COMPARED_DIGITS)) if size > 0.0 else 1
 
 
 def _value(line: Row, value: float | None, digits: int) -> str:
@@ -370,10 +382,25 @@ def _value(line: Row, value: float | None, digits: int) -> str:
     return line.names[round(value) - 1] if line.names else signed(value, digits)
 
 
-def _change(value: float, digits: int) -> str:
-    text = format_decimals(value, digits, signed=True)
-    return text if text.strip("0.") else "0"
-
-
 def _pair(legs: tuple[int, int] | None) -> str:
     return "" if legs is None else f"; in the new design that of legs {legs[0]} and {legs[1]}"
+
+
+def limits_table(design: Design) -> str:
+    """Return the limits in force as HTML, a row for those of equal words."""
+    hint = "They hold throughout a search; the tab Design changes them."
+    rows = "".join(row(dim(name), text) for name, text in limit_rows(design))
+    return (
+        f'<div class="ex-after" title="{hint}">{caption("Limits in force, in design units")}'
+        f'<table class="ex-limits">{rows}</table></div>'
+    )
+
+
+def limit_rows(design: Design) -> Iterator[tuple[str, str]]:
+    """Yield the symbols and the words of the limits that are in force."""
+    for symbols, demand in limits_in_force(design):
+        yield symbols, demand.words()
+    radii = design.limits.leg_radii
+    if any(radii):
+        ends = sorted({min(radii), max(radii)})
+        yield "leg radii", " to ".join(format_number(end, LIMIT_DIGITS) for end in ends)

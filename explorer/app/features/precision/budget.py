@@ -10,7 +10,8 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.optimise.problem import requested_box
+from explorer.app.features.optimise.work import requested_box
+from explorer.app.features.precision.budget import SetTolerances
 from explorer.app.features.precision.tasks import (
     BudgetDrawing,
     BudgetRequest,

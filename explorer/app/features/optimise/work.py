@@ -1,4 +1,4 @@
-"""The problem of the optimiser for a design, with values that suit the design by default."""
+"""The problem of the optimiser with values that suit a design, and the tasks of its process."""
 
 from __future__ import annotations
 
@@ -8,9 +8,13 @@ from functools import lru_cache
 import msgspec
 import numpy as np
 
-from explorer.app.state.optimisation import PLACE, OptimisationRequest
+from explorer.app.session.worker import Channel
+from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
+from explorer.measures.case import Case
+from explorer.measures.catalogue import measures_in
+from explorer.measures.measurements import measure_design
 from explorer.measures.size import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.optimise.conflicts import (
@@ -22,12 +26,14 @@ from explorer.optimise.conflicts import (
 )
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.demands import Box
+from explorer.optimise.outcome import Outcome
 from explorer.optimise.problem import (
     SHIFTS,
     YAW,
     Problem,
     StartError,
 )
+from explorer.optimise.solver import optimise_design
 from explorer.workspace.limits.constraints import Never, constraints
 from explorer.workspace.slices.volume import workspace_volume
 
@@ -185,3 +191,40 @@ def _default_volume(design: Design, *, same: bool) -> float:
         return float(f"{volume:.6g}")
     power = 10.0 ** math.floor(math.log10(MORE * volume))
     return math.ceil(MORE * volume / power) * power
+
+
+def optimise(problem: Problem, starts: int, channel: Channel) -> Outcome:
+    """Search for the best design, and send each iterate to the parent.
+
+    Args:
+        problem: Problem to solve.
+        starts: Number of designs to start from.
+        channel: Channel to the parent.
+
+    Raises:
+        InputError: see `optimise_design`.
+    """
+    return optimise_design(problem, starts=starts, watch=channel.send, stop=channel.is_cancelled)
+
+
+def compare(
+    before: Design,
+    after: Design,
+    demanded_margin: float | None,
+    boxes: tuple[Box | None, Box | None],
+) -> Comparison:
+    """Return the measures of two designs.
+
+    Args:
+        before: Design to compare with.
+        after: Other design.
+        demanded_margin: Margin from which on a clearance is demanded; None without a demand.
+        boxes: Box of each for its least margin, or None.
+    """
+    first, second = (
+        measure_design(
+            Case(design, demanded_margin=demanded_margin, box=box), measures_in("optimise")
+        )
+        for design, box in zip((before, after), boxes, strict=True)
+    )
+    return Comparison(first, second)
