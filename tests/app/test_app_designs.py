@@ -104,11 +104,13 @@ def test_preset_is_saved_only_as_a_copy(desk: Desk, saved: SavedDesigns) -> None
     assert names(saved) == [desk.state.design.name] == ["paper-optimal copy"]
 
 
-def test_design_is_renamed_copied_deleted_and_restored(desk: Desk, saved: SavedDesigns) -> None:
+def test_design_is_renamed_copied_deleted_and_restored(
+    desk: Desk, saved: SavedDesigns, library: Library
+) -> None:
     save_as(desk, saved, "mine")
     for act, expected in (
         (lambda: saved.rename("mine", "yours"), ["yours"]),
-        (lambda: saved.duplicate("yours"), ["yours", "yours copy"]),
+        (lambda: saved.copy(library.open("yours")), ["yours", "yours copy"]),
         (lambda: saved.delete("yours"), ["yours copy"]),
         (saved.restore, ["yours", "yours copy"]),
         (saved.restore, ["yours", "yours copy"]),

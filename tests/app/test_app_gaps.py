@@ -36,8 +36,8 @@ from explorer.app.features.mechanism.marks import (
     DragHandle,
     hides_a_gap,
 )
-from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum
 from explorer.app.features.singularity.panel import SingularityPanel, distance_table
+from explorer.app.features.singularity.work import GoToSingularity, GoToStratum
 from explorer.app.features.view.ground import TO_SUN, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import linear_colour, plate

@@ -19,7 +19,7 @@ from socket_tab import SocketTab
 import explorer.app
 from explorer.app.features.optimise.actions import CancelRun, EndRun, StartRun
 from explorer.app.features.paths.actions import Advance, CancelPlan, Go, Play, SetPathTime
-from explorer.app.features.singularity.actions import GoToSingularity
+from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.server import Running
 from explorer.app.session import gestures, history

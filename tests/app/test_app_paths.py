@@ -31,6 +31,7 @@ from explorer.app.features.paths.actions import (
     ends_of,
     goal_of,
 )
+from explorer.app.features.paths.feature import PathScene
 from explorer.app.features.paths.panel import (
     ENDS,
     MODES,
@@ -51,7 +52,6 @@ from explorer.app.features.paths.plots import (
     incidence_columns,
 )
 from explorer.app.features.paths.runner import DIED, PathRunner
-from explorer.app.features.paths.scene import PathScene
 from explorer.app.features.paths.work import plan
 from explorer.app.scene.placing import Placed
 from explorer.app.state.action import Action

@@ -25,7 +25,6 @@ from explorer.app.features.mechanism.modes import (
     hovered_mode,
     modes_table,
 )
-from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum, stratum_name
 from explorer.app.features.singularity.panel import (
     SingularityPanel,
     distance_table,
@@ -44,7 +43,14 @@ from explorer.app.features.singularity.scene import (
     show_button,
 )
 from explorer.app.features.singularity.strata import GOALS, StrataPanel, distances_of
-from explorer.app.features.singularity.work import STRATA_FEED, StrataRequest, strata_distances
+from explorer.app.features.singularity.work import (
+    STRATA_FEED,
+    GoToSingularity,
+    GoToStratum,
+    StrataRequest,
+    strata_distances,
+    stratum_name,
+)
 from explorer.app.scene.placing import Placed
 from explorer.app.session import clock
 from explorer.app.session.session import UNDO

@@ -32,8 +32,8 @@ from explorer.app.features.orientation.panel import OrientationPanel
 from explorer.app.features.orientation.scene import OrientationScene
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import Go
+from explorer.app.features.paths.feature import PathScene
 from explorer.app.features.paths.panel import TYPED, PathsPanel, end_numbers
-from explorer.app.features.paths.scene import PathScene
 from explorer.app.features.sharing.scene_html import caption_of
 from explorer.app.features.singularity.panel import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene

@@ -13,7 +13,7 @@ from limited_designs import scaled_design
 from tab import Tab
 
 from explorer.app.features.mechanism.marks import ARROW_LENGTH, HANDLE_NAME
-from explorer.app.features.singularity.actions import GoToSingularity
+from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.scene.camera import VIEWS, ViewName, framing
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS

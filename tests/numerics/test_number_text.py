@@ -8,8 +8,8 @@ import re
 import pytest
 from hypothesis import given, strategies as st
 
-from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.features.singularity.panel import distance_table, measures_table, summary
+from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.widgets.markup import signed

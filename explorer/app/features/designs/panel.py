@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from html import escape
 
@@ -66,12 +65,7 @@ class DesignName:
 
 
 def saved_words(live: Design, saved: Design | None) -> tuple[str, str]:
-    """Return whether a design is saved, in a word and in a sentence.
-
-    Args:
-        live: The live design.
-        saved: The saved design of the same name; None if there is none.
-    """
+    """Return in a word and in a sentence whether the saved design of its name is the live one."""
     if saved == live:
         return "saved", "Saved."
     if live == PRESETS.get(live.name):
@@ -79,23 +73,6 @@ def saved_words(live: Design, saved: Design | None) -> tuple[str, str]:
     if saved is None:
         return "not saved", "Not saved under a name yet; it comes back with the session."
     return "changed", "Changed since it was saved."
-
-
-@dataclass(frozen=True)
-class Row:
-    """A row of the list.
-
-    Attributes:
-        name: Name of the design.
-        design: The design; None if its file cannot be used.
-        problem: Why the file cannot be used; None if it can.
-        is_preset: Whether the design is a preset, which nobody can change.
-    """
-
-    name: str
-    design: Design | None
-    problem: str | None = None
-    is_preset: bool = False
 
 
 class DesignsPanel:
@@ -147,10 +124,10 @@ class DesignsPanel:
         self.restore.on_click(lambda event: saved.restore(event.client_id))
         buttons.on("designs.open", self._for_row(self._open))
         buttons.on("designs.duplicate", self._for_row(self._duplicate))
-        buttons.on("designs.delete", self._for_row(self._ask))
+        buttons.on("designs.delete", self._for_row(lambda row, _: self._set_asked(row.name)))
         buttons.on("designs.confirm", self._for_row(self._delete))
         buttons.on("designs.keep", self._for_row(lambda _, __: self._set_asked(None)))
-        self.rows: tuple[Row, ...] = ()
+        self.rows: tuple[Entry, ...] = ()
         # Name of the design that the page asks whether to delete.
         self.asked: str | None = None
         self._listed: tuple[object, ...] = ()
@@ -177,32 +154,26 @@ class DesignsPanel:
         state = self._session.settled()
         self._saved.rename(state.base.name, state.design.name, who)
 
-    def _open(self, row: Row, who: Who) -> None:
-        if row.is_preset and row.design is not None:
-            self._session.do(Open(row.design), who=who)
+    def _open(self, row: Entry, who: Who) -> None:
+        if row.name in PRESETS:
+            self._session.do(Open(PRESETS[row.name]), who=who)
         else:
             self._saved.open(row.name, who)
 
-    def _duplicate(self, row: Row, who: Who) -> None:
-        if row.is_preset and row.design is not None:
+    def _duplicate(self, row: Entry, who: Who) -> None:
+        if row.design is not None:
             self._saved.copy(row.design, who)
-        else:
-            self._saved.duplicate(row.name, who)
 
-    def _ask(self, row: Row, _: Who) -> None:
-        if not row.is_preset:
-            self._set_asked(row.name)
-
-    def _delete(self, row: Row, who: Who) -> None:
+    def _delete(self, row: Entry, who: Who) -> None:
         if row.name == self.asked:
             self._set_asked(None)
             self._saved.delete(row.name, who)
 
     def _set_asked(self, name: str | None) -> None:
-        self.asked = name
+        self.asked = name if name not in PRESETS else None
         self._session.redraw()
 
-    def _for_row(self, action: Callable[[Row, Who], None]) -> Does:
+    def _for_row(self, action: Callable[[Entry, Who], None]) -> Does:
         def press(name: str, client: viser.ClientHandle) -> None:
             row = next((row for row in self.rows if row.name == name), None)
             if row is not None:
@@ -211,20 +182,15 @@ class DesignsPanel:
         return press
 
 
-def rows_of(entries: Sequence[Entry]) -> tuple[Row, ...]:
+def rows_of(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     """Return the rows of the list: the designs of the user, then the presets."""
-    presets = [Row(design.name, design, is_preset=True) for design in PRESETS.values()]
-    own = [Row(entry.name, entry.design, entry.problem) for entry in entries]
-    return (*own, *presets)
+    return (*entries, *(Entry(name, "", design) for name, design in PRESETS.items()))
 
 
-def list_designs(rows: Sequence[Row], current: str, asked: str | None) -> str:
+def list_designs(rows: Sequence[Entry], current: str, asked: str | None) -> str:
     """Return the list in HTML, with the buttons of each row.
 
-    Args:
-        rows: The rows.
-        current: Name of the design that is open.
-        asked: Name of the design whose row asks whether to delete it; None for no question.
+    The open design is marked; the row of the design asked for asks whether to delete it.
     """
     head = (
         '<div class="ex-row ex-dim ex-small"><span class="ex-fill">Designs, the last saved on top'
@@ -236,7 +202,7 @@ def list_designs(rows: Sequence[Row], current: str, asked: str | None) -> str:
     return box(head, f'<div class="ex-designs">{lines}</div>')
 
 
-def _line(row: Row, *, is_current: bool, is_asked: bool) -> str:
+def _line(row: Entry, *, is_current: bool, is_asked: bool) -> str:
     if row.design is None:
         problem = escape(row.problem or "")
         name = (
@@ -245,7 +211,7 @@ def _line(row: Row, *, is_current: bool, is_asked: bool) -> str:
         )
         reach = copy = ""
     else:
-        tag = ' <span class="ex-dim">preset</span>' if row.is_preset else ""
+        tag = ' <span class="ex-dim">preset</span>' if row.name in PRESETS else ""
         name = press_button(
             "designs.open",
             row.name,
@@ -259,7 +225,7 @@ def _line(row: Row, *, is_current: bool, is_asked: bool) -> str:
             f"{format_number(length * row.design.unit_mm)} mm</span>"
         )
         copy = _link("duplicate", row.name, "Duplicate")
-    delete = "" if row.is_preset else _link("delete", row.name, "Delete")
+    delete = "" if row.name in PRESETS else _link("delete", row.name, "Delete")
     if is_asked:
         reach = "Delete it?"
         copy, delete = _link("confirm", row.name, "Delete"), _link("keep", row.name, "Keep")

@@ -117,10 +117,6 @@ class SavedDesigns:
         """Save a copy of a design under a new name; the live one stays as it is."""
         self._post(object(), lambda: self._copy(design), who)
 
-    def duplicate(self, name: str, who: Who = None) -> None:
-        """Save a saved design again under a new name."""
-        self._post(object(), lambda: self._copy(self._library.open(name)), who)
-
     def delete(self, name: str, who: Who = None) -> None:
         """Delete a saved design; `restore` brings it back."""
         self._post(object(), lambda: self._library.delete(name), who)

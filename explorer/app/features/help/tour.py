@@ -33,12 +33,9 @@ BUTTONS = {
 
 @dataclass(frozen=True)
 class Step:
-    """A step of the tour.
+    """A step of the tour: a task of the user with instructions, at a tab of the controls.
 
     Attributes:
-        title: Task of the user.
-        text: Instructions, and what to look at; plain text.
-        tab: Tab of the controls.
         is_done: Whether the user did it, from the frame in which it began and the present one.
         show: Action that does it for the user.
         after: Action when the user goes on; None for none.
@@ -104,13 +101,7 @@ STEPS = (
 
 @dataclass(frozen=True)
 class Tour:
-    """The progress of one user's tour.
-
-    Attributes:
-        at: Index of the step.
-        start: Frame in which the step began.
-        is_done: Whether the user has done the step.
-    """
+    """The progress of a tour: its step, the frame in which it began, and whether it is done."""
 
     at: int
     start: Frame

@@ -20,12 +20,9 @@ from explorer.workspace.accessible.radii import RadiusCurve, radius_curve, with_
 
 @dataclass(frozen=True)
 class RadiusRequest:
-    """A request for the accessible volume over the radius of the legs.
+    """A request for the accessible volume over the radius of the legs, at an orientation.
 
-    Attributes:
-        design: The manipulator, its legs without radii.
-        rotation: Rotation from platform to base, rows of the matrix.
-        start: Position of b4 from which paths start; None for the home position.
+    Paths start with b4 at a position; None stands for home. The legs of the design have no radii.
     """
 
     design: Design

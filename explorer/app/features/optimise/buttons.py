@@ -183,13 +183,7 @@ def button(
 ) -> str:
     """Return a button as HTML, disabled where it cannot be pressed.
 
-    Args:
-        name: Name of the button, out of `BUTTONS`.
-        state: The present state.
-        words: Words on the button; its label if "".
-        value: Value that its handler receives.
-        hint: Sentence on what a press does; that of the button if "".
-        is_main: Whether it is the filled one of several.
+    Words and hint are those of the button if ""; its handler receives the value.
     """
     declared = BUTTONS[name]
     return press_button(

@@ -87,9 +87,8 @@ class Notice:
     Attributes:
         title: State of the search, such as "Solving 5" or "Converged".
         text: Its value, with its unit.
-        share: Share of the starts that have ended, from 0 to 1; None where there is one start or
-            the search has ended.
-        buttons: Names of the buttons that answer it, out of `BUTTONS`, the main one first.
+        share: Share of the starts that have ended; None for one start, or at the end.
+        buttons: Names of the buttons that answer it, the main one first.
     """
 
     title: str
@@ -196,12 +195,7 @@ def _remedies(state: State, limits: Sequence[str]) -> str:
 
 
 def refused_words(refusals: Sequence[Conflict], limits: Sequence[str] = ()) -> str:
-    """Return why no search can start, as HTML.
-
-    Args:
-        refusals: The reasons.
-        limits: Limits that buttons below offer to lift.
-    """
+    """Return why no search can start, as HTML; buttons below offer to lift some limits."""
     body = " ".join(sentence(refusal.message) for refusal in refusals)
     if any(refusal.limit not in limits for refusal in refusals):
         lacking = next((refusal.limit for refusal in refusals if refusal.limit in LACKING), "")
@@ -256,16 +250,13 @@ def verdict_words(state: State, run: Run, verdict: SearchResult) -> str:
 
 @dataclass(frozen=True)
 class Row:
-    """A measure or a variable of two designs.
+    """A measure or a variable of two designs, as the table shows it.
 
     Attributes:
         name: Name, with the unit after a comma.
-        hint: Meaning.
         before, after: Values; None where there is none, and infinite ones.
-        is_whole: Whether it is a count.
         names: Names of the whole numbers from 1, as in `Measure`.
         look: Whether the change keeps or breaks the demands, where that is defined.
-        is_goal: Whether it is the objective.
     """
 
     name: str
@@ -293,13 +284,7 @@ def comparison_table(run: Run) -> str:
 
 
 def measure_rows(problem: Problem, before: Measurements, after: Measurements) -> Iterator[Row]:
-    """Yield the rows of the measures of two designs.
-
-    Args:
-        problem: The problem that the second design is to solve.
-        before: The measures of the user's own design.
-        after: The same measures of the other one.
-    """
+    """Yield the rows of the measures of the user's own design and one that solves a problem."""
     goal = GOALS[problem.objective]
     for name in after.values:
         if name == "yaw" and YAW not in problem.names:

@@ -30,6 +30,7 @@ from explorer.optimise.outcome import Outcome
 from explorer.optimise.problem import (
     SHIFTS,
     YAW,
+    ObjectiveName,
     Problem,
     StartError,
 )
@@ -47,32 +48,18 @@ TRIED, HALVINGS = 5, 30
 
 def requested_volume(state: State) -> float:
     """Return the required volume."""
-    return _requested_volume(state.base, state.optimisation.request)
+    request = state.optimisation.request
+    return request.volume or _default_volume(state.base, request.objective)
 
 
 def requested_reach(state: State) -> float:
     """Return the longest leg allowed."""
-    return _requested_reach(state.base, state.optimisation.request)
+    return state.optimisation.request.reach or longest_leg(state.base)
 
 
 def requested_box(state: State) -> Box:
     """Return the required box."""
-    return _requested_box(state.base, state.optimisation.request)
-
-
-def _requested_volume(base: Design, request: OptimisationRequest) -> float:
-    if request.volume is not None:
-        return request.volume
-    same = request.objective != "match-volume"
-    return _default_volume(base, same=same)
-
-
-def _requested_reach(base: Design, request: OptimisationRequest) -> float:
-    return longest_leg(base) if request.reach is None else request.reach
-
-
-def _requested_box(base: Design, request: OptimisationRequest) -> Box:
-    return request.box or box_within(base)
+    return state.optimisation.request.box or box_within(state.base)
 
 
 def problem_of(state: State) -> Problem:
@@ -91,10 +78,12 @@ def _problem(design: Design, base: Design, request: OptimisationRequest) -> Prob
     problem = make_problem(
         design,
         request.objective,
-        volume=_requested_volume(base, request) if request.needs_volume else None,
-        reach=_requested_reach(base, request) if request.needs_reach else None,
-        clearance=None if request.clearance == 0.0 else request.clearance,
-        required_box=_requested_box(base, request) if request.needs_box else None,
+        volume=(request.volume or _default_volume(base, request.objective))
+        if request.needs_volume
+        else None,
+        reach=(request.reach or longest_leg(base)) if request.needs_reach else None,
+        clearance=request.clearance or None,
+        required_box=(request.box or box_within(base)) if request.needs_box else None,
         held=request.held,
         error=request.error or None,
         deflection=request.deflection or None,
@@ -184,26 +173,17 @@ def box_within(design: Design) -> Box:
 
 
 @lru_cache(maxsize=8)
-def _default_volume(design: Design, *, same: bool) -> float:
-    """Return the volume of a design to six digits if `same`, else the next larger round one."""
+def _default_volume(design: Design, objective: ObjectiveName) -> float:
+    """Return the next larger round volume to match; else that of a design, to six digits."""
     volume = workspace_volume(design).volume or design.reach**3
-    if same:
+    if objective != "match-volume":
         return float(f"{volume:.6g}")
     power = 10.0 ** math.floor(math.log10(MORE * volume))
     return math.ceil(MORE * volume / power) * power
 
 
 def optimise(problem: Problem, starts: int, channel: Channel) -> Outcome:
-    """Search for the best design, and send each iterate to the parent.
-
-    Args:
-        problem: Problem to solve.
-        starts: Number of designs to start from.
-        channel: Channel to the parent.
-
-    Raises:
-        InputError: see `optimise_design`.
-    """
+    """Search for the best design from a number of starts, and send each iterate to the parent."""
     return optimise_design(problem, starts=starts, watch=channel.send, stop=channel.is_cancelled)
 
 
@@ -215,11 +195,8 @@ def compare(
 ) -> Comparison:
     """Return the measures of two designs.
 
-    Args:
-        before: Design to compare with.
-        after: Other design.
-        demanded_margin: Margin from which on a clearance is demanded; None without a demand.
-        boxes: Box of each for its least margin, or None.
+    The margin is that from which on a clearance is demanded, None without a demand; the boxes are
+    those of each design for its least margin.
     """
     first, second = (
         measure_design(

@@ -103,11 +103,7 @@ def edge_of(tilts: TiltMap, here: TiltTorsion, home: TiltTorsion) -> float:
 def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: TiltTorsion) -> str:
     """Return the map as SVG: azimuth as the direction, tilt as the distance from the centre.
 
-    Args:
-        tilts: Greatest tilts in azimuths at equal distances.
-        least: The greatest tilt in every azimuth, at the same torsion.
-        here: The present orientation.
-        home: The orientation of home.
+    It shows the greatest tilt by azimuth and in every azimuth, the present orientation and home.
     """
     edge = edge_of(tilts, here, home)
     facts = {"centre": CENTRE, "radius": RADIUS, "edge": edge}
@@ -216,12 +212,8 @@ def tilt_at(found: TiltByTorsion, torsion: float) -> float:
 def torsion_strip(found: TiltByTorsion, torsion: float, tilt: float) -> str:
     """Return the tilt by torsion as SVG, with marks at the present and the best torsion.
 
-    The best torsion is marked only where it allows a larger tilt than the present one.
-
-    Args:
-        found: Greatest tilts by torsion.
-        torsion: The present torsion, in degrees.
-        tilt: The greatest tilt in every azimuth there, in degrees; NaN where none is possible.
+    The best torsion is marked only where it allows a larger tilt than the present one, at which
+    the greatest tilt in every azimuth is `tilt`, NaN where none is possible. Angles in degrees.
     """
     largest = 0.0 if math.isnan(found.best.tilt) else found.best.tilt
     top = max(RING, _rounded_up(largest))

@@ -131,12 +131,9 @@ class TiltsRequest:
 
 @dataclass(frozen=True)
 class TiltsDrawing:
-    """The greatest tilts in every azimuth at the nodes of a grid.
+    """The greatest tilts in every azimuth, in degrees, at nodes where tilt zero keeps all limits.
 
-    Attributes:
-        positions: Nodes at which tilt zero keeps all limits, shape (n, 3), in design units.
-        tilts: Greatest tilts there, shape (n,), in degrees.
-        step: Largest distance of neighbouring nodes, in design units.
+    The step is the largest distance of neighbouring nodes, in design units.
     """
 
     request: TiltsRequest
@@ -146,12 +143,7 @@ class TiltsDrawing:
 
 
 def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> TiltsDrawing:
-    """Return the greatest tilts at nodes over the workspace of tilt zero.
-
-    Args:
-        request: The request.
-        channel: Channel to the parent, which gets each `Stage` and may cancel; None for neither.
-    """
+    """Return the greatest tilts over the workspace of tilt zero; `channel` sends progress."""
     design, watch = request.design, watch_of(channel)
     rotation = rotation_from_tilt_torsion((0.0, 0.0, request.torsion))
     ends = extent_of(design, rotation)
@@ -174,12 +166,9 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
 
 @dataclass(frozen=True)
 class RangeRequest:
-    """A request for a workspace over a range of tilts from the orientation of home.
+    """A request for the positions that have one or all of a range of orientations about home.
 
-    Attributes:
-        tilt: Largest tilt, in degrees.
-        turn: Largest change of the torsion either way, in degrees.
-        over: Whether positions have one of the orientations at least, or all of them.
+    The tilt is at most `tilt` from that of home, the torsion at most `turn` either way, in degrees.
     """
 
     design: Design

@@ -141,8 +141,7 @@ class SetPathTime(Action):
         if not math.isfinite(self.seconds):
             raise InputError(f"the time must be finite; got {self.seconds}")
         at = min(max(self.seconds, 0.0), journey.trajectory.duration)
-        after = replace(journey, at=at)
-        return moved(_with(state, journey=after), after.pose)
+        return _go_along(state, replace(journey, at=at))
 
     def words(self) -> str:
         """Return what the action does."""
@@ -167,8 +166,7 @@ class Play(Action):
         if not self.on:
             return _with(state, journey=replace(journey, is_playing=False))
         at = journey.at if journey.at < journey.trajectory.duration else 0.0
-        after = replace(journey, at=at, is_playing=True)
-        return moved(_with(state, journey=after), after.pose)
+        return _go_along(state, replace(journey, at=at, is_playing=True))
 
 
 @dataclass(frozen=True)
@@ -186,7 +184,7 @@ class Advance(Action):
             return state
         at = min(journey.at + self.seconds, journey.trajectory.duration)
         after = replace(journey, at=at, is_playing=at < journey.trajectory.duration)
-        return moved(_with(state, journey=after), after.pose)
+        return _go_along(state, after)
 
 
 @dataclass(frozen=True)
@@ -202,13 +200,7 @@ class CancelPlan(Action):
 
 @dataclass(frozen=True)
 class TakePlan(Action):
-    """Accept the result of planning, unless a newer request has replaced its own.
-
-    Attributes:
-        request: Number of the request.
-        journey: The path; None if none was found.
-        problem: Reason why there is no path; None if there is one.
-    """
+    """Accept the path of a request, or why there is none, unless a newer one has replaced it."""
 
     continues: ClassVar[bool] = True
 
@@ -235,6 +227,11 @@ def _journey(state: State) -> Journey:
     if journey is None:
         raise InputError("there is no path for this design; press Go to make one")
     return journey
+
+
+def _go_along(state: State, journey: Journey) -> State:
+    """Return the state at the present place of a path."""
+    return moved(_with(state, journey=journey), journey.pose)
 
 
 def _with(state: State, **changes: object) -> State:

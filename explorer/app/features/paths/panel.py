@@ -269,12 +269,7 @@ def plan_words(state: State) -> str | None:
 
 
 def path_title(state: State, loads: JourneyLoads | None) -> str:
-    """Return the title of the path and what is told of it, and buttons to play and export it.
-
-    Args:
-        state: The state of the page.
-        loads: The shares along the path; None without limits.
-    """
+    """Return the title of the path and what is known of it, and buttons to play and export it."""
     journey = state.journey
     if journey is None:
         return box(dim("No path yet. Choose a goal and press Go."))

@@ -119,12 +119,7 @@ def time_updates(
 
 
 class JourneyLoads(NamedTuple):
-    """The shares of the limits along a path over time.
-
-    Attributes:
-        time: Times of the samples, in seconds, shape (n,).
-        path: The shares along the path.
-    """
+    """The shares of the limits along a path, and the times of their samples in seconds."""
 
     time: FloatArray
     path: PathLoads
@@ -186,11 +181,8 @@ class Quantity(NamedTuple):
 
     Attributes:
         name: Its name, with braces for the number of the incidence.
-        vertical: The vertical axis.
         flat: Its values where a fold is flat.
-        decimals: Decimals of its values in the legend.
-        unit: Unit behind them.
-        of: Returns the values, shape (..., 3), of positions (..., 3) and rotations (..., 3, 3).
+        of: Function from positions (..., 3) and rotations (..., 3, 3) to its values (..., 3).
     """
 
     name: str
@@ -202,12 +194,7 @@ class Quantity(NamedTuple):
 
 
 def fold_magnitudes(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
-    """Return the folds without their signs, in degrees, shape (..., 3).
-
-    Args:
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-    """
+    """Return the folds without their signs in degrees, (..., 3); arguments as in `to_folds`."""
     return np.degrees(np.abs(to_folds(position, rotation)[..., 3:]))
 
 
@@ -225,13 +212,7 @@ FOLDS = Quantity(
 
 
 class IncidencePlot:
-    """The chart of a quantity and its legend, empty while there is no path.
-
-    Args:
-        gui: Controls of the page.
-        quantity: What it shows.
-        has_times: Whether the axis of time has numbers; those of a chart below serve it too.
-    """
+    """The chart of a quantity and its legend, empty while there is no path."""
 
     def __init__(self, gui: viser.GuiApi, quantity: Quantity, *, has_times: bool = True) -> None:
         self._quantity = quantity
@@ -358,12 +339,7 @@ class LoadPlot:
 
 
 def load_columns(loads: JourneyLoads, now: float) -> tuple[NDArray[Any], ...]:
-    """Return the columns of the chart: time, share, share beyond the limit, and present time.
-
-    Args:
-        loads: The shares over time.
-        now: The present time, in seconds.
-    """
+    """Return the columns of the chart: time, share, share beyond the limit, and present time."""
     # Room above the largest share and the limit, in percent.
     top = float(np.clip(115.0 * loads.path.share, LEAST_TOP, MOST_TOP))
     # Far above the chart a line is as good as at infinity.

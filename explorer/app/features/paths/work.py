@@ -15,16 +15,11 @@ from explorer.statics.loaded import LoadedPose
 
 @dataclass(frozen=True)
 class PlanRequest:
-    """A request for a path.
+    """A request for a path from a pose to another, of at most some seconds.
 
     Attributes:
-        design: The manipulator.
-        start: Pose at the start.
-        goal: Pose at the end.
-        seconds: Longest time of the search, in seconds.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
-        load: (F; M) at the tool point, base axes, in N and N × unit, that the path has to hold;
-            None for none.
+        load: (F; M) at the tool point, base axes, in N and N × unit, that the path has to hold.
         weighed: Bodies whose weights act besides the load.
         density: Density of the parts, in kg/m³.
     """

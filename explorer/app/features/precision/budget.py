@@ -11,7 +11,6 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise.work import requested_box
-from explorer.app.features.precision.budget import SetTolerances
 from explorer.app.features.precision.tasks import (
     BudgetDrawing,
     BudgetRequest,

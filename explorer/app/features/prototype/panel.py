@@ -111,12 +111,7 @@ def trouble_of(frame: Frame, feed: PartsFeed) -> str | None:
 
 
 def parts_table(listed: PartsList, density: float) -> str:
-    """Return the bill of materials as HTML: parts, then actuators.
-
-    Args:
-        listed: Parts of the prototype.
-        density: Density of all parts, in kg/m³.
-    """
+    """Return the bill of materials as HTML: parts, then actuators; the density is in kg/m³."""
     parts = (
         row(
             escape(line.name),

@@ -31,14 +31,10 @@ DIGITS = 6
 
 @dataclass(frozen=True)
 class Line:
-    """Parts that are alike.
+    """Parts that are alike: their kind, the legs that have one, and stock and volume of each.
 
-    Attributes:
-        kind: Kind of part, such as "rod".
-        legs: Legs that have one; () for base and platform.
-        stock: Diameter and length of the round bar that each is cut from, or the sides of the block
-            along the axes of its frame, in mm.
-        volume: Volume of each, in mm³.
+    Stock is the diameter and the length of a round bar, or the sides of a block along the axes of
+    the part's frame, in mm; the volume is in mm³.
     """
 
     kind: str
@@ -118,13 +114,7 @@ class PartsRequest:
 
 @dataclass(frozen=True)
 class Parts:
-    """The parts of a design.
-
-    Attributes:
-        prototype: Parts with their places in a pose.
-        meshes: Meshes of the parts, in their order and frames, in design units.
-        listed: List of the parts for the workshop.
-    """
+    """The parts of a design, with their meshes in their order and frames, in design units."""
 
     prototype: Prototype
     meshes: tuple[Drawn, ...]
@@ -176,11 +166,7 @@ def drawn_parts(feed: PartsFeed) -> Parts | None:
 
 
 def export_assembly(design: Design, file_format: str) -> bytes:
-    """Return a file of the prototype, assembled in the home pose.
-
-    Args:
-        design: The manipulator.
-        file_format: A format of `explorer.export.assembly`, or "step".
+    """Return a file of the prototype, assembled in the home pose, in a format of the page.
 
     Raises:
         ExplorerError: a design too tight for the parts, or a missing library.

@@ -47,13 +47,7 @@ CAPTION_STYLE = (
 
 @dataclass(frozen=True)
 class FileCamera:
-    """The camera of the opened file, in scene units.
-
-    Attributes:
-        position: Position, shape (3,).
-        look_at: Point that it looks at, shape (3,).
-        fov: Vertical angle of view, in radians.
-    """
+    """The camera of the opened file in scene units; the vertical angle of view is in radians."""
 
     position: FloatArray
     look_at: FloatArray

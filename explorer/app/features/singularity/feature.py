@@ -5,7 +5,6 @@ from __future__ import annotations
 import viser
 
 from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
-from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.features.singularity.panel import SingularityPanel
 from explorer.app.features.singularity.scene import (
     BallScene,
@@ -13,7 +12,7 @@ from explorer.app.features.singularity.scene import (
     FreeMotion,
     NearestGhost,
 )
-from explorer.app.features.singularity.work import STRATA_FEED, strata_distances
+from explorer.app.features.singularity.work import STRATA_FEED, GoToSingularity, strata_distances
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.commands import shift

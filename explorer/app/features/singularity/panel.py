@@ -11,9 +11,9 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.incidences import HOVER, hovered_margin
-from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.features.singularity.scene import show_button
 from explorer.app.features.singularity.strata import StrataPanel
+from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import length_span

@@ -9,8 +9,12 @@ from html import escape
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.singularity.actions import GoToStratum, stratum_name
-from explorer.app.features.singularity.work import STRATA_FEED, StrataFeed
+from explorer.app.features.singularity.work import (
+    STRATA_FEED,
+    GoToStratum,
+    StrataFeed,
+    stratum_name,
+)
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
@@ -92,12 +96,7 @@ def distances_of(frame: Frame, feed: StrataFeed) -> Mapping[Stratum, float]:
 
 
 def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
-    """Return the diagram as HTML.
-
-    Args:
-        frame: The frame that is shown.
-        distances: Distances that are known, by stratum, in design units.
-    """
+    """Return the diagram as HTML, with the distances that are known, in design units."""
     here = frame.snapshot.stratum
     warn = DISTANCE_SHARE * frame.state.warn_below
     levels = {w: distance / warn for w, distance in distances.items()}

@@ -1,4 +1,4 @@
-"""The distances to all strata, computed by the worker while they are shown."""
+"""The moves to singular poses, and the distances to all strata, which the worker computes."""
 
 from __future__ import annotations
 
@@ -6,11 +6,87 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from explorer.app.session.feed import Feed, feed_of
+from explorer.app.state.action import Action
+from explorer.app.state.actions import moved
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.errors import InputError
 from explorer.mechanism.design import Design
+from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
-from explorer.singularity.bruhat import Stratum
-from explorer.singularity.nearest_stratum import nearest_in_strata
+from explorer.singularity.bruhat import Stratum, codimension, describe_stratum
+from explorer.singularity.nearest import nearest_singularities
+from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_stratum, seen_stratum
+
+
+@dataclass(frozen=True)
+class GoToStratum(Action):
+    """Move to the nearest pose in a stratum of codimension one or more."""
+
+    stratum: Stratum
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: there is no such stratum, or none of its poses is the nearest: it is the
+                generic one, or the pose lies in it or in its boundary.
+        """
+        goal = tuple(self.stratum)
+        nearest = nearest_in_stratum(state.design, state.pose, goal)
+        if codimension(goal) == 0:
+            raise InputError(
+                "generic poses lie arbitrarily close to every pose; choose a singular stratum, or "
+                "move any margin off zero"
+            )
+        here = seen_stratum(state.design, state.pose)
+        if here == goal:
+            raise InputError(
+                f"the pose lies in {stratum_name(goal)} already: {describe_stratum(goal)}"
+            )
+        if nearest.distance == 0.0:
+            raise InputError(
+                f"the pose lies in {stratum_name(here)}, which {stratum_name(goal)} borders on, "
+                "so none of its poses is the nearest; move a margin off zero"
+            )
+        return moved(state, nearest.pose)
+
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"Go to stratum {stratum_name(self.stratum)}"
+
+
+@dataclass(frozen=True)
+class GoToSingularity(Action):
+    """Move to the nearest pose with an incidence, 1 to 3, or with any for None."""
+
+    incidence: int | None
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the pose has that incidence already.
+        """
+        poses = nearest_singularities(state.design, state.pose)
+        nearest = min(poses, key=lambda pose: pose.distance)
+        if self.incidence is not None:
+            nearest = poses[self.incidence - 1]
+        if nearest.distance == 0.0:
+            index = nearest.incidence
+            raise InputError(f"the pose has δ{index} = 0 already: {INCIDENCES[index - 1]}")
+        return moved(state, nearest.pose)
+
+    def words(self) -> str:
+        """Return what the action does."""
+        if self.incidence is None:
+            return "Go to the nearest singular pose"
+        return f"Go to the nearest pose with δ{self.incidence} = 0"
+
+
+def stratum_name(stratum: Stratum) -> str:
+    """Return the name of a stratum, such as "(3, 4, 2, 1)"."""
+    return f"({', '.join(map(str, stratum))})"
 
 
 @dataclass(frozen=True)
