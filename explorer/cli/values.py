@@ -11,7 +11,7 @@ import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
 from explorer.cli.parsing import UsageError
-from explorer.mechanism.design import LARGEST_SIZE
+from explorer.numerics.checks import LEAST, size_problem
 
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six", 7: "seven"}
 
@@ -73,12 +73,8 @@ def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstr
                 f"{alternative}; got {len(values)}"
             )
         for name, value in zip(names, values, strict=True):
-            if not math.isfinite(value):
-                raise UsageError(f"{option}: {name} must be a finite number; got {value}")
-            if abs(value) > LARGEST_SIZE:
-                raise UsageError(
-                    f"{option}: {name} must lie within ±{LARGEST_SIZE:g}; got {value:g}"
-                )
+            if problem := size_problem(value):
+                raise UsageError(f"{option}: {name} {problem}")
         return tuple(values)
 
     return _parser(order.upper(), read, lambda value: value or (), many=True)
@@ -183,8 +179,10 @@ def positive(option: str) -> PrimitiveConstructorSpec[Any]:
 
     def read(words: list[str]) -> float:
         value = _number(option, words[0])
-        if not (math.isfinite(value) and value > 0.0):
+        if not value > 0.0:
             raise UsageError(f"{option} must be a positive number; got {words[0]}")
+        if problem := size_problem(value, LEAST):
+            raise UsageError(f"{option} {problem}")
         return value
 
     return _parser("NUMBER", read)
@@ -195,8 +193,10 @@ def not_negative(option: str) -> PrimitiveConstructorSpec[Any]:
 
     def read(words: list[str]) -> float:
         value = _number(option, words[0])
-        if not (math.isfinite(value) and value >= 0.0):
+        if not value >= 0.0:
             raise UsageError(f"{option} must be a number of at least 0; got {words[0]}")
+        if problem := size_problem(value):
+            raise UsageError(f"{option} {problem}")
         return value
 
     return _parser("NUMBER", read)

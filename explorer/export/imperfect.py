@@ -21,7 +21,7 @@ from explorer.mechanism.kinematics import checked_joints, inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.mechanism.tool_point import tool_offset
-from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.numerics.arrays import FloatArray, finite_array, position_array
 from explorer.prototype.chains import ACTUATED, Chains, Places
 from explorer.statics.accuracy import A1_COLUMN, A3_COLUMN, B_COLUMN, GUIDE_COLUMN, TILT_COLUMN
 from explorer.statics.compliance import is_elastic
@@ -133,7 +133,7 @@ class ImperfectMachine:
         Raises:
             InputError: The position is not finite, or the rotation is not one.
         """
-        p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
+        p, r = position_array("position", position), checked_rotation(rotation)
         ends = p + self.points @ r.T
         # Seen from its base, a leg is that of the design at another position of the platform.
         seen = np.einsum("kji,kj->ki", self.turns, ends - self.shifts)
@@ -164,7 +164,7 @@ class ImperfectMachine:
         """
         from scipy.optimize import least_squares
 
-        true = checked_joints(self.design, joints) + self.encoder_offsets
+        true = checked_joints(joints) + self.encoder_offsets
         size, position, rotation = self.design.reach, np.array(near.position), near.rotation
 
         def moved(twist: FloatArray) -> tuple[FloatArray, FloatArray]:

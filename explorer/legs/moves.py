@@ -26,7 +26,14 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple, checked_rotation
 from explorer.mechanism.tool_point import one_tool, tool_offset
-from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, batch_shape, finite_array
+from explorer.numerics.arrays import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    batch_shape,
+    finite_array,
+    position_array,
+)
 
 # Tolerances as shares of the reach, or of the longest travel of a leg's end if that is longer.
 DEFAULT_TOLERANCE = 1e-6
@@ -337,7 +344,7 @@ class _Moves:
     def of(design: Design, *arrays: ArrayLike, tool: ArrayLike | None = None) -> _Moves:
         """Return the moves of the positions and rotations of `move_clearances`, broadcast."""
         p, q = (
-            finite_array(f"{end} position", position, (3,))
+            position_array(f"{end} position", position)
             for end, position in zip(("start", "end"), arrays[::2], strict=True)
         )
         r, s = map(checked_rotation, arrays[1::2])

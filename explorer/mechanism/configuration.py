@@ -21,9 +21,9 @@ from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import (
     FloatArray,
     batch_shape,
-    finite_array,
     for_kernel,
     lengths_of,
+    position_array,
     rotate,
     rows_for_kernel,
 )
@@ -59,9 +59,9 @@ class Configuration:
         tool: ArrayLike | None = None,
     ) -> None:
         self.design = design
-        self.position = finite_array("position", position, (3,))
+        self.position = position_array("position", position)
         self.rotation = checked_rotation(rotation)
-        self.tool = np.zeros(3) if tool is None else finite_array("tool", tool, (3,))
+        self.tool = np.zeros(3) if tool is None else position_array("tool", tool)
         self.batch = self.batch_with()
 
     @classmethod

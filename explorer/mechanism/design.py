@@ -30,6 +30,7 @@ from explorer.mechanism.points import Variables, platform_points
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import (
+    LEAST,
     instance,
     not_negative,
     number,
@@ -61,9 +62,6 @@ radians for angles."""
 
 # Share of the design's size up to which a3y, b1y and b3 - b2 are rounding noise.
 DEGENERATE_RATIO = 1e-12
-# Bounds of the largest design variable, whose seventh power in det J must not over- or
-# underflow.
-SMALLEST_SIZE, LARGEST_SIZE = 1e-30, 1e30
 
 DOWN: Triple = (0.0, 0.0, -1.0)
 """The default direction of gravity."""
@@ -207,9 +205,9 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         tolerances: Tolerances of the geometric dimensions.
 
     Raises:
-        DesignError: A value is not finite, the design is degenerate (a3y = 0, b1y = 0 or
-            b2 = b3), its size exceeds the range of double precision, or the tool or the payload
-            lies more than a hundred reaches from b4.
+        DesignError: A value is not finite or beyond the bounds of
+            `explorer.numerics.checks`, the design is degenerate (a3y = 0, b1y = 0 or b2 = b3), or
+            the tool or the payload lies more than a hundred reaches from b4.
     """
 
     schema: Literal[2] = 2
@@ -247,12 +245,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         _set(self, "unit_mm", positive("unit_mm", self.unit_mm))
         if self.node_step is not None:
             _set(self, "node_step", positive("node_step", self.node_step))
-        size = max(map(abs, self.variables))
-        if not SMALLEST_SIZE <= size <= LARGEST_SIZE:
-            raise DesignError(
-                f"the largest design variable must lie between {SMALLEST_SIZE:g} and "
-                f"{LARGEST_SIZE:g}; got {size:g}"
-            )
+        size = number("the largest design variable", max(map(abs, self.variables)), LEAST)
         for name, value, zero in (
             ("a3y", self.a3[1], "a1, a2 and a3 lie on one line"),
             ("b1y", self.b1[1], "b1, b2 and b3 lie on one line"),

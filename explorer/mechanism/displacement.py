@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import FloatArray, batch_shape, dot, finite_array
+from explorer.numerics.arrays import FloatArray, batch_shape, dot, position_array
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ def displacement(
     Raises:
         InputError: A position is not finite, or a rotation is not one.
     """
-    p = finite_array("position", position, (3,))
-    q = finite_array("other position", other_position, (3,))
+    p = position_array("position", position)
+    q = position_array("other position", other_position)
     r, s = checked_rotation(rotation), checked_rotation(other_rotation)
     batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
     # For close poses the formula with the scatter would cancel; these squares do not.

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from explorer.mechanism.design import JOINTS, LENGTHS, Design
-from explorer.mechanism.kinematics import LARGEST_RATIO, checked_joints, forward
-from explorer.numerics.arrays import FloatArray
+from explorer.mechanism.kinematics import checked_joints, forward
+from explorer.numerics.arrays import FARTHEST, FloatArray
 
 Interval = tuple[float, float]
 
@@ -35,13 +35,12 @@ def feasible_intervals(design: Design, joints: FloatArray) -> tuple[tuple[Interv
     Raises:
         InputError: The joints are not usable, see `checked_joints`.
     """
-    q = checked_joints(design, joints)
+    q = checked_joints(joints)
     # Dividing by the largest length keeps the roots near one, whatever the units.
     scale = max(map(abs, (*design.variables, *q.tolist())))
     polynomials, joint_of = _discriminants(design, q / scale, scale)
-    largest = LARGEST_RATIO * max(map(abs, design.variables))
     breaks = [
-        _breaks(offset + slope * np.array(roots), scale, largest, is_length)
+        _breaks(offset + slope * np.array(roots), scale, is_length)
         for roots, (offset, slope), is_length in zip(
             _real_roots(polynomials), joint_of.tolist(), _IS_LENGTH, strict=True
         )
@@ -166,18 +165,18 @@ def _real_roots(polynomials: FloatArray) -> list[list[float]]:
     return roots_of_joint
 
 
-def _breaks(roots: FloatArray, scale: float, largest: float, is_length: bool) -> list[float]:
+def _breaks(roots: FloatArray, scale: float, is_length: bool) -> list[float]:
     """Return the ascending values of one joint at which the joints may cease to close.
 
     No joints close beyond the outer values: |d1 - d3|, and with it every length, is bounded by a
-    few times the largest of the others. A value above `largest` belongs to a vanishing term and
-    is left out. The roots are those of the joint over `scale`, or of its square for a length.
+    few times the largest of the others. A value above `FARTHEST` belongs to a vanishing term
+    and is left out. The roots are those of the joint over `scale`, or of its square for a length.
     """
     values = np.sort(roots)
     if is_length:
         values = np.sqrt(np.append(0.0, values[values > 0.0]))
     values = values * scale
-    return values[np.abs(values) <= largest].tolist()
+    return values[np.abs(values) <= FARTHEST].tolist()
 
 
 def _closing_intervals(

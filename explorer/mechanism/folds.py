@@ -41,6 +41,7 @@ from explorer.numerics.arrays import (
     batch_shape,
     finite_array,
     for_kernel,
+    position_array,
     rows_for_kernel,
 )
 from explorer.numerics.compiled import helper, kernel
@@ -72,7 +73,7 @@ def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     Raises:
         InputError: The position is not finite, or the rotation is not one.
     """
-    p = finite_array("position", position, (3,))
+    p = position_array("position", position)
     matrices = checked_rotation(rotation)
     shape = batch_shape((p, 1), (matrices, 2))
     positions, rotations = rows_for_kernel(p, shape, 1), rows_for_kernel(matrices, shape, 2)

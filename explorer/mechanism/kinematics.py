@@ -17,14 +17,12 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, LENGTHS, Design
 from explorer.mechanism.trilateration import solve_rows
 from explorer.numerics.arrays import (
+    FARTHEST,
     BoolArray,
     FloatArray,
     finite_array,
     for_kernel,
 )
-
-# Largest joint over the design's size; beyond it double precision cannot tell its points apart.
-LARGEST_RATIO = 1e15
 
 
 class ForwardKinematics(NamedTuple):
@@ -78,33 +76,27 @@ def discriminants(design: Design, joints: ArrayLike) -> FloatArray:
     return _solve(design, joints)[3]
 
 
-def checked_joints(design: Design, joints: ArrayLike) -> FloatArray:
+def checked_joints(joints: ArrayLike) -> FloatArray:
     """Return joints (..., 6) as float64 after checking them.
 
     Raises:
         InputError: The joints are not six finite numbers, a length is negative, or a joint is
-            so large that double precision cannot tell the design's points apart.
+            beyond `FARTHEST`.
     """
-    array = finite_array(f"joints ({', '.join(JOINTS)})", joints, (6,))
+    array = finite_array(f"joints ({', '.join(JOINTS)})", joints, (6,), FARTHEST)
     for index, name in enumerate(JOINTS):
         if name in LENGTHS and (array[..., index] < 0.0).any():
             raise InputError(
                 f"{name} is a length and must not be negative; "
                 f"got {float(array[..., index].min()):g}"
             )
-    largest = LARGEST_RATIO * max(map(abs, design.variables))
-    if (np.abs(array) > largest).any():
-        raise InputError(
-            f"joints must not exceed {LARGEST_RATIO:g} times the largest design variable, "
-            f"{largest:g}; got {float(np.abs(array).max()):g}"
-        )
     return array
 
 
 def _solve(
     design: Design, joints: ArrayLike
 ) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
-    q = checked_joints(design, joints)
+    q = checked_joints(joints)
     batch = q.shape[:-1]
     rows = for_kernel(q.reshape(-1, 6))
     count = len(rows)

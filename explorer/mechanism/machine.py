@@ -15,7 +15,7 @@ import numpy as np
 from explorer.errors import DesignError
 from explorer.mechanism.pose import Quadruple, Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.checks import not_negative, number, numbers, positive, two
+from explorer.numerics.checks import MOST, STIFFEST, not_negative, numbers, positive, two
 
 Pair = tuple[float, float]
 Six = tuple[float, float, float, float, float, float]
@@ -114,8 +114,9 @@ class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             values = getattr(self, name)
             if values is not None:
                 field = f"actuators.{name}"
-                checked = tuple(positive(field, value) for value in numbers(field, values, 6))
-                _set(self, name, checked)
+                most = STIFFEST if name == "stiffness_n_mm" else MOST
+                given = numbers(field, values, 6, most)
+                _set(self, name, tuple(positive(field, value, most) for value in given))
         errors = numbers("actuators.error_mm", self.error_mm, 6)
         _set(self, "error_mm", tuple(not_negative("actuators.error_mm", each) for each in errors))
 
@@ -276,11 +277,7 @@ def check_near(name: str, point: Triple, reach: float) -> None:
 
 def _unit(name: str, values: list[float]) -> tuple[float, ...]:
     """Return a vector of unit length; one that has it already stays the same to the last bit."""
-    size = max(map(abs, values))
-    if size == 0.0:
+    norm = math.hypot(*values)
+    if norm == 0.0:
         raise DesignError(f"{name} must not be all zeros", name)
-    scaled = [number(name, value / size) for value in values]
-    norm = math.hypot(*scaled)
-    if abs(norm * size - 1.0) <= 4e-16:
-        return tuple(values)
-    return tuple(value / norm for value in scaled)
+    return tuple(values if abs(norm - 1.0) <= 4e-16 else (value / norm for value in values))

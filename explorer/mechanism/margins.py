@@ -19,7 +19,7 @@ from explorer.numerics.arrays import (
     FloatArray,
     IntArray,
     batch_shape,
-    finite_array,
+    position_array,
     rows_for_kernel,
 )
 from explorer.numerics.compiled import helper, kernel
@@ -56,7 +56,7 @@ def margins(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     Raises:
         InputError: The position is not finite, or the rotation is not one.
     """
-    p = finite_array("position", position, (3,))
+    p = position_array("position", position)
     r = checked_rotation(rotation)
     batch = batch_shape((p, 1), (r, 2))
     p_rows, r_rows = rows_for_kernel(p, batch, 1), rows_for_kernel(r, batch, 2)

@@ -7,6 +7,7 @@ and x axes, in this order, so R = Rz(yaw) Ry(pitch) Rx(roll).
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 
 import msgspec
@@ -15,8 +16,8 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
-from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
-from explorer.numerics.checks import LARGEST_NUMBER
+from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, position_array
+from explorer.numerics.checks import MOST
 from explorer.numerics.compiled import helper, kernel
 
 Triple = tuple[float, float, float]
@@ -35,30 +36,23 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Raises:
         InputError: The position or the quaternion is not of three or four finite numbers, the
-            position exceeds 1e40, or the quaternion is zero.
+            position exceeds 1e6, or the quaternion is zero.
     """
 
     position: Triple
     quaternion: Quadruple
 
     def __post_init__(self) -> None:
-        position = finite_array("position", self.position, (3,))
+        position = finite_array("position", self.position, (3,), MOST)
         quaternion = finite_array("quaternion", self.quaternion, (4,))
         if position.ndim != 1 or quaternion.ndim != 1:
             raise InputError("a pose has one position and one quaternion, not a batch")
-        farthest = float(np.abs(position).max())
-        if farthest > LARGEST_NUMBER:
-            raise InputError(
-                f"position must not exceed {LARGEST_NUMBER:g} in magnitude; got {farthest:g}"
-            )
-        size = float(np.abs(quaternion).max())
-        if size == 0.0:
+        norm = math.hypot(*quaternion)
+        if norm == 0.0:
             raise InputError("quaternion must not be all zeros; no rotation is (1, 0, 0, 0)")
-        unit = quaternion / size
-        norm = float(np.linalg.norm(unit))
         # A quaternion of unit length stays the same to the last bit, so that files round-trip.
-        if abs(norm * size - 1.0) > 4e-16:
-            quaternion = unit / norm
+        if abs(norm - 1.0) > 4e-16:
+            quaternion = quaternion / norm
         # Plain numbers, whatever was given: others can be neither compared nor written to a file.
         msgspec.structs.force_setattr(self, "position", tuple(position.tolist()))
         msgspec.structs.force_setattr(self, "quaternion", tuple(quaternion.tolist()))
@@ -71,7 +65,7 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @staticmethod
     def of(position: ArrayLike, rotation: ArrayLike) -> Pose:
         """Return the pose with this position (3,) and rotation matrix (3, 3)."""
-        x, y, z = finite_array("position", position, (3,)).tolist()
+        x, y, z = position_array("position", position).tolist()
         w, i, j, k = quaternion_from_rotation(rotation).tolist()
         return Pose((x, y, z), (w, i, j, k))
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
+from explorer.numerics.arrays import FloatArray, for_kernel, position_array
 
 Point = Literal["b4", "tool"]
 """The point whose position is meant."""
@@ -67,7 +67,7 @@ def one_tool(tool: ArrayLike | None) -> FloatArray:
     """
     if tool is None:
         return np.zeros(3)
-    t = finite_array("tool", tool, (3,))
+    t = position_array("tool", tool)
     if t.ndim != 1:
         raise InputError(f"give one tool point, three numbers; got the shape {t.shape}")
     return for_kernel(t)
@@ -83,5 +83,5 @@ def tool_offset(rotation: FloatArray, tool: ArrayLike | None) -> FloatArray:
     Raises:
         InputError: The tool is not finite.
     """
-    t = np.zeros(3) if tool is None else finite_array("tool", tool, (3,))
+    t = np.zeros(3) if tool is None else position_array("tool", tool)
     return np.asarray((rotation @ t[..., None])[..., 0])

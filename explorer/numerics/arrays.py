@@ -12,23 +12,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from explorer.errors import InputError
+from explorer.numerics.checks import MOST, size_problem
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
 
+FARTHEST = 10.0 * MOST
+"""Largest coordinate of a position and largest joint of a pose, in design units: a computation may
+find some beyond those that a user gives."""
 
-def finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+
+def finite_array(
+    name: str, value: ArrayLike, shape: tuple[int, ...], most: float = math.inf
+) -> FloatArray:
     """Return numbers as a float64 array, after checking their shape and that all are finite.
 
     Args:
         name: Name of the value in the error message.
         value: Numbers that NumPy can read, shape (..., *shape).
         shape: Required trailing axes.
+        most: Largest size of an entry.
 
     Raises:
-        InputError: The value is not numeric, has another shape, or has an entry that is NaN
-            or infinite.
+        InputError: The value is not numeric, has another shape, or has an entry that is not
+            finite or too large.
     """
     try:
         array = np.asarray(value, dtype=np.float64)
@@ -39,17 +47,19 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatAr
             f"{name} must have the shape {_shape_text(shape)}, leading batch axes allowed; "
             f"got {array.shape}"
         )
-    if not np.isfinite(array).all():
-        raise InputError(f"{name} must be finite numbers; got {_first_not_finite(array)}")
+    allowed = np.isfinite(array) & (np.abs(array) <= most)
+    if not allowed.all():
+        raise InputError(f"{name} {size_problem(float(array[~allowed].flat[0]), most=most)}")
     return array
+
+
+def position_array(name: str, value: ArrayLike) -> FloatArray:
+    """Return positions (..., 3) as `finite_array` does, none beyond `FARTHEST`."""
+    return finite_array(name, value, (3,), FARTHEST)
 
 
 def _shape_text(shape: tuple[int, ...]) -> str:
     return f"(..., {', '.join(map(str, shape))})" if shape else "(...)"
-
-
-def _first_not_finite(array: FloatArray) -> str:
-    return str(float(array[~np.isfinite(array)].flat[0]))
 
 
 def for_kernel(array: FloatArray) -> FloatArray:
@@ -92,8 +102,8 @@ def dot(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def lengths_of(vectors: FloatArray) -> FloatArray:
-    """Return the lengths of vectors (..., 3), also of those whose squares are no numbers."""
-    return np.hypot(np.hypot(vectors[..., 0], vectors[..., 1]), vectors[..., 2])
+    """Return the Euclidean norms of vectors (..., 3)."""
+    return np.sqrt(dot(vectors, vectors))
 
 
 def rotate(rotation: FloatArray, vector: FloatArray) -> FloatArray:

@@ -1,6 +1,10 @@
-"""Checks of the values in a design.
+"""Checks of the values in a design, and the bounds of all sizes that a user gives.
 
-Every function raises `DesignError` with one line: the field, what it must be, and the value.
+Every function that checks a value raises `DesignError` with one line: the field, what it must be,
+and the value. A length, mass, force, moment or stress is at most `MOST` in its unit, and one that
+must be positive at least `LEAST`; a stiffness is at most `STIFFEST`. The size of a design is the
+largest of its variables. What may be zero may also be as small as the rounding errors of what
+computed it.
 """
 
 from __future__ import annotations
@@ -12,47 +16,60 @@ from typing import Any, SupportsIndex, cast
 
 from explorer.errors import DesignError
 
-# The Jacobian's determinant is a product of seven numbers, which must not overflow.
-LARGEST_NUMBER = 1e40
-SMALLEST_POSITIVE = 1e-40
+LEAST, MOST = 1e-6, 1e6
+"""Bounds of the size of a number that a user gives, in its unit."""
+
+STIFFEST = 1e12
+"""Largest stiffness in N/mm: one rigid actuator among springs is stated by a large number."""
 
 # Types that Python converts to a number or a sequence although no caller means one.
 _NOT_A_NUMBER = (str, bytes, bytearray, bool)
 _NOT_A_SEQUENCE = (str, bytes, bytearray, Set, Mapping)
 
 
-def number(name: str, value: object) -> float:
-    """Return the value as a finite float of at most `LARGEST_NUMBER` in magnitude."""
+def size_problem(value: float, least: float = 0.0, most: float = MOST) -> str:
+    """Return what is wrong with the size of a number, to follow its name; "" if nothing is.
+
+    Args:
+        value: The number.
+        least: Least size of a number that is not zero.
+        most: Largest size.
+    """
+    if not math.isfinite(value):
+        return f"must be a finite number; got {value}"
+    if abs(value) > most:
+        return f"must not exceed {most:g} in size; got {value:g}: change the unit"
+    if 0.0 < abs(value) < least:
+        return f"must be at least {least:g} in size; got {value:g}: change the unit"
+    return ""
+
+
+def number(name: str, value: object, least: float = 0.0, most: float = MOST) -> float:
+    """Return the value as a finite float, zero or of a size from `least` to `most`."""
     try:
         checked = None if isinstance(value, _NOT_A_NUMBER) else float(cast("Any", value))
     except (TypeError, ValueError, OverflowError):
         checked = None
     if checked is None:
         raise DesignError(f"{name} must be a number; got {_short_repr(value)}", name)
-    if not math.isfinite(checked):
-        raise DesignError(f"{name} must be a finite number; got {checked}", name)
-    if abs(checked) > LARGEST_NUMBER:
-        raise DesignError(
-            f"{name} must not exceed {LARGEST_NUMBER:g} in magnitude; got {checked:g}", name
-        )
+    if problem := size_problem(checked, least, most):
+        raise DesignError(f"{name} {problem}", name)
     return checked
 
 
 def not_negative(name: str, value: object) -> float:
-    """Return the value as a finite float of at least zero."""
+    """Return the value as a float from 0 to `MOST`."""
     checked = number(name, value)
     if checked < 0.0:
         raise DesignError(f"{name} must not be negative; got {checked:g}", name)
     return checked
 
 
-def positive(name: str, value: object) -> float:
-    """Return the value as a finite float above zero, of at least `SMALLEST_POSITIVE`."""
-    checked = number(name, value)
+def positive(name: str, value: object, most: float = MOST) -> float:
+    """Return the value as a float from `LEAST` to `most`."""
+    checked = number(name, value, LEAST, most)
     if checked <= 0.0:
         raise DesignError(f"{name} must be positive; got {checked:g}", name)
-    if checked < SMALLEST_POSITIVE:
-        raise DesignError(f"{name} must be at least {SMALLEST_POSITIVE:g}; got {checked:g}", name)
     return checked
 
 
@@ -72,12 +89,12 @@ def two(name: str, value: Any) -> tuple[Any, Any]:
     return entries[0], entries[1]
 
 
-def numbers(name: str, value: Any, count: int) -> list[float]:
-    """Return the entries of the value, `count` finite floats."""
+def numbers(name: str, value: Any, count: int, most: float = MOST) -> list[float]:
+    """Return the entries of the value, `count` finite floats of at most `most` in size."""
     entries = _entries(value)
     if len(entries) != count:
         raise DesignError(f"{name} must be {count} numbers; got {_short_repr(value)}", name)
-    return [number(name, entry) for entry in entries]
+    return [number(name, entry, most=most) for entry in entries]
 
 
 def whole(name: str, value: object, low: int, high: int) -> int:

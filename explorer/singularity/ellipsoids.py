@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, checked_rotation
-from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.numerics.arrays import FloatArray, position_array
 from explorer.singularity.jacobian import jacobian
 from explorer.singularity.nearest import nearest_singularities
 
@@ -130,7 +130,7 @@ def singular_plane_distances(position: ArrayLike, rotation: ArrayLike) -> FloatA
     If the lines a1a2 and b2b3 are parallel every position is singular, and the distance for δ2
     is zero. Arguments and errors are those of `margins`.
     """
-    p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
+    p, r = position_array("position", position), checked_rotation(rotation)
     distances = np.abs(margins(p, r))
     sine = np.broadcast_to(np.hypot(r[..., 1, 0], r[..., 2, 0]), distances.shape[:-1])
     distances[..., 1] = np.divide(

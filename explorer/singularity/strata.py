@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import FloatArray, IntArray, batch_shape, dot, finite_array
+from explorer.numerics.arrays import FloatArray, IntArray, batch_shape, dot, position_array
 
 # Tolerance of an incidence: a share of the normalising length, or an angle in radians.
 TOLERANCE = 1e-9
@@ -57,7 +57,7 @@ def stratum(position: ArrayLike, rotation: ArrayLike, length: float | None = Non
     Raises:
         InputError: The position is not finite, or the rotation is not one.
     """
-    p = finite_array("position", position, (3,))
+    p = position_array("position", position)
     r = checked_rotation(rotation)
     shape = batch_shape((p, 1), (r, 2))
     ranks = np.zeros((*shape, 3, 3), dtype=np.int64)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import FloatArray, dot, finite_array
+from explorer.numerics.arrays import FloatArray, dot, position_array
 
 
 def least_turns(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
@@ -30,7 +30,7 @@ def least_turns(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     Raises:
         InputError: The position is not finite, or the rotation is not one.
     """
-    p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
+    p, r = position_array("position", position), checked_rotation(rotation)
     line = r[..., :, 0]
     from_line = np.cross(line, p)
     distance = np.sqrt(dot(p, p))

@@ -200,7 +200,7 @@ def test_interference_verdict_separates_clear_touching_and_colliding(cli: Comman
         ([*MOVE, "--to-quaternion", "1", "0", "0", "0"], "not both"),
         (["--to-quaternion", "0", "0", "0", "0"], "quaternion"),
         (["--to", "1", "2"], "--to needs three numbers in the order x y z; got 2"),
-        (["--to", "1e9", "2", "3"], "give their number with --steps"),
+        (["--to", "1e6", "2", "3"], "give their number with --steps"),
         (["--radii", "-0.5"], "leg_radii must not be negative; got -0.5"),
         (["--radii", "1", "2"], "--radii needs four numbers in the order r1 r2 r3 r4, or one"),
         (["--radii", "nan"], "finite"),

@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 import pytest
 import trimesh
+from limited_designs import scaled_design
 from mesh_files import glb_json, mesh_of, metadata_of, read_3mf
 
 from explorer import PRESETS, Design, ExplorerError, InputError, NoAnswerError, decode_design
@@ -400,7 +401,7 @@ def test_assembly_bytes_equal_designs_give_equal_files(file_format: str) -> None
 
 
 def test_assembly_bytes_huge_parts_and_unknown_formats_are_refused() -> None:
-    huge = make_prototype(msgspec.structs.replace(ASSEMBLED, unit_mm=1e9))
+    huge = make_prototype(msgspec.structs.replace(scaled_design(ASSEMBLED, 1e4), unit_mm=1e6))
     with pytest.raises(InputError, match="smaller unit"):
         assembly_bytes(huge, "3mf")
     with pytest.raises(InputError, match="3mf, glb, stl-zip"):

@@ -21,7 +21,7 @@ from explorer.mechanism.possible_ranges import possible_ranges, without_box, wit
 from explorer.numerics.arrays import BoolArray, FloatArray
 
 joint_indices = st.integers(0, 5)
-some_designs = designs(sizes=(10.0, 1e-6, 1e6), nearness=(1.0,))
+some_designs = designs(sizes=(10.0, 1e-4, 1e5), nearness=(1.0,))
 seeds = st.integers(0, 2**32 - 1)
 SAMPLES = 400
 
@@ -146,7 +146,7 @@ def test_intervals_of_any_design_and_joints_are_finite(design: Design, seed: int
     for intervals in feasible_intervals(design, joints):
         assert all(np.isfinite(end) for interval in intervals for end in interval)
     assert len(feasible_intervals(design, np.zeros(6))) == 6
-    assert len(feasible_intervals(design, joints * 4e14)) == 6
+    assert len(feasible_intervals(design, joints * (1e6 / joints.max()))) == 6
 
 
 def test_intervals_at_the_identity_orientation_are_empty_for_the_radii_alone() -> None:

@@ -99,7 +99,7 @@ def test_pose_function_of_a_batch_equals_single_calls(function: PoseFunction) ->
     assert empty.shape == (0, 2, *function.shape)
 
 
-@given(ordinary_cases(), st.sampled_from([1e-6, 1e-3, 1e3, 1e6]))
+@given(ordinary_cases(), st.sampled_from([1e-3, 1e3]))
 def test_pose_functions_in_another_unit_scale_by_their_power(case: Case, factor: float) -> None:
     other = case.scaled(factor)
     for function in FUNCTIONS:

@@ -122,7 +122,7 @@ def test_stratum_in_another_unit_is_the_same_and_of_exchanged_flags_the_inverse(
     w: tuple[int, ...],
 ) -> None:
     position, rotation = REPRESENTATIVES[w]
-    for scale in (1e-20, 1e-6, 1e6, 1e20):
+    for scale in (1e-6, 1e6):
         assert seen(scale * position, rotation) == w
     inverse = tuple(w.index(value) + 1 for value in (1, 2, 3, 4))
     assert seen(-rotation.T @ position, rotation.T) == inverse

@@ -1,6 +1,6 @@
 """Solids are closed, lie on the surfaces of their limits, and tend to the exact volumes.
 
-Random designs have sizes from 1e-20 to 1e20, are near degenerate ones, at quarter turns and near
+Random designs have sizes from 0.01 to 1e5, are near degenerate ones, at quarter turns and near
 the identity, and have shells thinner than a chord and cones around 90°.
 """
 
@@ -199,7 +199,7 @@ def test_solid_facets_are_within_the_tolerance_on_both_sides() -> None:
     assert slack[0].max() > 0.0 > slack[1].min()
 
 
-@pytest.mark.parametrize("s", [1e-3, 1e9])
+@pytest.mark.parametrize("s", [1e-3, 1e4])
 def test_solid_of_a_scaled_design_scales(s: float) -> None:
     solid, scaled = workspace_solid(OPTIMAL), workspace_solid(scaled_design(OPTIMAL, s))
     assert len(solid.faces) == len(scaled.faces)

@@ -9,7 +9,7 @@ from explorer.errors import InputError
 from explorer.measures.size import PositionSet
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import Point
-from explorer.numerics.checks import LARGEST_NUMBER, SMALLEST_POSITIVE
+from explorer.numerics.checks import STIFFEST, numbers, positive
 from explorer.numerics.number_text import format_number
 
 ALUMINIUM = 2700.0
@@ -98,11 +98,7 @@ class PrototypeView:
     def __post_init__(self) -> None:
         if not 0.0 <= self.exploded <= 1.0:
             raise InputError(f"the exploded view takes 0 to 1; got {format_number(self.exploded)}")
-        if not SMALLEST_POSITIVE <= self.density <= LARGEST_NUMBER:
-            raise InputError(
-                f"the density must be positive; got {format_number(self.density)} (aluminium: "
-                f"{format_number(ALUMINIUM)} kg/m³)"
-            )
+        positive("the density, in kg/m³,", self.density)
 
 
 Weighed = Literal["none", "payload", "payload and legs"]
@@ -120,7 +116,7 @@ class ForcesView:
         scale: Force whose arrow is as long as the reach, in N.
 
     Raises:
-        InputError: a number that is not finite or exceeds 1e40, or a scale that is not positive.
+        InputError: a number that is not finite or exceeds 1e6, or a scale that is not positive.
     """
 
     shown: bool = False
@@ -130,16 +126,9 @@ class ForcesView:
     scale: float = 20.0
 
     def __post_init__(self) -> None:
-        for name, unit in (("force", "N"), ("moment", "N m")):
-            if not all(abs(value) <= LARGEST_NUMBER for value in getattr(self, name)):
-                raise InputError(
-                    f"the {name} must be three finite numbers of at most {LARGEST_NUMBER:g} {unit}"
-                )
-        if not SMALLEST_POSITIVE <= self.scale <= LARGEST_NUMBER:
-            raise InputError(
-                f"the force whose arrow is as long as the reach must be positive, in N; got "
-                f"{format_number(self.scale)}"
-            )
+        numbers("the force, in N,", self.force, 3)
+        numbers("the moment, in N m,", self.moment, 3)
+        positive("the force whose arrow is as long as the reach, in N,", self.scale, STIFFEST)
 
 
 @dataclass(frozen=True)
@@ -176,8 +165,8 @@ class PrecisionView:
             ("wanted displacement", self.wanted),
             ("wanted turn", self.wanted_turn),
         ):
-            if value is not None and not SMALLEST_POSITIVE <= value <= LARGEST_NUMBER:
-                raise InputError(f"the {name} must be positive; got {format_number(value)}")
+            if value is not None:
+                positive(f"the {name}", value, STIFFEST)
 
 
 Coordinates = Literal["position", "folds"]
@@ -265,6 +254,5 @@ class View:
         return self.drawn_as == "6-4 twin"
 
     def __post_init__(self) -> None:
-        warn = self.warn_below
-        if warn is not None and not SMALLEST_POSITIVE <= warn <= LARGEST_NUMBER:
-            raise InputError(f"the warning length must be positive; got {format_number(warn)}")
+        if self.warn_below is not None:
+            positive("the warning length", self.warn_below)

@@ -55,7 +55,7 @@ class Forward(JsonOptions, PointOptions, DesignOptions):
     def run(self) -> None:
         """Write all eight poses of the joints."""
         design = self.read_design()
-        joints = checked_joints(design, self.joints)
+        joints = checked_joints(self.joints)
         squares, modes = discriminants(design, joints), forward(design, joints)
         is_shown = self.at == "tool" or any(design.tool.position)
         tool = design.tool.position if is_shown else None

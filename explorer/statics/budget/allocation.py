@@ -16,11 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError, NoAnswerError
+from explorer.errors import NoAnswerError
 from explorer.mechanism.design import JOINTS, Design
-from explorer.numerics.arrays import BoolArray, FloatArray, finite_array
-from explorer.numerics.checks import LARGEST_NUMBER, SMALLEST_POSITIVE
-from explorer.numerics.number_text import format_number
+from explorer.numerics.arrays import BoolArray, FloatArray, position_array
+from explorer.numerics.checks import positive
 from explorer.statics.budget.costs import (
     SourceCosts,
     costs_of,
@@ -90,18 +89,15 @@ def tolerance_budget(
         keep_actuators: Whether the errors of the actuators stay as the design states them.
 
     Raises:
-        InputError: What is wanted is not positive or beyond 1e±40, a position or the tool is not
+        InputError: What is wanted is not positive or beyond 1e±6, a position or the tool is not
             finite, or the rotation is not one.
         NoAnswerError: A position is singular, or singular ones lie between them, or the errors of
             the actuators alone exceed what is wanted.
     """
     for name, value in (("displacement", wanted), ("turn", wanted_turn)):
-        if value is not None and not SMALLEST_POSITIVE <= value <= LARGEST_NUMBER:
-            raise InputError(
-                f"the wanted {name} must be positive, from {SMALLEST_POSITIVE:g} to "
-                f"{LARGEST_NUMBER:g}; got {format_number(value)}"
-            )
-    points = finite_array("positions", positions, (3,)).reshape(-1, 3)
+        if value is not None:
+            positive(f"the wanted {name}", value)
+    points = position_array("positions", positions).reshape(-1, 3)
     influences = source_influences(design, points, rotation, tool)
     stated = stated_tolerances(design)
     kept = (np.arange(len(SOURCES)) < len(JOINTS)) & keep_actuators

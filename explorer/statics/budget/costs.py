@@ -18,7 +18,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.machine import DIMENSIONS, Tolerances
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Triple
-from explorer.numerics.arrays import FloatArray, IntArray, finite_array
+from explorer.numerics.arrays import FloatArray, IntArray, position_array
 from explorer.statics.error_sources import (
     IS_TILT,
     SOURCES,
@@ -101,7 +101,7 @@ def source_costs(
         InputError: There is no position, one or the tool is not finite, or the rotation is not one.
         NoAnswerError: A position is singular, or singular ones lie between them.
     """
-    points = finite_array("positions", positions, (3,)).reshape(-1, 3)
+    points = position_array("positions", positions).reshape(-1, 3)
     influences = source_influences(design, points, rotation, tool)
     return costs_of(design, points, influences, stated_tolerances(design))
 

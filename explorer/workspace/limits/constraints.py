@@ -20,7 +20,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import TOLERANCE, Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.tool_point import tool_offset
-from explorer.numerics.arrays import BoolArray, FloatArray, finite_array
+from explorer.numerics.arrays import BoolArray, FloatArray, position_array
 from explorer.workspace.limits.limit import Bound, Demand, LegAngle
 from explorer.workspace.limits.quantities import (
     D1,
@@ -225,7 +225,7 @@ def slacks(limits: tuple[Constraint, ...], position: ArrayLike) -> FloatArray:
 
     Slacks are in design units, those of cones in radians.
     """
-    p = finite_array("position", position, (3,))
+    p = position_array("position", position)
     return np.stack([limit.slack(p) for limit in limits], axis=-1)
 
 

@@ -24,8 +24,8 @@ from explorer.numerics.arrays import (
     BoolArray,
     FloatArray,
     batch_shape,
-    finite_array,
     for_kernel,
+    position_array,
     rows_for_kernel,
 )
 from explorer.numerics.compiled import helper, kernel
@@ -91,7 +91,7 @@ def moves_are_valid(
         InputError: a pose that is not finite or not a rotation, or not a point.
     """
     p, q = (
-        finite_array(name, value, (3,))
+        position_array(name, value)
         for name, value in (("start position", start_position), ("end position", end_position))
     )
     r, s = checked_rotation(start_rotation), checked_rotation(end_rotation)
@@ -103,7 +103,7 @@ def moves_are_valid(
     valid = np.empty(len(start), dtype=np.bool_)
     rules = rules or Rules.of(design)
     most = DEFAULT_TOLERANCE * design.reach if tolerance is None else tolerance
-    point = np.zeros(3) if tool is None else for_kernel(finite_array("tool", tool, (3,)))
+    point = np.zeros(3) if tool is None else for_kernel(position_array("tool", tool))
     move = start, turn, end, last_turn
     valid_move_rows(20 * len(start), rules.row, rules.demands, *move, point, most, valid)
     return valid.reshape(batch)

@@ -21,7 +21,7 @@ from explorer.numerics.arrays import (
     BoolArray,
     FloatArray,
     batch_shape,
-    finite_array,
+    position_array,
     rows_for_kernel,
 )
 from explorer.numerics.compiled import helper, kernel
@@ -107,7 +107,7 @@ def poses_are_valid(
     Raises:
         InputError: a pose that is not finite or not a rotation.
     """
-    p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
+    p, r = position_array("position", position), checked_rotation(rotation)
     batch = batch_shape((p, 1), (r, 2))
     p_rows, r_rows = rows_for_kernel(p, batch, 1), rows_for_kernel(r, batch, 2)
     valid = np.empty(len(p_rows), dtype=np.bool_)

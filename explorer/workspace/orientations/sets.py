@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
 from explorer.mechanism.pose import checked_rotation, rotation_from_yaw_pitch_roll
-from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.numerics.arrays import FloatArray, finite_array, position_array
 
 MOST_ORIENTATIONS = 1_000_000
 """Largest number of orientations in a set."""
@@ -89,7 +89,7 @@ def one_position(position: ArrayLike) -> FloatArray:
     Raises:
         InputError: The position is not finite, or there are several.
     """
-    p = finite_array("position", position, (3,))
+    p = position_array("position", position)
     if p.ndim != 1:
         raise InputError(f"give one position, three numbers; got the shape {p.shape}")
     return p

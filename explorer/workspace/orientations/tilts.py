@@ -18,7 +18,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.mechanism.tool_point import one_tool
-from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
+from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, position_array
 from explorer.workspace.limits.valid_poses import Rules
 from explorer.workspace.orientations.least_tilts import least_tilt_rows
 from explorer.workspace.orientations.sets import (
@@ -169,7 +169,7 @@ def greatest_tilts(
     Raises:
         InputError: as there, or positions and torsions that do not broadcast.
     """
-    p = finite_array("position", position, (3,))
+    p = position_array("position", position)
     sigma = np.asarray(checked_torsion(design, None))
     if torsion is not None:
         sigma = finite_array("torsion", torsion, ())
