@@ -46,11 +46,9 @@ def replace_all(tab: Tab, words: str) -> None:
 
 
 def wait_for_x(tab: Tab, value: float) -> None:
-    """Wait until state and page have an x, and the page has drawn it."""
+    """Wait until state and page have an x."""
     tab.wait_for(lambda: tab.state.pose.position[0] == pytest.approx(value), f"x = {value}")
     tab.wait_until_shown("x", tab.state.pose.position[0])
-    # What is drawn while all is selected takes the selection away.
-    tab.settle()
 
 
 def has_focus(tab: Tab, words: str) -> bool:
@@ -129,6 +127,28 @@ def test_field_keeps_what_is_typed_and_is_given_up_for_what_the_explorer_has(tab
         tab.type("z", f"{z:g}\n")
         tab.wait_for(lambda z=z: tab.state.pose.position[2] == z, "z")
         assert tab.state.pose.position[0] == value
+
+
+def test_number_that_arrives_leaves_a_field_selected_so_that_typing_replaces_it(tab: Tab) -> None:
+    session = tab.running.page.session
+    for arrives, text, value in ((2.5, "7", 7.0), (12.75, "9.5", 9.5)):
+        replace_all(tab, "x")
+        session.do(SetPosition(0, arrives))
+        wait_for_x(tab, arrives)
+        tab.page.keyboard.type(text)
+        tab.page.keyboard.press("Enter")
+        wait_for_x(tab, value)
+    # Escape goes back to the number that arrived, and an own choice of digits counts.
+    replace_all(tab, "x")
+    session.do(SetPosition(0, 3.25))
+    wait_for_x(tab, 3.25)
+    tab.page.keyboard.type("8")
+    tab.page.keyboard.press("Escape")
+    wait_for_x(tab, 3.25)
+    tab.page.keyboard.press("End")
+    tab.page.keyboard.press("Backspace")
+    tab.page.keyboard.press("Enter")
+    wait_for_x(tab, 3.2)
 
 
 def test_field_with_no_number_or_a_refused_one_gets_back_what_was_there(tab: Tab) -> None:

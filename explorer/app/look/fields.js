@@ -4,8 +4,10 @@ window.explorer.fields ??= (() => {
   const PAUSE = 700;
   const { clock } = window.explorer;
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+  const { setSelectionRange } = HTMLInputElement.prototype;
   const isField = (it) => it instanceof HTMLInputElement && it.inputMode === "decimal";
-  // The field that is typed into, what it held at first, and what the page last knew of.
+  // The field with the focus, its number at first, the number that the page last knew of, the text
+  // that stands in it, and the ends of the selection.
   let typing = null;
   const numberIn = (text) => {
     // Full-width characters, as from an input method of East Asia, count too.
@@ -27,10 +29,10 @@ window.explorer.fields ??= (() => {
   // The page's fields infer the typed text from the caret: here, all of it was replaced.
   const replaceText = (field, from, to) => {
     write.call(field, from);
-    field.setSelectionRange(0, from.length);
+    setSelectionRange.call(field, 0, from.length);
     field.dispatchEvent(new KeyboardEvent("keydown", { key: "Unidentified", bubbles: true }));
     write.call(field, to);
-    field.setSelectionRange(to.length, to.length);
+    setSelectionRange.call(field, to.length, to.length);
     field.dispatchEvent(new Event("input", { bubbles: true }));
   };
   const enter = () => {
@@ -42,22 +44,30 @@ window.explorer.fields ??= (() => {
     }
     clock.cancel(typing.pause);
     typing.isPending = false;
-    typing.before = plainText(value);
+    typing.before = typing.text = plainText(value);
     typing.isReplacing = true;
     replaceText(field, before, typing.before);
     typing.isReplacing = false;
+    choose();
   };
-  // The page writes its own number whenever it redraws the field, even while a user types.
+  const choose = () => {
+    typing.chosen = [typing.field.selectionStart, typing.field.selectionEnd];
+  };
+  // The page writes its own number whenever it redraws the field or a number arrives, even while a
+  // user types, or has selected all to type another number.
   const hold = () => {
     const { field, text, chosen } = typing;
     if (field.value === text) return;
     if (typing.first === typing.before) typing.first = field.value;
     typing.before = field.value;
-    write.call(field, text);
-    field.setSelectionRange(...chosen);
-  };
-  const choose = () => {
-    typing.chosen = [typing.field.selectionStart, typing.field.selectionEnd];
+    if (typing.isPending) {
+      write.call(field, text);
+      setSelectionRange.call(field, ...chosen);
+      return;
+    }
+    typing.text = field.value;
+    if (chosen[0] === 0 && chosen[1] === text.length) field.select();
+    choose();
   };
   const watch = () => {
     if (!typing || !typing.isPending) return;
@@ -81,7 +91,9 @@ window.explorer.fields ??= (() => {
   const giveUp = () => {
     clock.cancel(typing.pause);
     typing.isPending = false;
+    typing.text = typing.before;
     write.call(typing.field, typing.before);
+    choose();
   };
   // viser ignores keys pressed in fields.
   const passToPage = ({ key, code, ctrlKey, metaKey, shiftKey }) => {
@@ -90,18 +102,25 @@ window.explorer.fields ??= (() => {
   };
   // A field takes the focus back with its next number if its page is not told of the focusout.
   const refuseFocus = (field) => {
-    field.focus = field.setSelectionRange = () => {};
+    field.focus = () => {};
   };
   const acceptFocus = (field) => {
     delete field.focus;
-    delete field.setSelectionRange;
   };
-  const startTyping = (field) => ({ field, first: field.value, before: field.value });
+  const startTyping = (field) => {
+    // The page would set the caret with each number.
+    field.setSelectionRange = () => {};
+    const { value } = field;
+    typing = { field, first: value, before: value, text: value };
+    choose();
+  };
   addEventListener(
     "focusin",
     ({ target }) => {
-      if (isField(target)) acceptFocus(target);
-      typing = isField(target) ? startTyping(target) : null;
+      typing = null;
+      if (!isField(target)) return;
+      acceptFocus(target);
+      startTyping(target);
     },
     true,
   );
@@ -110,7 +129,7 @@ window.explorer.fields ??= (() => {
     (event) => {
       if (!isField(event.target)) return;
       if (!typing || typing.field !== event.target) {
-        typing = startTyping(event.target);
+        startTyping(event.target);
       }
       if (typing.isReplacing) return;
       event.stopPropagation();
@@ -140,7 +159,7 @@ window.explorer.fields ??= (() => {
       // The browser does not know what scripts wrote into its fields, and would undo wrongly.
       if (inputType.startsWith("history")) event.preventDefault();
       // The explorer may have written another number since.
-      if (typing && typing.field === target && !typing.isPending) typing.before = target.value;
+      if (typing && typing.field === target) hold();
     },
     true,
   );
@@ -152,14 +171,16 @@ window.explorer.fields ??= (() => {
     true,
   );
   document.addEventListener("selectionchange", () => {
-    if (typing && typing.isPending && typing.field.value === typing.text) choose();
+    if (!typing || typing.isReplacing) return;
+    if (typing.field.value === typing.text) choose();
+    else hold();
   });
   addEventListener(
     "keydown",
     (event) => {
       const { target, key } = event;
       if (!typing || typing.field !== target || typing.isReplacing || event.isComposing) return;
-      if (typing.isPending) hold();
+      hold();
       if ((event.ctrlKey || event.metaKey) && /^[zy]$/i.test(key)) {
         event.preventDefault();
         event.stopPropagation();
@@ -189,7 +210,8 @@ window.explorer.fields ??= (() => {
   addEventListener(
     "pointerdown",
     ({ target }) => {
-      if (typing && typing.isPending && typing.field !== target) finish();
+      if (typing && typing.field === target) hold();
+      else if (typing && typing.isPending) finish();
       // The arrows of a field need its focus.
       const field = target.closest?.(".mantine-NumberInput-root")?.querySelector("input");
       if (field) acceptFocus(field);
