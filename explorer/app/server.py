@@ -14,13 +14,7 @@ from pathlib import Path
 
 import viser
 
-from explorer.app.browser.viser_server import (
-    refuse_tunnels,
-    report_uploads_to_senders,
-    restrict_messages,
-    start_viser,
-    stop_viser,
-)
+from explorer.app.browser.viser_server import protect, start_viser, stop_viser
 from explorer.app.page import TITLE, Page
 from explorer.app.security.access import EVERYWHERE, Access, is_loopback
 from explorer.app.security.guard import Guard
@@ -114,9 +108,7 @@ def start(
     if port not in (0, server.get_port()):
         stop_viser(server)
         raise _taken(port)
-    refuse_tunnels(server)
-    report_uploads_to_senders(server)
-    restrict_messages(server)
+    protect(server)
     page = Page(
         server,
         state,

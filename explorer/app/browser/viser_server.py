@@ -1,29 +1,27 @@
-"""viser's server: started and stopped quietly, guarded, and with private parts of it changed."""
+"""viser's server: started and stopped quietly and guarded, with what upstream lacks for that.
+
+Each use of a private name of viser stands beside the gap in viser that it fills.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import io
-import sys
-import threading
 import warnings
 from collections.abc import Callable, Generator
-from typing import Any, cast
+from typing import Any
 
 import viser
 import websockets.asyncio.server
+from viser import _messages
+from viser.infra import _infra
 
 from explorer.app.security.guard import Serve
 from explorer.errors import ServerError
 
-# Name of the module of viser that serves.
-SERVING_MODULE = "viser.infra._infra"
-_serving_lock = threading.Lock()
 # Size in bytes beyond which no upload is read; no purpose of the page needs as much.
 LARGEST_UPLOAD = 32_000_000
-# Number up to which JavaScript represents every whole number.
-LARGEST_NUMBER = 2.0**53
 
 
 def start_viser(
@@ -42,8 +40,10 @@ def start_viser(
     """
     # A tab may close while a message is on its way to it; that needs no warning.
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection")
-    _set_events_in_their_loop()
-    with contextlib.redirect_stdout(io.StringIO()), _serving_through(guarded) as is_guarded:
+    # Gap: viser wakes tabs that wait for messages from threads outside of their loop.
+    internals: Any = _infra
+    internals.AsyncMessageBuffer = _Buffer
+    with contextlib.redirect_stdout(io.StringIO()), _serve_through(guarded) as is_guarded:
         server = viser.ViserServer(host=host, port=port, verbose=False)
     if not is_guarded():
         stop_viser(server)
@@ -55,157 +55,63 @@ def start_viser(
 
 
 class _LoopEvent(asyncio.Event):
-    """An event that only its loop sets.
+    """An event that only an event loop sets.
 
     viser sets the event for new messages twice: at once, in the thread that sends, and again in
     the loop. The first is not safe: a tab that begins to wait at that moment is never woken, or
     the thread fails.
-
-    Args:
-        loop: The loop.
     """
 
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        super().__init__()
-        self._own_loop = loop
-
     def set(self) -> None:
-        """Set the event if this runs in its loop, and do nothing otherwise."""
         with contextlib.suppress(RuntimeError):
-            if asyncio.get_running_loop() is self._own_loop:
-                super().set()
+            asyncio.get_running_loop()
+            super().set()
 
 
-def _set_events_in_their_loop() -> None:
-    """Give each buffer of messages that viser makes from now on an event that its loop sets."""
-    serving: Any = sys.modules.get(SERVING_MODULE)
-    # A viser that serves from elsewhere is refused once it serves.
-    if serving is None or serving.AsyncMessageBuffer.__module__ == __name__:
-        return
-    plain: Any = serving.AsyncMessageBuffer
-
-    class Buffer(plain):
-        def __init__(self, event_loop: asyncio.AbstractEventLoop, **options: Any) -> None:
-            plain.__init__(self, event_loop, **options)
-            self.message_event = _LoopEvent(event_loop)
-
-    serving.AsyncMessageBuffer = Buffer
+class _Buffer(_infra.AsyncMessageBuffer):
+    def __init__(self, event_loop: asyncio.AbstractEventLoop, **options: Any) -> None:
+        super().__init__(event_loop, message_event=_LoopEvent(), **options)
 
 
 @contextlib.contextmanager
-def _serving_through(guarded: Callable[[Serve], Serve] | None) -> Generator[Callable[[], bool]]:
-    """Let viser alone serve through `guarded`; yield a function that returns whether it did."""
-    if guarded is None:
-        yield lambda: True
-        return
+def _serve_through(guarded: Callable[[Serve], Serve] | None) -> Generator[Callable[[], bool]]:
+    """Let viser serve through `guarded`; yield a function that returns whether it did."""
     websockets_server: Any = websockets.asyncio.server
     plain = websockets_server.serve
     used: list[Serve] = []
 
-    def serve(handler: Any, *args: Any, **options: Any) -> Any:
-        if handler.__module__ != SERVING_MODULE:
-            return plain(handler, *args, **options)
+    def serve(*args: Any, **options: Any) -> Any:
         # viser tries port after port; each time it is the same guard.
-        used[:] = used or [guarded(plain)]
-        return used[0](handler, *args, **options)
+        used[:] = used or [plain if guarded is None else guarded(plain)]
+        return used[0](*args, **options)
 
-    with _serving_lock:
-        websockets_server.serve = serve
-        try:
-            yield lambda: bool(used)
-        finally:
-            websockets_server.serve = plain
+    websockets_server.serve = serve
+    try:
+        yield lambda: bool(used)
+    finally:
+        websockets_server.serve = plain
 
 
 def stop_viser(server: viser.ViserServer) -> None:
     """Stop a server, without the line that its thread prints to standard output."""
-    internals: Any = server
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
-        thread = getattr(internals._websock_server, "_server_thread", None)
-        if thread is not None:
-            thread.join(timeout=5.0)
+        # Gap: `stop` returns before the thread has ended.
+        internals: Any = server
+        internals._websock_server._server_thread.join(timeout=5.0)
 
 
-def refuse_tunnels(server: viser.ViserServer) -> None:
-    """Ignore every request for a public tunnel; viser opens one for any client that asks."""
-    from viser import _messages
-
+def protect(server: viser.ViserServer) -> None:
+    """Refuse public tunnels and giant files, and report an upload to its sender alone."""
     internals: Any = server
+    gui: Any = server.gui
+    # Gap: viser opens a public tunnel for any client that asks.
     for kind in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
         internals._websock_server.unregister_handler(kind)
-
-
-def restrict_messages(server: viser.ViserServer) -> None:
-    """Ignore messages by which one browser could harm all of them.
-
-    viser sets any property of a control, even to a number that it cannot send to any browser, and
-    it stores uploads of any size.
-    """
-    from viser import _messages
-
-    gui: Any = server.gui
+    # Gap: viser stores uploads of any size, and reports their progress to all browsers, also later
+    # ones, which then show a file without a name.
     interface = gui._websock_interface
-
-    def is_value(_: int, message: Any) -> bool:
-        control = gui._gui_input_handle_from_uuid.get(message.uuid)
-        if control is None or [*message.updates] != ["value"]:
-            return False
-        message.updates = {"value": _bounded(message.updates["value"], control._impl.value)}
-        return True
-
-    def is_small_file(_: int, message: Any) -> bool:
-        return message.size_bytes <= LARGEST_UPLOAD
-
-    def is_rest_of_file(client_id: int, message: Any) -> bool:
-        upload = gui._current_file_upload_states.get(message.transfer_uuid)
-        return (
-            upload is not None
-            and upload["client_id"] == client_id
-            and len(message.content) <= upload["total_bytes"] - upload["transferred_bytes"]
-        )
-
-    def check(kind: type[Any], is_allowed: Callable[[int, Any], bool]) -> None:
-        (handle,) = interface._incoming_handlers[kind]
-
-        async def handle_checked(client_id: int, message: Any) -> None:
-            if is_allowed(client_id, message):
-                handling = handle(client_id, message)
-                if handling is not None:
-                    await handling
-
-        interface.unregister_handler(kind)
-        interface.register_handler(kind, handle_checked)
-
-    check(_messages.GuiUpdateMessage, is_value)
-    check(_messages.FileTransferStartUpload, is_small_file)
-    check(_messages.FileTransferPart, is_rest_of_file)
-
-
-def _bounded(value: Any, present: object) -> Any:
-    """Return a value for a control that has another one; a number is bounded, also if it is NaN.
-
-    Raises:
-        ValueError, TypeError: it is no number where the control has one.
-    """
-    if isinstance(present, tuple):
-        entries = cast("tuple[object, ...]", present)
-        return [_bounded(each, entry) for each, entry in zip(value, entries, strict=True)]
-    if isinstance(present, int | float) and not isinstance(present, bool):
-        return max(-LARGEST_NUMBER, min(LARGEST_NUMBER, float(value)))
-    return value
-
-
-def report_uploads_to_senders(server: viser.ViserServer) -> None:
-    """Report the progress of an upload only to the browser that sends it.
-
-    viser reports it to all browsers, also later ones, which then show a file without a name.
-    """
-    from viser import _messages
-
-    gui: Any = server.gui
-    interface = gui._websock_interface
-    queue_for_all = interface.queue_message
+    queue_for_all, start_upload = interface.queue_message, gui._handle_file_transfer_start
 
     def queue_message(message: Any) -> None:
         if not isinstance(message, _messages.FileTransferPartAck):
@@ -216,4 +122,10 @@ def report_uploads_to_senders(server: viser.ViserServer) -> None:
         if sender is not None:
             sender._websock_connection.queue_message(message)
 
+    def start_small_upload(client_id: int, message: Any) -> None:
+        if message.size_bytes <= LARGEST_UPLOAD:
+            start_upload(client_id, message)
+
     interface.queue_message = queue_message
+    interface.unregister_handler(_messages.FileTransferStartUpload)
+    interface.register_handler(_messages.FileTransferStartUpload, start_small_upload)

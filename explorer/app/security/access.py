@@ -17,7 +17,8 @@ import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
-from http.cookies import CookieError, SimpleCookie
+
+from websockets.datastructures import Headers
 
 from explorer.errors import ServerError
 
@@ -65,6 +66,14 @@ class Head:
     origins: Sequence[str]
     cookies: Sequence[str]
     upgrade: bool
+
+    @staticmethod
+    def of(target: str, headers: Headers) -> Head:
+        """Return the head of a request for a target with these headers."""
+        hosts, origins, cookies, upgrade = (
+            headers.get_all(name) for name in ("Host", "Origin", "Cookie", "Upgrade")
+        )
+        return Head(target, hosts, origins, cookies, bool(upgrade))
 
 
 @dataclass(frozen=True)
@@ -190,19 +199,17 @@ class Access:
                 parts["port"] or HTTP_PORT
             )
         # Rebinding takes a name, so any address may pass; a container may map another port.
-        short = name.partition(".")[0]
-        known = (self.host.lower(), "localhost", socket.gethostname().lower())
-        return _is_address(name.strip("[]")) or name in known or short == known[-1]
+        own = socket.gethostname().lower()
+        is_known = name in (self.host.lower(), "localhost", own) or name.partition(".")[0] == own
+        return is_known or _address_of(name.strip("[]")) is not None
 
     def _reason_for_host(self, host: str, port: int) -> str:
         reason = f"The explorer has another address: {self.url(port).partition('?')[0].rstrip('/')}"
         parts = HOST.fullmatch(host)
         if parts is None:
             return reason
-        return (
-            f"{reason}. If a proxy has the name {parts['name']}, allow it on start: "
-            f"explorer --allow-host {parts['name']}"
-        )
+        name = parts["name"]
+        return f"{reason}. If a proxy has the name {name}, allow it: explorer --allow-host {name}"
 
     def _is_own_page(self, origins: Sequence[str], host: str) -> bool:
         # A program that is no browser can send any origin, so it can send this one as well.
@@ -215,38 +222,27 @@ class Access:
         return rest.removesuffix(usual) == host.removesuffix(usual)
 
     def _has_token(self, query: str, cookies: Sequence[str], port: int) -> bool:
-        given = [
-            value
-            for name, _, value in (pair.partition("=") for pair in query.split("&"))
-            if name == "token"
-        ]
-        for text in cookies:
-            try:
-                cookie = SimpleCookie(text).get(_cookie_name(port))
-            except CookieError:
-                continue
-            if cookie is not None:
-                given.append(cookie.value)
-        secret = (self.token or "").encode()
-        return any(hmac.compare_digest(v.encode(errors="replace"), secret) for v in given)
+        pairs = [("token", pair) for pair in query.split("&")]
+        pairs += [(_cookie_name(port), pair) for text in cookies for pair in text.split(";")]
+        return any(
+            hmac.compare_digest(
+                pair.strip().encode(errors="replace"), f"{name}={self.token}".encode()
+            )
+            for name, pair in pairs
+        )
 
 
 def is_loopback(host: str) -> bool:
     """Whether only this machine reaches a server that listens on this host."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    address = _address_of(host)
+    return host == "localhost" or (address is not None and address.is_loopback)
 
 
-def _is_address(name: str) -> bool:
+def _address_of(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
     try:
-        ipaddress.ip_address(name)
+        return ipaddress.ip_address(name)
     except ValueError:
-        return False
-    return True
+        return None
 
 
 def _cookie_name(port: int) -> str:

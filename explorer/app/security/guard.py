@@ -9,7 +9,8 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import AsyncGenerator, Awaitable, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from functools import partial
 from typing import Any
 
 import viser
@@ -24,8 +25,6 @@ from explorer.app.security.access import Access, Head, Refusal
 # Largest size in bytes of a message, that of a picture of the scene.
 LARGEST_MESSAGE = 24_000_000
 WAIT_SECONDS = 0.02
-# Turns of the event loop between accepting a connection and its handler's start.
-ACCEPT_TURNS = 3
 
 Serve = Callable[..., Any]
 
@@ -49,31 +48,23 @@ class Guard:
         """Return websockets' function that serves, with the checks of this guard."""
 
         def guarded_serve(handler: Any, *args: Any, **options: Any) -> Any:
-            answer = options["process_request"]
-
-            def process_request(connection: ServerConnection, request: Request) -> Response | None:
-                return self._answer(connection, request, answer)
-
-            async def handle(connection: ServerConnection) -> None:
-                await self._handle(connection, handler)
-
             options |= {
-                "process_request": process_request,
+                "process_request": partial(self._answer, options["process_request"]),
                 "max_size": LARGEST_MESSAGE,
                 "logger": _logger(),
             }
-            return _closing(serve(handle, *args, **options))
+            return _closing(serve(partial(self._handle, handler), *args, **options))
 
         return guarded_serve
 
     def _answer(
         self,
+        answer: Callable[[ServerConnection, Request], Response | None],
         connection: ServerConnection,
         request: Request,
-        answer: Callable[[ServerConnection, Request], Response | None],
     ) -> Response | None:
         port: int = connection.local_address[1]
-        head = _head(request)
+        head = Head.of(request.path, request.headers)
         refusal = self._access.judge(head, port)
         if refusal is not None:
             return _refuse(refusal)
@@ -84,7 +75,7 @@ class Guard:
         return response
 
     async def _handle(
-        self, connection: ServerConnection, handler: Callable[[ServerConnection], Awaitable[None]]
+        self, handler: Callable[[ServerConnection], Awaitable[None]], connection: ServerConnection
     ) -> None:
         if connection.subprotocol != f"viser-v{viser.__version__}":
             # viser would print the message.
@@ -99,33 +90,15 @@ class Guard:
 
 @asynccontextmanager
 async def _closing(serving: AbstractAsyncContextManager[Server]) -> AsyncGenerator[Server]:
-    """Serve, and at the end close all connections at once.
+    """Serve, and at the end close connections that browsers opened in advance at once.
 
-    asyncio accepts a connection some turns before websockets knows it, and websockets closes
-    those that it knows: another would stay open and silent (python/cpython issue 79033). For
-    connections without a request, as browsers open them in advance, websockets waits ten seconds.
+    websockets would wait ten seconds for their requests.
     """
     async with serving as server:
         yield server
-        loop = server.get_loop()
-        # The event loop of Windows has no readers.
-        with suppress(NotImplementedError):
-            for listening in server.sockets:
-                loop.remove_reader(listening.fileno())
-        for _ in range(ACCEPT_TURNS):
-            await asyncio.sleep(0.0)
         for connection in list(server.handlers):
             if connection.request is None:
                 connection.transport.abort()
-
-
-def _head(request: Request) -> Head:
-    def values(name: str) -> list[str]:
-        return list(request.headers.get_all(name))
-
-    return Head(
-        request.path, values("Host"), values("Origin"), values("Cookie"), bool(values("Upgrade"))
-    )
 
 
 def _refuse(refusal: Refusal) -> Response:
