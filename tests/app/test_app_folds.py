@@ -33,7 +33,7 @@ from explorer.app.state.actions import Open, Set, SetMode, SetPose
 from explorer.app.state.folds import SetFold, folds_of
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
-from explorer.app.storage.session_format import decode_session, encode_session
+from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.app.widgets.colours import SINGULAR, Rgb, proximity_colour
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
@@ -184,7 +184,7 @@ def test_choice_shows_six_sliders_in_place_of_six_and_is_kept(
     assert list(shown(panel, desk)) == ["r", "β (°)", "ε (°)", "φ1 (°)", "φ2 (°)", "φ3 (°)"]
     # It stays with the next design, and in the file of the session.
     assert Open(PRESETS["paper-initial"]).apply(after).view.coordinates == "folds"
-    saved = decode_session(encode_session(start_history(after), 1), "test")
+    saved = decode_session(encode_session(start_history(after)), "test")
     assert saved.step.state.view.coordinates == "folds"
     desk.press(services.buttons, "pose.coordinates", "position")
     assert list(shown(panel, desk)) == by_position

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from client import Client, opened, wait_for
 
-from explorer.app.storage.session_format import decode_session
+from explorer.app.storage.session_file import decode_session
 
 
 @dataclass(frozen=True)

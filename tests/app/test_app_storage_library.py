@@ -180,21 +180,22 @@ def test_file_copied_into_the_folder_appears_by_the_name_inside(library: Library
     copied = copy_in(library, "My Design (1).json", "theirs", 2)
     assert names(library) == ["theirs", "own"]
     assert library.open("theirs").b2 == design(2).b2
-    # One that is replaced or renamed gets a file of the library's own.
+    # One that is replaced keeps its file, one that is renamed gets a file of the library's own.
     library.save("theirs", design(3))
-    assert not copied.exists()
+    assert decode_design(copied.read_bytes(), "file").b2 == design(3).b2
     copy_in(library, "x.json", "fourth", 4)
     library.rename("fourth", "mine")
     files = {path.name for path in library.folder.glob("*.json")}
-    assert files == {file_of(name) for name in ("own", "theirs", "mine")}
-    # A file of the library precedes others with the same name.
-    for file in ("0.json", "z.json"):
-        copy_in(library, file, "own", 5)
-    assert {each.file for each in problems(library)} == {"0.json", "z.json"}
-    assert all("has the name 'own' too" in (each.problem or "") for each in problems(library))
-    library.delete("0.json")
-    assert library.open("own").b2 == design(1).b2
-    assert [each.file for each in problems(library)] == ["z.json"]
+    assert files == {file_of(name) for name in ("own", "mine")} | {copied.name}
+    # Of files with the same name the newest counts.
+    copy_in(library, "0.json", "own", 5)
+    assert library.open("own").b2 == design(5).b2
+    (old,) = problems(library)
+    assert old.file == file_of("own")
+    assert "has the name 'own' too" in (old.problem or "")
+    library.delete(old.name)
+    assert library.open("own").b2 == design(5).b2
+    assert problems(library) == []
 
 
 BROKEN = {

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
-import zlib
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from functools import partial
@@ -27,13 +25,14 @@ from explorer.app.state.actions import SetName, SetPosition
 from explorer.app.state.state import Run, State, joints_of, opened
 from explorer.app.storage.autosaver import Autosaver
 from explorer.app.storage.folder import SCRATCH_SECONDS, data_folder
-from explorer.app.storage.session_file import MOST_ORPHANS, Resumed, SessionFile
-from explorer.app.storage.session_format import (
+from explorer.app.storage.session_file import (
     MOST_BYTES,
+    MOST_ORPHANS,
     MOST_STEPS,
     SCHEMA,
     DamagedError,
-    decode_header,
+    Resumed,
+    SessionFile,
     decode_session,
     encode_session,
 )
@@ -43,7 +42,7 @@ from explorer.mechanism.pose import Pose
 
 DATA = Path(__file__).parents[1] / "data"
 RICH, OPENED = rich_state(), opened(OPTIMAL)
-WHOLE = encode_session(History((Step(7, "Open", OPENED), Step(8, "All", RICH)), 1), 3)
+WHOLE = encode_session(History((Step(7, "Open", OPENED), Step(8, "All", RICH)), 1))
 
 
 def saved_part_of(state: State) -> State:
@@ -79,13 +78,6 @@ def moves(state: State, count: int) -> list[State]:
     return states
 
 
-def signed(body: bytes, schema: int = SCHEMA, generation: int = 3) -> bytes:
-    """Return a file with this second line and a valid checksum."""
-    checksum = zlib.crc32(body, zlib.crc32(b"%d %d " % (schema, generation)))
-    head = {"schema": schema, "generation": generation, "checksum": checksum}
-    return json.dumps(head).encode() + b"\n" + body
-
-
 def leaves(value: Any, path: str = "") -> dict[str, Any]:
     """Return the values within the parts of a state, by their paths."""
     if not is_dataclass(value):
@@ -106,7 +98,7 @@ def test_rich_state_differs_from_a_new_one_in_every_saved_value() -> None:
 @given(samples())
 def test_session_after_any_actions_is_read_back_to_the_last_bit(actions: list[Sample]) -> None:
     history = history_of(states_of(actions))
-    read = decode_session(encode_session(history, 3), "file")
+    read = decode_session(encode_session(history), "file")
     assert [(step.number, step.words) for step in read.steps] == [
         (step.number, step.words) for step in history.steps
     ]
@@ -126,7 +118,7 @@ def test_long_and_large_histories_lose_steps_far_from_the_present_one(
     words: str, least: int, most: int
 ) -> None:
     history = history_of(moves(opened(OPTIMAL), 3 * MOST_STEPS), words)
-    data = encode_session(history, 1)
+    data = encode_session(history)
     read = decode_session(data, "file")
     assert least <= len(read.steps) <= most
     assert len(data) <= MOST_BYTES + 200 or len(read.steps) == 1
@@ -137,17 +129,13 @@ def test_long_and_large_histories_lose_steps_far_from_the_present_one(
 def test_infinite_number_is_refused_when_the_session_is_written() -> None:
     state = replace(opened(OPTIMAL), yaw_pitch_roll=(float("inf"), 0.0, 0.0))
     with pytest.raises(StorageError, match="no file can"):
-        encode_session(start_history(state), 1)
+        encode_session(start_history(state))
 
 
-@given(st.integers(0, len(WHOLE) - 1), st.integers(1, 255))
-@example(len(WHOLE) - 1, 1)
-def test_file_with_a_changed_byte_or_cut_short_is_refused(place: int, change: int) -> None:
-    damaged = bytearray(WHOLE)
-    damaged[place] ^= change
-    for data in (bytes(damaged), WHOLE[:place]):
-        with pytest.raises(StorageError):
-            decode_session(data, "file")
+@given(st.integers(0, len(WHOLE) - 2))
+def test_file_cut_short_is_refused(place: int) -> None:
+    with pytest.raises(StorageError):
+        decode_session(WHOLE[:place], "file")
 
 
 @given(st.binary(max_size=300))
@@ -157,7 +145,7 @@ def test_file_with_a_changed_byte_or_cut_short_is_refused(place: int, change: in
 @example(b'{"words":["a"],"at":0,"first":0,"objects":[{"a":{"#":0}}],"states":[0]}')
 @example(b'{"words":["a"],"at":0,"first":0,"objects":[{"a":{"b":0}}],"states":[0]}')
 def test_any_bytes_are_refused_in_one_line(data: bytes) -> None:
-    for each in (data, signed(data)):
+    for each in (data, b'{"schema":3}\n' + data):
         with pytest.raises(StorageError) as refusal:
             decode_session(each, "file")
         assert "\n" not in str(refusal.value)
@@ -188,14 +176,14 @@ def test_state_that_no_page_shows_is_refused_wherever_it_is(nonsense: str, place
         bad = replace(RICH, optimisation=optimisation)
     states = [bad, OPENED] if place == "undone" else [OPENED, bad]
     with pytest.raises(StorageError, match="file cannot be used") as refusal:
-        decode_session(encode_session(history_of(states), 1), "file")
+        decode_session(encode_session(history_of(states)), "file")
     assert str(refusal.value).isprintable()
 
 
 def test_file_of_this_version_opens_and_is_the_same_once_it_is_written_again() -> None:
     read = decode_session((DATA / "session.json").read_bytes(), "file")
     assert [step.words for step in read.steps] == ["Open é «one»", "All"]
-    assert repr(decode_session(encode_session(read, 3), "file")) == repr(read)
+    assert repr(decode_session(encode_session(read), "file")) == repr(read)
 
 
 @pytest.mark.parametrize("schema", [1, SCHEMA - 1, SCHEMA + 1])
@@ -260,14 +248,10 @@ def test_next_explorer_continues_in_the_same_file(tmp_path: Path) -> None:
     first = SessionFile(folder)
     assert first.resume().history is None
     assert first.path is None
-    generations: list[int] = []
     for number in range(5):
         first.save(numbered(number))
         assert first.path is not None
-        data = first.path.read_bytes()
-        generations.append(decode_header(data, "file").generation)
-        assert data == encode_session(numbered(number), generations[-1])
-    assert generations == sorted({*generations})
+        assert first.path.read_bytes() == encode_session(numbered(number))
     path = first.path
     first.close()
     second = SessionFile(folder)
@@ -341,11 +325,11 @@ def test_scratch_files_are_removed_unless_they_are_new_and_other_paths_ignored(
 
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "cut": lambda whole: whole[: len(whole) // 2],
-    "changed": lambda whole: whole.replace(b"2.0", b"3.0", 1),
+    "changed": lambda whole: whole.replace(b"[2.0", b"[3.0", 1),
     "empty": lambda _: b"",
-    "other": lambda _: b'{"schema": 1}\n',
+    "other": lambda _: b'{"what": 1}\n',
     # No page can show it.
-    "too far": lambda _: encode_session(history_of([NONSENSE["a pose far away"](OPENED)]), 2**61),
+    "too far": lambda _: encode_session(history_of([NONSENSE["a pose far away"](OPENED)])),
 }
 
 
@@ -373,7 +357,7 @@ def test_damaged_file_is_renamed_and_the_session_before_is_resumed(
 def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     leave_session(tmp_path, 1)
     other = tmp_path / "other.json"
-    other.write_bytes(b'{"schema": 99, "generation": 4000000000000000000, "more": [1]}\n\xff')
+    other.write_bytes(b'{"schema": 99, "more": [1]}\n\xff')
     before = other.read_bytes()
     store = SessionFile(tmp_path)
     resumed = store.resume()

@@ -57,7 +57,7 @@ from explorer.app.state.actions import Set, SetAngle, SetMode, SetPose, SetPosit
 from explorer.app.state.compared import Look
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of, opened
-from explorer.app.storage.session_format import decode_session, encode_session
+from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.pieces import widgets
 from explorer.mechanism.design import Design
@@ -270,7 +270,7 @@ def test_straight_path_is_the_line_of_the_tool(services: Services) -> None:
     placed = Placed(Frame(state))
     points = by_name(PathScene(services).updates(placed))["/path/line"]["points"]
     timed = journey.trajectory
-    read = decode_session(encode_session(start_history(state), 3), "file").step.state
+    read = decode_session(encode_session(start_history(state)), "file").step.state
     assert (read.view.at, read.journey) == ("tool", replace(journey, is_playing=False))
     # It goes straight, and ends are kept.
     along = points[-1, 1] - points[0, 0]

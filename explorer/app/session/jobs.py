@@ -18,7 +18,7 @@ from typing import IO, Any, cast
 
 from explorer.app.session.clock import Timer, start_timer
 from explorer.app.session.latest import LatestWins
-from explorer.app.session.log import log_error, text_of_arguments
+from explorer.app.session.log import log_error
 from explorer.app.session.worker import (
     Cancel,
     Message,
@@ -37,6 +37,7 @@ RESTARTED = "The worker process died and was started again."
 
 # Errors of a pipe to a process that has ended.
 PIPE_ERRORS = (OSError, ValueError, EOFError, pickle.UnpicklingError)
+PROGRAM = "import sys; from explorer.app.session.worker import main; main(sys.argv[1:])"
 
 
 @dataclass(frozen=True)
@@ -83,8 +84,6 @@ class Worker:
         self._current: _Request | None = None
         self._cancelled: dict[int, float | None] = {}
         self._deadline: Timer | None = None
-        # Order of the drawing that is to be cancelled since a newer one waits.
-        self._outdated = -1
         self._queue: LatestWins[_Request] = LatestWins(self._serve_all, "worker")
 
     def submit(
@@ -98,7 +97,7 @@ class Worker:
         *,
         is_drawing: bool = False,
     ) -> int:
-        """Queue a task, in place of one with the same key that waits.
+        """Queue a task, in place of one with the same key that waits; return its number.
 
         Args:
             key: Key of the task; of each key only the newest task waits.
@@ -111,14 +110,12 @@ class Worker:
             is_drawing: Whether only the newest task of this key is of use, as with drawings: one
                 under way is cancelled when a newer one waits and `LONG_SECONDS` have passed. It
                 is done once more if the process dies, even if it sends messages.
-
-        Returns:
-            A number to cancel it by.
         """
         number = next(self._numbers)
         order = Order(number, task.__module__, task.__name__, arguments, receive is not None)
-        self._queue.post(key, number, _Request(key, order, done, failed, receive, is_drawing))
-        self._cancel_outdated(key)
+        request = _Request(key, order, done, failed, receive, is_drawing)
+        self._queue.post(key, number, request)
+        self._cancel_outdated(request)
         return number
 
     def cancel(self, number: int, patience: float | None) -> None:
@@ -132,37 +129,29 @@ class Worker:
         """
         with self._writing:
             self._cancelled[number] = patience
-            if self._is_current(number):
-                self._write_cancel(number, patience)
+            self._write_cancel(number)
 
-    def _write_cancel(self, number: int, patience: float | None, after: float = 0.0) -> None:
-        """Cancel the order under way while this thread holds the lock for writing."""
-        if self._process is not None:
-            with contextlib.suppress(*PIPE_ERRORS):
-                write_frame(cast("IO[bytes]", self._process.stdin), Cancel(number, after))
+    def _write_cancel(self, number: int, after: float = 0.0) -> None:
+        """Cancel an order if it is under way; this thread holds the lock for writing."""
+        if self._process is None or not self._is_current(number):
+            return
+        with contextlib.suppress(*PIPE_ERRORS):
+            write_frame(cast("IO[bytes]", self._process.stdin), Cancel(number, after))
+        patience = self._cancelled.get(number)
         if patience is not None and self._deadline is None:
             self._deadline = start_timer(patience, self._kill, number)
 
     def _is_current(self, number: int) -> bool:
         return self._current is not None and self._current.order.number == number
 
-    def _cancel_outdated(self, key: object) -> None:
-        """Cancel the drawing under way once it is long, if a newer one of its key waits.
-
-        This is done on a thread of its own, as writing may have to wait for the process.
-        """
-        current = self._current
-        if current is None or not current.is_drawing or current.key != key:
+    def _cancel_outdated(self, request: _Request) -> None:
+        """Cancel the drawing under way once it is long, if a newer one of its key waits."""
+        if not request.is_drawing:
             return
-        number = current.order.number
-        if number != self._outdated and self._queue.is_waiting(key):
-            self._outdated = number
-            start_timer(0.0, self._cancel_if_current, number)
-
-    def _cancel_if_current(self, number: int) -> None:
         with self._writing:
-            if self._is_current(number):
-                self._write_cancel(number, None, LONG_SECONDS)
+            current = self._current
+            if current and current.key == request.key and self._queue.is_waiting(request.key):
+                self._write_cancel(current.order.number, LONG_SECONDS)
 
     @property
     def process_id(self) -> int | None:
@@ -209,7 +198,7 @@ class Worker:
         elif reply.problem is None:
             request.done(reply.value)
         else:
-            if not reply.expected:
+            if reply.trace:
                 task = request.order.task.replace("_", " ")
                 message = f"Something went wrong in the worker ({task}): {reply.problem}"
                 self._report_error(request, message, reply.trace)
@@ -218,8 +207,7 @@ class Worker:
     def _report_error(self, request: _Request, message: str, trace: str = "") -> None:
         order = request.order
         place = f"{order.module}.{order.task}, called with"
-        details = "\n".join((trace + place, text_of_arguments(order.arguments)))
-        self._report(log_error(message, details))
+        self._report(log_error(message, f"{trace}{place}", order.arguments))
 
     def _is_cancelled(self, request: _Request) -> bool:
         return self._stopped or request.order.number in self._cancelled
@@ -260,14 +248,12 @@ class Worker:
             # A task without a channel would not notice.
             if is_cancelled and not order.is_sending:
                 return False
-            # `Popen` was called with pipes.
-            stream = cast("IO[bytes]", process.stdin)
-            write_frame(stream, order)
+            write_frame(cast("IO[bytes]", process.stdin), order)
             self._current = request
             if is_cancelled:
-                self._write_cancel(order.number, self._cancelled[order.number])
+                self._write_cancel(order.number)
         # A newer drawing may have been queued before this one counted as under way.
-        self._cancel_outdated(request.key)
+        self._cancel_outdated(request)
         return True
 
     def _kill(self, number: int) -> None:
@@ -287,11 +273,8 @@ class Worker:
                 self._process = None
                 self._report(RESTARTED)
             if self._process is None:
-                code = (
-                    "import sys; from explorer.app.session.worker import main; main(sys.argv[1:])"
-                )
                 self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and words
-                    [sys.executable, "-P", "-c", code, *self._preload],
+                    [sys.executable, "-P", "-c", PROGRAM, *self._preload],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     env=os.environ | {"PYTHONPATH": str(SOURCES)},

@@ -29,20 +29,16 @@ def start_log(folder: Path) -> None:
     logging.getLogger().addHandler(log)
 
 
-def log_error(message: str, details: str) -> str:
+def log_error(message: str, details: str, arguments: tuple[object, ...] = ()) -> str:
     """Log an unexpected error; return the message for people, with the place of the log.
 
     Args:
         message: The error in one line.
         details: Its traceback and what led to it.
+        arguments: Arguments of the task in which it happened.
     """
-    logging.getLogger(__name__).error("%s\n%s", message, details)
+    texts = [repr(each)[:MOST_TEXT] for each in arguments]
+    logging.getLogger(__name__).error("%s", "\n".join((message, details, *texts)))
     logs = (log for log in logging.getLogger().handlers if isinstance(log, RotatingFileHandler))
     place = next((log.baseFilename for log in logs), None)
     return message if place is None else f"{message.removesuffix('.')}; the log is {place}"
-
-
-def text_of_arguments(arguments: tuple[object, ...]) -> str:
-    """Return the arguments of a task for the log, a line each."""
-    texts = map(repr, arguments)
-    return "\n".join(text if len(text) <= MOST_TEXT else f"{text[:MOST_TEXT]} …" for text in texts)

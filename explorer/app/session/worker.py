@@ -47,12 +47,7 @@ class Order:
 
 @dataclass(frozen=True)
 class Cancel:
-    """A request to cancel the order with this number.
-
-    Attributes:
-        number: Number of the order.
-        after: Seconds after its start until it counts.
-    """
+    """A request to cancel the order with a number, so many seconds after its start."""
 
     number: int
     after: float = 0.0
@@ -62,21 +57,15 @@ class Cancel:
 class Message:
     """A value that a task sends before it is done."""
 
-    number: int
     value: Any
 
 
 @dataclass(frozen=True)
 class Reply:
-    """The result of an order: a value, or a message for people and whether it was expected.
+    """The result of an order: a value or a problem, with its traceback if it is unexpected."""
 
-    An unexpected problem comes with its traceback.
-    """
-
-    number: int
     value: Any = None
     problem: str | None = None
-    expected: bool = True
     trace: str = ""
 
 
@@ -117,42 +106,34 @@ def read_frame(stream: IO[bytes]) -> Any:
     return pickle.load(stream)  # noqa: S301 - from our own process, over a pipe of our own
 
 
-class Inbox:
-    """The orders of the parent, read on a thread of its own, so that a cancel is read in time.
-
-    Args:
-        stream: Stream from the parent; its end cancels the task under way.
-    """
+class _Inbox:
+    """The orders of the parent, read on a thread of its own, so that a cancel is read in time."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
-        self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
-        # By the number of an order: when it is to end, in seconds after its start.
-        self._cancelled: dict[int, float] = {}
-        self._is_closed = threading.Event()
+        # None once the parent has closed the pipe.
+        self.orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
+        # By the number of the order under way: when it is to end, in seconds after its start.
+        self._ends: dict[int, float] = {}
+        self._is_closed = False
         threading.Thread(target=self._read, name="inbox", daemon=True).start()
 
-    def next(self) -> Order | None:
-        """Wait for the next order and return it; None once the parent closed the pipe."""
-        return self._orders.get()
-
     def is_cancelled(self, number: int, start: float) -> bool:
-        """Whether an order is cancelled that began at a time of the monotonic clock."""
-        after = self._cancelled.get(number, math.inf)
-        return self._is_closed.is_set() or time.monotonic() - start >= after
+        after = self._ends.get(number, math.inf)
+        return self._is_closed or time.monotonic() - start >= after
 
     def _read(self) -> None:
         try:
             while True:
                 frame: Order | Cancel = read_frame(self._stream)
                 if isinstance(frame, Cancel):
-                    before = self._cancelled.get(frame.number, math.inf)
-                    self._cancelled = {frame.number: min(before, frame.after)}
+                    before = self._ends.get(frame.number, math.inf)
+                    self._ends = {frame.number: min(before, frame.after)}
                 else:
-                    self._orders.put(frame)
+                    self.orders.put(frame)
         except (EOFError, OSError, pickle.UnpicklingError):
-            self._is_closed.set()
-            self._orders.put(None)
+            self._is_closed = True
+            self.orders.put(None)
 
 
 def do_nothing() -> None:
@@ -173,10 +154,10 @@ def main(preload: Sequence[str]) -> None:
     for module in preload:
         importlib.import_module(module)
     # Orders name modules too: two threads that import at a time could wait for each other.
-    inbox = Inbox(os.fdopen(os.dup(0), "rb"))
+    inbox = _Inbox(os.fdopen(os.dup(0), "rb"))
     # Until the kernels are compiled, or loaded, they run interpreted.
     warm_in_background()
-    while (order := inbox.next()) is not None:
+    while (order := inbox.orders.get()) is not None:
         try:
             write_frame(replies, _reply(order, inbox, replies))
         except BrokenPipeError:
@@ -184,23 +165,23 @@ def main(preload: Sequence[str]) -> None:
             os._exit(1)
 
 
-def _reply(order: Order, inbox: Inbox, replies: IO[bytes]) -> Reply:
-    number, arguments, start = order.number, order.arguments, time.monotonic()
+def _reply(order: Order, inbox: _Inbox, replies: IO[bytes]) -> Reply:
+    arguments, start = order.arguments, time.monotonic()
     if order.is_sending:
         channel = Channel(
-            lambda value: write_frame(replies, Message(number, value)),
-            lambda: inbox.is_cancelled(number, start),
+            lambda value: write_frame(replies, Message(value)),
+            lambda: inbox.is_cancelled(order.number, start),
         )
         arguments = (*arguments, channel)
     try:
         task: Callable[..., Any] = getattr(importlib.import_module(order.module), order.task)
-        return Reply(number, task(*arguments))
+        return Reply(task(*arguments))
     except ExplorerError as error:
-        return Reply(number, problem=str(error))
+        return Reply(problem=str(error))
     except CancelledError:
-        return Reply(number, problem=CANCELLED)
+        return Reply(problem=CANCELLED)
     except BrokenPipeError:
         raise
     except Exception as error:  # noqa: BLE001 - the parent reports it, and the worker goes on
         problem = " ".join(f"{type(error).__name__}: {error}".split())
-        return Reply(number, problem=problem, expected=False, trace=traceback.format_exc())
+        return Reply(problem=problem, trace=traceback.format_exc())

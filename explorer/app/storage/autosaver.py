@@ -41,10 +41,9 @@ class Autosaver:
         self._store = store
         self._notify = notify
         self._delay, self._retry = delay, retry
-        self._followed: History | None = None
-        # The first lock is held during a save, the second one guards the history that waits.
-        self._saving, self._lock = threading.Lock(), threading.Lock()
-        self._waiting: History | None = None
+        self._newest: History | None = None
+        self._saved: History | None = None
+        self._saving = threading.Lock()
         self._changed, self._stopped = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="autosave", daemon=True)
         self._thread.start()
@@ -55,35 +54,26 @@ class Autosaver:
         A search for a better design is no step before it ends: until then the file holds the
         session before it.
         """
-        if history is not self._followed and not state.optimisation.is_on:
-            with self._lock:
-                self._followed = self._waiting = history
+        if history is not self._newest and not state.optimisation.is_on:
+            self._newest = history
             self._changed.set()
 
     def flush(self) -> bool:
-        """Save the history that waits; return whether none waits any more."""
+        """Save the history that waits; return whether it is saved, or none waits."""
         with self._saving:
-            history, problem, before = self._waiting, None, self.problem
-            if history is None:
+            history, was_failing = self._newest, self.problem is not None
+            if history is None or history is self._saved:
                 return True
             try:
                 self._store.save(history)
-            except ExplorerError as error:
-                problem = str(error)
+                self._saved, self.problem = history, None
             except Exception as error:  # noqa: BLE001 - a fault here must not end the saving
-                problem = f"{type(error).__name__}: {error}"
-            if problem is None:
-                self.problem = None
-                with self._lock:
-                    if self._waiting is history:
-                        self._waiting = None
-            else:
-                line = " ".join(problem.split())
+                kind = "" if isinstance(error, ExplorerError) else f"{type(error).__name__}: "
+                line = " ".join(f"{kind}{error}".split())
                 self.problem = f"The session is not saved: {line}. The explorer keeps trying."
-        if self.problem is not None and before is None:
-            self._notify(self.problem)
-        elif self.problem is None and before is not None:
-            self._notify("The session is saved again.")
+        problem = self.problem
+        if (problem is not None) != was_failing:
+            self._notify(problem or "The session is saved again.")
         return problem is None
 
     def stop(self) -> None:

@@ -69,17 +69,15 @@ class Library:
 
     def list(self) -> tuple[Entry, ...]:
         """Return all entries: the design saved last first, unusable files last."""
-        entries = [_read(path) for path in _newest_first(self.folder)]
-        files: dict[str, str] = {}
-        # A file that the library wrote takes precedence over one copied in with the same name.
-        for each in sorted(entries, key=lambda each: each.file != file_of(each.name)):
-            if each.design is not None:
-                files.setdefault(each.name, each.file)
-        for index, each in enumerate(entries):
-            if each.design is not None and files[each.name] != each.file:
-                other = f"{files[each.name]!r} has the name {each.name!r} too"
-                problem = f"{other}; change it in one of them"
-                entries[index] = Entry(each.file, each.file, None, problem)
+        entries: list[Entry] = []
+        names: set[str] = set()
+        for path in _newest_first(self.folder):
+            entry = _read(path)
+            if entry.design is not None and entry.name in names:
+                problem = f"another file has the name {entry.name!r} too; change it in one of them"
+                entry = Entry(entry.file, entry.file, None, problem)
+            names.add(entry.name)
+            entries.append(entry)
         return tuple(sorted(entries, key=lambda each: each.design is None))
 
     def open(self, name: str) -> Design:
@@ -105,20 +103,11 @@ class Library:
             StorageError: it cannot be written.
         """
         named = _with_name(design, name)
-        file = file_of(named.name)
-        replaced = [e for e in self.list() if e.design is not None and e.name == named.name]
+        entry = self._designs().get(named.name)
         make_data_folder(self.folder)
-        for entry in replaced:
-            if entry.design is not None and entry.design != named:
-                make_folder(self._trash)
-                write_whole(self._trash / entry.file, encode_design(entry.design))
-                _date(self._trash / entry.file)
-        write_whole(self.folder / file, encode_design(named))
-        _date(self.folder / file)
-        for entry in replaced:
-            # A file that was copied in by hand may have any name.
-            if entry.file != file:
-                _remove(self.folder / entry.file)
+        if entry is not None and entry.design is not None and entry.design != named:
+            self._write(self._trash, entry.file, entry.design)
+        self._write(self.folder, file_of(named.name) if entry is None else entry.file, named)
         return named
 
     def rename(self, name: str, new: str) -> Design:
@@ -131,7 +120,7 @@ class Library:
         entry = self._entry(name)
         renamed = _with_name(self.open(name), new)
         if renamed.name != entry.name:
-            if renamed.name in self._names():
+            if renamed.name in self._designs():
                 raise InputError(f"there is a design called {renamed.name!r} already")
             # A process killed in between leaves the design under both names, never under none.
             self.save(new, renamed)
@@ -145,10 +134,10 @@ class Library:
             InputError: there is no such design.
             StorageError: it cannot be moved.
         """
-        path = self.folder / self._entry(name).file
+        file = self._entry(name).file
         make_folder(self._trash)
-        move(path, self._trash / path.name)
-        _date(self._trash / path.name)
+        move(self.folder / file, self._trash / file)
+        _date(self._trash / file)
 
     @property
     def last_deleted(self) -> str | None:
@@ -166,17 +155,23 @@ class Library:
         path = next(iter(_newest_first(self._trash)), None)
         if path is None:
             raise InputError("nothing has been deleted")
-        entry, names = _read(path), self._names()
-        if entry.design is not None and entry.name in names:
-            self.save(copy_name(entry.name, names), entry.design)
+        entry, designs = _read(path), self._designs()
+        if entry.design is not None and entry.name in designs:
+            self.save(copy_name(entry.name, {*designs}), entry.design)
             _remove(path)
         elif (self.folder / path.name).exists():
             raise InputError(f"a file {path.name!r} lies in {str(self.folder)!r}; rename it")
         else:
             move(path, self.folder / path.name)
 
-    def _names(self) -> set[str]:
-        return {each.name for each in self.list() if each.design is not None}
+    def _designs(self) -> dict[str, Entry]:
+        return {each.name: each for each in self.list() if each.design is not None}
+
+    @staticmethod
+    def _write(folder: Path, file: str, design: Design) -> None:
+        make_folder(folder)
+        write_whole(folder / file, encode_design(design))
+        _date(folder / file)
 
     def _entry(self, name: str) -> Entry:
         entries = self.list()
