@@ -1,15 +1,20 @@
-"""The places of the panels, and what each new browser needs: its room, theme and camera."""
+"""The panels and the bar on top, and what each new browser needs: its room, theme and camera."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import get_args
 
 import viser
 
 from explorer.app.browser.browser_facts import BrowserFacts, ask_browser
 from explorer.app.browser.viser_gaps import dock_above_in, panel_in, run_script
-from explorer.app.features.feature import Place, Tab
+from explorer.app.features.feature import Feature, Place, Services, Side, Tab
 from explorer.app.look import read_script
 from explorer.app.scene.camera import Cameras
 from explorer.app.session.clock import start_timer
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.theme import Theme
 
 # Seconds until the panels of a new page are laid out.
@@ -139,3 +144,28 @@ class Layout:
 def is_narrow(facts: BrowserFacts) -> bool:
     """Whether panels on both sides would leave the scene too little room."""
     return facts.width < NARROW and facts.height >= HIGH_ENOUGH
+
+
+SIDES: tuple[Side, ...] = get_args(Side)
+
+
+class Bar:
+    """Shows the parts, side by side.
+
+    Args:
+        services: Services of the page.
+        features: Features of the page.
+    """
+
+    def __init__(self, services: Services, features: Sequence[Feature]) -> None:
+        declared = [part for feature in features for part in feature.bar]
+        self._parts = [(each.side, each.part(services)) for each in declared]
+        self._html = services.gui.add_html("")
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the bar show the frame."""
+        sides = "".join(f"<div>{self._markup(side, frame)}</div>" for side in SIDES)
+        yield self._html, "content", f'<div class="ex-bar">{sides}</div>'
+
+    def _markup(self, side: Side, frame: Frame) -> str:
+        return "".join(part(frame) for each, part in self._parts if each == side)

@@ -10,13 +10,12 @@ from collections import deque
 import numpy as np
 import viser
 
-from explorer.app.bar import Bar
+from explorer.app.browser.browser_facts import listen
 from explorer.app.browser.downloads import Downloads
-from explorer.app.browser.press_events import listen
 from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Panel, Services
 from explorer.app.features.listed import FEATURES
-from explorer.app.layout import Layout, Panels
+from explorer.app.layout import Bar, Layout, Panels
 from explorer.app.look import read_script, read_stylesheet
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed

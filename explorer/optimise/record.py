@@ -12,7 +12,7 @@ from typing import Literal
 import msgspec
 
 from explorer.files.json_text import decode_strictly
-from explorer.files.versions import versions
+from explorer.files.packaged import versions
 from explorer.files.writing import read_at_most
 from explorer.mechanism.design import Design
 from explorer.optimise.outcome import Iterate, Outcome, Phase, Status

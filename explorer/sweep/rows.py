@@ -17,7 +17,7 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from explorer.errors import DesignError, InputError
-from explorer.files.versions import versions
+from explorer.files.packaged import versions
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.measurements import measure_design, reason_for_missing, unmet_needs

@@ -15,7 +15,7 @@ from itertools import islice
 from pathlib import Path
 
 from explorer.errors import ExplorerError
-from explorer.files.versions import versions
+from explorer.files.packaged import versions
 from explorer.numerics.compiled import warm
 from explorer.sweep.parts import claim, pyarrow, sound_parts, write_part
 from explorer.sweep.rows import (

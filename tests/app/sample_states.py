@@ -37,9 +37,9 @@ from explorer.app.state.actions import (
 from explorer.app.state.compared import Look
 from explorer.app.state.folds import SetFold
 from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
+from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import Run, State, opened
 from explorer.app.state.studies import Brush, Studies
-from explorer.app.state.values import value_at, with_value
 from explorer.app.state.view import PrecisionView, PrototypeView, SingularView, View, WorkspaceView
 from explorer.errors import ExplorerError
 from explorer.measures.case import Case

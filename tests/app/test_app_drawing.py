@@ -35,18 +35,17 @@ from explorer.app.scene.camera import (
     framing,
     has_perspective,
 )
-from explorer.app.scene.part import around
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import Placed, around
 from explorer.app.scene.shapes import cylinder, plate, sphere, turned_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.widgets import charts
-from explorer.app.widgets.colours import FAR_WARNINGS, OUTLINE, Rgb, proximity_colour
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_fitted
+from explorer.singularity.colours import FAR_WARNINGS, OUTLINE, Rgb, proximity_colour
 
 OPTIMAL = PRESETS["paper-optimal"]
 

@@ -35,8 +35,7 @@ from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Control
 from explorer.app.inputs.controls import Controls
 from explorer.app.page import Page
-from explorer.app.scene.part import ScenePart
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.server import Running, start
 from explorer.app.session.feed import Feed
 from explorer.app.session.gestures import UserAction
@@ -54,7 +53,7 @@ from explorer.app.state.actions import (
 )
 from explorer.app.state.folds import SetFold
 from explorer.app.state.frame import Frame
-from explorer.app.state.values import value_at, with_value
+from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.view import OrientationView
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import open_user_data

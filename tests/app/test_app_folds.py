@@ -34,12 +34,12 @@ from explorer.app.state.folds import SetFold, folds_of
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.storage.session_file import decode_session, encode_session
-from explorer.app.widgets.colours import SINGULAR, Rgb, proximity_colour
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.folds import FOLDS, to_folds
 from explorer.mechanism.margins import margins, mode_of, signs_of
 from explorer.numerics.arrays import FloatArray
+from explorer.singularity.colours import SINGULAR, Rgb, proximity_colour
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = opened(OPTIMAL)

@@ -50,7 +50,7 @@ from explorer.app.state.state import State, opened
 from explorer.app.state.view import ForcesView, PrecisionView
 from explorer.app.widgets.blocks import render, share_colour
 from explorer.app.widgets.buttons import Buttons
-from explorer.app.widgets.colours import GHOST, SINGULAR
+from explorer.app.widgets.colours import GHOST
 from explorer.errors import InputError, NoAnswerError
 from explorer.export.tables import TOLERANCE_COLUMNS
 from explorer.measures.blocks.block import Share
@@ -60,6 +60,7 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.typical import typical_machine
+from explorer.singularity.colours import SINGULAR
 from explorer.statics.budget.costs import stated_tolerances
 from explorer.statics.error_sources import SOURCES
 from explorer.statics.forces import actuator_forces, strut_bending

@@ -44,12 +44,12 @@ from explorer.app.scene.shapes import linear_colour, plate
 from explorer.app.state.actions import Open, SetJoint, SetPose
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
-from explorer.app.widgets.colours import SINGULAR, proximity_colour
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.bruhat import incidences
+from explorer.singularity.colours import SINGULAR, proximity_colour
 from explorer.singularity.strata import GENERIC, STRATA
 
 OPTIMAL = PRESETS["paper-optimal"]

@@ -50,7 +50,7 @@ from explorer.app.state.actions import Set, SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.widgets.blocks import render
-from explorer.app.widgets.colours import OUTLINE, SWEPT, TUBE
+from explorer.app.widgets.colours import SWEPT, TUBE
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, leg_axes, leg_clearances
 from explorer.legs.interference import step_overlaps, swept_tetrahedra
@@ -62,6 +62,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.singularity.colours import OUTLINE
 from explorer.workspace.accessible.radii import RadiusCurve
 from explorer.workspace.accessible.start import StartError, check_start
 from explorer.workspace.accessible.workspace import accessible_workspace

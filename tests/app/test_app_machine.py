@@ -19,8 +19,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.machine.panel import MachinePanel, SetToolAngle
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
 from explorer.app.features.machine.words import machine_words
-from explorer.app.scene.part import HALF_JOINT
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import HALF_JOINT, Placed
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame

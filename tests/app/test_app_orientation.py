@@ -49,10 +49,10 @@ from explorer.app.state.actions import Set, SetAngle, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import WorkspaceView
-from explorer.app.widgets.colours import css
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_from_rotation, tilt_torsion_of
+from explorer.singularity.colours import css
 from explorer.workspace.orientations.sets import cone_of_directions
 from explorer.workspace.orientations.share import orientation_share
 from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap, greatest_tilt, tilt_map

@@ -57,12 +57,11 @@ from explorer.app.scene.placing import Placed
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import value_at
 from explorer.app.state.paths import STRAIGHT_SECONDS, End, Journey
 from explorer.app.state.state import State, angles_of, joints_of, opened
-from explorer.app.state.values import value_at
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.charts import ORANGE
-from explorer.app.widgets.colours import css
 from explorer.app.widgets.pieces import widgets
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
@@ -73,6 +72,7 @@ from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.loads import path_loads
+from explorer.singularity.colours import css
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
 

@@ -37,13 +37,13 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import PrototypeView
 from explorer.app.widgets.assigning import Assigner
-from explorer.app.widgets.colours import OUTLINE
 from explorer.errors import InputError
 from explorer.export.assembly import FORMATS, assembly_bytes
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.chains import LEGS, ON_GUIDE, Places
+from explorer.singularity.colours import OUTLINE
 
 OPTIMAL = PRESETS["paper-optimal"]
 PARTS = 18

@@ -21,7 +21,6 @@ from explorer.app.features.singularity.work import STRATA_FEED, GoToSingularity
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
-from explorer.app.widgets.colours import SINGULAR, WARNED, proximity_colour
 from explorer.measures.snapshot import evaluate
 from explorer.measures.verdict import DISTANCE_SHARE, TITLES, verdict, warnings
 from explorer.mechanism.design import Design
@@ -29,7 +28,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import describe_modes
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.singularity.bruhat import COVERED, OF_INCIDENCES, incidences
-from explorer.singularity.colours import WARN_SHARE, css
+from explorer.singularity.colours import SINGULAR, WARN_SHARE, WARNED, css, proximity_colour
 from explorer.singularity.jacobian import scaled_margins
 from explorer.workspace.position_bands import position_bands
 

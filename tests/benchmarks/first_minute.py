@@ -16,8 +16,7 @@ from pathlib import Path
 
 from benchmarks.table import Row, seconds
 from benchmarks.timing import EXPLORER, ROOT, elapsed, run_to_end
-from explorer.app.browser.chromium import find_chromium
-from explorer.app.browser.headless import headless_browser
+from explorer.app.browser.headless import find_chromium, headless_browser
 
 RUNS = 5
 SEARCH = (

@@ -19,8 +19,7 @@ from playwright.sync_api import Browser, Page
 
 from benchmarks.table import Row, seconds
 from explorer import PRESETS
-from explorer.app.browser.chromium import find_chromium
-from explorer.app.browser.headless import headless_browser
+from explorer.app.browser.headless import find_chromium, headless_browser
 from explorer.app.browser.viser_gaps import mark_broadcasts
 from explorer.app.screenshot import AWAIT_FRAMES, PATIENCE_SECONDS, SCENE_CANVAS, open_page, settle
 from explorer.app.server import Running, start

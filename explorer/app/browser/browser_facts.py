@@ -1,6 +1,8 @@
-"""What only a browser knows: how large its window is, and whether its user prefers dark pages.
+"""What only a browser knows: its window's size, the theme that its user prefers, and presses.
 
-viser reports neither. A script sends both to a hidden text field of its tab.
+viser reports values alone. So scripts of the page write the rest to hidden fields of their tab, by
+the same way and in the same order as the values of other controls: a value is known to come from
+the press during which it arrives.
 """
 
 from __future__ import annotations
@@ -13,6 +15,8 @@ import viser
 
 from explorer.app.browser.viser_gaps import element_id, run_script_in
 from explorer.app.look import read_script
+from explorer.app.session.clock import moment_of
+from explorer.app.state.presses import Presses
 
 Pixels = Annotated[float, msgspec.Meta(ge=0, le=100_000)]
 Described = TypeVar("Described")
@@ -65,3 +69,24 @@ def decode_text(text: str, decoder: msgspec.json.Decoder[Described]) -> Describe
 def decode_facts(answer: str) -> BrowserFacts | None:
     """Return the facts in an answer of a browser; None if it is not valid."""
     return decode_text(answer, _DECODER)
+
+
+def listen(client: viser.ClientHandle, presses: Presses, at_release: Callable[[], None]) -> None:
+    """Record the presses of a browser that has connected.
+
+    Args:
+        client: The browser.
+        presses: Where to record them.
+        at_release: Called after each release.
+    """
+    field = client.gui.add_number("Press", 0, visible=False)
+
+    # On the thread that reads the browser's messages, one after the other.
+    @field.on_update
+    async def _(event: viser.GuiEvent[viser.GuiNumberHandle[int]]) -> None:
+        number, stamp = event.target.value, event.target.update_timestamp
+        presses.record(client.client_id, number, moment_of(stamp))
+        if number <= 0:
+            at_release()
+
+    run_script_in(client, read_script("holds", element_id(field)))

@@ -1,14 +1,23 @@
-"""A headless Chromium, for pictures and for printing."""
+"""A headless Chromium, for pictures, printing and tests, and how it is found on this machine.
+
+The search goes in this order: what EXPLORER_CHROMIUM names, the programs on the PATH, the usual
+places of macOS and Windows, and the one that Playwright has downloaded.
+"""
 
 from __future__ import annotations
 
+import importlib.util
+import itertools
 import os
-from collections.abc import Generator, Mapping, Sequence
+import shutil
+import subprocess
+import sys
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from explorer.app.browser.chromium import find_chromium
-from explorer.errors import ExplorerError, MissingExtraError
+from explorer.errors import ExplorerError, InputError, MissingExtraError
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -74,3 +83,77 @@ def headless_browser(
             raise PictureError(f"the browser {chromium} failed: {reason}") from None
         finally:
             browser.close()
+
+
+VARIABLE = "EXPLORER_CHROMIUM"
+"""The environment variable that names a Chromium, by its path or as found on the PATH."""
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+_MAC_APPS = (
+    "Chromium.app/Contents/MacOS/Chromium",
+    "Google Chrome.app/Contents/MacOS/Google Chrome",
+)
+_WINDOWS_PROGRAMS = (
+    "Google/Chrome/Application/chrome.exe",
+    "Chromium/Application/chrome.exe",
+    "Microsoft/Edge/Application/msedge.exe",
+)
+
+# Playwright's calls refuse to run inside an event loop, so another process asks.
+_ASK_PLAYWRIGHT = """
+from playwright.sync_api import sync_playwright
+with sync_playwright() as playwright:
+    print(playwright.chromium.executable_path)
+"""
+
+
+def find_chromium() -> str | None:
+    """Return the path of a Chromium that can be started, or None.
+
+    Raises:
+        InputError: EXPLORER_CHROMIUM is set, but names no program.
+    """
+    name = os.environ.get(VARIABLE)
+    if name:
+        program = shutil.which(name)
+        if program is None:
+            raise InputError(
+                f"{VARIABLE} names no program: {name!r}; set it to the path of a Chromium, "
+                "or unset it to have one looked for"
+            )
+        return program
+    on_path = (path for path in map(shutil.which, NAMES) if path and not _is_snap_stub(path))
+    return next(itertools.chain(on_path, _usual_places()), None) or _find_playwrights()
+
+
+def _is_snap_stub(program: str) -> bool:
+    """Whether a program is Ubuntu's script that only says how to install Chromium."""
+    with Path(program).open("rb") as file:
+        start = file.read(4096)
+    snap = "/snap/bin/chromium"
+    return start.startswith(b"#!") and snap.encode() in start and not Path(snap).exists()
+
+
+def _usual_places() -> Iterator[str]:
+    places: list[Path] = []
+    if sys.platform == "darwin":
+        folders = (Path("/Applications"), Path.home() / "Applications")
+        places = [folder / app for app in _MAC_APPS for folder in folders]
+    elif sys.platform == "win32":
+        roots = ("PROGRAMFILES", "PROGRAMFILES(X86)", "LOCALAPPDATA")
+        folders = tuple(Path(os.environ[root]) for root in roots if root in os.environ)
+        places = [folder / program for program in _WINDOWS_PROGRAMS for folder in folders]
+    for place in places:
+        if os.access(place, os.X_OK):
+            yield str(place)
+
+
+def _find_playwrights() -> str | None:
+    if importlib.util.find_spec("playwright") is None:
+        return None
+    answer = subprocess.run(  # noqa: S603 - our own interpreter and our own words
+        [sys.executable, "-c", _ASK_PLAYWRIGHT], check=False, capture_output=True, text=True
+    )
+    path = answer.stdout.strip()
+    return path if answer.returncode == 0 and path and os.access(path, os.X_OK) else None

@@ -1,14 +1,28 @@
-"""Features of viser's scene and controls without a public name."""
+"""Features of viser's scene and controls without a public name.
+
+Each use of a private name of viser stands beside the gap in viser that it fills; further ones are
+in `viser_server` beside this module, and in `explorer.app.widgets.pieces`.
+"""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from typing import Any, cast
 
 import numpy as np
 import viser
 from numpy.typing import ArrayLike
+from viser._messages import (
+    GuiSliderMark,
+    GuiUpdateMessage,
+    RunJavascriptMessage,
+    SetCameraFovMessage,
+    SetCameraLookAtMessage,
+    SetCameraPositionMessage,
+    SetCameraUpDirectionMessage,
+    SetOrientationMessage,
+    SetPositionMessage,
+)
 
 from explorer.numerics.arrays import FloatArray
 
@@ -18,45 +32,26 @@ SceneMessage = dict[str, Any]
 # Properties that place a node of the scene.
 PLACE = ("position", "wxyz")
 
+MARKS = "_marks"
+"""The property of a slider that holds its marks. Gap: only its constructor takes them."""
 
-class SliderMarks:
-    """The marks below a slider: its constructor takes them, its handle does not."""
 
-    def __init__(self, slider: viser.GuiSliderHandle[float]) -> None:
-        self._slider: Any = slider
-
-    @property
-    def marks(self) -> tuple[float, ...]:
-        """Position of each mark."""
-        return tuple(mark.value for mark in self._slider._marks)
-
-    @marks.setter
-    def marks(self, marks: tuple[float, ...]) -> None:
-        from viser import _messages
-
-        self._slider._marks = tuple(_messages.GuiSliderMark(value, "") for value in marks)
+def slider_marks(values: Iterable[float]) -> tuple[object, ...]:
+    """Return marks without words at positions of a slider."""
+    return tuple(GuiSliderMark(value, "") for value in values)
 
 
 def place(node: viser.SceneNodeHandle, name: str, value: ArrayLike) -> None:
     """Assign `position` or `wxyz` of a node of the scene to the last bit.
 
-    viser's own assignment leaves out what `np.allclose` calls unchanged, so that a node
+    Gap: viser's own assignment leaves out what `np.allclose` calls unchanged, so that a node
     lags behind by up to 1e-5 of its place, and small steps never add up.
     """
     held: Any = getattr(node, name)
     numbers = tuple(np.asarray(value, dtype=np.float64).tolist())
-    if tuple(held.tolist()) == numbers:
-        return
-    held[:] = numbers
-    _send_place(node, name)
-
-
-def _send_place(node: viser.SceneNodeHandle, name: str) -> None:
-    from viser import _messages
-
-    internals: Any = node
-    kind = _messages.SetPositionMessage if name == "position" else _messages.SetOrientationMessage
-    internals._impl.api._queue_scene_message(kind(node.name, tuple(getattr(node, name).tolist())))
+    if tuple(held.tolist()) != numbers:
+        held[:] = numbers
+        resend(node, name)
 
 
 def assign_properties(node: viser.SceneNodeHandle, values: Mapping[str, object]) -> None:
@@ -85,91 +80,58 @@ def put_camera(
 ) -> None:
     """Put a browser's camera at an eye, upright, looking at a target; the browser then reports it.
 
-    viser's own handle never sends the same place twice, although a browser that is still loading
-    returns to its first camera after all messages.
+    Gap: viser's own handle never sends the same place twice, although a browser that is still
+    loading returns to its first camera after all messages.
     """
-    from viser import _messages
-
-    def triple(vector: FloatArray) -> tuple[float, float, float]:
-        x, y, z = vector.tolist()
-        return (x, y, z)
-
-    internals: Any = client
-    connection = internals._websock_connection
-    with client.atomic():
-        connection.queue_message(_messages.SetCameraUpDirectionMessage((0.0, 0.0, 1.0)))
-        connection.queue_message(_messages.SetCameraPositionMessage(triple(eye)))
-        connection.queue_message(_messages.SetCameraLookAtMessage(triple(target)))
+    messages = (
+        SetCameraUpDirectionMessage((0.0, 0.0, 1.0)),
+        SetCameraPositionMessage(cast("Any", tuple(eye.tolist()))),
+        SetCameraLookAtMessage(cast("Any", tuple(target.tolist()))),
         # A browser answers this one, whatever its camera did.
-        connection.queue_message(_messages.SetCameraFovMessage(field_of_view))
+        SetCameraFovMessage(field_of_view),
+    )
+    with client.atomic():
+        for message in messages:
+            _send_to(client, message)
 
 
 def show_value(control: Any, value: object) -> None:
     """Assign the value of a control, and send it to the browsers.
 
-    viser's own assignment calls the callbacks too, which are for what users do.
+    Gap: viser's own assignment calls the callbacks too, which are for what users do.
     """
-    from viser import _messages
-
     state = control._impl
     value = type(state.value)(value)
-    if state.value == value:
-        return
-    message = _messages.GuiUpdateMessage(state.uuid, {"value": value})
-    state.gui_api._websock_interface.queue_message(message)
-    state.value = value
-    state.update_timestamp = time.time()
+    if state.value != value:
+        state.value = value
+        resend(control, "value")
 
 
 def resend(handle: Any, name: str) -> None:
-    """Send browsers a property that they have already: `value` of a control, or a node's place."""
-    from viser import _messages
-
+    """Send browsers a property of a control, or a node's place, that viser holds for sent."""
+    state = handle._impl
     if name in PLACE:
-        _send_place(handle, name)
+        kind = SetPositionMessage if name == "position" else SetOrientationMessage
+        state.api._queue_scene_message(kind(handle.name, tuple(getattr(handle, name).tolist())))
     else:
-        state = handle._impl
-        message = _messages.GuiUpdateMessage(state.uuid, {name: getattr(state, name)})
+        message = GuiUpdateMessage(state.uuid, {name: getattr(state, name)})
         state.gui_api._websock_interface.queue_message(message)
 
 
-def is_stale(handle: Any, name: str) -> bool:
-    """Whether browsers were last sent another `value` of a control than the one it holds.
-
-    A value is sent first and stored after: one that a user sets in between is sent last, and then
-    overwritten here.
-    """
-    from viser import _messages
-
-    if name in PLACE:
-        return False
-    state = handle._impl
-    held = getattr(state, name)
-    message = _messages.GuiUpdateMessage(state.uuid, {name: held})
-    buffer = state.gui_api._websock_interface.get_message_buffer()
-    with buffer.buffer_lock:
-        sent = buffer.message_from_id.get(
-            buffer.id_from_redundancy_key.get(message.redundancy_key())
-        )
-    return sent is not None and sent.updates[name] != held
-
-
 def element_id(control: viser.GuiInputHandle[Any] | viser.GuiButtonHandle) -> str:
-    """Return the id of a control in the page: a label of HTML can be for the button with it."""
+    """Return the id of a control in the page. Gap: scripts and labels of HTML cannot name it."""
     internals: Any = control
     return str(internals._impl.uuid)
 
 
 def run_script(server: viser.ViserServer, source: str) -> None:
     """Run a script of ours in every browser, also in those that come later."""
-    internals: Any = server
-    internals._websock_server.queue_message(_script(source))
+    _send_to_all(server, _script(source))
 
 
 def run_script_in(client: viser.ClientHandle, source: str) -> None:
     """Run a script of ours in one browser."""
-    internals: Any = client
-    internals._websock_connection.queue_message(_script(source))
+    _send_to(client, _script(source))
 
 
 def mark_broadcasts(client: viser.ClientHandle, number: int) -> None:
@@ -178,27 +140,34 @@ def mark_broadcasts(client: viser.ClientHandle, number: int) -> None:
     A browser has received those messages when its `window.explorer.mark` is the number. What is
     sent to one browser alone takes a way of its own and may arrive earlier.
     """
-    from viser import _messages
 
     # The type of a message is the name of its class.
-    class RunJavascriptMessage(_messages.RunJavascriptMessage):
+    class Mark(RunJavascriptMessage):
         def redundancy_key(self) -> str:
             return "mark"
 
+    Mark.__name__ = RunJavascriptMessage.__name__
     internals: Any = client
     source = f"(window.explorer ??= {{}}).mark = {number};"
-    internals._viser_server._websock_server.queue_message(RunJavascriptMessage(source=source))
+    _send_to_all(internals._viser_server, Mark(source=source))
 
 
-def _script(source: str) -> Any:
+def _script(source: str) -> object:
     """Return the message that runs a script, whose errors a browser logs.
 
-    An error that viser's page meets at a message takes all messages that wait with it.
+    Gap: an error that viser's page meets at a message takes all messages that wait with it.
     """
-    from viser import _messages
-
     guarded = f"try {{\n{source}\n}} catch (error) {{ console.error(error); }}"
-    return _messages.RunJavascriptMessage(source=guarded)
+    return RunJavascriptMessage(source=guarded)
+
+
+def _send_to_all(server: Any, message: object) -> None:
+    # Gap: viser has no public way to run a script.
+    server._websock_server.queue_message(message)
+
+
+def _send_to(client: Any, message: object) -> None:
+    client._websock_connection.queue_message(message)
 
 
 def scene_as_html(
@@ -211,20 +180,18 @@ def scene_as_html(
         server: Server of the scene.
         select: Returns the messages for the page from all messages that make the scene.
     """
+    # Gap: a recording of viser can neither be ended nor be filtered.
     serializer: Any = server.get_scene_serializer()
-    # Otherwise it would go on recording.
-    serializer._filter = _nothing
-    messages = select([message for _, message in serializer._messages])
-    serializer._messages = [(0.0, message) for message in messages]
+    serializer._filter = _refuse
+    recorded, arrays = serializer._messages, serializer._binary_buffers
+    messages = select([message for _, message in recorded])
+    recorded[:] = [(0.0, message) for message in messages]
     used = set(_arrays_in(messages))
-    serializer._binary_buffers = [
-        data if index in used else memoryview(b"")
-        for index, data in enumerate(serializer._binary_buffers)
-    ]
+    arrays[:] = [data if i in used else memoryview(b"") for i, data in enumerate(arrays)]
     return str(serializer.as_html())
 
 
-def _nothing(_: object) -> bool:
+def _refuse(_: object) -> bool:
     return False
 
 
@@ -243,7 +210,10 @@ def _arrays_in(value: object) -> Generator[int]:
 
 
 def panel_in(client: viser.ClientHandle, panel: viser.PanelHandle) -> viser.PanelHandle:
-    """Return a handle that places a panel, which all browsers share, in one browser alone."""
+    """Return a handle that places a panel, which all browsers share, in one browser alone.
+
+    Gap: viser's own handle places a panel in all of them.
+    """
     own = viser.PanelHandle.__new__(viser.PanelHandle)
     own.__dict__.update({**panel.__dict__, "_placement_gui_api": client.gui})
     return own
@@ -254,7 +224,7 @@ def dock_above_in(
 ) -> None:
     """Dock a panel above another one in one browser alone; all browsers share both.
 
-    viser's own handle refuses an anchor that was not made for that browser.
+    Gap: viser's own handle refuses an anchor that was not made for that browser.
     """
     internals: Any = anchor
     own: Any = panel_in(client, panel)

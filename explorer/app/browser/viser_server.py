@@ -13,9 +13,15 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 import viser
+import viser.infra
 import websockets.asyncio.server
-from viser import _messages
-from viser.infra import _infra
+from viser._messages import (
+    FileTransferPartAck,
+    FileTransferStartUpload,
+    ShareUrlDisconnect,
+    ShareUrlRequest,
+)
+from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from explorer.app.security.guard import Serve
 from explorer.errors import ServerError
@@ -41,8 +47,8 @@ def start_viser(
     # A tab may close while a message is on its way to it; that needs no warning.
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection")
     # Gap: viser wakes tabs that wait for messages from threads outside of their loop.
-    internals: Any = _infra
-    internals.AsyncMessageBuffer = _Buffer
+    internals: Any = viser.infra
+    internals._infra.AsyncMessageBuffer = _Buffer
     with contextlib.redirect_stdout(io.StringIO()), _serve_through(guarded) as is_guarded:
         server = viser.ViserServer(host=host, port=port, verbose=False)
     if not is_guarded():
@@ -68,7 +74,7 @@ class _LoopEvent(asyncio.Event):
             super().set()
 
 
-class _Buffer(_infra.AsyncMessageBuffer):
+class _Buffer(AsyncMessageBuffer):
     def __init__(self, event_loop: asyncio.AbstractEventLoop, **options: Any) -> None:
         super().__init__(event_loop, message_event=_LoopEvent(), **options)
 
@@ -106,7 +112,7 @@ def protect(server: viser.ViserServer) -> None:
     internals: Any = server
     gui: Any = server.gui
     # Gap: viser opens a public tunnel for any client that asks.
-    for kind in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+    for kind in (ShareUrlRequest, ShareUrlDisconnect):
         internals._websock_server.unregister_handler(kind)
     # Gap: viser stores uploads of any size, and reports their progress to all browsers, also later
     # ones, which then show a file without a name.
@@ -114,7 +120,7 @@ def protect(server: viser.ViserServer) -> None:
     queue_for_all, start_upload = interface.queue_message, gui._handle_file_transfer_start
 
     def queue_message(message: Any) -> None:
-        if not isinstance(message, _messages.FileTransferPartAck):
+        if not isinstance(message, FileTransferPartAck):
             queue_for_all(message)
             return
         upload = gui._current_file_upload_states.get(message.transfer_uuid)
@@ -127,5 +133,5 @@ def protect(server: viser.ViserServer) -> None:
             start_upload(client_id, message)
 
     interface.queue_message = queue_message
-    interface.unregister_handler(_messages.FileTransferStartUpload)
-    interface.register_handler(_messages.FileTransferStartUpload, start_small_upload)
+    interface.unregister_handler(FileTransferStartUpload)
+    interface.register_handler(FileTransferStartUpload, start_small_upload)

@@ -15,7 +15,7 @@ import viser
 
 from explorer.app.browser.downloads import Downloads
 from explorer.app.scene.camera import Cameras
-from explorer.app.scene.part import ScenePart
+from explorer.app.scene.placing import ScenePart
 from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Session, Who
 from explorer.app.state.action import Action

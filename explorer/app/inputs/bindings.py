@@ -9,8 +9,8 @@ from typing import Any, Generic, TypeAlias, TypeVar
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
-from explorer.app.state.values import value_at
 from explorer.mechanism.design import Pair
 from explorer.mechanism.pose import Triple
 

@@ -12,7 +12,7 @@ from typing import Any, Generic, cast
 
 import viser
 
-from explorer.app.browser.viser_gaps import SliderMarks
+from explorer.app.browser.viser_gaps import MARKS, slider_marks
 from explorer.app.inputs.bindings import Bound, Value
 from explorer.app.inputs.tracks import Intervals, Span, Track, decimals, tint_marks
 from explorer.app.session.session import Session
@@ -113,7 +113,6 @@ class Slider(Control[float]):
         self._track = Track(handle, span, closes_up=closes_up)
         self._tinted = tinted
         self._colours = colours
-        self._marks = SliderMarks(handle)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the slider show the frame, its range first."""
@@ -131,7 +130,7 @@ class Slider(Control[float]):
         value = snap_to_decimals(value, decimals(span.step), size)
         yield from self._track.updates(span)
         if self._tinted is not None:
-            yield self._marks, "marks", tint_marks(tinted, span)
+            yield self.handle, MARKS, slider_marks(tint_marks(tinted, span))
         if self._colours is not None:
             strip, stops = self._colours
             yield strip, "visible", True

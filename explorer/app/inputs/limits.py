@@ -9,8 +9,8 @@ from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.ranges import span_around
 from explorer.app.inputs.tracks import Span
 from explorer.app.state.actions import Set
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
-from explorer.app.state.values import with_value
 from explorer.mechanism.design import Design, Pair
 from explorer.workspace.limits.limit import Entry, Limit, Switch
 from explorer.workspace.limits.table import LIMITS

@@ -7,12 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.shapes import add_lines, add_translucent, sphere
+from explorer.app.scene.shapes import add_label, add_lines, add_translucent, sphere
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import FAR, Rgb
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
+from explorer.singularity.colours import FAR, Rgb
 
 OPACITY = 0.3
 

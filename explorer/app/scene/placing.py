@@ -1,4 +1,6 @@
-"""From design units to the scene, where every mechanism is about ten units large.
+"""Parts of the scene, and the mechanism in its scale: about ten units large.
+
+Each part is made once, then only assigned to, frame by frame.
 
 The scale follows the design as it was opened and not its sliders, so that a growing
 design is seen to grow. It is 1, 2 or 5 times a power of ten, as is the side of the ground's squares
@@ -8,6 +10,8 @@ in millimetres.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,6 +19,9 @@ import numpy as np
 
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.widgets.assigning import Update
+from explorer.measures.size import corners_of
+from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 
@@ -135,3 +142,45 @@ class Placed:
     def facing(self) -> float:
         """The side of the platform plane on which its body lies, ±1; away from a1 at home."""
         return 1.0 if self.frame.state.mode & 4 == 0 else -1.0
+
+
+# Half the edge of a cube about a joint, in scene units.
+HALF_JOINT = 0.8
+NO_POINTS: FloatArray = np.empty((0, 3))
+
+
+class ScenePart(ABC):
+    """A part of the scene."""
+
+    @abstractmethod
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the part in this frame."""
+
+    def corners(self, placed: Placed) -> FloatArray:  # noqa: ARG002 - most parts are within others
+        """Return the points that a picture of the whole mechanism must show, shape (n, 3)."""
+        return NO_POINTS
+
+
+def around(points: FloatArray) -> FloatArray:
+    """Return the corners of cubes about points (n, 3) of the mechanism, shape (8 n, 3)."""
+    half = corners_of(np.array([[-HALF_JOINT] * 3, [HALF_JOINT] * 3]))
+    return (points[:, None] + half).reshape(-1, 3)
+
+
+def outline(snapshot: Snapshot) -> FloatArray:
+    """Return lines along base, legs and platform, in design units, shape (n, 2, 3)."""
+    points = snapshot.points
+    d1, d3 = float(snapshot.joints[1]), float(snapshot.joints[3])
+    first, second = np.array([d1, 0.0, 0.0]), np.array([d3, 0.0, 0.0])
+    # The part of the guide between a1 and the carriages.
+    low, high = np.array([[min(0.0, d1, d3), 0.0, 0.0], [max(0.0, d1, d3), 0.0, 0.0]])
+    base = ((low, high), (points.a1, points.a3), (high, points.a3))
+    legs = (
+        (points.a1, points.b1),
+        (first, points.b2),
+        (second, points.b3),
+        (points.a3, points.b4),
+    )
+    corners = (points.b1, points.b2, points.b3, points.b4)
+    platform = tuple((a, b) for index, a in enumerate(corners) for b in corners[index + 1 :])
+    return np.array([*base, *legs, *platform])

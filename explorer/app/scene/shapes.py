@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import Rgb
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.singularity.colours import Rgb
 
 Mesh: TypeAlias = tuple[FloatArray, IntArray]
 
@@ -392,3 +392,34 @@ def _plate(
 def _sharp(triangles: FloatArray) -> Mesh:
     """Return triangles (n, 3, 3) as a mesh with corners of their own, so that edges are sharp."""
     return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
+
+
+def add_label(
+    scene: viser.SceneApi,
+    name: str,
+    text: str,
+    *,
+    colour: Rgb | None = None,
+    fades: bool = True,
+    visible: bool = True,
+) -> viser.LabelHandle:
+    """Add a label; its `text`, `position` and `visible` are assigned like those of other nodes.
+
+    Args:
+        scene: Scene of the label.
+        name: Name of the node; its parent is the frame of the label's position.
+        text: Text of the label.
+        colour: Colour of the text; None for that of the page's text.
+        fades: Whether the label is pale where a body hides its point.
+        visible: Whether the label is drawn.
+    """
+    # viser's labels have no colour; they use the scene height only if their size is that of
+    # things in the scene, so that the script finds the colour there.
+    red, green, blue = (0, 0, 0) if colour is None else colour
+    return scene.add_label(
+        name,
+        text,
+        font_scene_height=float(red << 16 | green << 8 | blue),
+        depth_test=fades,
+        visible=visible,
+    )

@@ -13,7 +13,7 @@ import numpy as np
 
 from explorer.app.state.action import Action, value_text
 from explorer.app.state.clear_length import clear_length
-from explorer.app.state.parts import kept_on_open
+from explorer.app.state.parts import kept_on_open, with_value
 from explorer.app.state.state import (
     Joints,
     State,
@@ -24,7 +24,6 @@ from explorer.app.state.state import (
     mode_at,
     opened,
 )
-from explorer.app.state.values import with_value
 from explorer.app.state.view import DrawnAs
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, VARIABLES, Design

@@ -1,14 +1,18 @@
-"""What becomes of the parts of the state when it is saved and when another design is opened.
+"""Parts of the state: values by path, and what a file and another design leave of each.
 
-Each field of the state, and of its parts, declares this as its metadata. A field that declares
-nothing is saved, and is that of a new state once another design is opened.
+A path is such as "view.singular.ball" or "view.tetrahedra.0". Each field of the state, and of its
+parts, declares as its metadata what becomes of it when the state is saved, and when another design
+is opened. A field that declares nothing is saved, and is that of a new state once another design is
+opened.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import Field, fields
-from typing import Any, cast
+from dataclasses import Field, fields, replace
+from typing import Any, TypeVar, cast
+
+import msgspec
 
 TRANSIENT: Mapping[str, Any] = {"is_saved": False}
 """Metadata of a field that no file holds: it describes work under way, or is computed again."""
@@ -37,3 +41,36 @@ def kept_on_open(state: Any) -> dict[str, Any]:
         for field in fields(state)
         if "on_open" in cast("Mapping[str, Any]", field.metadata)
     }
+
+
+Whole = TypeVar("Whole")
+
+
+def value_at(whole: object, path: str) -> Any:
+    """Return the value at a path: names of fields and indices of tuples, joined by dots.
+
+    Raises:
+        AttributeError: the path names a field that is not there.
+    """
+    value: Any = whole
+    for name in path.split("."):
+        value = value[int(name)] if name.isdecimal() else getattr(value, name)
+    return value
+
+
+def with_value(whole: Whole, path: str, value: object) -> Whole:
+    """Return a frozen value with another value at a path; the rest of it stays.
+
+    Raises:
+        InputError: a part refuses the value.
+    """
+    name, _, rest = path.partition(".")
+    new: Any = with_value(value_at(whole, name), rest, value) if rest else value
+    part: Any = whole
+    if isinstance(part, tuple):
+        values = cast("tuple[object, ...]", part)
+        index = int(name)
+        return cast("Whole", (*values[:index], new, *values[index + 1 :]))
+    if isinstance(part, msgspec.Struct):
+        return cast("Whole", msgspec.structs.replace(part, **{name: new}))
+    return replace(part, **{name: new})

@@ -8,10 +8,9 @@ to those before it. Every number is kept to the last bit.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import is_dataclass
-from functools import cache
-from typing import Any, cast, get_args, get_type_hints
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -34,8 +33,8 @@ class Packer:
 
     def __init__(self) -> None:
         self._numbers: dict[bytes, int] = {}
-        # By the id of an object: what it was packed as, and the object itself, which keeps the id.
-        self._packed: dict[int, tuple[Any, object]] = {}
+        # By the id of an object: its reference, and the object itself, which keeps the id.
+        self._packed: dict[int, tuple[dict[str, int], object]] = {}
 
     @property
     def objects(self) -> list[msgspec.Raw]:
@@ -58,90 +57,44 @@ class Packer:
         if isinstance(value, list | tuple):
             return [self._pack(each) for each in cast("list[Any]", value)]
         if id(value) not in self._packed:
-            self._packed[id(value)] = self._reference(_fields_of(value)), value
+            fields = {name: self._pack(each) for name, each in _fields_of(value).items()}
+            number = self._numbers.setdefault(msgspec.json.encode(fields), len(self._numbers))
+            self._packed[id(value)] = {REFERENCE: number}, value
         return self._packed[id(value)][0]
-
-    def _reference(self, fields: Mapping[str, Any]) -> dict[str, int]:
-        text = msgspec.json.encode({name: self._pack(value) for name, value in fields.items()})
-        return {REFERENCE: self._numbers.setdefault(text, len(self._numbers))}
 
 
 def _fields_of(value: Any) -> Mapping[str, Any]:
-    for_file: Callable[[], Any] | None = getattr(value, "for_file", None)
-    saved = value if for_file is None else for_file()
+    saved: Any = value.for_file() if hasattr(value, "for_file") else value
     if is_dataclass(saved):
         return {field.name: getattr(saved, field.name) for field in saved_fields(saved)}
-    if isinstance(saved, dict):
-        return cast("dict[str, Any]", saved)
-    return msgspec.to_builtins(saved)
+    return cast("dict[str, Any]", saved) if isinstance(saved, dict) else msgspec.to_builtins(saved)
 
 
-class Unpacker:
-    """States from JSON values; what they share in the file they share again."""
-
-    def __init__(self) -> None:
-        # By the id of a JSON object and the type it is read as: the value, and the JSON object.
-        self._values: dict[tuple[int, Any], tuple[Any, object]] = {}
-
-    def state(self, fields: Mapping[str, Any]) -> State:
-        """Return a state, with what follows from it computed again.
-
-        Args:
-            fields: JSON values by field, as `resolve` returns them.
-
-        Raises:
-            InputError: values that no state has, or an unknown field.
-            msgspec.ValidationError: a value has the wrong type.
-            TypeError: a field is missing.
-        """
-        return self._read(fields, State)
-
-    def _read(self, raw: Any, kind: Any) -> Any:
-        if not isinstance(raw, dict):
-            return msgspec.convert(raw, kind)
-        fields = cast("dict[str, Any]", raw)
-        key = id(fields), kind
-        if key not in self._values:
-            kinds = (each for each in (kind, *get_args(kind)) if is_dataclass(each))
-            part: Any = next(kinds, None)
-            if part is None:
-                value = msgspec.convert(raw, kind)
-            else:
-                types = _types_of(part)
-                for name in {*fields} - {*types}:
-                    raise InputError(f"{part.__name__} has no field {name!r}")
-                read = {name: self._read(each, types[name]) for name, each in fields.items()}
-                value = part(**read)
-                if isinstance(value, State):
-                    value = _restore(value)
-            self._values[key] = value, fields
-        return self._values[key][0]
-
-
-def resolve(objects: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return objects with those that they refer to in place of the references.
+def unpack(objects: list[dict[str, Any]], numbers: list[int]) -> list[State]:
+    """Return the states with these indices in a list of objects; what follows is computed again.
 
     Raises:
-        InputError: a reference to an object that does not come before.
+        InputError: a reference to an object that does not come before, or values that no state has.
+        msgspec.ValidationError: a value has the wrong type, or is missing.
+        IndexError: there is no object with one of the indices.
     """
-    resolved: list[dict[str, Any]] = []
+    resolved: list[Any] = []
 
     def value_of(raw: Any) -> Any:
         if isinstance(raw, list):
             return [value_of(each) for each in cast("list[Any]", raw)]
         if not isinstance(raw, dict):
             return raw
-        number = cast("dict[str, Any]", raw).get(REFERENCE)
-        if type(number) is not int or len(cast("dict[str, Any]", raw)) > 1:
-            raise InputError("an object within an object is no reference")
-        if not 0 <= number < len(resolved):
+        (number,) = cast("dict[str, Any]", raw).values()
+        if REFERENCE not in raw or not 0 <= number < len(resolved):
             raise InputError(f"there is no object {number}")
         return resolved[number]
 
     for each in objects:
         fields = {name: value_of(raw) for name, raw in each.items()}
         resolved.append(fields)
-    return resolved
+    states = {number: _restore(msgspec.convert(resolved[number], State)) for number in {*numbers}}
+    return [states[number] for number in numbers]
 
 
 def _restore(state: State) -> State:
@@ -151,6 +104,8 @@ def _restore(state: State) -> State:
         InputError: It cannot be drawn, or its joints are not those of its pose.
     """
     check_drawable(state)
+    if state.optimisation.run is not None:
+        _restore(state.optimisation.run.own)
     if state.unclosed is not None:
         joint = state.unclosed.joint
         return SetJoint(joint, state.joints[joint]).apply(state)
@@ -158,9 +113,3 @@ def _restore(state: State) -> State:
     if np.abs(off).max() > JOINT_TOLERANCE * state.design.reach:
         raise InputError("its joints are not those of its pose")
     return state
-
-
-@cache
-def _types_of(part: Any) -> dict[str, Any]:
-    types = get_type_hints(part, include_extras=True)
-    return {field.name: types[field.name] for field in saved_fields(part)}

@@ -20,7 +20,7 @@ from filelock import FileLock
 
 from explorer.app.session.history import History, Step
 from explorer.app.storage.folder import data_folder, make_data_folder, try_lock
-from explorer.app.storage.packing import Packer, Unpacker, resolve
+from explorer.app.storage.packing import Packer, unpack
 from explorer.errors import ExplorerError, InputError, StorageError
 from explorer.files.json_text import one_line
 from explorer.files.writing import move, read_at_most, write_whole
@@ -214,13 +214,11 @@ def decode_session(data: bytes, source: str) -> History:
 
 def _history_of(data: bytes) -> History:
     body = msgspec.json.decode(data, type=_Body)
-    if not body.at < len(body.states):
+    pairs = zip(body.words, unpack(body.objects, body.states), strict=True)
+    steps = tuple(Step(number, *pair) for number, pair in enumerate(pairs, body.first))
+    if not body.at < len(steps):
         raise InputError(f"there is no step {body.at}")
-    objects, unpacker = resolve(body.objects), Unpacker()
-    states = (unpacker.state(objects[state]) for state in body.states)
-    pairs = zip(body.words, states, strict=True)
-    steps = (Step(number, *pair) for number, pair in enumerate(pairs, body.first))
-    return History(tuple(steps), body.at)
+    return History(steps, body.at)
 
 
 def _newest_first(folder: Path) -> list[Path]:

@@ -14,14 +14,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from explorer.app.browser.viser_gaps import (
-    PLACE,
-    assign_properties,
-    is_stale,
-    place,
-    resend,
-    show_value,
-)
+from explorer.app.browser.viser_gaps import PLACE, assign_properties, place, resend, show_value
 from explorer.numerics.arrays import FloatArray
 
 Update: TypeAlias = tuple[Any, str, object]
@@ -60,6 +53,8 @@ class Assigner:
             new = [update for update in new if not _is_overtaken(update, since)]
         if not new:
             return new
+        # A value that a user sets from now on crosses.
+        now = time.time()
         # Nothing is computed in this block, since it holds up every browser.
         # By identity, since viser's handles have no hash.
         properties: dict[int, tuple[viser.SceneNodeHandle, dict[str, object]]] = {}
@@ -74,8 +69,7 @@ class Assigner:
                 else:
                     setattr(handle, name, value)
                 if is_set_by_clients(handle, name):
-                    # After the assignment, since viser sets the time of the last change by it too.
-                    self._sent[id(handle), name] = handle, time.time()
+                    self._sent[id(handle), name] = handle, now
             for node, values in properties.values():
                 assign_properties(node, values)
         return new
@@ -90,7 +84,7 @@ class Assigner:
         now = time.time()
         for key, (handle, sent) in tuple(self._sent.items()):
             changed = handle.update_timestamp
-            has_crossed = sent < changed <= sent + CROSSING_SECONDS or is_stale(handle, key[1])
+            has_crossed = sent < changed <= sent + CROSSING_SECONDS
             if not has_crossed:
                 if not sent <= now <= sent + CROSSING_SECONDS:
                     del self._sent[key]

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 
 from explorer.app.widgets.charts import BLUE, ORANGE, TEAL, VIOLET
-from explorer.app.widgets.colours import GHOST, Rgb, css
+from explorer.app.widgets.colours import GHOST
 from explorer.app.widgets.markup import box, caption, dim, meter, row, swatch, table
 from explorer.measures.blocks.block import (
     Bars,
@@ -26,6 +26,7 @@ from explorer.measures.blocks.block import (
     Words,
 )
 from explorer.numerics.number_text import format_decimals
+from explorer.singularity.colours import Rgb, css
 from explorer.workspace.position_bands import SHARE_COLOURS, SHARES
 
 KIND_COLOURS: dict[Kind, Rgb] = {"actuator": BLUE, "dimension": ORANGE}

@@ -18,11 +18,12 @@ import msgspec
 import viser
 
 from explorer.app.browser.browser_facts import decode_text
-from explorer.app.browser.viser_gaps import element_id, run_script
+from explorer.app.browser.viser_gaps import element_id, run_script, run_script_in
 from explorer.app.look import read_script
 from explorer.app.widgets.commands import Key
 from explorer.app.widgets.markup import meter
 from explorer.app.widgets.palette import Command
+from explorer.measures.blocks.source import Source
 
 LONGEST_VALUE = 4000
 # JSON escapes make a value longer.
@@ -251,3 +252,31 @@ def running(opens: str, title: str, words: str, share: float | None, buttons: st
     )
     title_button = open_button(opens, content, hint=f"Open the tab {opens}.", class_name="ex-name")
     return f'<span class="ex-running">{title_button}{buttons}</span>'
+
+
+HINT = "Copy the command line and the Python that compute this answer."
+# Two sheets.
+ICON = (
+    '<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M5.5 5.5v-3h8v8h-3m-8-5h8v8h-8z"/></svg>'
+)
+
+
+class CopyButton:
+    """The button of a panel that copies how its answer is computed.
+
+    Args:
+        buttons: Buttons of the page.
+        tab: Title of the panel's tab.
+        source: Function that returns how the present answer is computed.
+    """
+
+    def __init__(self, buttons: Buttons, tab: str, source: Callable[[], Source]) -> None:
+        self._name, self._source = f"{tab.lower()}.copy", source
+        buttons.on(self._name, self._copy)
+        buttons.offer(f"{tab} › Copy the command line", HINT, self._name)
+        self.html = press_button(
+            self._name, "", ICON, hint=HINT, label="Copy the command line", class_name="ex-copy"
+        )
+
+    def _copy(self, _: str, client: viser.ClientHandle) -> None:
+        run_script_in(client, read_script("copies", self._source().text))

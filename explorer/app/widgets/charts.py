@@ -6,7 +6,8 @@ import numpy as np
 import viser
 from viser import uplot
 
-from explorer.app.widgets.colours import GHOST, Rgb, css
+from explorer.app.widgets.colours import GHOST
+from explorer.singularity.colours import Rgb, css
 
 FONT = "11px system-ui, sans-serif"
 

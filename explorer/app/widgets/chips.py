@@ -12,8 +12,8 @@ from html import escape
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set
+from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
-from explorer.app.state.values import value_at
 from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.commands import Key, with_keys
 

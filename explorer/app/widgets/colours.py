@@ -1,46 +1,8 @@
-"""The colours of the scene; `explorer.singularity.colours` has those it shares with reports."""
+"""The colours of the scene, besides those of `explorer.singularity.colours`."""
 
 from __future__ import annotations
 
-from explorer.singularity.colours import (
-    CLEAR,
-    FAR,
-    FAR_WARNINGS,
-    MARGIN_COLOURS,
-    OUTLINE,
-    SINGULAR,
-    WARNED,
-    Rgb,
-    css,
-    margin_text,
-    proximity_colour,
-)
-
-__all__ = [
-    "BALL",
-    "BASE_BODY",
-    "CARRIAGE",
-    "CLEAR",
-    "COMPARED",
-    "FAR",
-    "FAR_WARNINGS",
-    "GHOST",
-    "JOINT",
-    "LEAVES",
-    "MARGIN_COLOURS",
-    "OUTLINE",
-    "PLATFORM_BODY",
-    "RAIL",
-    "ROD",
-    "SINGULAR",
-    "SWEPT",
-    "TUBE",
-    "WARNED",
-    "Rgb",
-    "css",
-    "margin_text",
-    "proximity_colour",
-]
+from explorer.singularity.colours import Rgb
 
 TUBE: Rgb = (84, 96, 114)
 ROD: Rgb = (188, 197, 209)

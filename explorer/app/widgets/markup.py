@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Literal
 
-from explorer.app.widgets.colours import MARGIN_COLOURS, Rgb, css, margin_text
 from explorer.measures.blocks.block import Look
 from explorer.numerics.number_text import format_decimals
+from explorer.singularity.colours import MARGIN_COLOURS, Rgb, css, margin_text
 
 
 def by_theme(light: str, dark: str) -> str:

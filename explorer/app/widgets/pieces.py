@@ -1,8 +1,7 @@
 """The controls of a page as viser holds them: places, words, options, and a way to use one.
 
-The command palette and the tests read them here, so that neither lags behind the page. Beside
-`viser_gaps` and `viser_server` in `explorer.app.browser` this is the one module that uses private
-names of viser.
+The command palette and the tests read them here, so that neither lags behind the page. Gap: viser
+lists its controls under private names alone, and presses none.
 """
 
 from __future__ import annotations
@@ -106,16 +105,15 @@ def _kind(handle: Any) -> Kind:
 
 def _containers(handle: Any) -> Iterator[Any]:
     """Yield the folders and the tab of a control, from the inside out."""
-    gui = handle._impl.gui_api
-    inside: str | None = handle._impl.parent_container_id
+    state = handle._impl
+    gui, inside = state.gui_api, state.parent_container_id
     while inside is not None:
         container = gui._container_handle_from_uuid.get(inside)
         if container is None:
             return
         yield container
         # A tab stands in its group of tabs.
-        owner = getattr(container, "_parent", container)
-        state = getattr(owner, "_impl", None)
+        state = getattr(getattr(container, "_parent", container), "_impl", None)
         inside = getattr(state, "parent_container_id", None)
 
 

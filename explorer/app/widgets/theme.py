@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import viser
 
-from explorer.app.widgets.colours import Rgb
+from explorer.singularity.colours import Rgb
 
 # Colours of buttons and of the tab in front; the second is light enough for dark panels.
 BRAND: Rgb = (24, 74, 150)

@@ -26,8 +26,7 @@ from explorer.export.report.mechanism import mechanism_section, parts_section
 from explorer.export.report.search import claims_section, search_section
 from explorer.export.report.singularity import legs_section, singularity_section
 from explorer.export.report.workspace import workspace_section
-from explorer.files.packaged import packaged_file
-from explorer.files.versions import versions
+from explorer.files.packaged import packaged_file, versions
 from explorer.measures.blocks.source import (
     DESIGN_FILE,
     load_source,

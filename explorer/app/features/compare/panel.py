@@ -18,8 +18,8 @@ from explorer.app.state.action import Action
 from explorer.app.state.actions import Open
 from explorer.app.state.compared import SLOTS, unnamed
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
-from explorer.app.state.values import with_value
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect, choose, turn

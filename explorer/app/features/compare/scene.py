@@ -23,10 +23,8 @@ from explorer.app.features.compare.work import (
 )
 from explorer.app.features.feature import Services
 from explorer.app.scene.creases import Drawn
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import NO_POINTS, ScenePart
-from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
+from explorer.app.scene.shapes import NO_MESH, add_label, add_lines, add_translucent
 from explorer.app.state.compared import SLOTS
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import COMPARED

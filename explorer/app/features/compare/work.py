@@ -15,7 +15,7 @@ import numpy as np
 
 from explorer.app.features.workspace.regions import Rows, rows_of
 from explorer.app.scene.bands import Shell
-from explorer.app.scene.outline import outline
+from explorer.app.scene.placing import outline
 from explorer.app.session.feed import Feed
 from explorer.app.state.compared import SLOTS, unnamed
 from explorer.app.state.frame import Frame

@@ -19,8 +19,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.view import Weighed
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.blocks import render
-from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.copying import CopyButton
+from explorer.app.widgets.buttons import CopyButton, press_button
 from explorer.app.widgets.markup import note
 from explorer.app.widgets.under_way import problem
 from explorer.measures.blocks.block import Statement

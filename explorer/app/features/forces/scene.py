@@ -15,13 +15,12 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import Loads, SetForce, fitting_scale, rounded
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import NO_POINTS, ScenePart
-from explorer.app.scene.placing import Placed, scene_scale
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import (
     NO_MESH,
     Instances,
     Rods,
+    add_label,
     add_lines,
     add_translucent,
     cone,
@@ -32,7 +31,7 @@ from explorer.app.scene.shapes import (
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.blocks import share_colour
-from explorer.app.widgets.colours import GHOST, Rgb
+from explorer.app.widgets.colours import GHOST
 from explorer.measures.blocks.block import Share
 from explorer.measures.blocks.forces import shares_of
 from explorer.mechanism.design import JOINTS
@@ -40,6 +39,7 @@ from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import position_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding, format_number
+from explorer.singularity.colours import Rgb
 from explorer.statics.loaded import LoadedPose
 
 LOAD: Rgb = (150, 40, 160)

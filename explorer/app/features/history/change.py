@@ -15,9 +15,7 @@ from explorer.app.features.workspace.tasks import (
     MeasuredVolume,
     measure_volume,
 )
-from explorer.app.scene.outline import outline
-from explorer.app.scene.part import ScenePart
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import Placed, ScenePart, outline
 from explorer.app.scene.shapes import add_lines
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame

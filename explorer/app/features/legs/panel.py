@@ -14,6 +14,7 @@ from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.blocks import render
+from explorer.app.widgets.buttons import CopyButton
 from explorer.app.widgets.charts import (
     BLUE,
     ORANGE,
@@ -25,7 +26,6 @@ from explorer.app.widgets.charts import (
     line,
 )
 from explorer.app.widgets.colours import Rgb
-from explorer.app.widgets.copying import CopyButton
 from explorer.app.widgets.markup import alert, box, dim, row, sentence, swatch, table
 from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.legs.clearance import PAIRS

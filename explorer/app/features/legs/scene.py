@@ -8,21 +8,21 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.app.features.feature import Services
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import ScenePart
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import (
     TETRAHEDRON_FACES,
     Balls,
     Rods,
+    add_label,
     add_lines,
     add_translucent,
 )
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import OUTLINE, SWEPT, TUBE
+from explorer.app.widgets.colours import SWEPT, TUBE
 from explorer.legs.clearance import PAIRS, leg_axes, legs_of, pair_name
 from explorer.legs.interference import swept_tetrahedra
 from explorer.numerics.number_text import format_number
+from explorer.singularity.colours import OUTLINE
 
 OPACITY = 0.22
 # Vertices 0 and 1 are the base ends at the start and at the end, 2 and 3 the platform ends.

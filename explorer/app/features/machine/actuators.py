@@ -16,8 +16,8 @@ from explorer.app.inputs.control import Condition
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set
+from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
-from explorer.app.state.values import value_at
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Six
 from explorer.mechanism.typical import STIFFNESSES

@@ -27,8 +27,8 @@ from explorer.app.inputs.tracks import Span
 from explorer.app.state.action import Action
 from explorer.app.state.actions import FULL_TURN, Set, check_free
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State
-from explorer.app.state.values import value_at, with_value
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import box, note

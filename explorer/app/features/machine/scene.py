@@ -9,14 +9,20 @@ import numpy as np
 
 from explorer.app.features.feature import Services
 from explorer.app.features.machine.words import turn_of
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import NO_POINTS, ScenePart, around
-from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import Rods, add_lines, add_translucent, linear_colour, sphere
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
+from explorer.app.scene.shapes import (
+    Rods,
+    add_label,
+    add_lines,
+    add_translucent,
+    linear_colour,
+    sphere,
+)
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import GHOST, Rgb
+from explorer.app.widgets.colours import GHOST
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.singularity.colours import Rgb
 
 # Length and radius of the axes of the tool, in scene units, and thickness of its line in pixels.
 AXIS_LENGTH, AXIS_RADIUS, THICKNESS = 0.9, 0.035, 2.5

@@ -12,8 +12,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.scene.part import ScenePart, around
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import Placed, ScenePart, around
 from explorer.app.scene.shapes import NO_MESH, Balls, Boxes, Mesh, Rods, plate
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import (
@@ -21,7 +20,6 @@ from explorer.app.widgets.colours import (
     BASE_BODY,
     CARRIAGE,
     JOINT,
-    OUTLINE,
     PLATFORM_BODY,
     RAIL,
     ROD,
@@ -31,6 +29,7 @@ from explorer.legs.clearance import legs_of
 from explorer.measures.snapshot import Snapshot
 from explorer.numerics.arrays import FloatArray
 from explorer.reproduce.six_legs import TWIN
+from explorer.singularity.colours import OUTLINE
 
 # Sizes in scene units.
 PLATE_THICKNESS, BASE_RADIUS = 0.22, 0.75

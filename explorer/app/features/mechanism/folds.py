@@ -19,26 +19,18 @@ from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import length_span
 from explorer.app.inputs.tracks import Span
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import ScenePart
-from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import add_lines, add_translucent, of_one_colour
+from explorer.app.scene.placing import Placed, ScenePart
+from explorer.app.scene.shapes import add_label, add_lines, add_translucent, of_one_colour
 from explorer.app.state.folds import FIRST_FOLD, HALF_TURN, SetFold
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import (
-    FAR_WARNINGS,
-    LEAVES,
-    MARGIN_COLOURS,
-    Rgb,
-    css,
-    proximity_colour,
-)
+from explorer.app.widgets.colours import LEAVES
 from explorer.mechanism.folds import FOLDS
 from explorer.mechanism.margins import signs_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals
+from explorer.singularity.colours import FAR_WARNINGS, MARGIN_COLOURS, Rgb, css, proximity_colour
 
 HINTS = (
     "The distance of a1 and b4. All three margins grow with it.",

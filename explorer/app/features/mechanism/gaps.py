@@ -22,14 +22,13 @@ from explorer.app.features.mechanism.incidences import (
     hovered_margin,
     is_shown,
 )
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import NO_POINTS, ScenePart
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import (
     TETRAHEDRON_FACES,
     Balls,
     Instances,
     Mesh,
+    add_label,
     add_lines,
     add_translucent,
     dashes,
@@ -41,7 +40,10 @@ from explorer.app.scene.shapes import (
     turned_to,
 )
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import (
+from explorer.mechanism.margins import TETRAHEDRA
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_fitted
+from explorer.singularity.colours import (
     MARGIN_COLOURS,
     OUTLINE,
     SINGULAR,
@@ -49,9 +51,6 @@ from explorer.app.widgets.colours import (
     Rgb,
     proximity_colour,
 )
-from explorer.mechanism.margins import TETRAHEDRA
-from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_fitted
 
 EDGES = np.array(list(itertools.combinations(range(4), 2)))
 OPACITY = 0.26

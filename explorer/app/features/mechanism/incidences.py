@@ -21,12 +21,11 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import guide_span
-from explorer.app.scene.part import NO_POINTS, ScenePart
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import Patch, cylinder, sphere, turned_to
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import proximity_colour
 from explorer.numerics.arrays import FloatArray
+from explorer.singularity.colours import proximity_colour
 
 
 class HoveredRow:

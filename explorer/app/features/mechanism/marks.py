@@ -11,9 +11,8 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.incidences import approaches
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import NO_POINTS, ScenePart
-from explorer.app.scene.placing import Placed, scene_scale
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
+from explorer.app.scene.shapes import add_label
 from explorer.app.session.clock import Timer, now, start_timer
 from explorer.app.state.actions import SetPose
 from explorer.app.state.state import State

@@ -11,10 +11,8 @@ import viser
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.features.mechanism.incidences import HoveredRow
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import NO_POINTS, ScenePart, around
-from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
+from explorer.app.scene.shapes import NO_MESH, add_label, add_lines, add_translucent
 from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update

@@ -22,8 +22,8 @@ from explorer.app.state.actions import (
     UseNearest,
 )
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
-from explorer.app.state.values import value_at
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.chips import Chip, Chips, Effect
 from explorer.app.widgets.markup import alert, box, note, remark

@@ -16,9 +16,8 @@ from explorer.app.features.optimise.work import find_refusals, problem_of
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Open, Set, check_free, moved
 from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
-from explorer.app.state.parts import kept_on_open
+from explorer.app.state.parts import kept_on_open, with_value
 from explorer.app.state.state import Optimisation, Run, State
-from explorer.app.state.values import with_value
 from explorer.app.storage.library import LONGEST_NAME
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design

@@ -14,8 +14,7 @@ from explorer.app.features.optimise.panel import OptimisePanel
 from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.words import search_notice
 from explorer.app.features.optimise.work import requested_box
-from explorer.app.scene.part import ScenePart
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import add_lines
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State

@@ -29,7 +29,6 @@ from explorer.app.state.optimisation import PLACE
 from explorer.app.state.state import Run, State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import BLUE, FONT, ORANGE, add_chart, line
-from explorer.app.widgets.colours import css
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.pose import Triple
@@ -37,6 +36,7 @@ from explorer.numerics.number_text import format_number
 from explorer.optimise.curves import CALLED, GOALS, Curve, curves_of
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import OVER_BOX, YAW, ObjectiveName, Problem
+from explorer.singularity.colours import css
 from explorer.statics.compliance import is_elastic
 
 OBJECTIVES: dict[str, ObjectiveName] = {

@@ -11,17 +11,16 @@ from explorer.app.features.feature import Feature, InBar, Services, StateCommand
 from explorer.app.features.paths.actions import Play
 from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.features.paths.runner import PathRunner
-from explorer.app.scene.part import ScenePart
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_lines
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button, running
-from explorer.app.widgets.colours import FAR, SINGULAR
 from explorer.app.widgets.commands import Key
 from explorer.mechanism.pose import rotation_from_quaternion
 from explorer.mechanism.tool_point import position_of
 from explorer.numerics.number_text import format_decimals, format_number
+from explorer.singularity.colours import FAR, SINGULAR
 
 # Number of crossings that are drawn at most.
 MOST_CROSSINGS = 24

@@ -29,7 +29,6 @@ from explorer.app.widgets.charts import (
     level_axis,
     line,
 )
-from explorer.app.widgets.colours import MARGIN_COLOURS
 from explorer.app.widgets.markup import margin_name, note, signed, swatch
 from explorer.measures.blocks.block import MOST_SHARE, Share
 from explorer.mechanism.folds import to_folds
@@ -38,6 +37,7 @@ from explorer.mechanism.pose import Pose, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.paths.loads import DemandedLoad, PathLoads
+from explorer.singularity.colours import MARGIN_COLOURS
 from explorer.statics.reactions import PART_NAMES, has_limits
 
 # Dashes of the incidences' lines beside their colours, and the marks of the legend.

@@ -24,8 +24,8 @@ from explorer.app.session.session import Who
 from explorer.app.state.action import Action
 from explorer.app.state.actions import check_free
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
-from explorer.app.state.values import with_value
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import press_button

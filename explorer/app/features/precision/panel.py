@@ -17,12 +17,11 @@ from explorer.app.inputs.controls import Controls
 from explorer.app.state.action import Action
 from explorer.app.state.actions import check_free
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
-from explorer.app.state.values import with_value
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.blocks import render
-from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.copying import CopyButton
+from explorer.app.widgets.buttons import CopyButton, press_button
 from explorer.app.widgets.markup import box, dim
 from explorer.measures.blocks.precision import deflections, tool_errors
 from explorer.measures.blocks.source import Source, load_source

@@ -12,22 +12,21 @@ from explorer.app.features.forces.loads import Loads
 from explorer.app.features.forces.scene import tool_point
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.scene.ellipsoid import Ellipsoid
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import ScenePart
-from explorer.app.scene.placing import Placed, round_step
+from explorer.app.scene.placing import Placed, ScenePart, round_step
 from explorer.app.scene.shapes import (
     NO_MESH,
     Balls,
     Rods,
+    add_label,
     add_lines,
     add_translucent,
     linear_colour,
 )
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import Rgb
 from explorer.measures.blocks.precision import DIGITS
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.singularity.colours import Rgb
 from explorer.statics.compliance import is_elastic
 from explorer.statics.tool_precision import ToolPrecision
 

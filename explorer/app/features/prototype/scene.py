@@ -15,25 +15,16 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import colliding_legs
 from explorer.app.features.prototype.work import PARTS_FEED, Parts, drawn_parts
 from explorer.app.scene.creases import Drawn
-from explorer.app.scene.part import NO_POINTS, ScenePart
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import (
-    BALL,
-    CARRIAGE,
-    OUTLINE,
-    PLATFORM_BODY,
-    RAIL,
-    ROD,
-    TUBE,
-    Rgb,
-)
+from explorer.app.widgets.colours import BALL, CARRIAGE, PLATFORM_BODY, RAIL, ROD, TUBE
 from explorer.measures.size import corners_of
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import exploded_offsets
 from explorer.prototype.chains import BODIES, LEGS, Places
+from explorer.singularity.colours import OUTLINE, Rgb
 
 COLOURS: dict[str, Rgb] = {
     "base": PLATFORM_BODY,

@@ -22,18 +22,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.view import Gain, Ghost
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.blocks import render
-from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.colours import (
-    CLEAR,
-    FAR,
-    FAR_WARNINGS,
-    MARGIN_COLOURS,
-    SINGULAR,
-    WARNED,
-    css,
-    proximity_colour,
-)
-from explorer.app.widgets.copying import CopyButton
+from explorer.app.widgets.buttons import CopyButton, press_button
 from explorer.app.widgets.markup import box, margin_name, meter, status, swatch, ticks
 from explorer.measures.blocks.block import Column, Facts, head_of
 from explorer.measures.blocks.singularity import (
@@ -51,6 +40,16 @@ from explorer.measures.verdict import warnings
 from explorer.mechanism.folds import FOLD_LINES, FOLDS
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, signs_of
 from explorer.numerics.number_text import format_decimals
+from explorer.singularity.colours import (
+    CLEAR,
+    FAR,
+    FAR_WARNINGS,
+    MARGIN_COLOURS,
+    SINGULAR,
+    WARNED,
+    css,
+    proximity_colour,
+)
 
 GHOSTS: tuple[Ghost, ...] = get_args(Ghost)
 GAINS: tuple[Gain, ...] = get_args(Gain)

@@ -12,22 +12,21 @@ import viser
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.scene.ellipsoid import Ellipsoid
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import ScenePart
-from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent, sphere
+from explorer.app.scene.placing import Placed, ScenePart
+from explorer.app.scene.shapes import NO_MESH, add_label, add_lines, add_translucent, sphere
 from explorer.app.session.clock import now, start_timer
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.colours import FAR, GHOST, SINGULAR, Rgb, proximity_colour
+from explorer.app.widgets.colours import GHOST
 from explorer.measures.blocks.block import Number
 from explorer.measures.blocks.singularity import finite_gain
 from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.singularity.colours import FAR, SINGULAR, Rgb, proximity_colour
 from explorer.singularity.freedoms import FreeTurn
 from explorer.singularity.nearest import NearestSingularity
 

@@ -19,7 +19,6 @@ from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.colours import css, proximity_colour
 from explorer.app.widgets.markup import box, dim
 from explorer.measures.blocks.singularity import stratum_sentence
 from explorer.measures.verdict import DISTANCE_SHARE
@@ -31,6 +30,7 @@ from explorer.singularity.bruhat import (
     codimension,
     describe_stratum,
 )
+from explorer.singularity.colours import css, proximity_colour
 from explorer.singularity.strata import GENERIC, STRATA, inversions
 
 # In pixels, as in the stylesheet: from row to row, and the height of a node.

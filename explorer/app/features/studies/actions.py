@@ -8,9 +8,9 @@ from typing import ClassVar
 
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Open
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.state.studies import Brush, Studies, label_of
-from explorer.app.state.values import with_value
 from explorer.errors import InputError
 from explorer.numerics.number_text import format_number
 

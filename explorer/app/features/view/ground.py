@@ -22,12 +22,11 @@ from explorer.app.features.mechanism.bodies import (
     TUBE_RADIUS,
     TWIN,
 )
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import ScenePart
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import Placed, ScenePart
+from explorer.app.scene.shapes import add_label
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import Rgb
 from explorer.numerics.arrays import FloatArray
+from explorer.singularity.colours import Rgb
 
 TO_SUN = np.array([-0.22, 0.3, 1.0])
 """Direction from the scene to the sun, so that shadows fall towards the isometric camera."""

@@ -23,16 +23,13 @@ from explorer.app.features.workspace.tasks import (
 )
 from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Shell
 from explorer.app.scene.creases import Drawn
-from explorer.app.scene.labels import add_label
-from explorer.app.scene.part import NO_POINTS, ScenePart
-from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import NO_MESH, Patch, add_lines, add_translucent
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
+from explorer.app.scene.shapes import NO_MESH, Patch, add_label, add_lines, add_translucent
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import OUTLINE, Rgb, proximity_colour
 from explorer.measures.size import corners_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.singularity.colours import band_colours
+from explorer.singularity.colours import OUTLINE, Rgb, band_colours, proximity_colour
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,

@@ -18,7 +18,6 @@ from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.blocks import content_of
-from explorer.app.widgets.colours import css
 from explorer.app.widgets.markup import (
     alert,
     box,
@@ -37,7 +36,7 @@ from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import format_number
-from explorer.singularity.colours import BAND_EDGES, band_colours
+from explorer.singularity.colours import BAND_EDGES, band_colours, css
 from explorer.statics.reactions import has_limits
 from explorer.workspace.position_bands import (
     MEASURE_WORDS,
