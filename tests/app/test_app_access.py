@@ -218,8 +218,7 @@ def test_policy_lets_the_page_connect_only_to_its_server() -> None:
         words[0]: words[1:]
         for words in map(str.split, headers["Content-Security-Policy"].split(";"))
     }
-    assert policy["default-src"] == ["'none'"]
-    remote = [s for s in policy["connect-src"] if s not in ("'self'", "blob:", "data:")]
+    remote = [source for source in policy["default-src"] if "://" in source]
     assert remote == [f"ws://{HERE}", f"wss://{HERE}"]
     assert headers["Referrer-Policy"] == "no-referrer"
     assert headers["X-Content-Type-Options"] == "nosniff"

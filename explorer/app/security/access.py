@@ -33,19 +33,10 @@ HOST = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:(?P<port>[0-9]{1,5})
 HTTP_PORT = 80
 # Ports that browsers leave out, by the scheme of the address.
 USUAL_PORTS = {"http": "80", "https": "443"}
-# Permissions of the page. Its program, its styles and its workers are all inside one file; it
-# connects to no other server than its own, so that no link can make it connect elsewhere.
-# Plots of studies come as text that viser's page runs, and compile their shaders from text.
+# Permissions of the page: it connects to no other server than its own, and only pages of notebooks
+# on this machine may frame it. Plots of studies come as text that viser's page runs.
 POLICY = (
-    "default-src 'none'; "
-    "script-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; "
-    "worker-src 'self' blob: data:; "
-    "style-src 'self' 'unsafe-inline'; "
-    "img-src 'self' blob: data:; "
-    "font-src 'self' data:; "
-    "connect-src 'self' ws://{host} wss://{host} blob: data:; "
-    "base-uri 'none'; form-action 'none'; "
-    # Notebooks of this machine show the page in a frame.
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data: ws://{host} wss://{host}; "
     "frame-ancestors 'self' http://localhost:* http://127.0.0.1:* https://localhost:* "
     "https://127.0.0.1:* vscode-webview: vscode-file:"
 )
@@ -130,12 +121,9 @@ class Access:
     def url(self, port: int, host: str | None = None) -> str:
         """Return the address of the page, token included.
 
-        Args:
-            port: Port of the server.
-            host: Name of this machine for others; for a browser on this machine if None.
+        It is for browsers on this machine unless a name of this machine for others is given.
         """
-        name = EVERYWHERE.get(self.host, self.host) if host is None else host
-        address = f"http://{_in_address(name)}:{port}"
+        address = f"http://{_in_address(host or EVERYWHERE.get(self.host, self.host))}:{port}"
         return address if self.token is None else f"{address}/?token={self.token}"
 
     def proxy_url(self, name: str) -> str:
@@ -143,15 +131,14 @@ class Access:
         return f"https://{name}/?token={self.token}"
 
     def judge(self, head: Head, port: int) -> Refusal | None:
-        """Return why a request is refused, or None if it may pass.
-
-        Args:
-            head: Head of the request.
-            port: Port of the server.
-        """
+        """Return why a request to a port of the server is refused; None if it may pass."""
         host = head.hosts[0].lower() if len(head.hosts) == 1 else ""
         if not self._is_own_host(host, port):
-            return Refusal(HTTPStatus.FORBIDDEN, self._reason_for_host(host, port))
+            reason = f"The explorer has another address: {self.url(port).partition('/?')[0]}"
+            if parts := HOST.fullmatch(host):
+                allow = f"explorer --allow-host {parts['name']}"
+                reason += f". If a proxy has the name {parts['name']}, allow it: {allow}"
+            return Refusal(HTTPStatus.FORBIDDEN, reason)
         _, _, query = head.target.partition("?")
         if PLAIN_QUERY.fullmatch(query) is None:
             return Refusal(
@@ -202,14 +189,6 @@ class Access:
         own = socket.gethostname().lower()
         is_known = name in (self.host.lower(), "localhost", own) or name.partition(".")[0] == own
         return is_known or _address_of(name.strip("[]")) is not None
-
-    def _reason_for_host(self, host: str, port: int) -> str:
-        reason = f"The explorer has another address: {self.url(port).partition('?')[0].rstrip('/')}"
-        parts = HOST.fullmatch(host)
-        if parts is None:
-            return reason
-        name = parts["name"]
-        return f"{reason}. If a proxy has the name {name}, allow it: explorer --allow-host {name}"
 
     def _is_own_page(self, origins: Sequence[str], host: str) -> bool:
         # A program that is no browser can send any origin, so it can send this one as well.

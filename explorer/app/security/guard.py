@@ -28,6 +28,10 @@ WAIT_SECONDS = 0.02
 
 Serve = Callable[..., Any]
 
+_LOGGER = logging.getLogger("explorer.websockets")
+# Clients that do not speak HTTP are not logged.
+_LOGGER.addFilter(lambda record: record.getMessage() != "opening handshake failed")
+
 
 class Guard:
     """Checks the requests to one server.
@@ -51,7 +55,7 @@ class Guard:
             options |= {
                 "process_request": partial(self._answer, options["process_request"]),
                 "max_size": LARGEST_MESSAGE,
-                "logger": _logger(),
+                "logger": _LOGGER,
             }
             return _closing(serve(partial(self._handle, handler), *args, **options))
 
@@ -111,11 +115,3 @@ def _refuse(refusal: Refusal) -> Response:
         "Cache-Control": "no-store",
     }
     return Response(refusal.status.value, refusal.status.phrase, Headers(headers), body)
-
-
-def _logger() -> logging.Logger:
-    logger = logging.getLogger("explorer.websockets")
-    if not logger.filters:
-        # Clients that do not speak HTTP are not logged.
-        logger.addFilter(lambda record: record.getMessage() != "opening handshake failed")
-    return logger

@@ -20,12 +20,7 @@ CANCEL_SECONDS = 2.0
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of a drawing that takes long.
-
-    Attributes:
-        words: What is computed, in words.
-        share: Share of the stages that are done, from 0 to 1.
-    """
+    """A stage of a drawing that takes long: what is computed, and the share that is done."""
 
     words: str
     share: float
@@ -96,9 +91,8 @@ class Feed(Generic[Request, Drawing]):
         self._stage: Stage | None = None
         # Shows the first stage of a drawing that takes long.
         self._stage_timer: Timer | None = None
-        # Number of the newest request, its time, and its number in the worker until it is answered.
-        self._count, self._submitted = 0, 0.0
-        self._order: int | None = None
+        # Number of the newest request, its time, and its number in the worker.
+        self._count, self._submitted, self._order = 0, 0.0, -1
 
     @property
     def drawing(self) -> Drawing | None:
@@ -124,8 +118,7 @@ class Feed(Generic[Request, Drawing]):
     @property
     def is_current(self) -> bool:
         """Whether the drawing is that of the newest request."""
-        drawing = self._drawing
-        return drawing is not None and drawing.request == self.request
+        return self._drawing is not None and self._drawing.request == self.request
 
     @property
     def is_settled(self) -> bool:
@@ -148,8 +141,8 @@ class Feed(Generic[Request, Drawing]):
         with self._lock:
             if not self._has_stages or self.is_settled:
                 return
-            self.problem = CANCELLED
             self._cancel_order(CANCEL_SECONDS)
+            self.problem = CANCELLED
         self._redraw()
 
     def retry(self) -> None:
@@ -168,29 +161,28 @@ class Feed(Generic[Request, Drawing]):
         self._stage, self._submitted = None, now()
         count = self._count
 
-        def failed(problem: str) -> None:
-            self._show_problem(count, problem)
-
         def receive(value: object) -> None:
             if isinstance(value, Stage):
-                self._receive(count, value)
+                self._receive_stage(count, value)
             else:
                 self._part = value
                 self._redraw()
 
-        order = (self._key, self._task, (self.request,), self._show_drawing, failed)
-        if self._has_stages:
-            self._order = self._worker.submit(*order, receive, is_drawing=True)
-        else:
-            self._worker.submit(*order)
+        self._order = self._worker.submit(
+            self._key,
+            self._task,
+            (self.request,),
+            self._show_drawing,
+            lambda problem: self._show_problem(count, problem),
+            receive if self._has_stages else None,
+            is_drawing=self._has_stages,
+        )
 
     def _cancel_order(self, patience: float | None) -> None:
-        """Cancel the newest order, if it is not answered yet."""
-        if self._order is not None:
+        if self._has_stages and not self.is_settled:
             self._worker.cancel(self._order, patience)
-        self._order = None
 
-    def _receive(self, count: int, stage: Stage) -> None:
+    def _receive_stage(self, count: int, stage: Stage) -> None:
         with self._lock:
             if count != self._count:
                 return
@@ -198,10 +190,10 @@ class Feed(Generic[Request, Drawing]):
         if self.stage is not None:
             self._redraw()
         elif is_first:
-            # The stage of a drawing that is done by then is not shown.
             self._stage_timer = start_timer(LONG_SECONDS, self._show_stage, count)
 
     def _show_stage(self, count: int) -> None:
+        # The stage of a drawing that is done by then is not shown.
         if count == self._count and not self.is_settled:
             self._redraw()
 
@@ -211,7 +203,7 @@ class Feed(Generic[Request, Drawing]):
             self._drawing, self._part = drawing, None
             if self.is_current:
                 self.problem = None
-                self._end_order()
+                self._stop_timer()
         self._redraw()
 
     def _show_problem(self, count: int, problem: str) -> None:
@@ -219,11 +211,10 @@ class Feed(Generic[Request, Drawing]):
             if count != self._count or self.request is None or self.is_cancelled:
                 return
             self._drawing, self._part, self.problem = None, None, problem
-            self._end_order()
+            self._stop_timer()
         self._redraw()
 
-    def _end_order(self) -> None:
-        self._order = None
+    def _stop_timer(self) -> None:
         if self._stage_timer is not None:
             self._stage_timer.cancel()
 

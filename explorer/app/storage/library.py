@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import itertools
 import os
 import re
 import time
@@ -196,13 +197,9 @@ def file_of(name: str) -> str:
 def copy_name(name: str, taken: set[str]) -> str:
     """Return the name of a copy: that of the original with "copy", and a number if need be."""
     name = _COPY.sub("", name)
-    number = 1
-    while True:
-        suffix = " copy" if number == 1 else f" copy {number}"
-        copy = name[: LONGEST_NAME - len(suffix)].rstrip() + suffix
-        if copy not in taken:
-            return copy
-        number += 1
+    suffixes = itertools.chain([" copy"], (f" copy {number}" for number in itertools.count(2)))
+    copies = (name[: LONGEST_NAME - len(suffix)].rstrip() + suffix for suffix in suffixes)
+    return next(copy for copy in copies if copy not in taken)
 
 
 def _tidy(name: str) -> str:
@@ -234,12 +231,12 @@ def _remove(path: Path) -> None:
 
 def _newest_first(folder: Path) -> list[Path]:
     """Return the files of designs in a folder, the one changed last first."""
-    files: list[tuple[int, str, Path]] = []
+    files: list[tuple[int, Path]] = []
     for path in folder.glob("[!.]*.json"):
         # Another explorer may remove it meanwhile.
         with contextlib.suppress(OSError):
-            files.append((-path.stat(follow_symlinks=False).st_mtime_ns, path.name, path))
-    return [path for *_, path in sorted(files)]
+            files.append((-path.lstat().st_mtime_ns, path))
+    return [path for _, path in sorted(files)]
 
 
 def _read(path: Path) -> Entry:

@@ -6,6 +6,7 @@ kept as a file beside the folder of its results, so that it is known before ther
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -37,14 +38,9 @@ class StudyFolders:
     def by_name(self) -> dict[str, Path]:
         """Return the folders that hold a study, by name; those that were given first."""
         folders: dict[str, Path] = {}
-        try:
-            # A study without results yet has no folder.
-            own = sorted({path.with_suffix("") for path in self.home.iterdir()})
-        except OSError:
-            own = []
-        for path in (*self.given, *own):
-            if not _is_study(path):
-                continue
+        # A study without results yet has no folder.
+        own = sorted({path.with_suffix("") for path in self.home.glob("*")})
+        for path in filter(_is_study, (*self.given, *own)):
             name, number = path.name, 2
             while name in folders:
                 name, number = f"{path.name} ({number})", number + 1
@@ -69,13 +65,10 @@ class StudyFolders:
         Raises:
             StorageError: the folder of studies cannot be made.
         """
-        slug = plain_words(name, _LONGEST) or "study"
-        home = make_data_folder(self.home)
-        number = 1
+        slug, home = plain_words(name, _LONGEST) or "study", make_data_folder(self.home)
         taken = {path.stem for path in home.iterdir()}
-        while f"{slug}-{number}" in taken:
-            number += 1
-        return home / f"{slug}-{number}"
+        names = (f"{slug}-{number}" for number in itertools.count(1))
+        return home / next(name for name in names if name not in taken)
 
 
 def check_given(folders: Sequence[Path]) -> None:

@@ -88,11 +88,9 @@ class PreferenceFile:
         """
         with self._lock:
             # Another explorer may have written the file meanwhile.
-            last = self._read()
-            self.chosen = Preferences(
-                last.dark if dark is None else dark,
-                last.tour_seen if tour_seen is None else tour_seen,
-            )
+            given = {"dark": dark, "tour_seen": tour_seen}
+            changed = {name: value for name, value in given.items() if value is not None}
+            self.chosen = msgspec.structs.replace(self._read(), **changed)
             make_data_folder(self._path.parent)
             write_whole(self._path, msgspec.json.encode(self.chosen))
 

@@ -1,4 +1,7 @@
-"""The command palette: all commands of the page, by name and by key."""
+"""The command palette: all commands of the page, by name and by key.
+
+It offers every button, switch and list of the page; features add commands that have no control.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from typing import Any
 import viser
 
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.commands import STEP, Key, offers, with_keys
+from explorer.app.widgets.commands import NAMED_WITH_FOLDER, NO_OPTION, PAGE, STEP, Key, with_keys
 from explorer.app.widgets.pieces import Widget, widgets
 
 Run = Callable[[viser.ClientHandle], None]
@@ -145,19 +148,24 @@ class Palette:
 
 
 def commands_of(widget: Widget, lists: Container[str] = ()) -> Iterator[Command]:
-    """Yield the commands that use a control as a user would."""
-    for label, option in offers(widget, lists).items():
-        yield Command(
-            label,
-            widget.hint,
-            lambda client, option=option: _use(widget, client, option),
-            lambda: widget.is_in_use,
-            stands_alone=False,
-        )
+    """Yield the commands that use a control as a user would, one for each of its options."""
+    label = " ".join(widget.label.split())
+    folders = [title for title in widget.path[1:] if title in NAMED_WITH_FOLDER]
+    tab = widget.path[0] if widget.path else PAGE
+    # The label of a row of buttons above the tabs takes the place of a tab.
+    parts = [label] if widget.kind == "choice" and not widget.path else [tab, *folders, label]
+    options: dict[str, Any] = {}
+    if widget.kind in ("button", "switch"):
+        options = {STEP.join(parts): None}
+    elif widget.kind == "choice" or (widget.kind == "list" and widget.label in lists):
+        chosen = (option for option in widget.options if option != NO_OPTION)
+        options = {STEP.join([*parts, " ".join(option.split())]): option for option in chosen}
+    for name, option in options.items():
 
+        def use(client: viser.ClientHandle, option: str | None = option) -> None:
+            widget.use(client, not widget.handle.value if widget.kind == "switch" else option)
 
-def _use(widget: Widget, client: viser.ClientHandle, option: str | None) -> None:
-    widget.use(client, not widget.handle.value if widget.kind == "switch" else option)
+        yield Command(name, widget.hint, use, lambda: widget.is_in_use, stands_alone=False)
 
 
 def group_of(command: Command) -> str:
