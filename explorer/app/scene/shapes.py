@@ -149,12 +149,7 @@ class Rods(Instances):
     """Cylinders between pairs of points."""
 
     def __init__(
-        self,
-        scene: viser.SceneApi,
-        name: str,
-        colours: list[Rgb],
-        *,
-        opacity: float | None = None,
+        self, scene: viser.SceneApi, name: str, colours: list[Rgb], *, opacity: float | None = None
     ) -> None:
         super().__init__(scene, name, cylinder(), colours, opacity=opacity)
 
@@ -170,12 +165,7 @@ class Balls(Instances):
     """Spheres."""
 
     def __init__(
-        self,
-        scene: viser.SceneApi,
-        name: str,
-        colours: list[Rgb],
-        *,
-        opacity: float | None = None,
+        self, scene: viser.SceneApi, name: str, colours: list[Rgb], *, opacity: float | None = None
     ) -> None:
         super().__init__(scene, name, sphere(), colours, opacity=opacity)
 
@@ -273,66 +263,50 @@ def turned_to(directions: FloatArray) -> FloatArray:
     return wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True)
 
 
+def _revolve(*profile: tuple[float, float]) -> Mesh:
+    """Return the surface that a line of points (r, z) sweeps about the z-axis, seen from its right.
+
+    It is smooth along the line; parts that meet at a sharp edge are revolved apart.
+    """
+    angles = np.linspace(0.0, 2.0 * np.pi, SECTIONS, endpoint=False)
+    radii, heights = np.array(profile).T
+    sides = [np.outer(turn(angles), radii) for turn in (np.cos, np.sin)]
+    vertices = np.stack([*sides, np.tile(heights, (SECTIONS, 1))], axis=-1).reshape(-1, 3)
+    count = len(profile)
+    section, point = (each.ravel() for each in np.indices((SECTIONS, count - 1)))
+    a, b = count * section + point, count * ((section + 1) % SECTIONS) + point
+    faces = np.concatenate([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)])
+    # On the axis one of two faces has no area.
+    ends = vertices[faces]
+    areas = np.linalg.norm(np.cross(ends[:, 1] - ends[:, 0], ends[:, 2] - ends[:, 0]), axis=1)
+    return vertices, faces[areas > 1e-12]
+
+
 @functools.cache
 def cylinder() -> Mesh:
     """Return the cylinder of radius one from z = 0 to z = 1, its rim with sharp edges."""
-    angles = np.linspace(0.0, 2.0 * np.pi, SECTIONS, endpoint=False)
-    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(SECTIONS)], axis=1)
-    top = ring + [0.0, 0.0, 1.0]
-    # Each rim stands twice, so that caps and mantle keep their own normals.
-    vertices = np.concatenate([ring, top, ring, top])
-    i = np.arange(SECTIONS)
-    j = (i + 1) % SECTIONS
-    mantle = np.concatenate(
-        [np.stack([i, j, SECTIONS + j], 1), np.stack([i, SECTIONS + j, SECTIONS + i], 1)]
-    )
-    fan = np.stack([np.zeros(SECTIONS - 2, int), i[1:-1], i[2:]], axis=1)
-    bottom_cap = 2 * SECTIONS + fan[:, ::-1]
-    top_cap = 3 * SECTIONS + fan
-    return vertices, np.concatenate([mantle, bottom_cap, top_cap])
+    bottom, top = _revolve((0.0, 0.0), (1.0, 0.0)), _revolve((1.0, 1.0), (0.0, 1.0))
+    return joined(bottom, _revolve((1.0, 0.0), (1.0, 1.0)), top)
 
 
 @functools.cache
 def cone() -> Mesh:
     """Return the cone of radius one from z = 0 to z = 1."""
-    vertices, faces = cylinder()
-    vertices = vertices.copy()
-    vertices[vertices[:, 2] > 0.5, :2] = 0.0
-    return vertices, faces
+    return joined(_revolve((0.0, 0.0), (1.0, 0.0)), _revolve((1.0, 0.0), (0.0, 1.0)))
 
 
 @functools.cache
 def sphere() -> Mesh:
-    """Return the sphere of radius one, an icosahedron whose faces are split three times."""
-    # The corners are those of three golden rectangles; the faces are those of their hull.
-    golden = 0.5 * (1.0 + math.sqrt(5.0))
-    rectangle = np.array([[0.0, y, z] for y in (-1.0, 1.0) for z in (-golden, golden)])
-    vertices = np.concatenate([np.roll(rectangle, axis, axis=1) for axis in range(3)])
-    vertices /= math.hypot(1.0, golden)
-    faces = ConvexHull(vertices).simplices.astype(np.int64)
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0.0
-    faces[inward] = faces[inward, ::-1]
-    for _ in range(3):
-        vertices, faces = _split(vertices, faces)
-    return vertices, faces
+    """Return the sphere of radius one."""
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, SECTIONS).tolist()
+    return _revolve(*((math.cos(angle), math.sin(angle)) for angle in angles))
 
 
 @functools.cache
 def torus(radius: float, tube: float) -> Mesh:
     """Return the ring about the z-axis with a radius and the radius of its tube."""
-    around, along = (
-        np.linspace(0.0, 2.0 * np.pi, count, endpoint=False) for count in (SECTIONS, TUBE_SECTIONS)
-    )
-    u, v = (each.ravel() for each in np.meshgrid(around, along, indexing="ij"))
-    distance = radius + tube * np.cos(v)
-    vertices = np.stack([distance * np.cos(u), distance * np.sin(u), tube * np.sin(v)], axis=1)
-    i, j = (each.ravel() for each in np.indices((SECTIONS, TUBE_SECTIONS)))
-    a, b, c, d = (
-        (i + di) % SECTIONS * TUBE_SECTIONS + (j + dj) % TUBE_SECTIONS
-        for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1))
-    )
-    return vertices, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    angles = np.linspace(-np.pi, np.pi, TUBE_SECTIONS + 1).tolist()
+    return _revolve(*((radius + tube * math.cos(v), tube * math.sin(v)) for v in angles))
 
 
 def joined(*meshes: Mesh) -> Mesh:
@@ -350,18 +324,6 @@ def box() -> Mesh:
     side = np.column_stack([square, np.full(4, 0.5)])
     sides = [np.roll(turn * side, axis, axis=1) for axis in range(3) for turn in (HALF_TURN, 1.0)]
     return _sharp(np.concatenate([each[[0, 1, 2, 0, 2, 3]].reshape(2, 3, 3) for each in sides]))
-
-
-def _split(vertices: FloatArray, faces: IntArray) -> Mesh:
-    """Return the mesh on the unit sphere with each face split into four."""
-    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
-    edges, index = np.unique(sides, axis=0, return_inverse=True)
-    middles = vertices[edges].sum(axis=1)
-    middles /= np.linalg.norm(middles, axis=1, keepdims=True)
-    a, b, c = faces.T
-    ab, bc, ca = len(vertices) + index.reshape(-1, 3).T
-    quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-    return np.concatenate([vertices, middles]), np.concatenate([np.stack(q, 1) for q in quarters])
 
 
 def plate(points: FloatArray, radius: float, bottom: float, top: float) -> Mesh:
