@@ -22,7 +22,7 @@ from desk import CLIENT
 import explorer.app
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
-from explorer.app.features.forces.loads import SetForce, WeightsFeed
+from explorer.app.features.forces.loads import WEIGHTS_FEED, SetForce
 from explorer.app.features.listed import FEATURES
 from explorer.app.features.machine.panel import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
@@ -254,7 +254,7 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
         page.session.do(Set("view.forces.weighed", "payload and legs"))
         assert page.session.wait_until_idle()
         get = page.services.get
-        feeds: tuple[Feed[Any, Any], ...] = (get(TILTS_FEED), get(RANGE_FEED), get(WeightsFeed))
+        feeds: tuple[Feed[Any, Any], ...] = (get(TILTS_FEED), get(RANGE_FEED), get(WEIGHTS_FEED))
         assert all(feed.request is not None for feed in feeds)
     finally:
         running.stop()

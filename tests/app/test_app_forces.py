@@ -23,18 +23,18 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.feature import LoadFigure
 from explorer.app.features.forces.loads import (
     FITTING,
+    WEIGHTS_FEED,
     Loads,
-    NearestFeed,
     SetForce,
-    WeightsFeed,
     fitting_scale,
     load_of,
+    nearest_feed,
 )
 from explorer.app.features.forces.panel import GO, WORST, ForcesPanel
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle, load_tip, tool_point
 from explorer.app.features.precision.budget import (
+    BUDGET_FEED,
     SET,
-    BudgetFeed,
     BudgetPart,
     SetTolerances,
     budget_request,
@@ -165,7 +165,7 @@ def test_weights_are_those_that_are_chosen() -> None:
     assert np.abs(none).max() == 0.0
     assert np.abs(payload).max() > 1.0
     frame = Frame(loaded_state(force=(0.0, 0.0, 0.0), weighed="payload and legs"))
-    services.get(WeightsFeed).follow(frame)
+    services.get(WEIGHTS_FEED).follow(frame)
     # Until the parts have masses, the payload alone counts.
     assert loads.of(frame).own is None
     worker.work()
@@ -180,7 +180,7 @@ def test_nearest_position_that_holds_the_load_is_searched_and_gone_to(
 ) -> None:
     worker = StubWorker()
     services = services_for(server, desk.session, worker, buttons=buttons)
-    panel, feed = ForcesPanel(services), services.get(NearestFeed)
+    panel, feed = ForcesPanel(services), services.get(nearest_feed)
     show_in(desk, loaded_state())
     feed.follow(Frame(desk.state))
     assert feed.request is None
@@ -282,7 +282,7 @@ def test_moment_is_in_newton_metres_whatever_the_unit(unit_mm: float) -> None:
 
 @pytest.mark.parametrize("force", [(math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0), (0.0, 1e41, 0.0)])
 def test_force_that_is_not_finite_is_refused(force: tuple[float, float, float]) -> None:
-    with pytest.raises(InputError, match=r"^the force must be three finite numbers[^\n]*$"):
+    with pytest.raises(InputError, match=r"^the force, in N, must [^\n]*$"):
         SetForce(force).apply(loaded_state())
 
 
@@ -434,7 +434,7 @@ def test_budget_keeps_what_is_wanted_and_is_set_in_one_step(
     show_in(desk, state_with(budget=True, over=over, wanted=0.5))
     part = BudgetPart(services)
     before = desk.state.design
-    services.get(BudgetFeed).follow(Frame(desk.state))
+    services.get(BUDGET_FEED).follow(Frame(desk.state))
     text = markup(part, desk.state)
     drawing = budget_of(budget_request(desk.state))
     assert drawing.found is not None
@@ -462,7 +462,7 @@ def test_budget_that_cannot_be_kept_is_reported_in_one_line(
     worker, buttons = StubWorker(), Buttons(server)
     services = services_for(server, desk.session, worker, buttons=buttons)
     part, before = BudgetPart(services), desk.state
-    services.get(BudgetFeed).follow(Frame(before))
+    services.get(BUDGET_FEED).follow(Frame(before))
     with pytest.raises(NoAnswerError) as error:
         worker.work()
     worker.orders[-1].failed(str(error.value))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab
-from explorer.app.features.forces.loads import Loads, NearestFeed, WeightsFeed
+from explorer.app.features.forces.loads import WEIGHTS_FEED, Loads, nearest_feed
 from explorer.app.features.forces.panel import ForcesPanel
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle
 from explorer.app.features.forces.tasks import nearest_position, weights_of_parts
@@ -36,7 +36,7 @@ FORCES = Feature(
     tabs=(Tab("analyse", "Forces", ForcesPanel, viser.Icon.ARROW_DOWN_CIRCLE),),
     bar=(InBar("middle", LoadFigure),),
     scene=(ForcesScene, LoadHandle),
-    later_feeds=(WeightsFeed, NearestFeed),
+    later_feeds=(WEIGHTS_FEED, nearest_feed),
     tasks=(weights_of_parts, nearest_position),
     lists=("Weights",),
 )

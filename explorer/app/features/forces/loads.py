@@ -11,13 +11,12 @@ import numpy as np
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.tasks import (
     NearestDrawing,
-    WeightsDrawing,
     WeightsRequest,
     nearest_position,
     weights_of_parts,
 )
 from explorer.app.scene.placing import round_step
-from explorer.app.session.feed import Feed
+from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
@@ -99,18 +98,6 @@ def fitting_scale(force: float, scale: float) -> float:
     return round_step(force / FITTING)
 
 
-class WeightsFeed(Feed[WeightsRequest, WeightsDrawing]):
-    """The weights of platform and legs, while they count."""
-
-    def __init__(self, services: Services) -> None:
-        super().__init__(services.worker, weights_of_parts, _weights_of, services.session.redraw)
-
-    @property
-    def weights(self) -> Weights | None:
-        """The weights; None while there are none or none count."""
-        return None if self.drawing is None else self.drawing.weights
-
-
 def _weights_of(frame: Frame) -> WeightsRequest | None:
     view = frame.state.view
     if view.forces.weighed != "payload and legs":
@@ -119,11 +106,14 @@ def _weights_of(frame: Frame) -> WeightsRequest | None:
     return WeightsRequest(design, view.prototype.density)
 
 
+WEIGHTS_FEED = feed_of(weights_of_parts, _weights_of)
+
+
 class Loads:
     """The loaded pose of the present frame, which the panel and the scene share."""
 
     def __init__(self, services: Services) -> None:
-        self.weights = services.get(WeightsFeed)
+        self.weights = services.get(WEIGHTS_FEED)
         self._last: tuple[State, Weights | None, ToolPrecision] | None = None
 
     def of(self, frame: Frame) -> LoadedPose:
@@ -132,7 +122,8 @@ class Loads:
 
     def precision(self, frame: Frame) -> ToolPrecision:
         """Return the precision of the tool in the pose of a frame under its load."""
-        state, weights = frame.state, self.weights.weights
+        drawing = self.weights.drawing
+        state, weights = frame.state, None if drawing is None else drawing.weights
         if self._last is None or self._last[0] is not state or self._last[1] is not weights:
             weighs_payload = state.view.forces.weighed != "none"
             loaded = LoadedPose(state.design, state.pose, load_of(state), weights, weighs_payload)
@@ -140,17 +131,15 @@ class Loads:
         return self._last[2]
 
 
-class NearestFeed(Feed[LoadedPose, NearestDrawing]):
-    """The nearest position that holds the load, while the present one does not."""
+def nearest_feed(services: Services) -> Feed[LoadedPose, NearestDrawing]:
+    """Return the feed of the nearest position that holds the load, while the pose does not."""
+    loads = services.get(Loads)
 
-    def __init__(self, services: Services) -> None:
-        loads = services.get(Loads)
+    def request_of(frame: Frame) -> LoadedPose | None:
+        loaded = loads.of(frame)
+        return loaded if has_limits(loaded.design) and loaded.share > 1.0 else None
 
-        def request_of(frame: Frame) -> LoadedPose | None:
-            loaded = loads.of(frame)
-            return loaded if has_limits(loaded.design) and loaded.share > 1.0 else None
-
-        super().__init__(services.worker, nearest_position, request_of, services.session.redraw)
+    return Feed(services.worker, nearest_position, request_of, services.session.redraw)
 
 
 def load_of(state: State) -> Six:

@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.loads import Loads, NearestFeed, SetForce, rounded
+from explorer.app.features.forces.loads import Loads, SetForce, nearest_feed, rounded
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.actions import SetPose
@@ -45,7 +45,7 @@ class ForcesPanel:
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
-        self._loads, self._nearest = services.get(Loads), services.get(NearestFeed)
+        self._loads, self._nearest = services.get(Loads), services.get(nearest_feed)
         self._controls = controls = Controls(gui, services.session)
         self._top = gui.add_html("")
         with gui.add_folder("Load at the tool (axes of the base)"):
@@ -127,7 +127,7 @@ class ForcesPanel:
         weights = self._loads.weights
         if weights.problem is not None:
             yield problem(weights, "The legs have no weights", "")
-        elif weights.request is not None and weights.weights is None:
+        elif weights.request is not None and weights.drawing is None:
             yield note("computing the weights of the parts …")
 
     def _nearest_position(self, frame: Frame, loaded: LoadedPose) -> Iterator[Statement]:

@@ -19,7 +19,7 @@ from explorer.app.features.precision.tasks import (
 )
 from explorer.app.inputs.bindings import At
 from explorer.app.inputs.controls import Controls
-from explorer.app.session.feed import Feed
+from explorer.app.session.feed import feed_of
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
 from explorer.app.state.actions import check_free
@@ -73,13 +73,6 @@ class SetTolerances(Action):
         return with_value(state, "design", design)
 
 
-class BudgetFeed(Feed[BudgetRequest, BudgetDrawing]):
-    """The budget, while it is shown."""
-
-    def __init__(self, services: Services) -> None:
-        super().__init__(services.worker, budget_of, _shown_budget, services.session.redraw)
-
-
 def _shown_budget(frame: Frame) -> BudgetRequest | None:
     return budget_request(frame.state) if frame.state.view.precision.budget else None
 
@@ -97,6 +90,9 @@ def budget_request(state: State) -> BudgetRequest:
         view.wanted_turn if view.wanted is not None else None,
         view.keep_actuators and view.wanted is not None,
     )
+
+
+BUDGET_FEED = feed_of(budget_of, _shown_budget)
 
 
 class ToleranceFile:
@@ -117,7 +113,7 @@ class BudgetPart:
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
-        self._feed = services.get(BudgetFeed)
+        self._feed = services.get(BUDGET_FEED)
         self._controls = controls = Controls(gui, services.session)
         controls.checkbox(
             "What each tolerance costs",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import viser
 
 from explorer.app.features.feature import Export, Feature, Tab
-from explorer.app.features.precision.budget import BudgetFeed, ToleranceFile
+from explorer.app.features.precision.budget import BUDGET_FEED, ToleranceFile
 from explorer.app.features.precision.panel import PrecisionPanel
 from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene
 from explorer.app.features.precision.tasks import budget_of, budget_table
@@ -22,7 +22,7 @@ PRECISION = Feature(
         ),
     ),
     scene=(ErrorEllipsoidScene, DeflectedScene),
-    later_feeds=(BudgetFeed,),
+    later_feeds=(BUDGET_FEED,),
     tasks=(budget_of, budget_table),
     lists=("Worst over",),
 )
