@@ -51,6 +51,8 @@ lengths, one radius for all four legs, and those of the machine."""
 LARGEST_FILE = 1_000_000
 # The longest Sobol sequence has as many points.
 MOST_DESIGNS = 2**30
+# A hypercube is made as a whole, in each process.
+MOST_IN_HYPERCUBE = 1_000_000
 MOST_IN_CHUNK = 100_000
 MOST_ITERATIONS = 100_000
 LARGEST_SEED = 2**31 - 1
@@ -271,6 +273,11 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             raise InputError(
                 f"sampling.count must name the variables {', '.join(self.variables)}; it names "
                 f"{', '.join(count) or 'none'}"
+            )
+        if self.sampling.method == "latin-hypercube" and self.count > MOST_IN_HYPERCUBE:
+            raise InputError(
+                f"sampling.count must be at most {MOST_IN_HYPERCUBE:,} for a latin-hypercube; "
+                "take sobol for more designs"
             )
         if self.count > MOST_DESIGNS:
             raise InputError(

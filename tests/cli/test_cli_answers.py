@@ -12,14 +12,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 from command_line import CommandLine
 
 import explorer
 from explorer import InputError, NoAnswerError, __version__
-from explorer.cli import COMMANDS, main, run
+from explorer.cli import COMMANDS, run
 from explorer.cli.commands.sweep import Sweep
 from explorer.cli.parsing import load_command
 from explorer.mechanism.feasible_intervals import feasible_intervals
@@ -59,19 +58,6 @@ def test_inverse_has_joints_in_order_and_text_their_millimetres(cli: CommandLine
     outside = cli.answer("inverse", "--position", "30", "5", "9")
     assert outside["within_limits"] is False
     assert any("box x" in each for each in outside["violations"])
-
-
-def test_inverse_swapped_carriages_names_their_order(cli: CommandLine, tmp_path: Path) -> None:
-    other = ["--position", "10", "5", "9", "--yaw-pitch-roll", "-106.9", "0", "0"]
-    found = cli.answer("inverse", *other)
-    assert found["within_limits"] is False
-    (violation,) = found["violations"]
-    assert violation.startswith("carriage order: d3 − d1 = −0.66")
-    limits = msgspec.structs.replace(PRESET.limits, carriage_order="any")
-    plain = msgspec.structs.replace(PRESET, limits=limits)
-    file = tmp_path / "plain.json"
-    file.write_bytes(explorer.encode_design(plain))
-    assert cli.answer("inverse", *other, "--design", file)["within_limits"] is True
 
 
 def test_singularity_json_has_the_snapshot(cli: CommandLine) -> None:
@@ -320,18 +306,6 @@ def test_optimise_writes_each_file_that_it_can(
     assert {left.name, failing} == {"design.json", "run.json"}
 
 
-def test_optimise_without_convergence_and_disk_reports_both_in_a_line(
-    cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(os, "fsync", fail_for_space)
-    argv = [*PAPER[:3], "--target-volume", "2000", "--iterations", "1"]
-    out, complaints = run_with_progress(cli, *argv, "--record", tmp_path / "run.json", status=1)
-    assert "best so far" in out
-    (line,) = complaints
-    assert "iteration" in line
-    assert "; cannot write " in line
-
-
 @pytest.mark.parametrize(
     "argv",
     [
@@ -398,31 +372,6 @@ def test_process_answer_is_one_json_object_and_status_0() -> None:
     done = subprocess.run(argv, capture_output=True, encoding="utf-8", check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert set(json.loads(done.stdout)) == {"joints", "folds", "within_limits", "violations"}
-
-
-@pytest.mark.parametrize(("words", "status"), [(["1"] * 6, 1), (["1", "2", "x"], 2)])
-def test_main_without_answer_exits_with_status_and_one_line(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    words: list[str],
-    status: int,
-) -> None:
-    monkeypatch.setattr(sys, "argv", ["explorer", "forward", "--joints", *words])
-    with pytest.raises(SystemExit) as leave:
-        main()
-    assert leave.value.code == status
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-
-
-@pytest.mark.long
-def test_installed_script_runs_the_module() -> None:
-    script = Path(sys.executable).parent / "explorer"
-    if not script.exists():
-        pytest.skip("the project is not installed here")
-    done = subprocess.run([script, "--version"], capture_output=True, text=True, check=True)
-    assert done.stdout == f"explorer {__version__}\n"
 
 
 def test_version_and_help_are_those_of_the_package(cli: CommandLine) -> None:
@@ -507,29 +456,6 @@ def test_full_streams_end_with_one_line_or_keep_answer_and_status() -> None:
     assert done.stderr.startswith(b"explorer: cannot write to standard output: ")
     assert done.stderr.count(b"\n") == 1
     assert [(each.returncode, each.stdout.count(b"\n")) for each in kept] == [(0, 1), (2, 0)]
-
-
-@pytest.mark.long
-@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
-def test_record_that_no_longer_fits_on_the_disk_keeps_design_and_answer(tmp_path: Path) -> None:
-    argv = ("optimise", "--design", "paper-initial", "--target-volume", "900", "--json")
-    # A file of at most 4 kB: the design fits, the record does not.
-    limit = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)); "
-    code = f"{limit}from explorer.cli import run; sys.exit(run(sys.argv[1:]))"
-    done = subprocess.run(
-        [sys.executable, "-c", code, *argv, "--out", str(tmp_path / "best.json")],
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-    )
-    assert done.returncode == 1
-    found = json.loads(done.stdout)
-    assert found["converged"] is True
-    assert found["files"] == [str(tmp_path / "best.json")]
-    assert explorer.load_design(found["files"][0]).name == found["design"]["name"]
-    assert [path.name for path in tmp_path.iterdir()] == ["best.json"]
-    last = done.stderr.splitlines()[-1]
-    assert last.startswith(f"explorer: cannot write {str(tmp_path / 'best.record.json')!r}: ")
 
 
 ALIKE = ("−-", "–-", "⁻-", "×x", "≤<=", "≥>=", "²2", "³3", '“"', '”"', "′'", "öo", "±+-", "° deg")

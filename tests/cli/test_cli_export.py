@@ -214,17 +214,6 @@ def test_export_simulation_with_errors_assumes_typical_values_only_if_asked(
     assert "assumed, since the design states none: errors" in cli.text(*words, "--typical")
 
 
-def test_export_simulation_of_springs_alone_says_that_nothing_deviates(
-    cli: CommandLine, tmp_path: Path
-) -> None:
-    file, out = tmp_path / "design.json", tmp_path / "model.xml"
-    springs = Actuators(stiffness_n_mm=STIFFNESSES)
-    file.write_bytes(encode_design(msgspec.structs.replace(OPTIMAL, actuators=springs)))
-    lines = cli.text("simulation", "--design", file, "--out", out, "--errors", 0).splitlines()
-    assert lines[1] == "the design states neither errors nor tolerances: only its servos give way"
-    assert 'gainprm="1000000.0"' in out.read_text(encoding="utf-8")
-
-
 @pytest.mark.parametrize(("name", "expected"), [("a.3mf", "3mf"), ("a.zip", "stl-zip")])
 def test_export_mechanism_writes_its_parts(
     cli: CommandLine, tmp_path: Path, name: str, expected: str

@@ -74,32 +74,6 @@ def test_interference_one_radius_is_for_all_legs(cli: CommandLine, tmp_path: Pat
     assert cli.answer("--design", file, "--radii", "0") == cli.answer()
 
 
-def test_interference_pose_outside_limits_names_them(cli: CommandLine) -> None:
-    words = ["--position", "30", "5", "9"]
-    found = cli.answer(*words)
-    assert found["within_limits"] is False
-    assert any("box x" in each for each in found["violations"])
-    shown = cli.text(*words)
-    assert "outside the limits" in shown
-    assert all(each in shown for each in found["violations"])
-    assert "the pose is within the limits" in cli.text().splitlines()
-    assert "the pose is within the limits, but singular" in cli.text("--position", "10", "5", "0")
-    moved = cli.answer("--to", *words[1:])
-    assert moved["within_limits"] is moved["end"]["within_limits"] is False
-    assert moved["start"]["within_limits"] is True
-    shown = cli.text("--to", *words[1:])
-    assert "the start is within the limits" in shown
-    assert "the end is outside the limits" in shown
-
-
-def test_interference_move_to_folds_is_the_move_to_their_pose(cli: CommandLine) -> None:
-    r, *angles = explorer.to_folds(END.position, END.rotation).tolist()
-    found = cli.answer("--to-folds", r, *np.degrees(angles).tolist(), "--steps", "3")
-    expected = cli.answer(*MOVE, "--steps", "3")
-    np.testing.assert_allclose(column(found, "clearance"), column(expected, "clearance"), rtol=1e-9)
-    np.testing.assert_allclose(found["end"]["position"], END.position, atol=1e-12)
-
-
 def test_interference_move_has_exact_and_swept_tests(cli: CommandLine) -> None:
     found = cli.answer(*MOVE, "--steps", "3", "--radii", *map(str, RADII))
     expected = move_clearance(with_radii(RADII), HOME, END, steps=3)
@@ -134,18 +108,6 @@ def test_interference_default_steps_are_within_the_node_step(
     if words == MOVE[:4]:
         # A move without a turn has no more steps than it needs.
         assert farthest(found["steps"] - 1) > step
-
-
-def test_interference_move_keeps_what_is_not_given(cli: CommandLine) -> None:
-    straight = cli.answer(*POSE, "--to", "14", "-2", "6")
-    assert straight["end"]["quaternion"] == straight["start"]["quaternion"]
-    by_angles = cli.answer("--to-yaw-pitch-roll", "-20", "0", "15")
-    assert by_angles["start"]["position"] == by_angles["end"]["position"] == list(HOME.position)
-    quaternion = map(repr, END.quaternion)
-    by_quaternion = cli.answer("--to-quaternion", *quaternion)
-    np.testing.assert_allclose(
-        column(by_angles, "clearance"), column(by_quaternion, "clearance"), rtol=1e-9
-    )
 
 
 def test_interference_joined_legs_are_null_and_in_words(cli: CommandLine, joined: str) -> None:

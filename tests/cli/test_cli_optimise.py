@@ -239,8 +239,3 @@ def test_optimise_interrupt_leaves_files_unchanged(tmp_path: Path) -> None:
     assert "Traceback" not in complaint
     assert out.read_text() == "as it was"
     assert [path.name for path in tmp_path.iterdir()] == ["design.json"]
-
-
-@pytest.mark.parametrize(("option", "folder"), [("--out", "."), ("--record", "")])
-def test_folder_in_place_of_a_file_is_refused(cli: CommandLine, option: str, folder: str) -> None:
-    assert "it is a folder" in cli.refusal(option, folder)

@@ -78,15 +78,6 @@ def test_path_forms_of_a_pose_agree(cli: CommandLine, words: list[str]) -> None:
         )
 
 
-def test_path_by_the_folds_of_its_ends_is_the_same(cli: CommandLine) -> None:
-    found = cli.answer("--from", "9", "6", "8", "-70", "5", "3", "--to", "10", "6", "8")
-    first, last = found["poses"]
-    same = cli.answer("--from-folds", *first["folds"], "--to-folds", *last["folds"])
-    for expected, pose in zip((first, last), same["poses"], strict=True):
-        np.testing.assert_allclose(pose["position"], expected["position"], atol=1e-12)
-        np.testing.assert_allclose(pose["quaternion"], expected["quaternion"], atol=1e-12)
-
-
 def test_path_without_solution_has_status_1_and_reason(cli: CommandLine) -> None:
     found = cli.answer("--to", "12", "8", "-7", status=1)
     assert found == {"found": False, "reason": "other mode", "poses": []}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import msgspec
@@ -123,21 +122,6 @@ def test_parts_of_the_prototype_weigh_in_place_of_bars(cli: CommandLine) -> None
     found = cli.answer("forces", *POSE, "--density", "2700", "--parts")
     assert_allclose(found["actuator_forces"], expected)
     assert "--density" in cli.refusal("forces", *POSE, "--parts")
-
-
-def test_a_part_with_a_limit_tells_its_share_though_nothing_loads_it(
-    cli: CommandLine, machine: Path
-) -> None:
-    given = ["forces", *POSE, "--design", machine, "--payload", "0"]
-    text = cli.text(*given)
-    assert text.count(" 0.0 %") == 13
-    for words in ("force, N", "bending of strut 2", "payload", "worst direction"):
-        assert words in text
-    assert re.search(r"load acts at +b4", text)
-    assert "the tool" in cli.text(*given, "--at", "tool")
-    free = cli.text("forces", *POSE)
-    assert "%" not in free
-    assert "no limit" in free
 
 
 def test_forces_of_payload_are_those_of_its_weight(cli: CommandLine, machine: Path) -> None:
@@ -293,20 +277,6 @@ def test_budget_writes_the_design_that_keeps_what_is_wanted(
     text = cli.text("budget", "--design", stated, *OVER_BOX, *wanted, "--out", out)
     for words in ("of the wanted 0.05 mm", "of the wanted 0.04°", "above the least", str(out)):
         assert words in text
-
-
-def test_budget_tells_any_where_a_source_moves_nothing(
-    cli: CommandLine, stated: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "better.json"
-    found = cli.answer("budget", "--design", stated, "--wanted", "0.05", "--out", out)
-    tolerances = dict(zip(found["sources"], found["tolerances"], strict=True))
-    assert tolerances["l1"] is tolerances["b1x"] is None
-    assert explorer.load_design(str(out)).tolerances.b1 == EACH
-    line = next(
-        line for line in cli.text("budget", "--wanted", "1").splitlines() if line.startswith("b1x")
-    )
-    assert " any " in line
 
 
 def test_kept_errors_of_actuators_stay_or_are_refused(cli: CommandLine, stated: Path) -> None:

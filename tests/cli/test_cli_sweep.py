@@ -4,11 +4,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +15,6 @@ from sweep_faults import HereWorkers
 import explorer
 from explorer.app.storage.library import Library
 from explorer.sweep import cluster
-from explorer.sweep.parts import part_paths
 from explorer.sweep.results import load_results
 from explorer.sweep.study import Objective, Sampling, Study, decode_study, encode_study
 
@@ -207,42 +201,3 @@ def test_sweep_scheduler_without_workers_is_reported(
         found = cli.answer(file, "--out", tmp_path / "out", "--scheduler", scheduler)
     assert (found["done"], found["complete"]) == (20, True)
     assert said == [f"the scheduler has no worker yet: start one with dask worker {scheduler}"]
-
-
-@pytest.mark.long
-def test_sweep_interrupt_keeps_finished_parts(file: Path, tmp_path: Path) -> None:
-    many = msgspec.structs.replace(
-        STUDY, sampling=Sampling(count=100_000), measures=("volume", "reach", "clearance"), nodes=20
-    )
-    file.write_bytes(encode_study(many))
-    out = tmp_path / "results"
-    process = subprocess.Popen(
-        [sys.executable, "-m", "explorer", "sweep", file, "--out", out],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
-        # As in a terminal, where the workers get it too.
-        start_new_session=True,
-    )
-    while process.poll() is None and len(part_paths(out)) < 2:
-        time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGINT)
-    written, complaint = process.communicate()
-    assert process.returncode == 130
-    assert written == ""
-    assert "Traceback" not in complaint
-    assert complaint.splitlines()[-1].startswith("stopped; finished designs are kept")
-    assert " of 100000 designs" in complaint
-    assert load_results(out).count % 4 == 0
-    # Nobody is left in its group, some moments later.
-    while _lives(process.pid):
-        time.sleep(0.02)
-
-
-def _lives(group: int) -> bool:
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True

@@ -73,36 +73,6 @@ def test_poses_are_completed_from_the_tool_at_home(cli: CommandLine, tooled: lis
     assert_allclose(moved["quaternion"], home.quaternion)
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("inverse",),
-        ("singularity",),
-        ("forces", "--load", "1", "2", "3"),
-        ("accuracy", "--errors", "0.1"),
-        ("interference",),
-        ("interference", "--to", "9", "4", "8"),
-        ("orientation", "--samples", "500"),
-        ("workspace", "--step", "4", "--yaw-range", "-80", "-70", "--samples", "2"),
-    ],
-)
-def test_answers_at_b4_are_those_without_the_option(
-    cli: CommandLine, tooled: list[str], command: tuple[str, ...]
-) -> None:
-    pose = [] if command[0] in ("orientation", "workspace") else POSE
-    without, at_b4, in_text = (
-        cli.run(*command, *pose, *more)[0]
-        for more in (["--json"], ["--json", "--at", "b4"], ["--at", "b4"])
-    )
-    assert without == at_b4
-    assert "tool position" not in in_text
-    # With a tool at b4 the numbers are the same.
-    same = cli.answer(*command, *pose, "--at", "tool")
-    for key, value in cli.answer(*command, *pose).items():
-        if isinstance(value, float):
-            assert same[key] == pytest.approx(value, rel=1e-9)
-
-
 def test_forces_and_accuracy_are_those_of_the_tool(cli: CommandLine, tooled: list[str]) -> None:
     load = [3.0, -2.0, -10.0, 0.0, 0.0, 0.0]
     found = cli.answer("forces", *POSE, "--load", *load, *tooled)
@@ -220,32 +190,6 @@ def test_workspace_of_the_tool_is_moved_as_a_whole(cli: CommandLine, tooled: lis
                 assert found[key] == value, key
     assert_allclose(found["extent"], np.array(b4["extent"]) + TURN @ TOOL)
     assert "of the tool point  1.00000  -0.500000  3.00000" in cli.text("workspace", *tooled)
-
-
-def test_workspaces_over_orientations_are_those_of_the_tool(
-    cli: CommandLine, tooled: list[str]
-) -> None:
-    options = ["--yaw-range", "-80", "-60", "--pitch-range", "-10", "10", "--samples", "3"]
-    found, b4 = (
-        cli.answer("workspace", *options, "--tolerance", "0.2", *more)
-        for more in (tooled, tooled[:2])
-    )
-    rotations = explorer.rotation_from_yaw_pitch_roll(
-        [(yaw, pitch, 0.0) for yaw in (-80.0, -70.0, -60.0) for pitch in (-10.0, 0.0, 10.0)]
-    )
-    # Volumes by counting random positions of the tool.
-    low, high = np.array([-5.0, -18.0, -4.0]), np.array([26.0, 28.0, 26.0])
-    points = np.random.default_rng(0).uniform(low, high, (60_000, 3))
-    box = float(np.prod(high - low))
-    for tool, answer in ((TOOL, found), ((0.0, 0.0, 0.0), b4)):
-        within = explorer.poses_are_valid(TOOLED, points[:, None] - rotations @ tool, rotations)
-        for key, holds in (("inclusive", within.any(axis=1)), ("total", within.all(axis=1))):
-            share = float(holds.mean())
-            error = 5.0 * box * (share * (1.0 - share) / len(points)) ** 0.5
-            volume = answer[f"{key}_mesh"]["volume"]
-            assert volume == pytest.approx(box * share, abs=error + 0.01 * volume)
-            assert answer[f"{key}_mesh"]["watertight"]
-    assert found["total_mesh"]["volume"] < 0.97 * b4["total_mesh"]["volume"]
 
 
 def test_capability_and_orientations_are_those_of_the_tool(

@@ -170,34 +170,6 @@ def test_workspace_interference_adds_the_accessible_volume(cli: CommandLine) -> 
     assert "no radius is harmless" in text
 
 
-def test_workspace_interference_empty_workspace_has_no_accessible_volume(cli: CommandLine) -> None:
-    level = ("--yaw-pitch-roll", "0", "0", "0")
-    found = cli.answer("--interference", *level)
-    assert found["accessible_volume"] == found["accessible_node_count"] == 0
-    assert [pair["clearance"] for pair in found["pairs"]] == [None] * 6
-    assert "joined" not in cli.text("--interference", *level)
-
-
-def test_workspace_interference_joined_pair_has_no_clearance(
-    cli: CommandLine, tmp_path: Path
-) -> None:
-    joined = explorer.Design(a3=(10.0, 4.0), b1=(4.0, -3.0), b2=0.0, b3=2.0)
-    file = tmp_path / "joined.json"
-    file.write_bytes(explorer.encode_design(joined))
-    found = cli.answer("--design", file, "--interference", "--radius-curve", *COARSE)
-    assert found["pairs"][4] == {
-        "legs": [2, 4],
-        "clearance": None,
-        "bound": None,
-        "blocked_volume": 0.0,
-    }
-    radii, volumes = (found["radius_curve"][key] for key in ("radii", "volumes"))
-    assert radii[0] == 0.0
-    assert radii == sorted(radii)
-    assert volumes == sorted(volumes, reverse=True)
-    assert volumes[-1] == 0.0
-
-
 @pytest.mark.parametrize(
     ("words", "reason"),
     [

@@ -24,7 +24,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import CHAIN_JOINTS
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import HULL, convex_hull, workspace_solid
+from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
 OPTIMAL = msgspec.structs.replace(PRESETS["paper-optimal"], unit_mm=7.5)
 SOLID = workspace_solid(OPTIMAL)
@@ -215,12 +215,6 @@ def test_obj_reads_back_corners_and_groups_of_limits() -> None:
     used = {limit.replace(" ", "_") for limit in limits_of_faces(SOLID)}
     assert set(groups) == used
     assert len(groups) == len(used)
-
-
-def test_colour_of_limits_differs_by_kind_only() -> None:
-    assert colour_of("l1 minimum") == colour_of("l1 maximum") != colour_of("l4 maximum")
-    assert len({colour_of(limit) for limit in ("l1", "d2", "d4", "l4", "box x", "swing a1")}) == 6
-    assert colour_of(HULL) == colour_of("anything else")
 
 
 @pytest.mark.parametrize("file_format", FORMATS)

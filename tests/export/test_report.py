@@ -30,7 +30,6 @@ from explorer.export.report.document import report_html
 from explorer.legs.clearance import PAIRS, pair_name
 from explorer.mechanism.design import JOINTS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design, encode_design
-from explorer.numerics.number_text import format_number
 from explorer.optimise.defaults import paper_problem
 from explorer.optimise.record import Record, Settings, record_of
 from explorer.optimise.solver import optimise_design
@@ -325,14 +324,6 @@ def test_number_any_value_reads_back_rounded_and_in_full(value: float) -> None:
     exponent = power.translate(digits) or "0"
     assert float(f"{mantissa}e{exponent}") == pytest.approx(value, rel=5.1e-6)
     assert "e" not in text
-
-
-def test_format_number_special_values_are_readable() -> None:
-    assert format_number(math.inf) == "infinite"
-    assert format_number(-math.inf) == "−infinite"
-    assert format_number(-0.0) == "0"
-    assert format_number(1234567.0) == "1,234,567"
-    assert format_number(-1.5e-7) == "−1.5 × 10⁻⁷"
 
 
 def test_report_empty_workspace_gives_reason() -> None:

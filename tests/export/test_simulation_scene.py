@@ -176,56 +176,6 @@ def test_model_in_a_scene_is_the_model_alone(design: Design, ahead: str, behind:
     assert np.abs(loops_of(both, data)[0]).max() < 1e-9
 
 
-@pytest.mark.parametrize(
-    ("seed", "way"),
-    [(0, "body"), (1, "model"), (2, "element"), (3, "carried"), (4, "model"), (5, "body")],
-)
-def test_model_attached_anywhere_starts_closed_with_its_tool_in_place(seed: int, way: str) -> None:
-    rng = np.random.default_rng(seed)
-    design = [PRESS, FULL, *map(loaded, (0, 2, 4))][seed] if seed < 5 else OPTIMAL
-    given = design if seed < 4 else ImperfectMachine.draw(typical_machine(design)[0], seed)
-    position = rng.normal(size=3) * 10.0 ** rng.uniform(-1.0, 2.0)
-    turn = Rotation.random(random_state=rng)
-    quaternion = turn.as_quat(scalar_first=True)
-    machine = simulation_mjcf(given)
-    rows = (" ".join(map(repr, each.tolist())) for each in (position, quaternion))
-    place = " ".join(f'{key}="{row}"' for key, row in zip(("pos", "quat"), rows, strict=True))
-    if way == "element":
-        model = model_of(
-            f'<mujoco><asset><model name="m" file="{FILE}"/></asset><worldbody><frame {place}>'
-            f'<attach model="m" body="base" prefix="m-"/></frame></worldbody></mujoco>',
-            machine,
-        )
-    else:
-        host = engine.MjSpec()
-        parent = host.worldbody
-        if way == "carried":
-            # A flange that hangs on a joint.
-            parent = parent.add_body(mass=50.0, inertia=[1.0, 1.0, 1.0], pos=[0.0, 0.0, 0.0])
-            parent.add_joint(type=engine.mjtJoint.mjJNT_HINGE, axis=[0.0, 1.0, 0.0], damping=1.0)
-        frame = parent.add_frame(pos=position, quat=quaternion)
-        child = engine.MjSpec.from_string(machine)
-        if way == "model":
-            host.attach(child, prefix="m-", frame=frame)
-        else:
-            frame.attach_body(child.body("base"), "m-", "")
-        model = host.compile()
-    data = at_home(model, "m-home")
-    size = float(np.linalg.norm(position)) + 1e-3 * design.unit_mm * design.reach
-    assert np.abs(loops_of(model, data)[0]).max() < min(1e-9, 1e-14 * size)
-    pose = given.home if isinstance(given, ImperfectMachine) else design.home_pose
-    tool = 1e-3 * design.unit_mm * np.array(tool_position(pose, design.tool.position))
-    site = data.site("m-tool")
-    base = data.body("m-base")
-    assert_allclose(base.xpos, position, atol=1e-12 * size)
-    base_turn = base.xmat.reshape(3, 3)
-    if design.gravity == DOWN or way != "model":
-        assert_allclose(base_turn, turn.as_matrix(), atol=1e-12)
-    assert_allclose(site.xpos, position + base_turn @ tool, atol=1e-12 * size)
-    axes = Rotation.from_quat(design.tool.quaternion, scalar_first=True).as_matrix()
-    assert_allclose(site.xmat.reshape(3, 3), base_turn @ pose.rotation @ axes, atol=1e-12)
-
-
 # The parts of a random design need not fit.
 BODIES = [(design, "bars") for design in LOADED] + [(UNLIMITED, "parts"), (OPTIMAL, "parts")]
 

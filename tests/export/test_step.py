@@ -152,14 +152,6 @@ def test_step_any_name_is_written_as_the_standard_says(name: str, tmp_path: Path
     assert [each.Name().ToCString() for each in products] == [kept]
 
 
-def test_step_margins_have_the_letter_delta() -> None:
-    limits = msgspec.structs.replace(OPTIMAL.limits, margin=0.8)
-    solid = exact_workspace(msgspec.structs.replace(OPTIMAL, limits=limits))
-    of_margins = {limit for limit in solid.limit_of_face if limit.startswith("margin δ")}
-    assert of_margins
-    assert of_margins <= set(strings(step_bytes(solid, "workspace")))
-
-
 def test_step_assembly_of_any_name_reads_back() -> None:
     name = "d'où \\ 😀"
     design = msgspec.structs.replace(OPTIMAL, name=name)
