@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,22 +73,15 @@ def total_mass(parts: Iterable[Mass]) -> Mass:
 def mesh_mass(vertices: FloatArray, faces: NDArray[np.int32], density: float) -> Mass:
     """Return the mass properties of the body that a closed mesh encloses, exactly.
 
-    They are sums over the tetrahedra between the faces (m, 3), counter-clockwise from outside, and
-    one point; their second moments have a closed form.
+    The faces (m, 3) are counter-clockwise from outside.
     """
+    import trimesh
+
+    # Far from the middle the integrals of trimesh would cancel.
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    corners = (vertices - middle)[faces]
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
-    volume = float(volumes.sum())
-    sums = a + b + c
-    centre = volumes @ sums / (4.0 * volume)
-    # ∫ x xᵀ over a tetrahedron with a corner at 0 is V/20 (Σ c cᵀ + Σc Σcᵀ).
-    moments = np.einsum("i,ikj,ikl->jl", volumes, corners, corners, optimize=True)
-    moments = (moments + (volumes[:, None] * sums).T @ sums) / 20.0
-    moments -= volume * np.outer(centre, centre)
-    inertia = density * (np.trace(moments) * np.eye(3) - moments)
-    return Mass(density * volume, centre + middle, inertia)
+    untyped: Any = trimesh.triangles
+    found = untyped.mass_properties((vertices - middle)[faces], density=density)
+    return Mass(float(found["mass"]), found["center_mass"] + middle, found["inertia"])
 
 
 DEFAULT_RADIUS = 0.01

@@ -7,6 +7,7 @@ has a minimum: then no visible face covers another, and the drawing is exact.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -25,7 +26,6 @@ from explorer.export.drawings.mechanism import (
 from explorer.export.drawings.projection import Projection, extents, fit_view
 from explorer.export.drawings.slices import Slices
 from explorer.measures.snapshot import Snapshot
-from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import css, mix
 from explorer.workspace.limits.constraints import HalfSpace
 from explorer.workspace.solids.solid import Solid
@@ -87,7 +87,7 @@ _SHADES = 24
 def shaded_faces(solid: Solid, view: Projection) -> Element:
     """Return the visible faces of a solid, shaded by their angle to the light."""
     corners = solid.vertices[solid.faces]
-    normals = _normals(solid)
+    normals = _mesh(solid).face_normals
     seen = np.flatnonzero(normals @ view.toward > 0.0)
     order = seen[np.argsort(view.depth(corners[seen].mean(axis=1)), kind="stable")]
     light = _LIGHT / np.linalg.norm(_LIGHT)
@@ -117,26 +117,20 @@ def _faces(shade: int, data: list[str]) -> Element:
     return element("path", d="".join(data), fill=colour, stroke=colour)
 
 
-def _normals(solid: Solid) -> FloatArray:
-    a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
-    # In units of the solid's own size, squares neither over- nor underflow.
-    size = float(np.ptp(solid.vertices, axis=0).max())
-    normals = np.cross((b - a) / size, (c - a) / size)
-    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None])
-
-
 def _edges(solid: Solid, view: Projection) -> Iterator[str]:
-    faces = solid.faces.astype(np.int64)
-    pairs = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    owners = np.repeat(np.arange(len(faces)), 3)
-    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-    # Each edge of a closed mesh comes twice.
-    one, other = owners[order[::2]], owners[order[1::2]]
-    ends = pairs[order[::2]]
-    facing = _normals(solid) @ view.toward > 0.0
+    mesh = _mesh(solid)
+    facing = mesh.face_normals @ view.toward > 0.0
+    one, other = mesh.face_adjacency.T
     differs = solid.limit_of_face[one] != solid.limit_of_face[other]
     drawn = (facing[one] & facing[other] & differs) | (facing[one] != facing[other])
     flat = view.to(solid.vertices)
-    for a, b in ends[drawn].tolist():
+    for a, b in mesh.face_adjacency_edges[drawn].tolist():
         (x1, y1), (x2, y2) = flat[a].tolist(), flat[b].tolist()
         yield (f"M{coordinate(x1)},{coordinate(y1)}L{coordinate(x2)},{coordinate(y2)}")
+
+
+def _mesh(solid: Solid) -> Any:
+    import trimesh
+
+    untyped: Any = trimesh
+    return untyped.Trimesh(solid.vertices, solid.faces, process=False)
