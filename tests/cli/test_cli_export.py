@@ -20,7 +20,7 @@ from explorer.export.mesh import FORMATS
 from explorer.export.simulation import simulation_mjcf
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Actuators, Payload
-from explorer.mechanism.typical import STIFFNESSES, typical_machine
+from explorer.mechanism.typical import STIFFNESSES
 from explorer.statics.error_sources import SOURCES
 from explorer.workspace.held import held_workspace
 from explorer.workspace.solids.solids import convex_hull, workspace_solid
@@ -197,21 +197,6 @@ def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is
     text = cli.text(*words)
     for line in ("seed 7", "tool at home off by", f"weights move the tool by {moved:.3g} mm and "):
         assert line in text
-
-
-def test_export_simulation_with_errors_assumes_typical_values_only_if_asked(
-    cli: CommandLine, tmp_path: Path
-) -> None:
-    out = tmp_path / "model.xml"
-    words = ("simulation", "--out", out, "--errors", 3)
-    assert "give its file tolerances" in cli.refusal(*words)
-    assert not out.exists()
-    answer = cli.answer(*words, "--typical")
-    typical, assumed = typical_machine(OPTIMAL)
-    assert answer["assumed"] == list(assumed)
-    machine = ImperfectMachine.draw(typical, 3)
-    assert out.read_text(encoding="utf-8") == simulation_mjcf(machine)
-    assert "assumed, since the design states none: errors" in cli.text(*words, "--typical")
 
 
 @pytest.mark.parametrize(("name", "expected"), [("a.3mf", "3mf"), ("a.zip", "stl-zip")])

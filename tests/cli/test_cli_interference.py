@@ -128,22 +128,6 @@ def test_interference_joined_legs_are_null_and_in_words(cli: CommandLine, joined
         assert "inf" not in row
 
 
-def test_interference_text_has_a_row_per_pair(cli: CommandLine) -> None:
-    for words in ([], MOVE):
-        found = cli.answer("--radii", "0.4", *words)
-        rows = [
-            line.split()
-            for line in cli.text("--radii", "0.4", *words).splitlines()
-            if line[1:2] == "–"
-        ]
-        assert [row[0] for row in rows] == [f"{i}–{j}" for i, j in PAIRS]
-        for row, clearance in zip(rows, column(found, "clearance"), strict=True):
-            assert float(row[2]) == pytest.approx(clearance, rel=1e-5)
-            assert float(row[3]) == pytest.approx(clearance * OPTIMAL.unit_mm, rel=1e-5)
-        if words:
-            assert [row[1] == "overlap" for row in rows] == column(found, "overlaps")
-
-
 def test_interference_verdict_separates_clear_touching_and_colliding(cli: CommandLine) -> None:
     assert "Legs are clear: Least clearance: legs 2–3" in cli.text()
     assert "Legs 2–3 collide: Least clearance: legs 2–3" in cli.text("--radii", "0.4")

@@ -246,17 +246,6 @@ def test_budget_without_wanted_precision_ranks_the_costs(cli: CommandLine, state
     assert "found" not in text
 
 
-def test_budget_of_a_pose_is_that_of_the_pose(cli: CommandLine) -> None:
-    found = cli.answer(
-        "budget", "--position", "8", "-2.5", "11", "--yaw-pitch-roll", "-60", "9", "-7"
-    )
-    rotation = explorer.rotation_from_yaw_pitch_roll((-60.0, 9.0, -7.0))
-    costs = source_costs(OPTIMAL, [8.0, -2.5, 11.0], rotation)
-    assert (found["over"], found["count"]) == ("pose", 1)
-    assert_allclose(found["displacement"], costs.displacement)
-    assert cli.answer("budget")["position"] == list(HOME.position)
-
-
 def test_budget_writes_the_design_that_keeps_what_is_wanted(
     cli: CommandLine, stated: Path, tmp_path: Path
 ) -> None:
@@ -285,19 +274,6 @@ def test_kept_errors_of_actuators_stay_or_are_refused(cli: CommandLine, stated: 
     assert_allclose(found["tolerances"][:6], STATED.actuators.error_mm)
     message = cli.refusal(*given, "--wanted", "0.05", status=1)
     assert "the errors of the actuators alone move the tool by up to" in message
-
-
-def test_budget_over_the_workspace_tells_what_margins_allow(
-    cli: CommandLine, tmp_path: Path
-) -> None:
-    text = cli.text("budget", "--over", "workspace", "--typical")
-    assert "nodes of a grid in the workspace" in text
-    assert "nearer to singular poses errors are larger" in text
-    limits = msgspec.structs.replace(OPTIMAL.limits, margin=1.0)
-    path = tmp_path / "apart.json"
-    path.write_bytes(explorer.encode_design(msgspec.structs.replace(OPTIMAL, limits=limits)))
-    apart = cli.text("budget", "--over", "workspace", "--typical", "--design", path)
-    assert "nearer to singular" not in apart
 
 
 def test_typical_values_are_told(cli: CommandLine, stated: Path) -> None:

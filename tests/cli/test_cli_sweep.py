@@ -86,7 +86,7 @@ def test_sweep_summary_names_damaged_parts_and_strays(
     page, remarks = cli.run("--out", out, "--summary")
     assert "small: 4 of 20 designs" in page
     first, second = remarks.splitlines()
-    assert "1 damaged part is left out; a run computes it again" in first
+    assert "damaged parts are left out; a run computes them again: 1" in first
     assert "has that name: 'part-000001 copy.parquet'; move" in second
 
 
@@ -173,7 +173,7 @@ def test_sweep_bad_input_is_one_line_and_writes_nothing(
         ([file, "--out", file], "study.json"),
         ([file, "--design", "paper", "--out", out], "no preset and no file named 'paper'"),
         ([file, "--design", LONG, "--out", out], "File name too long"),
-        ([LONG, "--out", out], "File name too long"),
+        ([LONG, "--out", out], "no study and no file named"),
         (["--out", LONG, "--summary"], "File name too long"),
         ([file, "--out", LONG], "choose a shorter name"),
     ]

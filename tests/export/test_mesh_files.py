@@ -182,21 +182,6 @@ def test_binary_formats_take_any_name(name: str) -> None:
     assert only_mesh(read_3mf(mesh_bytes(SOLID, "3mf", OPTIMAL, name)))[0].GetName() == kept
 
 
-def test_names_of_margins_are_words_of_ascii() -> None:
-    limits = msgspec.structs.replace(OPTIMAL.limits, margin=0.8)
-    design = msgspec.structs.replace(OPTIMAL, limits=limits)
-    solid = workspace_solid(design)
-    used = {limit for limit in limits_of_faces(solid) if limit.startswith("margin")}
-    assert used
-    obj = text_lines(mesh_bytes(solid, "obj", design, NAME))
-    groups = [line for line in obj if line.startswith("g ")]
-    assert {f"g margin_{limit[-1]}" for limit in used} <= set(groups)
-    assert len(set(groups)) == len(set(limits_of_faces(solid)))
-    ply = text_lines(mesh_bytes(solid, "ply", design, NAME))
-    named = [line.split(" ", 5)[-1] for line in ply if line.startswith("comment colour ")]
-    assert [name.replace("margin ", "margin δ") for name in named] == list(solid.limits)
-
-
 def test_ply_reads_back_corners_and_face_colours() -> None:
     data = mesh_bytes(SOLID, "ply", OPTIMAL, NAME)
     start = data.index(b"end_header\n") + len(b"end_header\n")

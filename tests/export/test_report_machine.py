@@ -265,12 +265,6 @@ def test_report_precision_tells_the_errors_of_the_pose_and_ranks_their_sources()
     assert "Compliance" not in section.text
 
 
-def test_report_precision_of_actuators_alone_lists_no_dimension() -> None:
-    section = precision_of(design_with(actuators=ERRORS))
-    assert list(table_of(section, "Errors of the tool")) == ["actuators, worst", "actuators, RMS"]
-    assert len(table_of(section, "By source")) == 6
-
-
 @pytest.mark.parametrize("payload", [PAYLOAD, Payload(0.6, (0.0, 0.5, 1.0)), Payload(force_n=8.0)])
 def test_report_precision_tells_what_the_payload_bends(payload: Payload) -> None:
     design = design_with(actuators=SOFT, struts=BENDS, payload=payload)

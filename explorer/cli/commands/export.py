@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -30,8 +31,16 @@ What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
 
 # Typical width of a browser window over its height.
 ASPECT = 1.6
-# Options of an imperfect machine, which the simulation alone has.
-ERRORS = ("errors", "typical")
+_ORIENTED = ("quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
+# Options of each object, besides those of all.
+TAKES: Mapping[What, tuple[str, ...]] = {
+    "workspace": ("tolerance", "load", *_ORIENTED),
+    "hull": ("tolerance", "load", *_ORIENTED),
+    "mechanism": ("density",),
+    "simulation": ("density", "masses", "errors", "typical"),
+    "scene": ("position", "folds", *_ORIENTED),
+}
+OF_ALL = ("what", "out", "format", "design", "json")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,6 +108,8 @@ class Export(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
                 f"--out {str(self.out)!r} has no suffix that names the format: give --format"
             )
         check_writable(self.out)
+        names = (field.name for field in dataclasses.fields(self))
+        self.refuse(*(name for name in names if name not in (*OF_ALL, *TAKES[self.what])))
         data, facts = _WRITERS[self.what](self, file_format)
         write_whole(self.out, data)
         self.write(lambda: {"file": self.out, **facts}, lambda: (str(self.out), *_as_lines(facts)))
@@ -136,7 +147,6 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
     if command.what == "workspace" and file_format in ("step", "stp"):
         return _step(command)
-    command.refuse("density", "masses", *ERRORS, "position", "folds")
     check_format(file_format)
     design = command.read_design()
     from explorer.workspace.solids.solids import convex_hull, workspace_solid
@@ -177,7 +187,7 @@ def _step(command: Export) -> tuple[bytes, Facts]:
             "STEP takes exact faces, and the surface along which a part takes its limit consists "
             "of facets: write 3mf, stl, glb, obj or ply"
         )
-    command.refuse("tolerance", "density", "masses", *ERRORS, "position", "folds")
+    command.refuse("tolerance")
     check_extra()
     design = command.read_design()
     home = command.oriented_home(design)
@@ -195,10 +205,6 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.export.simulation import DENSITY
     from explorer.prototype.assembly import bill_of_materials, make_prototype
 
-    command.refuse(
-        *("tolerance", "masses", *ERRORS, "position", "quaternion"),
-        *("yaw_pitch_roll", "tilt_torsion", "folds", "at", "load"),
-    )
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     if file_format == "step":
         from explorer.export.step import assembly_step, check_extra
@@ -233,10 +239,6 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.export.imperfect import ImperfectMachine
     from explorer.export.simulation import DENSITY, SimulationModel
 
-    command.refuse(
-        *("tolerance", "position", "quaternion"),
-        *("yaw_pitch_roll", "tilt_torsion", "folds", "at", "load"),
-    )
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
     design, density = command.read_design(), command.density or DENSITY
@@ -259,7 +261,6 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
 
 def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    command.refuse("tolerance", "density", "masses", *ERRORS, "load")
     if file_format not in ("html", "htm"):
         raise InputError(f"no format {file_format!r} of the scene; there is html")
     design = command.read_design()

@@ -177,27 +177,17 @@ def _pose(
     tool: Triple | None,
 ) -> Pose:
     """Return the pose of an option whose position an orientation may follow."""
-    position = None
-    if values is not None:
-        x, y, z, *rest = values
-        position = (x, y, z)
-        others = {
-            "quaternion": quaternion,
-            "yaw-pitch-roll": yaw_pitch_roll,
-            "tilt-torsion": tilt_torsion,
-            "folds": folds,
-        }
-        given = [name for name, value in others.items() if value is not None]
-        if rest and len(given) == 1:
-            other = given[0]
-            raise InputError(f"{option} has an orientation already; leave {option}-{other} out")
-        if rest and not given:
-            if len(rest) == 3:
-                yaw_pitch_roll = (rest[0], rest[1], rest[2])
-            else:
-                quaternion = (rest[0], rest[1], rest[2], rest[3])
-    given = (position, quaternion, yaw_pitch_roll, tilt_torsion, folds)
-    return make_pose(f"{option}-", default, *given, tool)
+    position, rest = (None, ()) if values is None else (values[:3], values[3:])
+    others = (quaternion, yaw_pitch_roll, tilt_torsion, folds)
+    names = ("quaternion", "yaw-pitch-roll", "tilt-torsion", "folds")
+    for name, value in zip(names, others, strict=True):
+        if rest and value is not None:
+            raise InputError(f"{option} has an orientation already; leave {option}-{name} out")
+    if len(rest) == 3:
+        others = (None, rest, None, None)
+    elif rest:
+        others = (rest, None, None, None)
+    return make_pose(f"{option}-", default, position, *others, tool)  # pyright: ignore[reportArgumentType]
 
 
 def _as_json(

@@ -19,7 +19,6 @@ from explorer.mechanism.design_file import encode_design
 
 if TYPE_CHECKING:
     from explorer.sweep.results import Summary
-    from explorer.sweep.rows import Value
     from explorer.sweep.run import Progress
     from explorer.sweep.study import Study
     from explorer.sweep.workers import Workers
@@ -144,11 +143,7 @@ class Sweep(JsonOptions):
 
         summary = summarise(folder)
         if summary.damaged:
-            one = summary.damaged == 1
-            write_error(
-                f"{summary.damaged} damaged part{' is' if one else 's are'} left out; "
-                f"a run computes {'it' if one else 'them'} again"
-            )
+            write_error(f"damaged parts are left out; a run computes them again: {summary.damaged}")
         if summary.strays:
             more = f" and {len(summary.strays) - 1} more" if len(summary.strays) > 1 else ""
             write_error(
@@ -233,7 +228,8 @@ def summary_lines(summary: Summary) -> Iterator[str]:
     if summary.incomparable:
         yield f"without a value of an objective, so not in the front: {summary.incomparable}"
     names = [*dict.fromkeys([*(goal.measure for goal in study.objectives), *study.varied])]
-    shown = _spread(summary.front)
+    step = max(1.0, (len(summary.front) - 1) / (SHOWN - 1))
+    shown = [summary.front[round(k * step)] for k in range(min(SHOWN, len(summary.front)))]
     if shown:
         rows = [("index", *names)]
         rows += [
@@ -243,13 +239,6 @@ def summary_lines(summary: Summary) -> Iterator[str]:
         yield table(rows, ">" * len(rows[0]))
     if len(shown) < len(summary.front):
         yield f"{len(shown)} of them, evenly spread; --json has all"
-
-
-def _spread(rows: list[dict[str, Value]]) -> list[dict[str, Value]]:
-    """Return at most `SHOWN` rows, evenly spread from the first to the last."""
-    if len(rows) <= SHOWN:
-        return rows
-    return [rows[round(k * (len(rows) - 1) / (SHOWN - 1))] for k in range(SHOWN)]
 
 
 def _count_lines(counts: Mapping[str, int]) -> list[str]:
