@@ -52,11 +52,7 @@ def held_by(
 ) -> HeldWorkspace:
     """Return the part of the workspace of a design with limits that holds a load.
 
-    Args:
-        design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        load: (F; M) at the tool besides the payload, base axes, in N and N × unit.
-        tolerance: Tolerance of the mesh, in design units; None for the usual one.
+    The load is (F; M) at the tool besides the payload, base axes, in N and N × unit.
     """
     from explorer.workspace.held import held_workspace
 
@@ -74,13 +70,7 @@ def check_limited(design: Design) -> None:
 
 
 def check_regular(pose: Pose, values: FloatArray, infinite: str) -> None:
-    """Check that results of a pose are finite.
-
-    Args:
-        pose: The pose.
-        values: The results.
-        infinite: What is infinite in a singular pose, such as "the forces that hold a load".
-    """
+    """Check that results of a pose are finite, and name what is infinite in a singular one."""
     if np.isfinite(values).all():
         return
     least = SINGULAR * float(np.linalg.norm(pose.position))

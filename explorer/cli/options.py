@@ -171,14 +171,13 @@ def make_pose(
 
     Args:
         option: Start of the names of the options for orientation and folds, such as ``--to-``.
-        default: Pose that completes what is not given.
+        default: Pose that completes what is not given; without a position the tool stays in place.
         position: Position of b4 or the tool in the base frame, in design units.
         quaternion: Orientation as (w, x, y, z), of any length but zero.
         yaw_pitch_roll: Orientation as angles in degrees.
         tilt_torsion: Orientation as azimuth, tilt and torsion in degrees.
         folds: The whole pose as r in design units and five angles in degrees.
-        tool: Tool point in the platform frame, in design units; None if the position is that of
-            b4. Without a position the tool stays where it is in the default pose.
+        tool: Tool point in the platform frame, in design units; None if positions are those of b4.
     """
     orientations = {
         "quaternion": quaternion,

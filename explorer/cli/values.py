@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, TypeAlias
 
 import tyro
@@ -91,22 +91,41 @@ def numbers_or_none(option: str, order: str) -> PrimitiveConstructorSpec[Any]:
     return _parser(metavar, read, lambda value: ["none"] if value == () else value or (), many=True)
 
 
+def _numbers_in_orders(
+    option: str, orders: Mapping[int, str], metavar: str, needs: str, length: int = 0
+) -> PrimitiveConstructorSpec[Any]:
+    """Return the parser of an option whose numbers have one of some orders, by their count.
+
+    Zeros fill what is missing of a length.
+    """
+
+    def read(words: list[str]) -> Numbers:
+        if len(words) not in orders:
+            raise UsageError(f"{option} needs {needs}; got {len(words)} numbers")
+        values = numbers(option, orders[len(words)]).instance_from_str(words)
+        return (*values, *(0.0,) * (length - len(values)))
+
+    return _parser(metavar, read, lambda value: value or (), many=True)
+
+
 def pose_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
     """Return the parser of an option with a position and, optionally, an orientation.
 
     Three numbers are a position; six add yaw, pitch and roll, seven a quaternion.
     """
     orders = {3: "x y z", 6: "x y z yaw pitch roll", 7: "x y z qw qx qy qz"}
+    needs = "a position x y z, and may go on with yaw pitch roll or with a quaternion w x y z"
+    return _numbers_in_orders(option, orders, "X Y Z [...]", needs)
 
-    def read(words: list[str]) -> Numbers:
-        if len(words) not in orders:
-            raise UsageError(
-                f"{option} needs a position x y z, and may go on with yaw pitch roll or with a "
-                f"quaternion w x y z; got {len(words)} numbers"
-            )
-        return numbers(option, orders[len(words)]).instance_from_str(words)
 
-    return _parser("X Y Z [...]", read, lambda value: value or (), many=True)
+def load_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
+    """Return the parser of an option with a force and, optionally, a moment.
+
+    Three numbers are a force without a moment; the value always has six.
+    """
+    orders = {3: "fx fy fz", 6: "fx fy fz mx my mz"}
+    needs = "a force fx fy fz, and may go on with a moment mx my mz"
+    return _numbers_in_orders(option, orders, "FX FY FZ [MX MY MZ]", needs, 6)
 
 
 def fold_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
@@ -130,25 +149,6 @@ def fold_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
         return values
 
     return _parser(order.upper(), read, lambda value: value or (), many=True)
-
-
-def load_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
-    """Return the parser of an option with a force and, optionally, a moment.
-
-    Three numbers are a force without a moment; the value always has six.
-    """
-    orders = {3: "fx fy fz", 6: "fx fy fz mx my mz"}
-
-    def read(words: list[str]) -> Numbers:
-        if len(words) not in orders:
-            raise UsageError(
-                f"{option} needs a force fx fy fz, and may go on with a moment mx my mz; "
-                f"got {len(words)} numbers"
-            )
-        values = numbers(option, orders[len(words)]).instance_from_str(words)
-        return (*values, *(0.0,) * (6 - len(values)))
-
-    return _parser("FX FY FZ [MX MY MZ]", read, lambda value: value or (), many=True)
 
 
 def texts(option: str, metavar: str) -> PrimitiveConstructorSpec[Any]:

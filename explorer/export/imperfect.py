@@ -129,9 +129,6 @@ class ImperfectMachine:
         Args:
             position: Position of the platform's frame in the base frame, shape (3,).
             rotation: Platform to base, shape (3, 3).
-
-        Raises:
-            InputError: The position is not finite, or the rotation is not one.
         """
         p, r = position_array("position", position), checked_rotation(rotation)
         ends = p + self.points @ r.T

@@ -130,12 +130,10 @@ class SimulationModel:
         strokes: The ranges of the actuated joints.
 
     Args:
-        given: The manipulator, or an imperfect machine of it, such as
-            `explorer.ImperfectMachine.draw(design, seed)`.
+        given: The manipulator, or an imperfect machine of it.
         density: Density of the bodies, in kg/m³.
-        masses: Masses of the bodies in their own frames, in metres and kilograms, such as
-            `explorer.prototype.assembly.Prototype.masses`; those of bars with the legs' radii
-            if None. The design's payload comes in addition.
+        masses: Masses of the bodies without the payload, in their own frames, in metres and
+            kilograms, such as `explorer.prototype.assembly.Prototype.masses`; of bars if None.
 
     Raises:
         InputError: The density is not positive, a leg has zero length in the home pose, or bodies
@@ -202,11 +200,10 @@ class SimulationModel:
         return tuple(each for each, is_left_out in words.items() if is_left_out)
 
     def _check_masses(self) -> None:
-        def inertia(mass: Mass) -> float:
-            return float(np.linalg.eigvalsh(mass.inertia)[0])
-
-        name, lightest = min(self.masses.items(), key=lambda item: inertia(item[1]))
-        least = inertia(lightest)
+        least, name = min(
+            (float(np.linalg.eigvalsh(mass.inertia)[0]), name) for name, mass in self.masses.items()
+        )
+        lightest = self.masses[name]
         if least < LEAST_INERTIA or lightest.mass < LEAST_MASS:
             # Inertia grows with the fifth power of the size.
             factor = 1.02 * (LEAST_INERTIA / least) ** 0.2 if least > 0.0 else math.inf

@@ -297,22 +297,12 @@ def step_bytes(solid: ExactSolid, name: str) -> bytes:
 
 
 def exact_parts(sizes: Sizes) -> dict[str, ExactShape]:
-    """Return the parts by name, each in the frame of its body, in millimetres.
-
-    Raises:
-        MissingExtraError: OpenCASCADE is not installed.
-        ExplorerError: A boolean operation fails.
-    """
+    """Return the parts by name, each in the frame of its body, in millimetres."""
     return {name: shape for name, _, shape in forms_of(sizes, ExactKernel())}
 
 
 def assembly_step(sizes: Sizes) -> bytes:
-    """Return a STEP file of the parts, assembled in the home pose.
-
-    Raises:
-        MissingExtraError: OpenCASCADE is not installed.
-        ExplorerError: A boolean operation fails, or the file cannot be made.
-    """
+    """Return a STEP file of the parts, assembled in the home pose."""
     design = sizes.design
     home = design.home_pose
     places = Chains.of(design).places_at(home.position, home.rotation)

@@ -50,9 +50,6 @@ class Prototype:
         """Return the placements of the parts in a pose, in the order of `parts`.
 
         Arguments are those of `Chains.joints`.
-
-        Raises:
-            InputError: a pose that is not finite or not a rotation.
         """
         bodies = self.chains.places_at(position, rotation)
         index = [part.body_index for part in self.parts]

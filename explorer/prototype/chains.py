@@ -138,9 +138,6 @@ class Chains:
         """Return the placements of all bodies in a pose, in the order of `BODIES`.
 
         A leg depends on its own joint values alone, shape (..., 12).
-
-        Raises:
-            InputError: not a rotation.
         """
         shape = joints.shape[:-1]
         origin = np.zeros((*shape, len(BODIES), 3))

@@ -38,9 +38,6 @@ def broken_joint_limits(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) 
         sizes: Sizes of the parts.
         position: Position of b4 in the base frame, shape (3,), in design units.
         rotation: Rotation from platform to base, shape (3, 3).
-
-    Raises:
-        InputError: a pose that is not finite or not a rotation.
     """
     chains = sizes.chains
     joints = chains.joints(position, rotation)

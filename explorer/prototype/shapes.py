@@ -73,11 +73,7 @@ SEGMENTS = 48
 
 
 def make_parts(sizes: Sizes) -> tuple[Part, ...]:
-    """Make all parts, the base first.
-
-    Raises:
-        ExplorerError: a boolean fails.
-    """
+    """Make all parts, the base first."""
     unit = sizes.design.unit_mm
     return tuple(
         _part(name, body, shape, unit) for name, body, shape in forms_of(sizes, MeshKernel())

@@ -7,7 +7,7 @@ tight for its parts. Units are those of the lengths and the density given.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Payload
+from explorer.mechanism.pose import Quadruple
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
 from explorer.statics.weights import Weights
@@ -131,22 +132,20 @@ def machine_weights(design: Design, masses: Mapping[str, Mass], *, payload: bool
     """
     units = 1e3 / design.unit_mm
     x, y, z = (units * masses["platform"].centre).tolist()
-
-    def row(values: list[float]) -> tuple[float, float, float, float]:
-        first, second, third, fourth = values
-        return first, second, third, fourth
-
     carried = (design.payload,) if payload else ()
-    cylinders = [masses[f"cylinder {leg}"] for leg in LEGS]
-    rods = [masses[f"rod {leg}"] for leg in LEGS]
-    carriages = [masses[f"carriage {leg}"].mass if leg in ON_GUIDE else 0.0 for leg in LEGS]
+
+    def of_legs(kind: str, value: Callable[[Mass], float]) -> Quadruple:
+        a, b, c, d = (value(masses[f"{kind} {leg}"]) for leg in LEGS)
+        return a, b, c, d
+
+    two, three = (masses[f"carriage {leg}"].mass for leg in ON_GUIDE)
     return Weights(
         on_platform=(*carried, Payload(masses["platform"].mass, (x, y, z))),
-        carriages=row(carriages),
-        cylinders=row([each.mass for each in cylinders]),
-        cylinder_centres=row([units * float(each.centre[2]) for each in cylinders]),
-        rods=row([each.mass for each in rods]),
-        rod_centres=row([-units * float(each.centre[2]) for each in rods]),
+        carriages=(0.0, two, three, 0.0),
+        cylinders=of_legs("cylinder", lambda each: each.mass),
+        cylinder_centres=of_legs("cylinder", lambda each: units * float(each.centre[2])),
+        rods=of_legs("rod", lambda each: each.mass),
+        rod_centres=of_legs("rod", lambda each: -units * float(each.centre[2])),
     )
 
 

@@ -105,7 +105,6 @@ def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -
 
     Raises:
         StorageError: the part cannot be written; a part that was there is unchanged.
-        MissingExtraError: pyarrow is not installed.
     """
     arrow = pyarrow()
     fields: list[Any] = []
@@ -136,7 +135,6 @@ def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, A
 
     Raises:
         BadPartError: the file is damaged or cut off, or no part of a study.
-        MissingExtraError: pyarrow is not installed.
     """
     arrow = pyarrow()
     try:
@@ -171,7 +169,6 @@ def sound_parts(
 
     Raises:
         InputError: a part is of another study.
-        MissingExtraError: pyarrow is not installed.
     """
     known_hash = None if study is None else study_hash(study)
     for chunk, path in _numbered(folder):

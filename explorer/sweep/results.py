@@ -111,7 +111,6 @@ class Results:
 
         Raises:
             InputError: there is no such row.
-            DesignError: the row is one of an invalid design.
         """
         if not 0 <= row < self.count:
             raise InputError(f"the row must lie within 0 to {self.count - 1}; got {row}")
@@ -155,8 +154,6 @@ def design_at(folder: str | Path, index: int) -> Design:
 
     Raises:
         InputError: the folder holds no results, or not yet those of this design.
-        DesignError: its variables make no design.
-        MissingExtraError: pyarrow is not installed.
     """
     study, damaged = None, list[Path]()
     for study, _, table in sound_parts(Path(folder), damaged):
@@ -195,7 +192,6 @@ def summarise(folder: str | Path) -> Summary:
 
     Raises:
         InputError: the folder holds no results, or those of several studies.
-        MissingExtraError: pyarrow is not installed.
     """
     damaged: list[Path] = []
     counts: Counter[str] = Counter()

@@ -125,9 +125,6 @@ def design_of(study: Study, values: Mapping[str, float], name: str | None = None
         study: The study.
         values: Values by variable; others are those of the study's design.
         name: Name of the design; that of the study's design if None.
-
-    Raises:
-        DesignError: the values make a degenerate design.
     """
     design = varied(study.base, values)
     if RADIUS in values:

@@ -58,9 +58,9 @@ def report_html(data: ReportData, date: dt.date) -> str:
     head = element(
         "head",
         element("meta", charset="utf-8"),
-        _meta("viewport", "width=device-width, initial-scale=1"),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
         element("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        _meta("generator", f"Flagged 4-4 explorer {__version__}"),
+        element("meta", name="generator", content=f"Flagged 4-4 explorer {__version__}"),
         element("title", title),
         element("style", style),
     )
@@ -70,10 +70,6 @@ def report_html(data: ReportData, date: dt.date) -> str:
         if pieces:
             body.append(element("section", *pieces))
     return f"<!DOCTYPE html>\n{as_html(element('html', head, body, lang='en-GB'))}\n"
-
-
-def _meta(name: str, content: str) -> Element:
-    return element("meta", name=name, content=content)
 
 
 def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
