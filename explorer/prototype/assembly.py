@@ -173,15 +173,19 @@ class Bill:
 def bill_of_materials(prototype: Prototype, density: float) -> Bill:
     """Return the bill of materials of a prototype; the density is in kg/m³."""
     unit, sizes = prototype.design.unit_mm, prototype.sizes
-    items: list[Item] = []
+    items: dict[str, Item] = {}
     for part in prototype.parts:
-        x, y, z = ((part.vertices.max(axis=0) - part.vertices.min(axis=0)) * unit).tolist()
-        volume = part.unit_mass.mass * unit**3
-        items.append(Item(part.name, (x, y, z), volume, part.mass(density, unit).mass))
-    mass = {item.name: item.mass for item in items}
-    actuators: list[Actuator] = []
-    for leg, stroke in enumerate(sizes.strokes, 1):
-        actuator_mass = mass[f"cylinder {leg}"] + mass[f"rod {leg}"]
-        diameter = 2.0 * sizes.radii[leg - 1]
-        actuators.append(Actuator(leg, stroke, sizes.required_stroke(leg), diameter, actuator_mass))
-    return Bill(tuple(items), tuple(actuators))
+        x, y, z = (np.ptp(part.vertices, axis=0) * unit).tolist()
+        volume, mass = part.unit_mass.mass * unit**3, part.mass(density, unit).mass
+        items[part.name] = Item(part.name, (x, y, z), volume, mass)
+    actuators = tuple(
+        Actuator(
+            leg,
+            stroke,
+            sizes.required_stroke(leg),
+            2.0 * sizes.radii[leg - 1],
+            items[f"cylinder {leg}"].mass + items[f"rod {leg}"].mass,
+        )
+        for leg, stroke in zip(LEGS, sizes.strokes, strict=True)
+    )
+    return Bill(tuple(items.values()), actuators)

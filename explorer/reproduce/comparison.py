@@ -51,14 +51,10 @@ class Workspace:
 
 @dataclass(frozen=True)
 class Abilities:
-    """The orientations that a mechanism can have over its workspace.
+    """The orientations that a mechanism can have, as means over positions of its workspace.
 
-    Attributes:
-        name: Name of the mechanism.
-        share: Mean share of all orientations over positions of the workspace.
-        share_error: Standard error of that mean.
-        tilt: Mean of the greatest tilts in every azimuth from home's orientation, in degrees.
-        tilt_error: Standard error of that mean.
+    They are the share of all orientations, and the greatest tilt in every azimuth from home's
+    orientation in degrees, each with its standard error.
     """
 
     name: str
@@ -197,14 +193,11 @@ def _abilities(name: str, holds: Holds, points: FloatArray, rotation: FloatArray
     turns = np.asarray(Rotation.random(ORIENTATIONS, rng=np.random.default_rng(10)).as_matrix())
     shares = np.array([holds(np.tile(p, (len(turns), 1)), turns).mean() for p in chosen])
     tilts = np.array([_greatest_tilt(holds, p, rotation) for p in chosen])
-    root = len(chosen) ** 0.5
-    return Abilities(
-        name,
-        float(shares.mean()),
-        float(shares.std(ddof=1)) / root,
-        float(tilts.mean()),
-        float(tilts.std(ddof=1)) / root,
-    )
+    values = [
+        (float(each.mean()), float(each.std(ddof=1)) / len(chosen) ** 0.5)
+        for each in (shares, tilts)
+    ]
+    return Abilities(name, *values[0], *values[1])
 
 
 def _greatest_tilt(holds: Holds, position: FloatArray, rotation: FloatArray) -> float:

@@ -57,8 +57,7 @@ class Interference:
         median: Median over the nodes of the least clearance of thin legs.
         clearer: Share of the nodes at which it is clearer than the 4-4; None for the 4-4 itself.
         free: Shares of the nodes without a collision, by the radius of all legs, as in `RADII`.
-        steps: Shares of the steps from nodes on which legs collide by the paper's test, by axis
-            and by the length of the steps, as in `STEPS`.
+        steps: Shares of colliding steps by their length, as in `STEPS`, and by axis.
     """
 
     name: str

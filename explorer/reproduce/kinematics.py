@@ -245,12 +245,10 @@ def judge_paths(worst: float, kept: float) -> Measurement:
 
 @dataclass(frozen=True)
 class Paths:
-    """Curved paths between two poses: shifts of b4 and turns, with a detour.
+    """Curved paths between two poses: from a pose along a way, with a detour.
 
-    Attributes:
-        position, rotation: Poses at the start, shapes (n, 3) and (n, 3, 3).
-        way: Shift and rotation vector from start to end, shape (n, 6).
-        detour: Shift and rotation vector that are added in the middle of the way, shape (n, 6).
+    Way and detour are shifts of b4 and rotation vectors, shape (n, 6); the detour is largest in the
+    middle. Positions have the shape (n, 3), rotations (n, 3, 3).
     """
 
     position: FloatArray

@@ -37,15 +37,10 @@ STARTS = 14
 
 @dataclass(frozen=True)
 class Optimum:
-    """A design and the search that led to it.
+    """A design and the search that led to it; None and 0 where the paper has no such number.
 
-    Attributes:
-        name: Name of the row.
-        measured: Measures of the optimiser, and the step of the nodes.
-        iterations: Number of iterations; None for the initial design.
-        objective: F = |1 − V/V′|, with V as its source measures it; None without a volume to match.
-        converged: Whether the search converged; None for the paper's designs.
-        starts: Number of starts of the search; 0 for the paper's designs.
+    The objective is F = |1 − V/V′|, with V as its source measures it; the measures are those of
+    the optimiser, and the step of the nodes.
     """
 
     name: str

@@ -60,16 +60,13 @@ class SixLegs:
     @cached_property
     def pairs(self) -> IntArray:
         """The pairs of legs that share no joint, shape (m, 2)."""
-        return np.array(
-            [
-                (i, j)
-                for i, j in itertools.combinations(range(6), 2)
-                if not (
-                    np.array_equal(self.base[i], self.base[j])
-                    or np.array_equal(self.platform[i], self.platform[j])
-                )
-            ]
-        )
+        base, platform = self.base, self.platform
+
+        def share_joint(i: int, j: int) -> bool:
+            return (base[i] == base[j]).all() or (platform[i] == platform[j]).all()
+
+        pairs = itertools.combinations(range(6), 2)
+        return np.array([(i, j) for i, j in pairs if not share_joint(i, j)])
 
     def lengths(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
         """Return the lengths of the legs, shape (n, 6)."""

@@ -47,13 +47,7 @@ PRINTED: Mapping[str, Printed] = {
 
 @dataclass(frozen=True)
 class Row:
-    """A row of Table 1 as it is measured.
-
-    Attributes:
-        preset: Name of the preset with its design.
-        nodes: Count of the nodes, with their extent.
-        exact: Exact volume in cubed design units.
-    """
+    """A row of Table 1 as it is measured: nodes with their extent, and the exact volume."""
 
     preset: str
     nodes: NodeCount

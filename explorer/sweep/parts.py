@@ -36,14 +36,7 @@ class BadPartError(InputError):
 
 @dataclass(frozen=True)
 class Part:
-    """Metadata of a part.
-
-    Attributes:
-        study: Encoded study.
-        study_hash: Hash of the study.
-        chunk: Number of the chunk.
-        versions: Versions of the libraries that computed the part.
-    """
+    """Metadata of a part: encoded study, its hash, chunk, and versions of the libraries."""
 
     study: bytes
     study_hash: str
