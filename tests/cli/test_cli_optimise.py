@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import msgspec
@@ -14,7 +10,6 @@ import pytest
 from command_line import CommandLine
 
 import explorer
-from explorer.numerics.compiled import warm
 from explorer.optimise.record import load_record
 
 COMMAND = ("optimise",)
@@ -215,27 +210,3 @@ def test_optimise_shows_infinite_loads_beside_finite_ones(
 )
 def test_optimise_bad_input_is_one_line(cli: CommandLine, argv: list[str], words: str) -> None:
     assert words in cli.refusal(*argv)
-
-
-def test_optimise_interrupt_leaves_files_unchanged(tmp_path: Path) -> None:
-    warm()
-    out = tmp_path / "design.json"
-    out.write_text("as it was")
-    argv = ["--objective", "smallest-reach", "--starts", "5000", "--out", out]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "explorer", "optimise", *argv],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
-    )
-    assert process.stderr is not None
-    # Its first progress says that the search is under way.
-    assert "start 1 of 5000" in process.stderr.readline()
-    process.send_signal(signal.SIGINT)
-    written, complaint = process.communicate()
-    assert process.returncode == 130
-    assert written == ""
-    assert "Traceback" not in complaint
-    assert out.read_text() == "as it was"
-    assert [path.name for path in tmp_path.iterdir()] == ["design.json"]

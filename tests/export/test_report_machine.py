@@ -12,28 +12,14 @@ from limited_designs import ordinary_case
 from report_page import Node, read, table_of
 
 import explorer
-from explorer import Actuators, Design, Guide, Payload, Pose, Struts, Tolerances, Tool
+from explorer import Actuators, Design, Guide, Payload, Pose, Struts, Tool
 from explorer.app.features.sharing.reporting import make_report
 from explorer.export.report.data import gather_report_data
 from explorer.export.report.loads import worst_payload_force
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Triple
-from explorer.numerics.arrays import FloatArray
-from explorer.statics.compliance import (
-    compliance_shares,
-    largest_deflection,
-    principal_compliances,
-    stiffness_of,
-)
-from explorer.statics.error_sources import (
-    SOURCES,
-    error_by_source,
-    largest_error,
-    rms_of_sources,
-    source_errors,
-)
-from explorer.statics.reactions import PART_NAMES, Reactions, limit_shares
-from explorer.statics.weights import design_weights, payload_wrench
+from explorer.statics.reactions import Reactions, limit_shares
+from explorer.statics.weights import design_weights
 from explorer.workspace.held import held_workspace
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -41,9 +27,7 @@ ZERO = np.zeros(6)
 POSE = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-60.0, 5.0, 2.0))
 TENTH: Triple = (0.1, 0.1, 0.1)
 ERRORS = Actuators(error_mm=(0.05, 0.02, 0.03, 0.04, 0.01, 0.06))
-SOFT = Actuators(stiffness_n_mm=(900.0, 1100.0, 700.0, 1300.0, 800.0, 1000.0))
 BENDS = Struts(outer_mm=12.0, inner_mm=10.0)
-TOLERANCES = Tolerances(TENTH, TENTH, TENTH, (0.2, 0.05), TENTH, TENTH, TENTH, TENTH)
 PAYLOAD = Payload(0.6, (0.0, 0.5, 1.0), 8.0)
 SINGULAR = Pose((10.0, 5.0, 9.0), (1.0, 0.0, 0.0, 0.0))
 
@@ -102,15 +86,6 @@ def section_of(page: Node, title: str) -> Node:
     return section
 
 
-def precision_of(design: Design) -> Node:
-    """Return the section on precision of a report at the pose of these tests."""
-    return section_of(page_of(design, POSE), "Precision")
-
-
-def given(design: Design) -> tuple[Design, Triple, FloatArray]:
-    return design, POSE.position, POSE.rotation
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
     design = loaded_case(seed)
@@ -139,18 +114,6 @@ def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
             assert f" {k + 2}" in parts[place + k].text
     worst = worst_payload_force(gather_report_data(design))
     assert worst.share == pytest.approx(float(shares.max()), rel=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_report_loads_largest_payload_and_force_are_those_of_statics(seed: int) -> None:
-    design = loaded_case(seed)
-    loaded = gather_report_data(design).loaded
-    rows = table_of(loaded_page(seed), "Most that is held")
-    assert rows["payload"].values == [loaded.largest_payload]
-    assert rows["force in every direction"].values == [1.0 / loaded.newton.share]
-    direction = rows["its worst direction"]
-    assert direction.values == pytest.approx(loaded.newton.direction.tolist())
-    assert PART_NAMES[loaded.newton.part] in rows["force in every direction"].text
 
 
 def test_report_loads_volume_is_that_of_held_workspace_beside_the_whole() -> None:
@@ -233,66 +196,6 @@ def test_report_of_a_singular_pose_says_that_nothing_holds_a_load_or_bounds_erro
     section = section_of(page_of(design, SINGULAR), "Precision")
     assert "Errors are infinite here" in section.text
     assert "The deflection is infinite" in section.text
-
-
-def test_report_precision_tells_the_errors_of_the_pose_and_ranks_their_sources() -> None:
-    design = design_with(actuators=ERRORS, tolerances=TOLERANCES)
-    section, tool = precision_of(design), design.tool.position
-    by = error_by_source(explorer.Configuration(*given(design), tool))
-    bounds = source_errors(design)
-    rows = table_of(section, "Errors of the tool")
-    for name, part in (("actuators", slice(6)), ("dimensions", slice(6, 29)), ("all", slice(29))):
-        worst = largest_error(by[:, part], bounds[part])
-        rms = rms_of_sources(by[:, part], bounds[part])
-        for kind, each in (("worst", worst), ("RMS", rms)):
-            moved = float(each.displacement) * design.unit_mm
-            turned = float(np.degrees(each.turn))
-            values = rows[f"{name}, {kind}"].values
-            assert values == pytest.approx([moved, turned], rel=1e-12)
-    alone = np.linalg.norm((by * bounds)[:3], axis=0) * design.unit_mm
-    ranked = table_of(section, "By source")
-    assert list(ranked) == [SOURCES[k] for k in np.argsort(-alone)[: len(ranked)]]
-    assert f"{29 - len(ranked)} more" in section.text
-    for name, row in ranked.items():
-        bound, moved, _ = row.values
-        index = SOURCES.index(name)
-        assert moved == pytest.approx(alone[index], rel=1e-12)
-        size = np.degrees(bounds[index]) if "tilt" in name else bounds[index] * design.unit_mm
-        assert bound == pytest.approx(size, rel=1e-12)
-        (bar,) = row.all("rect")
-        expected = 100.0 * alone[index] / alone.max()
-        assert float(bar.attributes["width"]) == pytest.approx(expected, abs=0.01)
-    assert "Compliance" not in section.text
-
-
-@pytest.mark.parametrize("payload", [PAYLOAD, Payload(0.6, (0.0, 0.5, 1.0)), Payload(force_n=8.0)])
-def test_report_precision_tells_what_the_payload_bends(payload: Payload) -> None:
-    design = design_with(actuators=SOFT, struts=BENDS, payload=payload)
-    section, tool = precision_of(design), design.tool.position
-    soft = explorer.compliance(*given(design), *stiffness_of(design), tool)
-    principal = principal_compliances(soft)
-    rows = [row.values for row in section.all("tr") if "mm/N" in row.text]
-    found = [values for values in rows if len(values) == 4]
-    assert [values[3] for values in found] == pytest.approx(
-        (principal.displacement * design.unit_mm).tolist()
-    )
-    assert found[0][:3] == pytest.approx(principal.force_directions[0].tolist())
-    weight = payload_wrench(design, POSE.rotation)
-    deflection = table_of(section, "Deflection")
-    size, *vector = deflection["displacement"].values
-    assert np.linalg.norm(vector) == pytest.approx(size, rel=1e-12)
-    largest, _ = largest_deflection(soft, weight, payload.force_n)
-    assert size == pytest.approx(float(largest) * design.unit_mm, rel=1e-9)
-    load = weight.copy()
-    if payload.force_n:
-        load[:3] += payload.force_n * np.array(
-            deflection["direction of the payload's force"].values
-        )
-    assert vector == pytest.approx((soft @ load)[:3] * design.unit_mm, rel=1e-9)
-    poses = explorer.Configuration(*given(design), tool)
-    shares = compliance_shares(poses, load, *stiffness_of(design))
-    told = [row.values[0] for row in table_of(section, "Work of the load").values()]
-    assert told == pytest.approx([100.0 * float(share) for share in shares], rel=1e-9)
 
 
 def test_report_commands_of_a_tool_place_the_tool() -> None:

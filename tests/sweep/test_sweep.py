@@ -26,7 +26,7 @@ from explorer.files.json_text import LONGEST_LINE
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
-from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
+from explorer.mechanism.machine import Actuators, Tool
 from explorer.mechanism.pose import Pose
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.loaded import LoadedPose
@@ -47,7 +47,6 @@ from explorer.sweep.study import (
     load_study,
     study_hash,
 )
-from explorer.workspace.held import held_workspace
 from explorer.workspace.limits.valid_poses import violations
 from explorer.workspace.node_measures import node_measures
 
@@ -350,39 +349,6 @@ MACHINE_RANGES = {
     "tool_y": [-2, 2],
     "tool_z": [0, 4],
 }
-LOADS = [
-    *("home_load_share", "home_worst_actuator", "home_largest_payload"),
-    *("home_largest_bending", "held_volume"),
-]
-
-
-def test_study_over_machine_and_geometry_measures_loads_as_statics_does() -> None:
-    study = decoded(variables={"a3y": [4, 8], **MACHINE_RANGES}, measures=LOADS)
-    rows = columns(study, 0, 2)
-    assert rows["status"] == ["done"] * 2
-    for k in range(2):
-        values = {name: float(rows[name][k] or 0.0) for name in study.variables}
-        limit, tool = values["actuator_limit"], [values[f"tool_{axis}"] for axis in "xyz"]
-        # The machine is made anew, without the study's way to change a design.
-        design = msgspec.structs.replace(
-            design_of(study, {"a3y": values["a3y"]}),
-            tool=Tool((tool[0], tool[1], tool[2])),
-            payload=Payload(values["payload_mass"], force_n=values["payload_force"]),
-            actuators=Actuators((limit, limit, limit, limit, limit, limit)),
-            struts=Struts(moment_nm=values["strut_limit"]),
-            guide=Guide(values["guide_force"], values["guide_moment"]),
-        )
-        assert design == design_of(study, values)
-        home = design.home_pose
-        loaded = LoadedPose(design, home)
-        assert rows["home_load_share"][k] == pytest.approx(loaded.share, rel=1e-9)
-        assert rows["home_worst_actuator"][k] == 1 + loaded.shares[:6].argmax()
-        assert rows["home_largest_payload"][k] == pytest.approx(loaded.largest_payload, rel=1e-9)
-        held = loaded.held
-        bending = 1e-3 * design.unit_mm * (held.bending + held.spread[6:8]).max()
-        assert rows["home_largest_bending"][k] == pytest.approx(bending, rel=1e-9)
-        volume = held_workspace(design, home.rotation).held_volume
-        assert rows["held_volume"][k] == pytest.approx(volume, rel=1e-9)
 
 
 def test_limits_of_a_study_replace_both_sides_of_the_design() -> None:
