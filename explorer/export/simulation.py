@@ -4,10 +4,9 @@ Every leg is a chain of three joints from the body `base`; the platform, with th
 a ball joint at the end of leg 4, and three `connect` close the other loops. The home pose is the
 reference configuration. Six position servos move the actuators, see `explorer.export.servos`.
 
-The model is made to be part of a scene. It states no option and no compiler setting, which would
-hold for the whole scene; angles are zero at home and limited by tendons, so that the scene may
-count them in degrees or radians. Its defaults are a class of its own. Gravity is that of the scene,
-downwards; a base that stands otherwise is turned by a frame around it.
+The model can be part of a scene. It states no option and no compiler setting of the whole scene;
+angles are zero at home and limited by tendons, so that the scene may count them in degrees or
+radians. Gravity is that of the scene, downwards; a frame turns a base that stands otherwise.
 
 MuJoCo's loops give way: by a ten-thousandth of what the bodies at their ends would do apart from
 each other, each as far as its centre of mass moves. A `connect` ends at a socket on the rod, a body
@@ -98,9 +97,6 @@ def simulation_joints(design: Design, position: FloatArray, rotation: FloatArray
         design: The manipulator.
         position: Position of b4 in the base frame, shape (..., 3), in design units.
         rotation: Rotation from platform to base, shape (..., 3, 3).
-
-    Raises:
-        InputError: The position is not finite, or the rotation is not one.
     """
     chains, home = Chains.of(design), design.home_pose
     at_home = chains.joints(home.position, home.rotation)
@@ -136,10 +132,8 @@ class SimulationModel:
             kilograms, such as `explorer.prototype.assembly.Prototype.masses`; of bars if None.
 
     Raises:
-        InputError: The density is not positive, a leg has zero length in the home pose, or bodies
-            are so light that MuJoCo treats them as massless.
-        NoAnswerError: The legs of the imperfect machine do not close near home, or its home is
-            singular.
+        InputError: The density is not positive, a leg has no length at home, or a body no weight.
+        NoAnswerError: The legs of the machine do not close near home, or its home is singular.
     """
 
     def __init__(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +12,6 @@ from numpy.typing import ArrayLike
 from explorer.legs.clearance import PAIRS, leg_axes, pair_rows
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Design
-from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
 from explorer.prototype.dimensions import CLEARANCE, THINNEST, GuideSizes, LegSizes, Stroke
 from explorer.workspace.limits.constraints import constraints
@@ -25,43 +23,47 @@ JOINT, TUBE, CUP = range(3)
 COMBINATIONS = np.array([*itertools.product((JOINT, TUBE, CUP), repeat=4)])
 
 
-@dataclass(frozen=True)
 class Sizes:
-    """The sizes of all parts of a design.
+    """The sizes of all parts of a design, in millimetres.
+
+    Args:
+        design: The manipulator; its `unit_mm` sets the scale.
+        radii: Radii of the four legs.
 
     Attributes:
-        design: The manipulator; its `unit_mm` sets the scale.
-        radii: Radii of the four legs, in millimetres.
+        guide, legs: Dimensions of the guide and of the four legs.
+        chains: Chains of bodies and joints.
+        home_joints: Joint values of the chains at home, in design units and radians, shape (12,).
+        strokes: Strokes of the four actuators.
+        depth: Distance from the base plane to the base plate.
+        base_plate, platform_plate: Thickness of the plates.
+        standoff: Distance from the platform plane to its plate, with room for a rod between.
+        between_carriages: Least distance between the centres of the carriages.
     """
 
-    design: Design
-    radii: tuple[float, ...]
+    def __init__(self, design: Design, radii: tuple[float, ...]) -> None:
+        self.design, self.radii = design, radii
+        home, thickest = design.home_pose, max(radii)
+        self.guide = GuideSizes(max(radii[leg - 1] for leg in ON_GUIDE))
+        self.legs = tuple(map(self._leg, LEGS))
+        self.chains = Chains.of(design)
+        self.home_joints = self.chains.joints(home.position, home.rotation)
+        self.strokes = tuple(
+            own.stroke(self.required_stroke(leg), self.home_length(leg))
+            for leg, own in zip(LEGS, self.legs, strict=True)
+        )
+        room_for_joints = max(self.legs[0].swing, self.legs[3].swing)
+        self.depth = max(room_for_joints, self.guide.eye) + 2.0 * CLEARANCE
+        self.base_plate = max(1.5 * thickest, 3.0 * THINNEST)
+        self.standoff = max(1.1 * own.cup for own in self.legs) + 2.0 * CLEARANCE
+        self.platform_plate = max(1.2 * thickest, 3.0 * THINNEST)
+        self.between_carriages = radii[1] + radii[2] + CLEARANCE
 
-    @cached_property
-    def guide(self) -> GuideSizes:
-        """The dimensions of the guide."""
-        return GuideSizes(max(self.radii[leg - 1] for leg in ON_GUIDE))
-
-    @cached_property
-    def legs(self) -> tuple[LegSizes, ...]:
-        """The dimensions of the four legs."""
-        sizes: list[LegSizes] = []
-        for leg, radius in zip(LEGS, self.radii, strict=True):
-            joint_sizes = LegSizes(radius, 0.0)
-            bottom = self.guide.eye if leg in ON_GUIDE else joint_sizes.bottom
-            sizes.append(LegSizes(radius, bottom + joint_sizes.plate))
-        return tuple(sizes)
-
-    @cached_property
-    def chains(self) -> Chains:
-        """The chains of bodies and joints."""
-        return Chains.of(self.design)
-
-    @cached_property
-    def home_joints(self) -> FloatArray:
-        """The joint values of the chains at home, in design units and radians, shape (12,)."""
-        home = self.design.home_pose
-        return self.chains.joints(home.position, home.rotation)
+    def _leg(self, leg: int) -> LegSizes:
+        radius = self.radii[leg - 1]
+        own = LegSizes(radius, 0.0)
+        bottom = self.guide.eye if leg in ON_GUIDE else own.bottom
+        return LegSizes(radius, bottom + own.plate)
 
     def home_length(self, leg: int) -> float:
         """Return the length of a leg in the home pose."""
@@ -75,35 +77,6 @@ class Sizes:
         """Return the stroke that the limits of a leg allow."""
         low, high = self.design.length_range(LENGTHS[leg - 1])
         return Stroke(low * self.design.unit_mm, high * self.design.unit_mm)
-
-    @cached_property
-    def strokes(self) -> tuple[Stroke, ...]:
-        """The strokes of the four actuators."""
-        return tuple(
-            leg_sizes.stroke(self.required_stroke(leg), self.home_length(leg))
-            for leg, leg_sizes in zip(LEGS, self.legs, strict=True)
-        )
-
-    @cached_property
-    def depth(self) -> float:
-        """The distance from the base plane to the base plate."""
-        room_for_joints = max(self.legs[0].swing, self.legs[3].swing)
-        return max(room_for_joints, self.guide.eye) + 2.0 * CLEARANCE
-
-    @cached_property
-    def base_plate(self) -> float:
-        """The thickness of the base plate."""
-        return max(1.5 * max(self.radii), 3.0 * THINNEST)
-
-    @cached_property
-    def standoff(self) -> float:
-        """The distance from the platform plane to the plate, with room for a rod between."""
-        return max(1.1 * leg_sizes.cup for leg_sizes in self.legs) + 2.0 * CLEARANCE
-
-    @cached_property
-    def platform_plate(self) -> float:
-        """The thickness of the platform plate."""
-        return max(1.2 * max(self.radii), 3.0 * THINNEST)
 
     def nearest_to_a1(self, leg: int) -> float:
         """Return the least distance of a leg's carriage from a1; a pillar stands between."""
@@ -152,11 +125,6 @@ class Sizes:
                 (low - overhang, high + overhang)
             )
         return tuple(Stroke(min(ends), max(ends)) for ends in ends_by_side.values())
-
-    @property
-    def between_carriages(self) -> float:
-        """The least distance between the centres of the carriages."""
-        return self.radii[1] + self.radii[2] + CLEARANCE
 
     def leg_distances(
         self, position: ArrayLike, rotation: ArrayLike
