@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.values import hint, load_numbers, not_negative
+from explorer.cli.values import OF_DESIGN, hint, load_numbers, not_negative
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Six
@@ -33,9 +33,7 @@ class LoadOptions(JsonOptions, PoseOptions, DesignOptions):
     )
     """Force in N and moment in N × unit on the platform, along the axes of the base."""
 
-    payload: Annotated[
-        float | None, not_negative("--payload"), hint("default: that of the design")
-    ] = None
+    payload: Annotated[float | None, not_negative("--payload"), OF_DESIGN] = None
     """Mass of the payload, in kg; its weight is added to the load."""
 
     def read_loaded_design(self) -> Design:

@@ -14,7 +14,7 @@ import numpy as np
 import tyro
 
 from explorer.cli.output import write_json, write_lines
-from explorer.cli.values import DESIGN_NAME, Flag, fold_numbers, hint, numbers
+from explorer.cli.values import DESIGN_NAME, OF_DESIGN, OF_HOME, Flag, fold_numbers, hint, numbers
 from explorer.errors import DesignError, ExplorerError, InputError, StorageError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design
@@ -126,9 +126,7 @@ class RadiiOptions:
     """The option for the radii of the legs."""
 
     radii: Annotated[
-        Quadruple | None,
-        numbers("--radii", "r1 r2 r3 r4", or_one=True),
-        hint("default: those of the design"),
+        Quadruple | None, numbers("--radii", "r1 r2 r3 r4", or_one=True), OF_DESIGN
     ] = None
     """Radii of the four legs in design units, or one for all."""
 
@@ -207,7 +205,6 @@ def make_pose(
     return Pose((x, y, z), pose.quaternion)
 
 
-_HOME_HINT = hint("default: that of the home pose")
 _INSTEAD = hint("instead of --quaternion")
 
 
@@ -249,7 +246,7 @@ class EndOptions:
 class OrientationOptions:
     """The options for the orientation; that of the home pose by default."""
 
-    quaternion: Annotated[Quadruple | None, numbers("--quaternion", "w x y z"), _HOME_HINT] = None
+    quaternion: Annotated[Quadruple | None, numbers("--quaternion", "w x y z"), OF_HOME] = None
     """Orientation of the platform; of any length but zero."""
 
     yaw_pitch_roll: Annotated[
@@ -277,7 +274,7 @@ class OrientationOptions:
 class PoseOptions(OrientationOptions, PointOptions):
     """The options for the pose; position and orientation are those of the home pose by default."""
 
-    position: Annotated[Triple | None, numbers("--position", "x y z"), _HOME_HINT] = None
+    position: Annotated[Triple | None, numbers("--position", "x y z"), OF_HOME] = None
     """Position of b4, or of the tool, in the base frame, in design units."""
 
     folds: Annotated[

@@ -31,6 +31,7 @@ def hint(words: str, metavar: str | None = None) -> Any:
 
 
 OPTIONAL = hint("optional")
+OF_DESIGN, OF_HOME = hint("default: as in the design"), hint("default: as in the home pose")
 FILE = hint("optional", "FILE")
 DESIGN_NAME = "PRESET_OR_FILE"
 

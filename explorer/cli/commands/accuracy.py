@@ -13,7 +13,7 @@ from explorer.cli.blocks import lines
 from explorer.cli.load_options import LoadOptions, check_regular
 from explorer.cli.options import TypicalOptions
 from explorer.cli.output import assumed_lines, heading, pose_table
-from explorer.cli.values import hint, numbers
+from explorer.cli.values import OF_DESIGN, numbers
 from explorer.measures.blocks.precision import deflections, tool_errors
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import DIMENSIONS, Six
@@ -36,14 +36,10 @@ class Accuracy(TypicalOptions, LoadOptions):
     errors, each uniform within its bounds.
     """
 
-    errors: Annotated[
-        Six | None, numbers("--errors", ORDER, or_one=True), hint("default: those of the design")
-    ] = None
+    errors: Annotated[Six | None, numbers("--errors", ORDER, or_one=True), OF_DESIGN] = None
     """Largest errors of the actuators in mm, or one for all."""
 
-    stiffness: Annotated[
-        Six | None, numbers("--stiffness", ORDER, or_one=True), hint("default: that of the design")
-    ] = None
+    stiffness: Annotated[Six | None, numbers("--stiffness", ORDER, or_one=True), OF_DESIGN] = None
     """Stiffness of the actuators in N/mm, or one for all."""
 
     def run(self) -> None:

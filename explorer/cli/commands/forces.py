@@ -11,7 +11,7 @@ import numpy as np
 from explorer.cli.blocks import lines
 from explorer.cli.load_options import LoadOptions, check_regular
 from explorer.cli.output import finite, heading, pose_json, pose_table
-from explorer.cli.values import hint, numbers, positive
+from explorer.cli.values import OF_DESIGN, hint, numbers, positive
 from explorer.errors import InputError
 from explorer.measures.blocks.forces import (
     most_held,
@@ -41,11 +41,9 @@ class Forces(LoadOptions):
     is no largest force.
     """
 
-    most: Annotated[
-        Six | None,
-        numbers("--most", "l1 d1 d2 d3 d4 l4", or_one=True),
-        hint("default: those of the design"),
-    ] = None
+    most: Annotated[Six | None, numbers("--most", "l1 d1 d2 d3 d4 l4", or_one=True), OF_DESIGN] = (
+        None
+    )
     """Largest forces of the actuators in N for the largest force in every direction, or one for
     all."""
 

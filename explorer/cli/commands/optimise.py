@@ -17,6 +17,7 @@ from explorer.cli.parsing import UsageError
 from explorer.cli.streams import SearchMeter
 from explorer.cli.values import (
     FILE,
+    OF_DESIGN,
     OPTIONAL,
     Flag,
     hint,
@@ -74,11 +75,7 @@ class Optimise(JsonOptions, DesignOptions):
     target_reach: Annotated[float | None, positive("--target-reach"), OPTIONAL] = None
     """Longest leg allowed; for the largest volume by default that of the design."""
 
-    box: Annotated[
-        Six | tuple[()] | None,
-        numbers_or_none("--box", _CORNERS),
-        hint("default: that of the design"),
-    ] = None
+    box: Annotated[Six | tuple[()] | None, numbers_or_none("--box", _CORNERS), OF_DESIGN] = None
     """Box that bounds the workspace, in design units; none lifts that of the design."""
 
     clearance: Annotated[float | None, positive("--clearance"), OPTIONAL] = None
@@ -95,19 +92,15 @@ class Optimise(JsonOptions, DesignOptions):
     required_box: Annotated[Six | None, numbers("--required-box", _CORNERS), OPTIONAL] = None
     """A box that must lie in the workspace, in design units."""
 
-    force: Annotated[float | None, positive("--force"), hint("default: that of the design")] = None
+    force: Annotated[float | None, positive("--force"), OF_DESIGN] = None
     """Force of any direction at the tool in N, besides the weight of the payload."""
 
-    most: Annotated[
-        Six | None,
-        numbers("--most", "l1 d1 d2 d3 d4 l4", or_one=True),
-        hint("default: those of the design"),
-    ] = None
+    most: Annotated[Six | None, numbers("--most", "l1 d1 d2 d3 d4 l4", or_one=True), OF_DESIGN] = (
+        None
+    )
     """Largest forces of the actuators in N, or one for all."""
 
-    most_bending: Annotated[
-        float | None, positive("--most-bending"), hint("default: that of the design")
-    ] = None
+    most_bending: Annotated[float | None, positive("--most-bending"), OF_DESIGN] = None
     """Largest bending moment of the struts in N m."""
 
     held: Flag = False

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from explorer.cli.options import DesignOptions, JsonOptions, PointOptions
 from explorer.cli.output import degrees, figure, figures, finite, heading, table
-from explorer.cli.values import finite_number, hint, numbers, whole_number
+from explorer.cli.values import OF_HOME, finite_number, numbers, whole_number
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import Point, position_of
@@ -29,16 +29,10 @@ class Orientation(JsonOptions, PointOptions, DesignOptions):
     place, and b4 moves about it.
     """
 
-    position: Annotated[
-        Triple | None, numbers("--position", "x y z"), hint("default: that of the home pose")
-    ] = None
+    position: Annotated[Triple | None, numbers("--position", "x y z"), OF_HOME] = None
     """Position of b4, or of the tool, in the base frame, in design units."""
 
-    torsion: Annotated[
-        float | None,
-        finite_number("--torsion"),
-        hint("default: that of the home pose"),
-    ] = None
+    torsion: Annotated[float | None, finite_number("--torsion"), OF_HOME] = None
     """Torsion of the tilts, in degrees."""
 
     samples: Annotated[int, whole_number("--samples", 2, 1_000_000)] = 100_000

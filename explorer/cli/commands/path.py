@@ -31,6 +31,7 @@ from explorer.cli.output import (
     write_json,
 )
 from explorer.cli.values import (
+    OF_HOME,
     OPTIONAL,
     Numbers,
     fold_numbers,
@@ -70,9 +71,7 @@ class Path(JsonOptions, RadiiOptions, EndOptions, PointOptions, DesignOptions):
     """Start of the path; lengths are in design units."""
 
     from_quaternion: Annotated[
-        Quadruple | None,
-        numbers("--from-quaternion", "w x y z"),
-        hint("default: that of the home pose"),
+        Quadruple | None, numbers("--from-quaternion", "w x y z"), OF_HOME
     ] = None
     """Orientation of the platform at the start."""
 

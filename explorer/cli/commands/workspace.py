@@ -32,6 +32,7 @@ from explorer.cli.output import (
     table,
 )
 from explorer.cli.values import (
+    OF_DESIGN,
     OPTIONAL,
     Flag,
     hint,
@@ -77,7 +78,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
     over several each by its own vector.
     """
 
-    step: Annotated[float | None, positive("--step"), hint("default: that of the design")] = None
+    step: Annotated[float | None, positive("--step"), OF_DESIGN] = None
     """Step of the paper's grid of nodes, in design units."""
 
     tolerance: Annotated[
