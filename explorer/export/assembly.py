@@ -76,28 +76,18 @@ def check_format(file_format: str) -> None:
         )
 
 
-def _at_home(prototype: Prototype) -> Places:
-    """Return the places of the bodies in the home pose, in the order of `BODIES`."""
-    home = prototype.design.home_pose
-    return prototype.chains.places_at(home.position, home.rotation)
-
-
 def part_groups() -> Sequence[tuple[str, Sequence[str]]]:
     """Return the subassemblies, each with the names of its parts."""
-    legs = [(f"leg {leg}", [f"{kind} {leg}" for kind in _chain(leg)]) for leg in LEGS]
+    kinds = [("carriage" if leg in ON_GUIDE else "cross", "cylinder", "rod") for leg in LEGS]
+    legs = [(f"leg {n}", [f"{kind} {n}" for kind in kinds[n - 1]]) for n in LEGS]
     top = ["platform", *(f"ball {leg}" for leg in LEGS)]
     return [("base", ["base"]), *legs, ("platform with balls", top)]
-
-
-def _chain(leg: int) -> tuple[str, str, str]:
-    """Return the kinds of the parts of a leg, from the base to the platform."""
-    return ("carriage" if leg in ON_GUIDE else "cross", "cylinder", "rod")
 
 
 def _3mf(prototype: Prototype) -> bytes:
     design, unit, home = prototype.design, prototype.design.unit_mm, prototype.design.home_pose
     check_size(np.concatenate(prototype.at(home.position, home.rotation)) * unit)
-    places, kinds = _at_home(prototype), list(COLOURS)
+    places, kinds = prototype.chains.places_at(home.position, home.rotation), list(COLOURS)
     by_name = {part.name: part for part in prototype.parts}
     with refusals_of_lib3mf("parts"):
         model = Model(f"mechanism of {design.name}", design, COLOURS)
@@ -122,14 +112,16 @@ def _glb(prototype: Prototype) -> bytes:
             part.name: (part.vertices * metres, part.faces, kinds.index(part.kind))
             for part in prototype.parts
         },
-        _nodes(prototype, _at_home(prototype), metres),
+        _nodes(prototype, metres),
         [material(kind, rgb, metallic=0.2, roughness=0.6) for kind, rgb in COLOURS.items()],
         prototype.design,
     )
 
 
-def _nodes(prototype: Prototype, places: Places, metres: float) -> list[dict[str, Any]]:
+def _nodes(prototype: Prototype, metres: float) -> list[dict[str, Any]]:
     """Return the nodes: the mechanism, the bodies from joint to joint, the balls."""
+    home = prototype.design.home_pose
+    places = prototype.chains.places_at(home.position, home.rotation)
     nodes: list[dict[str, Any]] = [{"name": "mechanism", "rotation": Y_UP, "children": [1]}]
     indices: dict[str, int] = {}
     for number, part in enumerate(prototype.parts):
