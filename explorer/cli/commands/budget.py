@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from explorer.cli import output
 from explorer.cli.blocks import lines
 from explorer.cli.options import (
     DesignOptions,
@@ -14,13 +15,6 @@ from explorer.cli.options import (
     PoseOptions,
     TypicalOptions,
     write_files,
-)
-from explorer.cli.output import (
-    assumed_lines,
-    attributes,
-    finite,
-    heading,
-    pose_table,
 )
 from explorer.cli.parsing import UsageError
 from explorer.cli.values import FILE, OPTIONAL, Flag, hint, numbers, positive
@@ -105,10 +99,10 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
         if found is not None and self.out is not None:
             files[self.out] = encode_design(with_tolerances(design, found.tolerances))
         written, errors = write_files(files)
-        head = (heading(design), *assumed_lines(assumed))
+        head = (output.heading(design), *output.assumed_lines(assumed))
         out = ("", str(written[0])) if written else ()
         if over == "pose":
-            head += (pose_table(design, pose, tool),)
+            head += (output.pose_table(design, pose, tool),)
         self.write(
             lambda: {
                 "over": over,
@@ -153,9 +147,9 @@ def _as_json(costs: SourceCosts, found: ToleranceBudget | None) -> dict[str, obj
         "sources": SOURCES,
         "parts": PARTS,
         "ranking": [SOURCES[k] for k in costs.ranking.tolist()],
-        **attributes(costs, names),
-        **attributes(costs, "worst_displacement worst_turn rms_displacement rms_turn"),
-        "tolerances": None if found is None else [*map(finite, found.tolerances.tolist())],
+        **output.attributes(costs, names),
+        **output.attributes(costs, "worst_displacement worst_turn rms_displacement rms_turn"),
+        "tolerances": None if found is None else [*map(output.finite, found.tolerances.tolist())],
         "effort": None if found is None else found.effort,
         "least_effort": None if found is None else found.least_effort,
     }

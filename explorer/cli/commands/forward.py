@@ -6,17 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
+from explorer.cli import output
 from explorer.cli.options import DesignOptions, JsonOptions, PointOptions
-from explorer.cli.output import (
-    degrees,
-    figure,
-    figures,
-    folds_in_degrees,
-    heading,
-    table,
-    write_json,
-    write_lines,
-)
 from explorer.cli.values import numbers
 from explorer.errors import NoAnswerError
 from explorer.mechanism.design import JOINTS, Design
@@ -62,10 +53,12 @@ class Forward(JsonOptions, PointOptions, DesignOptions):
         if self.json:
             listed = _modes_json(modes, tool) if modes.feasible else []
             answer = {"feasible": modes.feasible, "discriminants": squares, "modes": listed}
-            write_json(answer)
+            output.write_json(answer)
         elif modes.feasible:
-            rows = [("joint", *JOINTS), ("units", *figures(self.joints))]
-            write_lines(heading(design), table(rows, "<>>>>>>"), *_mode_lines(modes, tool))
+            rows = [("joint", *JOINTS), ("units", *output.figures(self.joints))]
+            output.write_lines(
+                output.heading(design), output.table(rows, "<>>>>>>"), *_mode_lines(modes, tool)
+            )
         if not modes.feasible:
             raise NoAnswerError(_failure_message(design, joints, squares))
 
@@ -74,7 +67,7 @@ def _modes_json(modes: ForwardKinematics, tool: Triple | None) -> list[dict[str,
     quaternion = quaternion_from_rotation(modes.rotation)
     tilt_torsion = tilt_torsion_from_rotation(modes.rotation)
     margin = margins(modes.position, modes.rotation)
-    folds = folds_in_degrees(modes.position, modes.rotation)
+    folds = output.folds_in_degrees(modes.position, modes.rotation)
     at_tool = modes.position + tool_offset(modes.rotation, tool)
     return [
         {
@@ -94,9 +87,10 @@ def _modes_json(modes: ForwardKinematics, tool: Triple | None) -> list[dict[str,
 def _mode_lines(modes: ForwardKinematics, tool: Triple | None) -> Iterator[str]:
     angles = yaw_pitch_roll_from_rotation(modes.rotation)
     margin = margins(modes.position, modes.rotation)
-    folds = folds_in_degrees(modes.position, modes.rotation)
+    folds = output.folds_in_degrees(modes.position, modes.rotation)
     r, *between = folds[0, :3].tolist()
-    yield f"{' '.join(FOLDS[:3])}  {'  '.join([figure(r), *degrees(between)])}, in every mode"
+    first = "  ".join([output.figure(r), *output.degrees(between)])
+    yield f"{' '.join(FOLDS[:3])}  {first}, in every mode"
     at_tool = modes.position + tool_offset(modes.rotation, tool)
     names = () if tool is None else ("tool x", "tool y", "tool z")
     heads = *names, "yaw", "pitch", "roll", "δ1", "δ2", "δ3", *FOLDS[3:]
@@ -105,15 +99,15 @@ def _mode_lines(modes: ForwardKinematics, tool: Triple | None) -> Iterator[str]:
         (
             str(mode),
             mode_name(mode),
-            *figures(modes.position[mode].tolist()),
-            *(figures(at_tool[mode].tolist()) if names else ()),
-            *degrees(angles[mode].tolist()),
-            *figures(margin[mode].tolist()),
-            *degrees(folds[mode, 3:].tolist()),
+            *output.figures(modes.position[mode].tolist()),
+            *(output.figures(at_tool[mode].tolist()) if names else ()),
+            *output.degrees(angles[mode].tolist()),
+            *output.figures(margin[mode].tolist()),
+            *output.degrees(folds[mode, 3:].tolist()),
         )
         for mode in range(len(margin))
     ]
-    yield from ("", table(rows, "<<" + ">" * (len(rows[0]) - 2)))
+    yield from ("", output.table(rows, "<<" + ">" * (len(rows[0]) - 2)))
 
 
 def _failure_message(design: Design, joints: FloatArray, squares: FloatArray) -> str:

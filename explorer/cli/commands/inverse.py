@@ -5,17 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from explorer.cli import output
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.output import (
-    folds_in_degrees,
-    heading,
-    lengths,
-    limits_json,
-    limits_lines,
-    pose_json,
-    pose_table,
-    table,
-)
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Triple
@@ -37,9 +28,9 @@ class Inverse(JsonOptions, PoseOptions, DesignOptions):
 
 
 def _as_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
-    folds = folds_in_degrees(snapshot.pose.position, snapshot.rotation)
-    answer = {"joints": snapshot.joints, "folds": folds, **limits_json(snapshot)}
-    return answer if tool is None else {**answer, **pose_json(snapshot.pose, tool)}
+    folds = output.folds_in_degrees(snapshot.pose.position, snapshot.rotation)
+    answer = {"joints": snapshot.joints, "folds": folds, **output.limits_json(snapshot)}
+    return answer if tool is None else {**answer, **output.pose_json(snapshot.pose, tool)}
 
 
 def _lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
@@ -48,7 +39,7 @@ def _lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
     for name, value in zip(JOINTS, snapshot.joints.tolist(), strict=True):
         bounds = ranges.get(name)
         allowed = f"{bounds[0]:.6g} to {bounds[1]:.6g}" if bounds else "none"
-        rows.append((name, *lengths(design, value, design.reach), allowed))
-    pose = pose_table(design, snapshot.pose, tool)
-    yield from (heading(design), pose, "", table(rows, "<>><"), "")
-    yield from limits_lines(snapshot)
+        rows.append((name, *output.lengths(design, value, design.reach), allowed))
+    pose = output.pose_table(design, snapshot.pose, tool)
+    yield from (output.heading(design), pose, "", output.table(rows, "<>><"), "")
+    yield from output.limits_lines(snapshot)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import tyro
 
+from explorer.cli import output
 from explorer.cli.load_options import check_limited
 from explorer.cli.options import (
     DesignOptions,
@@ -19,16 +20,6 @@ from explorer.cli.options import (
     RadiiOptions,
     make_pose,
     write_files,
-)
-from explorer.cli.output import (
-    attributes,
-    figure,
-    heading,
-    indented,
-    pose_json,
-    pose_table,
-    table,
-    write_json,
 )
 from explorer.cli.values import (
     OF_HOME,
@@ -149,7 +140,7 @@ class Path(JsonOptions, RadiiOptions, EndOptions, PointOptions, DesignOptions):
             path = plan_path(design, start, goal, seconds=self.seconds, tool=tool, load=self.load)
         except NoPathError as error:
             if self.json:
-                write_json({"found": False, "reason": error.reason, "poses": []})
+                output.write_json({"found": False, "reason": error.reason, "poses": []})
             raise
         timed = trajectory(design, path.poses, speed=self.speed, samples=self.samples, tool=tool)
         loads = None
@@ -196,10 +187,10 @@ def _as_json(
     answer: dict[str, object] = {
         "found": True,
         "reason": None,
-        "poses": [pose_json(pose, path.tool) for pose in path.poses],
-        **attributes(path, "length margin clearance seconds checked"),
+        "poses": [output.pose_json(pose, path.tool) for pose in path.poses],
+        **output.attributes(path, "length margin clearance seconds checked"),
         "duration": timed.duration,
-        "trajectory": attributes(timed, names),
+        "trajectory": output.attributes(timed, names),
     }
     if loads is not None:
         answer["largest_share"] = loads.share
@@ -220,24 +211,27 @@ def _as_lines(
 
     least = path_margins(path.poses, tool=path.tool).least
     plural = "" if path.checked == 1 else "s"
-    yield heading(design)
+    yield output.heading(design)
     for name, pose in (("from", path.poses[0]), ("to", path.poses[-1])):
-        yield from (name, *indented(pose_table(design, pose, path.tool)))
+        yield from (name, *output.indented(output.pose_table(design, pose, path.tool)))
     rows = [
         ("moves", f"{len(path.poses) - 1}, each proved to keep limits and clearances"),
-        ("length", f"{figure(path.length)} (root mean square of b1 to b4)"),
-        ("keeps", f"|δ| {figure(path.margin)}, clearance {figure(path.clearance)} or more"),
+        ("length", f"{output.figure(path.length)} (root mean square of b1 to b4)"),
+        (
+            "keeps",
+            f"|δ| {output.figure(path.margin)}, clearance {output.figure(path.clearance)} or more",
+        ),
         ("planned in", f"{path.seconds:.3g} s, {path.checked} line{plural} tried"),
-        ("takes", f"{figure(timed.duration)} s"),
-        ("least |δ|", "  ".join(f"δ{i + 1} {figure(v)}" for i, v in enumerate(least))),
+        ("takes", f"{output.figure(timed.duration)} s"),
+        ("least |δ|", "  ".join(f"δ{i + 1} {output.figure(v)}" for i, v in enumerate(least))),
     ]
     if loads is not None:
         words = f"held, with {100.0 * loads.share:.1f} % of a limit"
         words += f" at {len(loads.at)} samples and {100.0 * loads.bound:.1f} % at most between them"
         if loads.part is not None:
             seconds = float(np.interp(loads.place, timed.at, timed.time))
-            words += f": {PART_NAMES[loads.part]}, at {figure(seconds)} s"
+            words += f": {PART_NAMES[loads.part]}, at {output.figure(seconds)} s"
         rows.append(("load", words))
-    yield from ("", table(rows, "<<"))
+    yield from ("", output.table(rows, "<<"))
     if out is not None:
         yield from ("", f"{len(timed.time)} rows in {out}")

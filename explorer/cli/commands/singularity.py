@@ -5,17 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from explorer.cli import output
 from explorer.cli.blocks import lines
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.output import (
-    attributes,
-    finite,
-    folds_in_degrees,
-    heading,
-    pose_json,
-    pose_table,
-    tool_json,
-)
 from explorer.measures.blocks.block import Statement
 from explorer.measures.blocks.singularity import (
     conditioning,
@@ -56,13 +48,13 @@ def _as_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
     indices = "inverse_condition smallest_singular_value manipulability transmissions"
     names = f"margins volumes determinant {indices} transmission_index proximity"
     return {
-        **attributes(snapshot, f"{names} stratum stratum_dimension mode signs"),
-        "folds": folds_in_degrees(snapshot.pose.position, snapshot.rotation),
+        **output.attributes(snapshot, f"{names} stratum stratum_dimension mode signs"),
+        "folds": output.folds_in_degrees(snapshot.pose.position, snapshot.rotation),
         "incidences": incidences(snapshot.stratum),
         "nearest": [
             {
-                **attributes(nearest, "incidence distance"),
-                **pose_json(nearest.pose, tool),
+                **output.attributes(nearest, "incidence distance"),
+                **output.pose_json(nearest.pose, tool),
             }
             for nearest in snapshot.nearest
         ],
@@ -74,11 +66,11 @@ def _tool_json(snapshot: Snapshot, tool: Triple) -> dict[str, object]:
     """Return the tool's position, and the condition of J and the ellipsoids at the tool."""
     found = performance(snapshot.design, snapshot.pose, tool)
     return {
-        **tool_json(snapshot.pose, tool),
+        **output.tool_json(snapshot.pose, tool),
         "tool_inverse_condition": _condition_at(snapshot, tool),
         "tool_ellipsoids": {
             name: {
-                "gain": [finite(gain) for gain in ellipsoid.gain.tolist()],
+                "gain": [output.finite(gain) for gain in ellipsoid.gain.tolist()],
                 "axes": ellipsoid.axes.T,
             }
             for name, ellipsoid in (
@@ -97,7 +89,7 @@ def _condition_at(snapshot: Snapshot, tool: Triple) -> float:
 
 def _as_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
     design, here = snapshot.design, verdict(snapshot)
-    yield from (heading(design), pose_table(design, snapshot.pose, tool))
+    yield from (output.heading(design), output.pose_table(design, snapshot.pose, tool))
     blocks = (
         Statement(here.title, here.reason(design.unit_mm)),
         *freedoms(snapshot),

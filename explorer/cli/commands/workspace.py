@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from explorer.cli import output
 from explorer.cli.blocks import lines
 from explorer.cli.load_options import held_by
 from explorer.cli.options import (
@@ -16,20 +17,6 @@ from explorer.cli.options import (
     OrientationOptions,
     PointOptions,
     RadiiOptions,
-)
-from explorer.cli.output import (
-    DISAGREES,
-    attributes,
-    degrees,
-    figure,
-    figures,
-    finite,
-    heading,
-    lengths,
-    measure_text,
-    mesh_json,
-    radii_line,
-    table,
 )
 from explorer.cli.values import (
     OF_DESIGN,
@@ -139,10 +126,10 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
         design = self.with_radii(self.read_design())
         pose = self.oriented_home(design)
         measures = self._measure(design, pose, self._orientations(pose))
-        angles = "  ".join(degrees(yaw_pitch_roll_from_rotation(pose.rotation).tolist()))
-        head = [heading(design), f"yaw pitch roll  {angles}", ""]
+        angles = "  ".join(output.degrees(yaw_pitch_roll_from_rotation(pose.rotation).tolist()))
+        head = [output.heading(design), f"yaw pitch roll  {angles}", ""]
         if self.at == "tool":
-            tool = "  ".join(figures(design.tool.position))
+            tool = "  ".join(output.figures(design.tool.position))
             head.insert(2, f"of the tool point  {tool}")
         self.write(measures.as_json, lambda: (*head, *measures.as_lines()))
 
@@ -251,11 +238,11 @@ class WorkspaceMeasures:
         measured = measure_design(self.case, measures_in("workspace"))
         answer: dict[str, object] = {
             "volume": measured["volume"],
-            **attributes(self.case.volume, "gradient empty_because"),
+            **output.attributes(self.case.volume, "gradient empty_because"),
             "node_step": measured["node_step"],
             **measured.values,
             "extent": self._extent(),
-            "mesh": mesh_json(self.solid),
+            "mesh": output.mesh_json(self.solid),
         }
         if self.solid.agrees is False:
             answer["mesh_agrees"] = False
@@ -263,11 +250,11 @@ class WorkspaceMeasures:
             answer["hull_volume"] = self.hull.volume
         if self.inclusive is not None and self.total is not None:
             answer["orientations"] = self.orientations
-            answer["inclusive_mesh"] = mesh_json(self.inclusive)
-            answer["total_mesh"] = mesh_json(self.total)
+            answer["inclusive_mesh"] = output.mesh_json(self.inclusive)
+            answer["total_mesh"] = output.mesh_json(self.total)
         if self.held is not None:
             answer["held_volume"] = self.held.held_volume
-            answer["held_mesh"] = mesh_json(self.held.solid)
+            answer["held_mesh"] = output.mesh_json(self.held.solid)
             if self.held.factor is not None:
                 answer["held_factor"] = self.held.factor
         if self.capability is not None:
@@ -275,21 +262,21 @@ class WorkspaceMeasures:
         if self.accessible is not None:
             found = self.accessible
             answer |= {
-                **attributes(found, "accessible_volume accessible_node_count"),
-                "harmless_radius": finite(found.harmless_radius),
+                **output.attributes(found, "accessible_volume accessible_node_count"),
+                "harmless_radius": output.finite(found.harmless_radius),
                 "pairs": [
                     {
                         "legs": pair.legs,
-                        "clearance": finite(pair.clearance),
-                        "bound": finite(pair.bound),
+                        "clearance": output.finite(pair.clearance),
+                        "bound": output.finite(pair.bound),
                         "blocked_volume": pair.blocked_volume,
                     }
                     for pair in found.pairs
                 ],
-                "accessible_solid": mesh_json(found.solid),
+                "accessible_solid": output.mesh_json(found.solid),
             }
         if self.curve is not None:
-            curve = attributes(self.curve, "radii volumes harmless harmless_bound")
+            curve = output.attributes(self.curve, "radii volumes harmless harmless_bound")
             answer["radius_curve"] = {**curve, "closest": self.curve.closest_legs}
         return answer
 
@@ -305,7 +292,7 @@ class WorkspaceMeasures:
             if measure.power == CATALOGUE["volume"].power:
                 volumes.append((measure.heading, value or 0.0, remarks.get(name, "")))
             elif name not in _IN_REMARK:
-                text = f"{measure_text(measure, value)} {measure.unit_in('units')}"
+                text = f"{output.measure_text(measure, value)} {measure.unit_in('units')}"
                 others.append((measure.heading, text.rstrip()))
         volumes += self._volumes_of_meshes()
         accessible = self.accessible
@@ -315,25 +302,28 @@ class WorkspaceMeasures:
             volumes.append((title, accessible.accessible_volume, remark))
         cubic = (0.1 * design.unit_mm) ** 3
         rows = [("", "units³", "cm³", "")]
-        rows += [(name, figure(v), figure(v * cubic), remark) for name, v, remark in volumes]
-        yield table(rows, "<>><")
+        rows += [
+            (name, output.figure(v), output.figure(v * cubic), remark)
+            for name, v, remark in volumes
+        ]
+        yield output.table(rows, "<>><")
         if others:
-            yield table(others, "<<")
+            yield output.table(others, "<<")
         extent = self._extent()
         if extent is not None:
             yield from ("", "extent of the nodes")
             for axis, low, high in zip("xyz", *extent, strict=True):
-                yield f"  {axis}  {figure(low)} to {figure(high)}"
+                yield f"  {axis}  {output.figure(low)} to {output.figure(high)}"
         if volume.empty_because:
             yield from ("", f"empty because of {', '.join(volume.empty_because)}")
         if volume.gradient:
             rates = [("moves with", "units² (yaw: units³ a radian)")]
-            rates += [(name, figure(rate)) for name, rate in volume.gradient.items()]
-            yield from ("", table(rates, "<>"))
+            rates += [(name, output.figure(rate)) for name, rate in volume.gradient.items()]
+            yield from ("", output.table(rates, "<>"))
         if self.capability is not None:
             yield from ("", f"orientation capability {100.0 * self.capability:.2f} %")
         if accessible is not None:
-            yield from ("", radii_line(design))
+            yield from ("", output.radii_line(design))
             yield from lines(workspace_clearances(accessible.pairs, design))
         if self.curve is not None:
             yield from ("", *_curve_lines(design, self.curve, self.shift))
@@ -358,7 +348,7 @@ class WorkspaceMeasures:
 
 
 def _mesh_remark(solid: Solid) -> str:
-    off = f", {DISAGREES}" if solid.agrees is False else ""
+    off = f", {output.DISAGREES}" if solid.agrees is False else ""
     if solid.is_empty:
         return f"empty because of {', '.join(solid.empty_because) or 'the tolerance'}{off}"
     state = "watertight" if solid.is_watertight else "not watertight"
@@ -373,14 +363,16 @@ def _curve_lines(design: Design, curve: RadiusCurve, shift: FloatArray | None) -
     for index in sorted({round(last * row / ROWS) for row in range(ROWS + 1)}):
         radius, volume = float(curve.radii[index]), float(curve.volumes[index])
         share = volume / float(curve.volumes[0]) if curve.volumes[0] > 0.0 else 0.0
-        rows.append((*lengths(design, radius), figure(volume), f"{100.0 * share:.1f} %"))
-    yield table(rows, ">>>>")
+        rows.append(
+            (*output.lengths(design, radius), output.figure(volume), f"{100.0 * share:.1f} %")
+        )
+    yield output.table(rows, ">>>>")
     if curve.closest_legs is not None:
         i, j = curve.closest_legs
         at = np.array(curve.closest_position) + (0.0 if shift is None else shift)
         place = ", ".join(f"{x:.4g}" for x in at.tolist())
         if curve.harmless > 0.0:
-            yield f"no legs collide up to a radius of {figure(curve.harmless)}"
+            yield f"no legs collide up to a radius of {output.figure(curve.harmless)}"
             yield f"legs {i} and {j} come closest, at ({place})"
         else:
             yield f"no radius is harmless: legs {i} and {j} touch at ({place})"

@@ -7,71 +7,54 @@ from collections.abc import Iterable, Iterator, Sequence
 from xml.etree.ElementTree import Element
 
 from explorer.export.drawings.markup import Cell, Piece, Row, element, figure, paragraph, table
-from explorer.measures.blocks.block import (
-    Bars,
-    Block,
-    Column,
-    Fact,
-    Facts,
-    Names,
-    Number,
-    Share,
-    Shares,
-    Split,
-    Statement,
-    Table,
-    Vector,
-    Words,
-    head_of,
-    parts_of,
-)
+from explorer.measures.blocks import block as kinds
 
 
-def elements(blocks: Iterable[Block]) -> Iterator[Element]:
+def elements(blocks: Iterable[kinds.Block]) -> Iterator[Element]:
     """Yield blocks as elements; hints of tables are printed in their captions."""
     for block in blocks:
         match block:
-            case Statement(title, words, look):
+            case kinds.Statement(title, words, look):
                 between = (": ",) if title and words else ()
                 pieces = (*pieces_of(title), *between, *pieces_of(words))
                 yield paragraph(*pieces, class_="note" if look in ("close", "beyond") else None)
-            case Facts(title, facts, hint):
+            case kinds.Facts(title, facts, hint):
                 rows: list[Row] = [
                     (fact.name, pieces_of(fact.words), _remark(fact)) for fact in facts
                 ]
                 yield table((), rows, align="<><", caption=_caption(title, hint))
-            case Table():
+            case kinds.Table():
                 yield _table(block)
-            case Split(title, names, shares, hint):
+            case kinds.Split(title, names, shares, hint):
                 rows = list(zip(names, map(_share, shares), strict=True))
                 yield table((), rows, align="<>", caption=_caption(title, hint))
 
 
-def pieces_of(words: Words) -> tuple[Piece, ...]:
+def pieces_of(words: kinds.Words) -> tuple[Piece, ...]:
     """Return words as pieces, their numbers as elements with the number in full."""
     pieces: list[Piece] = []
-    for part in parts_of(words):
+    for part in kinds.parts_of(words):
         match part:
             case str():
                 pieces.append(part)
-            case Number():
+            case kinds.Number():
                 pieces += figure(part.text, part.value), part.unit
-            case Vector():
+            case kinds.Vector():
                 for text, value in zip(part.texts, part.values, strict=True):
                     pieces += figure(text, value), ", "
                 pieces[-1] = part.unit
-            case Share():
+            case kinds.Share():
                 pieces += _share(part.value)
     return tuple(pieces)
 
 
-def _remark(fact: Fact) -> tuple[Piece, ...]:
+def _remark(fact: kinds.Fact) -> tuple[Piece, ...]:
     between = "; " if fact.remark and fact.hint else ""
     return (*pieces_of(fact.remark), between, element("span", fact.hint, class_="dim"))
 
 
 def _share(share: float | None) -> tuple[Piece, ...]:
-    words = Share(share).text(1)
+    words = kinds.Share(share).text(1)
     return (words,) if share is None else (figure(words, 100.0 * share),)
 
 
@@ -79,27 +62,27 @@ def _caption(title: str, hint: str) -> Element:
     return element("span", title, element("span", hint, class_="hint") if hint else None)
 
 
-def _table(block: Table) -> Element:
+def _table(block: kinds.Table) -> Element:
     cells: list[Sequence[Cell]] = []
     heads: list[str] = []
     align = ""
     for column in block.columns:
         match column:
-            case Names():
+            case kinds.Names():
                 cells.append([pieces_of(words) for words in column.words])
-            case Column():
+            case kinds.Column():
                 cells.append([*_numbers(column)])
-            case Shares(_, values):
+            case kinds.Shares(_, values):
                 cells.append([_share(value) for value in values])
-            case Bars(lengths, _):
+            case kinds.Bars(lengths, _):
                 cells.append([_bar(length) for length in lengths])
-        heads.append("" if isinstance(column, Bars) else head_of(column))
-        align += "<" if isinstance(column, Names | Bars) else ">"
+        heads.append("" if isinstance(column, kinds.Bars) else kinds.head_of(column))
+        align += "<" if isinstance(column, kinds.Names | kinds.Bars) else ">"
     rows = list(zip(*cells, strict=True))
     return table(heads, rows, align=align, caption=_caption(block.title, block.hint))
 
 
-def _numbers(column: Column) -> Iterator[Cell]:
+def _numbers(column: kinds.Column) -> Iterator[Cell]:
     for text, value, (before, unit) in zip(column.texts, column.values, column.around, strict=True):
         number = figure(text, value) if math.isfinite(value) else text
         yield number if column.has_one_unit else (before, number, unit)
