@@ -17,22 +17,13 @@ from typing import Any
 import numpy as np
 
 from explorer.errors import InputError
+from explorer.export import packing
 from explorer.export.mesh import mesh_bytes
-from explorer.export.packing import (
-    METRES_PER_MILLIMETRE,
-    Y_UP,
-    Model,
-    Rgb,
-    check_size,
-    glb_bytes,
-    material,
-    refusals_of_lib3mf,
-)
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Places
 
-COLOURS: Mapping[str, Rgb] = MappingProxyType(
+COLOURS: Mapping[str, packing.Rgb] = MappingProxyType(
     {
         "base": (214, 219, 226),
         "carriage": (238, 119, 51),
@@ -86,11 +77,11 @@ def part_groups() -> Sequence[tuple[str, Sequence[str]]]:
 
 def _3mf(prototype: Prototype) -> bytes:
     design, unit, home = prototype.design, prototype.design.unit_mm, prototype.design.home_pose
-    check_size(np.concatenate(prototype.at(home.position, home.rotation)) * unit)
+    packing.check_size(np.concatenate(prototype.at(home.position, home.rotation)) * unit)
     places, kinds = prototype.chains.places_at(home.position, home.rotation), list(COLOURS)
     by_name = {part.name: part for part in prototype.parts}
-    with refusals_of_lib3mf("parts"):
-        model = Model(f"mechanism of {design.name}", design, COLOURS)
+    with packing.refusals_of_lib3mf("parts"):
+        model = packing.Model(f"mechanism of {design.name}", design, COLOURS)
         whole = model.add_group("mechanism")
         for name, members in part_groups():
             group = model.add_group(name)
@@ -105,15 +96,15 @@ def _3mf(prototype: Prototype) -> bytes:
 
 
 def _glb(prototype: Prototype) -> bytes:
-    metres = METRES_PER_MILLIMETRE * prototype.design.unit_mm
+    metres = packing.METRES_PER_MILLIMETRE * prototype.design.unit_mm
     kinds = list(COLOURS)
-    return glb_bytes(
+    return packing.glb_bytes(
         {
             part.name: (part.vertices * metres, part.faces, kinds.index(part.kind))
             for part in prototype.parts
         },
         _nodes(prototype, metres),
-        [material(kind, rgb, metallic=0.2, roughness=0.6) for kind, rgb in COLOURS.items()],
+        [packing.material(kind, rgb, metallic=0.2, roughness=0.6) for kind, rgb in COLOURS.items()],
         prototype.design,
     )
 
@@ -122,7 +113,7 @@ def _nodes(prototype: Prototype, metres: float) -> list[dict[str, Any]]:
     """Return the nodes: the mechanism, the bodies from joint to joint, the balls."""
     home = prototype.design.home_pose
     places = prototype.chains.places_at(home.position, home.rotation)
-    nodes: list[dict[str, Any]] = [{"name": "mechanism", "rotation": Y_UP, "children": [1]}]
+    nodes: list[dict[str, Any]] = [{"name": "mechanism", "rotation": packing.Y_UP, "children": [1]}]
     indices: dict[str, int] = {}
     for number, part in enumerate(prototype.parts):
         node: dict[str, Any] = {"name": part.name, "mesh": number}

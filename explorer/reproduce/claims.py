@@ -8,28 +8,23 @@ from types import MappingProxyType
 
 from explorer.errors import InputError
 from explorer.files.packaged import packaged_file
+from explorer.reproduce import kinematics
 from explorer.reproduce.claim import Claim, Measurement, Result
 from explorer.reproduce.comparison import large_workspace, orientations
 from explorer.reproduce.flags import chart, strata, uncoupled
 from explorer.reproduce.interference import clear_optimum, lower_risk
-from explorer.reproduce.kinematics import (
-    closed_form,
-    flat_tetrahedra,
-    mode_paths,
-    same_kinematics,
-)
 from explorer.reproduce.search import search
 from explorer.reproduce.table_one import extents
 
 _MEASURES: Mapping[str, Callable[[], Measurement]] = {
-    "same-kinematics": same_kinematics,
+    "same-kinematics": kinematics.same_kinematics,
     "interference": lower_risk,
-    "closed-form": closed_form,
-    "flat-tetrahedra": flat_tetrahedra,
+    "closed-form": kinematics.closed_form,
+    "flat-tetrahedra": kinematics.flat_tetrahedra,
     "strata": strata,
     "uncoupled-motions": uncoupled,
     "charts": chart,
-    "paths": mode_paths,
+    "paths": kinematics.mode_paths,
     "clear-optimum": clear_optimum,
     "table-1": extents,
     "search": search,

@@ -13,14 +13,7 @@ from explorer.cli.load_options import LoadOptions, check_regular
 from explorer.cli.output import finite, heading, pose_json, pose_table
 from explorer.cli.values import OF_DESIGN, hint, numbers, positive
 from explorer.errors import InputError
-from explorer.measures.blocks.forces import (
-    most_held,
-    most_of_actuators,
-    nearest_held,
-    reaction_tables,
-    verdict,
-    worst_force,
-)
+from explorer.measures.blocks import forces as blocks
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import Six
@@ -134,10 +127,10 @@ def _as_lines(
 ) -> Iterator[str]:
     yield from (heading(loaded.design), pose_table(loaded.design, loaded.pose, tool))
     yield f"load acts at          {'b4' if tool is None else 'the tool'}"
-    facts = most_held(loaded)
+    facts = blocks.most_held(loaded)
     if added is not None:
-        more = worst_force(added, "the added force")
+        more = blocks.worst_force(added, "the added force")
         facts = replace(facts, facts=(*facts.facts, *more))
-    refused = (nearest_held(loaded, nearest, tool),) if loaded.share > 1.0 else ()
-    yield from lines((verdict(loaded), *refused, *reaction_tables(loaded)))
-    yield from lines((most_of_actuators(worst), facts))
+    refused = (blocks.nearest_held(loaded, nearest, tool),) if loaded.share > 1.0 else ()
+    yield from lines((blocks.verdict(loaded), *refused, *blocks.reaction_tables(loaded)))
+    yield from lines((blocks.most_of_actuators(worst), facts))

@@ -27,13 +27,7 @@ from explorer.export.report.search import claims_section, search_section
 from explorer.export.report.singularity import legs_section, singularity_section
 from explorer.export.report.workspace import workspace_section
 from explorer.files.packaged import packaged_file, versions
-from explorer.measures.blocks.source import (
-    DESIGN_FILE,
-    load_source,
-    name_of,
-    pose_options,
-    pose_source,
-)
+from explorer.measures.blocks import source as sources
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design_file import encode_design
 from explorer.numerics.number_text import format_number
@@ -127,9 +121,9 @@ def _unit(words: str) -> Element:
 
 def _reproduction(data: ReportData) -> Iterator[Element]:
     yield element("h2", "How to reproduce it")
-    name = name_of(data.design)
+    name = sources.name_of(data.design)
     where: tuple[Piece, ...] = ("The design is a preset of the explorer. ",)
-    if name == DESIGN_FILE:
+    if name == sources.DESIGN_FILE:
         where = ("Save the file below as ", element("code", name), ". ")
     yield paragraph(*where, "These commands give the same figures:")
     yield element("pre", "\n".join(_commands(data, shlex.quote(name))), id="commands")
@@ -160,16 +154,16 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
     turned = "" if data.is_home else f" --quaternion {' '.join(map(repr, pose.quaternion))}"
     legs = " --interference" if isinstance(data.accessible, AccessibleWorkspace) else ""
     record = "" if data.record is None else " --record record.json"
-    at = pose_options(design, pose)
+    at = sources.pose_options(design, pose)
     yield f"explorer report --design {source}{at}{record} --out report.html"
     yield f"explorer workspace --design {source}{turned} --hull{legs}"
-    yield pose_source("singularity", design, pose).command
-    yield pose_source("interference", design, pose).command
+    yield sources.pose_source("singularity", design, pose).command
+    yield sources.pose_source("interference", design, pose).command
     loaded = LoadedPose(design, pose)
     if data.case.is_loaded or data.case.is_limited:
-        yield load_source("forces", loaded).command
+        yield sources.load_source("forces", loaded).command
     if data.precision is not None:
-        yield load_source("accuracy", data.precision.loaded).command
+        yield sources.load_source("accuracy", data.precision.loaded).command
     if data.held is not None:
         yield f"explorer workspace --design {source}{turned} --load 0 0 0"
     if not isinstance(data.bill, Missing):

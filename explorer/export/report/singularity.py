@@ -9,19 +9,9 @@ from explorer.export.drawings.markup import element, paragraph
 from explorer.export.report.blocks import elements
 from explorer.export.report.data import ReportData
 from explorer.legs.clearance import PAIRS
+from explorer.measures.blocks import singularity as blocks
 from explorer.measures.blocks.block import Facts, Statement
 from explorer.measures.blocks.clearances import pose_clearances, workspace_clearances
-from explorer.measures.blocks.singularity import (
-    LOOKS,
-    conditioning,
-    ellipsoids,
-    free_ball,
-    freedoms,
-    margin_table,
-    nearest_poses,
-    regular_distance,
-    tetrahedra,
-)
 from explorer.measures.verdict import verdict
 from explorer.singularity.ellipsoids import certified_radius, performance, singularity_free_ball
 from explorer.workspace.accessible.workspace import AccessibleWorkspace, PairCost
@@ -38,20 +28,22 @@ def singularity_section(data: ReportData) -> Iterator[Element]:
         singularity_free_ball(data.case.at),
         certified_radius(data.design, data.case.at),
     )
-    regular = free_ball(snapshot, ball, "b4"), regular_distance(certified, unit)
+    regular = blocks.free_ball(snapshot, ball, "b4"), blocks.regular_distance(certified, unit)
     yield from elements(
         (
-            Statement(here.title, here.reason(unit), LOOKS[here.kind]),
-            *freedoms(snapshot),
-            margin_table(snapshot),
-            tetrahedra(snapshot),
-            conditioning(snapshot),
+            Statement(here.title, here.reason(unit), blocks.LOOKS[here.kind]),
+            *blocks.freedoms(snapshot),
+            blocks.margin_table(snapshot),
+            blocks.tetrahedra(snapshot),
+            blocks.conditioning(snapshot),
             Facts("Around the pose", regular),
-            nearest_poses(snapshot),
+            blocks.nearest_poses(snapshot),
         )
     )
     yield element(
-        "div", *elements(ellipsoids(performance(data.design, data.case.at), "b4")), class_="pair"
+        "div",
+        *elements(blocks.ellipsoids(performance(data.design, data.case.at), "b4")),
+        class_="pair",
     )
 
 
