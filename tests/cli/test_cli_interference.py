@@ -63,17 +63,6 @@ def test_interference_pose_has_clearances_of_pairs(cli: CommandLine) -> None:
     assert found["within_limits"] is (not expected.violations)
 
 
-def test_interference_one_radius_is_for_all_legs(cli: CommandLine, tmp_path: Path) -> None:
-    thick = cli.answer("--radii", "0.4")
-    assert thick["radii"] == [0.4] * 4
-    assert thick["is_clear"] is False
-    assert thick["closest"] == [2, 3]
-    file = tmp_path / "thick.json"
-    file.write_bytes(explorer.encode_design(with_radii((0.4, 0.4, 0.4, 0.4))))
-    assert cli.answer("--design", file) == thick
-    assert cli.answer("--design", file, "--radii", "0") == cli.answer()
-
-
 def test_interference_move_has_exact_and_swept_tests(cli: CommandLine) -> None:
     found = cli.answer(*MOVE, "--steps", "3", "--radii", *map(str, RADII))
     expected = move_clearance(with_radii(RADII), HOME, END, steps=3)

@@ -14,9 +14,6 @@ from report_page import read, table_of
 
 import explorer
 from explorer.mechanism.design_file import encode_design
-from explorer.optimise.defaults import paper_problem
-from explorer.optimise.record import Settings, encode_record, record_of
-from explorer.optimise.solver import optimise_design
 
 COMMAND = ("report",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -57,15 +54,6 @@ def test_report_commands_reproduce_its_figures(
     assert answers["workspace"]["volume"] == volume
     condition = table_of(page, "Conditioning")["1/cond J"].values
     assert [answers["singularity"]["inverse_condition"]] == condition
-
-
-def test_report_record_adds_its_history(cli: CommandLine, tmp_path: Path) -> None:
-    record = record_of(optimise_design(paper_problem(), iterations=2), Settings())
-    file, out = tmp_path / "run.record.json", tmp_path / "report.html"
-    file.write_bytes(encode_record(record))
-    assert cli.text("--out", out, "--record", file) == f"{out}\n"
-    heads = [each.text for each in read(out.read_text(encoding="utf-8")).all("h2")]
-    assert "Optimisation" in heads
 
 
 @pytest.mark.parametrize(
