@@ -20,7 +20,7 @@ from explorer.statics.equilibrium import SINGULAR
 from explorer.statics.reactions import has_limits
 
 if TYPE_CHECKING:
-    from explorer.workspace.held import HeldWorkspace
+    from explorer.workspace.carried_region import CarriedRegion
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,15 +47,15 @@ class LoadOptions(JsonOptions, PoseOptions, DesignOptions):
 
 def held_by(
     design: Design, rotation: FloatArray, load: Six, tolerance: float | None
-) -> HeldWorkspace:
+) -> CarriedRegion:
     """Return the part of the workspace of a design with limits that holds a load.
 
     The load is (F; M) at the tool besides the payload, base axes, in N and N × unit.
     """
-    from explorer.workspace.held import held_workspace
+    from explorer.workspace.carried_region import carried_region
 
     check_limited(design)
-    return held_workspace(design, rotation, load, tolerance=tolerance)
+    return carried_region(design, rotation, load, tolerance=tolerance)
 
 
 def check_limited(design: Design) -> None:

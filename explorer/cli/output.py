@@ -203,7 +203,7 @@ def radii_line(design: Design) -> str:
 
 
 DISAGREES = "its volume does not agree with the exact one"
-"""The remark on a mesh that `explorer.workspace.solids.agreement` rejects."""
+"""The remark on a mesh that `explorer.workspace.solids.solids` rejects."""
 
 
 def mesh_json(solid: Solid) -> dict[str, object]:

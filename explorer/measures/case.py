@@ -23,7 +23,7 @@ from explorer.workspace.node_measures import DEFAULT_NODES, NodeMeasures, node_m
 from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
 
 if TYPE_CHECKING:
-    from explorer.workspace.held import HeldWorkspace
+    from explorer.workspace.carried_region import CarriedRegion
 
 
 @dataclass
@@ -174,9 +174,9 @@ class Case:
         return value is not None and value is not False
 
     @cached_property
-    def held(self) -> HeldWorkspace:
+    def held(self) -> CarriedRegion:
         """The part of the workspace where the design's load is held."""
         # It loads the kernel of solids.
-        from explorer.workspace.held import held_workspace
+        from explorer.workspace.carried_region import carried_region
 
-        return held_workspace(self.design, self.rotation)
+        return carried_region(self.design, self.rotation)

@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import msgspec
+
 from explorer.mechanism.design import Design
 from explorer.optimise.problem import Problem
 
@@ -25,15 +27,13 @@ Phase = Literal["opening", "growing", "solving"]
 since the volume was out of reach. Solving: the problem itself."""
 
 
-@dataclass(frozen=True)
-class Iterate:
-    """A design that the solver accepted on its way.
+class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An iterate without its design, which follows from the values.
 
     Attributes:
         number: Number from 0, over all runs.
         run: Number of the run, from 0.
         phase: Phase of the search.
-        design: The design.
         values: Values of the variables of the problem.
         objective: F = |1 − V/V′|, or the value of the measure that the objective improves; None
             if it is infinite.
@@ -46,12 +46,17 @@ class Iterate:
     number: int
     run: int
     phase: Phase
-    design: Design
     values: tuple[float, ...]
     objective: float | None
     volume: float
     worst: str
     spare: float
+
+
+class Iterate(Step, frozen=True, kw_only=True):
+    """A design that the solver accepted on its way."""
+
+    design: Design
 
     @property
     def value(self) -> float:
@@ -59,14 +64,12 @@ class Iterate:
         return math.inf if self.objective is None else self.objective
 
 
-@dataclass(frozen=True)
-class Run:
-    """The search from one start.
+class SearchResult(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The result of the search from one start.
 
     Attributes:
         start: Values of the variables at the start.
         status: Status at the end.
-        best: Best iterate.
         iterations: Number of steps of the solver.
         evaluations: Number of designs that were measured.
         attempts: Number of attempts, from the start and from elsewhere.
@@ -76,12 +79,23 @@ class Run:
 
     start: tuple[float, ...]
     status: Status
-    best: Iterate
     iterations: int
     evaluations: int
     attempts: int
     holding: str
     message: str
+
+
+class Run(SearchResult, frozen=True, kw_only=True):
+    """The search from one start, with its best iterate."""
+
+    best: Iterate
+
+
+class RunRecord(SearchResult, frozen=True, kw_only=True):
+    """A run in a file, with the index of its best iterate in the history."""
+
+    best: int
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Records of optimisations, to read them or run them again.
+"""Records of optimisations, to read them or run them again, and the curves of their iterates.
 
 They are JSON, read strictly: the problem, the settings, every iterate, and the versions of the
 libraries.
@@ -6,17 +6,23 @@ libraries.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from types import MappingProxyType
+from typing import Any, Literal
 
 import msgspec
+import numpy as np
 
 from explorer.files.json_text import decode_strictly
 from explorer.files.packaged import versions
 from explorer.files.writing import read_at_most
+from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import Design
-from explorer.optimise.outcome import Iterate, Outcome, Phase, Status
-from explorer.optimise.problem import Problem
+from explorer.numerics.arrays import FloatArray
+from explorer.optimise.outcome import Iterate, Outcome, RunRecord, SearchResult, Step
+from explorer.optimise.problem import ObjectiveName, Problem
 
 # Largest record that is read, in bytes; real ones are much smaller.
 LARGEST_FILE = 200_000_000
@@ -28,32 +34,6 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     starts: int = 1
     seed: int = 0
     iterations: int = 300
-
-
-class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An iterate without its design, which follows from the values; see `Iterate`."""
-
-    number: int
-    run: int
-    phase: Phase
-    values: tuple[float, ...]
-    objective: float | None
-    volume: float
-    worst: str
-    spare: float
-
-
-class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A run without its iterates; see `Run`."""
-
-    start: tuple[float, ...]
-    status: Status
-    best: int
-    iterations: int
-    evaluations: int
-    attempts: int
-    holding: str
-    message: str
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -90,19 +70,9 @@ def record_of(outcome: Outcome, settings: Settings) -> Record:
         design=outcome.design,
         chosen=outcome.chosen,
         runs=tuple(
-            RunRecord(
-                start=run.start,
-                status=run.status,
-                best=run.best.number,
-                iterations=run.iterations,
-                evaluations=run.evaluations,
-                attempts=run.attempts,
-                holding=run.holding,
-                message=run.message,
-            )
-            for run in outcome.runs
+            RunRecord(best=run.best.number, **_fields(SearchResult, run)) for run in outcome.runs
         ),
-        history=tuple(step_of(iterate) for iterate in outcome.history),
+        history=tuple(map(step_of, outcome.history)),
         seconds=outcome.seconds,
         versions=versions(),
     )
@@ -139,4 +109,72 @@ def load_record(path: Path) -> Record:
 
 def step_of(iterate: Iterate) -> Step:
     """Return an iterate without its design."""
-    return Step(**{name: getattr(iterate, name) for name in Step.__struct_fields__})
+    return Step(**_fields(Step, iterate))
+
+
+def _fields(base: type[msgspec.Struct], value: msgspec.Struct) -> dict[str, Any]:
+    """Return the values of those fields that a value has from a base."""
+    return {name: getattr(value, name) for name in base.__struct_fields__}
+
+
+GOALS: Mapping[ObjectiveName, str] = MappingProxyType(
+    {
+        "match-volume": "volume",
+        "smallest-reach": "longest_leg",
+        "largest-volume": "volume",
+        "largest-margin": "box_margin",
+        "smallest-load": "load_share",
+        "smallest-error": "worst_error",
+        "smallest-deflection": "deflection",
+    }
+)
+"""The name in the catalogue of the measure that each objective improves."""
+
+OBJECTIVE_SYMBOLS: Mapping[ObjectiveName, str] = MappingProxyType(
+    {
+        objective: "F" if objective == "match-volume" else CATALOGUE[name].label
+        for objective, name in GOALS.items()
+    }
+)
+"""The name of the value of each objective: F, or the label of the measure in the catalogue."""
+
+# Value drawn for an objective of zero, which has no logarithm.
+LEAST = 1e-16
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Values of the iterates of one start.
+
+    Attributes:
+        kind: Quantity of the values.
+        values: Value of each iterate, shape (n,); NaN for an infinite one.
+        level: Value to compare the others with, or None.
+        powers: Whether the values are exponents of ten.
+    """
+
+    kind: Literal["objective", "volume", "spare"]
+    values: FloatArray
+    level: float | None
+    powers: bool = False
+
+
+def curves_of(problem: Problem, iterates: Sequence[Step]) -> list[Curve]:
+    """Return the curves of one start of a search.
+
+    Args:
+        problem: The problem.
+        iterates: Iterates in their order; not empty.
+    """
+    objective = np.array([iterate.objective for iterate in iterates], dtype=np.float64)
+    curves: list[Curve] = []
+    if problem.objective == "match-volume":
+        powers = np.log10(np.maximum(objective, LEAST))
+        curves.append(Curve("objective", powers, None, powers=True))
+    elif problem.objective != "largest-volume":
+        curves.append(Curve("objective", objective, None))
+    volume = np.array([iterate.volume for iterate in iterates])
+    curves.append(Curve("volume", volume, problem.demands.volume))
+    if any(iterate.worst for iterate in iterates):
+        curves.append(Curve("spare", np.array([iterate.spare for iterate in iterates]), 0.0))
+    return curves

@@ -10,8 +10,8 @@ from explorer.numerics.compiled import warm_in_background
 from explorer.optimise.outcome import Outcome, Run
 from explorer.optimise.problem import Problem
 from explorer.optimise.search.search import SAME, Search
+from explorer.optimise.search.sqp import Trail, Watch
 from explorer.optimise.search.starts import check_starts, more_starts
-from explorer.optimise.search.trail import Trail, Watch
 
 MOST_ITERATIONS = 300
 

@@ -135,12 +135,9 @@ def _merge_corners(crossings: list[Crossing]) -> list[Crossing]:
 def _roots(values: FloatArray, size: float) -> tuple[list[tuple[float, bool, int]], float]:
     """Return the roots of a margin over a move, and its least magnitude.
 
-    A root is the share of the move, whether the sign changes there, and the sign before it; after
-    it if the move starts there.
-
-    Args:
-        values: The margin at the Chebyshev points, shape (POINTS,).
-        size: Size of the numbers that it comes from.
+    The margin is given at the Chebyshev points, with the size of the numbers that it comes from. A
+    root is the share of the move, whether the sign changes there, and the sign before it; after it
+    if the move starts there.
     """
     # Over x from −1 to 1.
     coefficients = chebyshev.chebfit(chebyshev.chebpts1(POINTS), values, POINTS - 1)

@@ -173,11 +173,8 @@ class DemandedLoad:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the shares of the limits in the middle of intervals, (n, 12), and bounds, (n,).
 
-        Args:
-            moves: The moves.
-            number: Number of the move of each interval, shape (n,).
-            share: Share of the move in the middle, shape (n,).
-            half: Half of the interval, as a share of the move, shape (n,).
+        An interval is given by the number of its move, the share of that in its middle, and its
+        half as a share, shape (n,) each.
         """
         design, masses = self.design, self.weights
         position, rotation = moves.poses(number, share)

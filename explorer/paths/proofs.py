@@ -69,16 +69,10 @@ class Proofs:
         return valid.tolist()
 
     def prove_line(self, first: FloatArray, last: FloatArray) -> FloatArray | None:
-        """Return the corners of a straight line in the folds, or None if it is not proven valid.
+        """Return the corners of a straight line in the folds, (n, 6), or None if it is not proven.
 
-        The moves between the corners are straight, and as long as is proven.
-
-        Args:
-            first: Fold coordinates at the start, shape (6,).
-            last: Fold coordinates at the end, shape (6,), in the same mode.
-
-        Returns:
-            Fold coordinates from the start to the end, shape (n, 6).
+        The moves between the corners are straight, and as long as is proven. The first and the last
+        corner are in the same mode.
         """
         tool = np.zeros(3) if self.tool is None else np.array(self.tool)
         shares, count = np.zeros(MOST_MOVES + 1), np.zeros(1, dtype=np.int64)
@@ -116,15 +110,9 @@ def divide_line(
 ) -> None:
     """Halve a straight line in the folds until each piece is a valid straight move.
 
-    Args:
-        row: Row of the rules.
-        demands: Demands of the rules.
-        first: Fold coordinates at the start, shape (6,).
-        last: Fold coordinates at the end, shape (6,).
-        tool: Point that moves straight, in platform coordinates, shape (3,).
-        tolerance: Length by which limits may be exceeded, in design units.
-        shares: Output, shares of the line at which its pieces end, shape (MOST_MOVES,).
-        count: Output, number of pieces, 0 if the line is not proven valid, shape (1,).
+    The shares of the line at which its pieces end, shape (MOST_MOVES,), and their number, shape
+    (1,), 0 if the line is not proven valid, are written. The other arguments are those of
+    `MoveCheck` and `Proofs.prove_line`.
     """
     check = make_check(row, demands, tool)
     p, r, q, s = np.zeros(3), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))

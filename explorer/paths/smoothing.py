@@ -126,12 +126,7 @@ class _Shortcut:
 
 
 def lengths_of_moves(design: Design, poses: Sequence[Pose]) -> FloatArray:
-    """Return the root-mean-square displacement of b1 to b4 over each move, shape (n,).
-
-    Args:
-        design: The manipulator.
-        poses: The n + 1 corners of the moves.
-    """
+    """Return the root-mean-square displacement of b1 to b4 between n + 1 poses, shape (n,)."""
     p, r = positions_and_rotations(poses)
     return displacement(design, p[:-1], r[:-1], p[1:], r[1:])
 

@@ -66,15 +66,10 @@ class TreeSearch:
         self._units = np.array([proofs.design.reach, 1.0, 1.0, 1.0, 1.0, 1.0])
 
     def find_path(self, first: FloatArray, last: FloatArray, seconds: float) -> FloatArray | None:
-        """Return the corners of a path, or None if the time was too short.
+        """Return the corners of a path in folds, (n, 6), or None if the time was too short.
 
-        Args:
-            first: Fold coordinates at the start, shape (6,).
-            last: Fold coordinates at the end, shape (6,), in the same mode.
-            seconds: Time for the search.
-
-        Returns:
-            Fold coordinates of the corners, shape (n, 6); the moves between them are straight.
+        The first and the last corner, shape (6,), are in the same mode, and the moves between
+        corners straight.
 
         Raises:
             MissingExtraError: OMPL is not installed.

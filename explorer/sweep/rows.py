@@ -256,7 +256,7 @@ def load_kernels(study: Study) -> None:
     for is_needed, module in (
         (study.polish is not None, "explorer.optimise.solver"),
         ("accessible_volume" in study.measures, "explorer.workspace.accessible.workspace"),
-        ("held_volume" in study.measures, "explorer.workspace.held"),
+        ("held_volume" in study.measures, "explorer.workspace.carried_region"),
     ):
         if is_needed:
             importlib.import_module(module)

@@ -137,10 +137,9 @@ def measure_nodes(  # noqa: PLR0917 - a compiled loop takes plain values
         r: Rotation from platform to base, shape (3, 3).
         radii: Sum of the two radii of each pair, shape (6,); -inf for a pair to leave out.
         margin: Least |δ| of nodes at which clearances count.
-        within: Written: whether a node is in the region, shape (n, n, n).
-        results: Written, shape (RESULTS,): number of nodes in the region, their lowest and
-            highest indices, least margins, sum of the smallest margins, number of nodes off
-            the singular planes, number with clear legs, least clearances of the pairs.
+        within: Written: whether a node is in the region.
+        results: Written, see `COUNT`: number of nodes, lowest and highest indices, least margins,
+            sum of the smallest, numbers off the singular planes and with clear legs, clearances.
     """
     p, base, ends = np.zeros(3), np.zeros((4, 3)), np.zeros((4, 3))
     results[:] = 0.0

@@ -129,17 +129,11 @@ def measure_positions(
     positions: FloatArray,
     load: ArrayLike | None = None,
 ) -> tuple[FloatArray, IntArray]:
-    """Return a measure at positions, and the index of the margin or part that has it, (n,) each.
+    """Return a measure at positions (n, 3), and the margin or part that has it, (n,) each.
 
-    Parts are those of `explorer.statics.reactions.part_limits`; the index is 0 for a measure of the
-    whole machine.
-
-    Args:
-        design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        measure: The measure, in design units for a margin, else as in `MEASURE_WORDS`.
-        positions: b4 in the base frame, shape (n, 3), in design units.
-        load: As in `position_bands`, shape (6,).
+    The measure is in design units for a margin, else as in `MEASURE_WORDS`. Parts are those of
+    `explorer.statics.reactions.part_limits`; the index is 0 for a measure of the whole machine. The
+    load is as in `position_bands`.
     """
     at = Configuration(design, positions, rotation, design.tool.position)
     whole = np.zeros(len(positions), dtype=np.int64)

@@ -49,9 +49,9 @@ from explorer.mechanism.design import VARIABLES, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.tilt_torsion import TiltTorsion
-from explorer.optimise.outcome import Iterate
+from explorer.optimise.outcome import Iterate, RunRecord
 from explorer.optimise.problem import YAW
-from explorer.optimise.record import Record, RunRecord, Settings, step_of
+from explorer.optimise.record import Record, Settings, step_of
 
 OPTIMAL = PRESETS["paper-optimal"]
 MEASURED = measure_design(Case(OPTIMAL), measures_in("optimise"))

@@ -76,11 +76,11 @@ from explorer.errors import InputError
 from explorer.measures.size import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
-from explorer.optimise.curves import curves_of
 from explorer.optimise.defaults import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
-from explorer.optimise.search.trail import Trail
+from explorer.optimise.record import curves_of
+from explorer.optimise.search.sqp import Trail
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.table import GAP
 from explorer.workspace.slices.volume import workspace_volume

@@ -56,7 +56,7 @@ from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.reactions import limit_shares, reactions
 from explorer.statics.weights import design_weights, payload_wrench
-from explorer.workspace.held import held_workspace
+from explorer.workspace.carried_region import carried_region
 from explorer.workspace.position_bands import SHARE_COLOURS, SHARES, STEP_COLOURS, position_bands
 from explorer.workspace.slices.outline import slice_outline
 from explorer.workspace.slices.volume import workspace_volume
@@ -619,7 +619,7 @@ def test_part_that_holds_the_load_is_drawn_and_measured(
     assert drawing.trouble is None
     rotation = np.array(drawing.request.rotation)
     assert drawing.part is not None
-    expected = held_workspace(LOADED, rotation, LOAD).held_volume
+    expected = carried_region(LOADED, rotation, LOAD).held_volume
     assert drawing.part.volume == pytest.approx(expected, rel=5e-3)
     assert 0.1 < expected / drawing.volume < 0.9
     words = drawing_words(Frame(load_state(region="held")), feed)

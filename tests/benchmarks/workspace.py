@@ -22,7 +22,7 @@ from explorer import Actuators, Payload, Struts
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.statics.held import largest_shares, load_case
-from explorer.workspace.held import held_workspace
+from explorer.workspace.carried_region import carried_region
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints, slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.nodes import count_nodes
@@ -151,9 +151,9 @@ def _through_trimesh(exact: float) -> tuple[float, int, float]:
 
 
 def _held_region() -> Row:
-    true = held_workspace(LOADED, nodes=FINE).held_volume
-    ours = best_of(5, lambda: held_workspace(LOADED))
-    error = abs(held_workspace(LOADED).held_volume / true - 1.0)
+    true = carried_region(LOADED, nodes=FINE).held_volume
+    ours = best_of(5, lambda: carried_region(LOADED))
+    error = abs(carried_region(LOADED).held_volume / true - 1.0)
     count, theirs, their_error = _marching_cubes(true)
     return Row(
         f"region that holds a load, its volume off by {error:.2%}",

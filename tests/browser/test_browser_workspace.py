@@ -22,7 +22,7 @@ from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection
 from explorer.statics.held import largest_shares, load_case
-from explorer.workspace.held import part_names
+from explorer.workspace.carried_region import part_names
 
 OPTIMAL = PRESETS["paper-optimal"]
 READING = re.compile(r"x ([−\d.]+), z ([−\d.]+) units: min \|δ\| ([\d.]+) \(δ(\d)\)")

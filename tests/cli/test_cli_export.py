@@ -22,8 +22,9 @@ from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Actuators, Payload
 from explorer.mechanism.typical import STIFFNESSES
 from explorer.statics.error_sources import SOURCES
-from explorer.workspace.held import held_workspace
-from explorer.workspace.solids.solids import convex_hull, workspace_solid
+from explorer.workspace.carried_region import carried_region
+from explorer.workspace.solids.booleans import convex_hull
+from explorer.workspace.solids.solids import workspace_solid
 
 COMMAND = ("export",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -75,7 +76,7 @@ def test_export_with_a_load_writes_the_part_that_holds_it(
     cli: CommandLine, tmp_path: Path, limited: Path
 ) -> None:
     load = (0.0, 0.0, -20.0, 0.0, 5.0, 0.0)
-    solid = held_workspace(LIMITED, load=load).solid
+    solid = carried_region(LIMITED, load=load).solid
     assert solid.is_watertight
     for what, expected in (("workspace", solid), ("hull", convex_hull(solid))):
         out = tmp_path / f"{what}.stl"

@@ -19,13 +19,9 @@ from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.orientations.sets import cone_of_directions, yaw_pitch_roll_range
 from explorer.workspace.orientations.share import orientation_capability
 from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
+from explorer.workspace.solids.booleans import convex_hull
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import (
-    convex_hull,
-    inclusive_solid,
-    total_solid,
-    workspace_solid,
-)
+from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid
 
 COMMAND = ("workspace",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]

@@ -23,8 +23,9 @@ from explorer.export.mesh import FORMATS, colour_of, mesh_bytes
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import CHAIN_JOINTS
+from explorer.workspace.solids.booleans import convex_hull
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import convex_hull, workspace_solid
+from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = msgspec.structs.replace(PRESETS["paper-optimal"], unit_mm=7.5)
 SOLID = workspace_solid(OPTIMAL)

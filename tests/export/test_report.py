@@ -40,7 +40,8 @@ from explorer.workspace.accessible.workspace import accessible_workspace
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.slices.outline import slice_outline
 from explorer.workspace.slices.volume import workspace_nodes
-from explorer.workspace.solids.solids import convex_hull, workspace_solid
+from explorer.workspace.solids.booleans import convex_hull
+from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 DAY = dt.date(2026, 3, 9)

@@ -21,9 +21,9 @@ from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
-from explorer.optimise.curves import GOALS
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.problem import OBJECTIVES, OVER_BOX, YAW, ObjectiveName
+from explorer.optimise.record import GOALS
 from explorer.optimise.search.model import Model, reported_objective
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.least_clearance import least_clearances

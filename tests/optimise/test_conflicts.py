@@ -29,7 +29,7 @@ from explorer.optimise.conflicts import (
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.problem import Problem, Variable, with_box
 from explorer.optimise.search.model import Model
-from explorer.optimise.search.trail import MET
+from explorer.optimise.search.sqp import MET
 from explorer.optimise.solver import optimise_design
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")

@@ -23,7 +23,6 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.conflicts import find_conflicts
-from explorer.optimise.curves import curves_of
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.demands import Box
 from explorer.optimise.outcome import Outcome
@@ -35,7 +34,7 @@ from explorer.optimise.problem import (
     Problem,
     Variable,
 )
-from explorer.optimise.record import Settings, decode_record, encode_record, record_of
+from explorer.optimise.record import Settings, curves_of, decode_record, encode_record, record_of
 from explorer.optimise.solver import optimise_design
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")

@@ -20,8 +20,9 @@ from explorer.workspace.limits.constraints import (
     HalfSpace,
     constraints,
 )
+from explorer.workspace.solids.booleans import cut_solid
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import cut_solid, workspace_solid
+from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = PRESETS["paper-optimal"]
 # Pixels across the diagonal of a workspace that fills a page of 1440 x 900.

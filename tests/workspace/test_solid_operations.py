@@ -15,14 +15,8 @@ from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.workspace.limits.constraints import HalfSpace
 from explorer.workspace.orientations.sets import cone_of_directions
 from explorer.workspace.slices.volume import home_rotation
-from explorer.workspace.solids.solids import (
-    HULL,
-    convex_hull,
-    cut_solid,
-    inclusive_solid,
-    total_solid,
-    workspace_solid,
-)
+from explorer.workspace.solids.booleans import HULL, convex_hull, cut_solid
+from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 

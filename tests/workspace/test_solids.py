@@ -31,13 +31,8 @@ from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints
 from explorer.workspace.slices.volume import home_rotation, workspace_volume
-from explorer.workspace.solids.solids import (
-    carved_solid,
-    convex_hull,
-    cut_solid,
-    inclusive_solid,
-    workspace_solid,
-)
+from explorer.workspace.solids.booleans import carved_solid, convex_hull, cut_solid
+from explorer.workspace.solids.solids import inclusive_solid, workspace_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 

@@ -17,8 +17,8 @@ from explorer.optimise.demands import Box, Demands
 from explorer.optimise.outcome import Iterate, Outcome, Status
 from explorer.optimise.problem import OF_THE_MACHINE, OVER_BOX, YAW, ObjectiveName, Problem
 from explorer.optimise.record import Record, Settings, record_of
+from explorer.optimise.search.sqp import Trail
 from explorer.optimise.search.starts import check_starts
-from explorer.optimise.search.trail import Trail
 
 PLACE = "place"
 """Name in `OptimisationRequest.free` for the three shifts of the required box."""

@@ -149,7 +149,8 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
         return _step(command)
     check_format(file_format)
     design = command.read_design()
-    from explorer.workspace.solids.solids import convex_hull, workspace_solid
+    from explorer.workspace.solids.booleans import convex_hull
+    from explorer.workspace.solids.solids import workspace_solid
 
     home = command.oriented_home(design)
     if command.load is None:

@@ -62,9 +62,9 @@ class Forces(LoadOptions):
         most = np.minimum(*design.actuators.limits) if self.most is None else self.most
         nearest = None
         if loaded.share > 1.0:
-            from explorer.workspace.nearest_held import nearest_held
+            from explorer.workspace.nearest_carrying import nearest_carrying_pose
 
-            nearest = nearest_held(loaded)
+            nearest = nearest_carrying_pose(loaded)
         worst = worst_direction(configuration, most)
         added = None if self.force is None else loaded.worst_force(self.force)
         self.write(

@@ -35,7 +35,7 @@ from explorer.measures.size import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
-from explorer.optimise.curves import CALLED
+from explorer.optimise.record import OBJECTIVE_SYMBOLS
 
 if TYPE_CHECKING:
     from explorer.optimise.demands import Box
@@ -259,7 +259,7 @@ def _search(problem: Problem, settings: Settings) -> Outcome:
     from explorer.optimise.solver import optimise_design
 
     starts, iterations = settings.starts, settings.iterations
-    with SearchMeter(starts, iterations, CALLED[problem.objective]) as meter:
+    with SearchMeter(starts, iterations, OBJECTIVE_SYMBOLS[problem.objective]) as meter:
         return optimise_design(
             problem,
             starts=starts,

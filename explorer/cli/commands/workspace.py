@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from explorer.numerics.arrays import FloatArray
     from explorer.workspace.accessible.radii import RadiusCurve
     from explorer.workspace.accessible.workspace import AccessibleWorkspace
-    from explorer.workspace.held import HeldWorkspace
+    from explorer.workspace.carried_region import CarriedRegion
     from explorer.workspace.solids.solid import Solid
 
 Ends = tuple[float, float]
@@ -136,7 +136,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
     def _measure(
         self, design: Design, pose: Pose, orientations: FloatArray | None
     ) -> WorkspaceMeasures:
-        from explorer.workspace.solids import solids
+        from explorer.workspace.solids import booleans, solids
 
         case, rotation = Case(design, node_step=self.step, pose=pose), pose.rotation
         # Too fine a grid is refused before anything else is computed.
@@ -145,7 +145,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
         shift, tool = self.shift(design, pose), self.tool(design)
         measures = WorkspaceMeasures(case, shift, solid if shift is None else solid.shifted(shift))
         if self.hull:
-            measures.hull = solids.convex_hull(measures.solid)
+            measures.hull = booleans.convex_hull(measures.solid)
         if orientations is not None:
             measures.orientations = len(orientations)
             measures.inclusive = solids.inclusive_solid(design, orientations, self.tolerance, tool)
@@ -222,7 +222,7 @@ class WorkspaceMeasures:
     inclusive: Solid | None = None
     total: Solid | None = None
     capability: float | None = None
-    held: HeldWorkspace | None = None
+    held: CarriedRegion | None = None
     accessible: AccessibleWorkspace | None = None
     curve: RadiusCurve | None = None
 

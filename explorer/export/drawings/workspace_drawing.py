@@ -28,8 +28,8 @@ from explorer.export.drawings.slices import Slices
 from explorer.measures.snapshot import Snapshot
 from explorer.singularity.colours import css, mix
 from explorer.workspace.limits.constraints import HalfSpace
+from explorer.workspace.solids.booleans import cut_solid
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import cut_solid
 
 MOST_HEIGHT = 380.0
 

@@ -27,7 +27,7 @@ from explorer.statics.compliance import largest_deflection
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.tool_precision import ToolPrecision
 from explorer.workspace.accessible.workspace import AccessibleWorkspace, accessible_workspace
-from explorer.workspace.held import HeldWorkspace
+from explorer.workspace.carried_region import CarriedRegion
 from explorer.workspace.slices.volume import NodeCount, Volume
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import workspace_solid
@@ -133,7 +133,7 @@ class ReportData:
         return has_load or self.case.is_limited
 
     @cached_property
-    def held(self) -> HeldWorkspace | Missing | None:
+    def held(self) -> CarriedRegion | Missing | None:
         """Part of the workspace that holds the payload; None without a payload or limits."""
         if not (self.case.is_loaded and self.case.is_limited):
             return None

@@ -33,7 +33,7 @@ from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import WARN_SHARE
 from explorer.statics.loaded import LoadedPose, WorstForce
-from explorer.workspace.held import HeldWorkspace
+from explorer.workspace.carried_region import CarriedRegion
 from explorer.workspace.position_bands import position_bands
 from explorer.workspace.solids.solid import Solid
 
@@ -125,7 +125,7 @@ def worst_payload_force(data: ReportData) -> WorstForce:
     return LoadedPose(weighed, data.case.at).worst_force(data.design.payload.force_n)
 
 
-def _over_the_workspace(data: ReportData, held: HeldWorkspace | Missing) -> Iterator[Element]:
+def _over_the_workspace(data: ReportData, held: CarriedRegion | Missing) -> Iterator[Element]:
     yield element("h3", "Where the payload is held")
     if isinstance(held, Missing):
         yield paragraph(
@@ -145,7 +145,7 @@ def _over_the_workspace(data: ReportData, held: HeldWorkspace | Missing) -> Iter
     )
 
 
-def _volumes(data: ReportData, held: HeldWorkspace) -> Element:
+def _volumes(data: ReportData, held: CarriedRegion) -> Element:
     cubic, whole = (0.1 * data.unit_mm) ** 3, data.volume.volume
     rows: list[Row] = [
         (name, volume, volume * cubic, percentage(volume / whole), remark)

@@ -26,8 +26,7 @@ from explorer.files.packaged import packaged_file
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.number_text import format_number, power_of_ten
-from explorer.optimise.curves import CALLED, Curve, curves_of
-from explorer.optimise.record import Record, Step
+from explorer.optimise.record import OBJECTIVE_SYMBOLS, Curve, Record, Step, curves_of
 
 
 def search_section(data: ReportData) -> Iterator[Element]:
@@ -57,7 +56,7 @@ def search_section(data: ReportData) -> Iterator[Element]:
         rows.append(("demanded volume, units³", problem.demands.volume))
     if best is not None:
         value = "infinite" if best.objective is None else best.objective
-        rows.append((CALLED[problem.objective], value))
+        rows.append((OBJECTIVE_SYMBOLS[problem.objective], value))
         rows.append(("volume, units³", best.volume))
     rows += [
         ("iterations", whole(run.iterations)),
@@ -117,7 +116,7 @@ def _title(record: Record, curve: Curve) -> str:
         return "Worst demand; missed below 0"
     if curve.powers:
         return "F = |1 − V / V′|"
-    return f"{CALLED[record.problem.objective].capitalize()} (units)"
+    return f"{OBJECTIVE_SYMBOLS[record.problem.objective].capitalize()} (units)"
 
 
 def _chart(curve: Curve, left: float, width: float) -> list[Element]:

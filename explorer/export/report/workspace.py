@@ -25,8 +25,8 @@ from explorer.export.drawings.workspace_drawing import workspace_views
 from explorer.export.report.data import Missing, ReportData, compute
 from explorer.measures.catalogue import CATALOGUE
 from explorer.numerics.number_text import format_number
+from explorer.workspace.solids.booleans import convex_hull
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import convex_hull
 
 
 def workspace_section(data: ReportData) -> Iterator[Element]:

@@ -1,4 +1,4 @@
-"""The test of an optimum by its own conditions.
+"""The test of an optimum by its own conditions, and the step to the nearest place that meets all.
 
 At an optimum the slope of the objective is a sum of the gradients of the demands and bounds that
 are just met, those of inequalities with a factor of at least zero (Karush, Kuhn and
@@ -8,6 +8,11 @@ Volumes have kinks where two limits become the same surface, and optima like to 
 the workspace is largest for its reach where the balls of legs 1 and 4 are one. There the
 gradients all around take part, each as if it were one more demand (J. V. Burke, A. S.
 Lewis, M. L. Overton, "A robust gradient sampling algorithm", 2005).
+
+A solver that lowers an objective ends where rounding keeps it from lowering both that and the
+misses, which are then larger than the tolerance of limits. From there each step is the shortest
+that meets the demands to first order, found by least distance programming (C. L. Lawson, R. J.
+Hanson, "Solving Least Squares Problems", 1974, chapter 23).
 """
 
 from __future__ import annotations
@@ -49,10 +54,7 @@ class Optimality(NamedTuple):
 def optimality(model: Model, at: Evaluation, *, kinks: bool = True) -> Optimality:
     """Return how nearly a place that meets all demands is an optimum.
 
-    Args:
-        model: The problem.
-        at: The place.
-        kinks: Whether it may be an optimum in a kink, which takes many evaluations to see.
+    To see an optimum in a kink takes many evaluations.
     """
     smooth = _conditions(model, at, [at])
     if smooth.is_optimal or not kinks or model.problem.objective == "match-volume":
@@ -121,3 +123,57 @@ def _conditions(model: Model, at: Evaluation, around: list[Evaluation]) -> Optim
     if not len(pulls) or not pulls.max() > 0.0:
         return Optimality(float(residual), "")
     return Optimality(float(residual), names[int(pulls.argmax())])
+
+
+# Demands that are missed by more than this, dimensionless, are not missed by little.
+NEARLY = 1e-6
+# Each step squares the misses.
+MOST_STEPS = 4
+# Below this residual no step meets the demands to first order.
+CONTRADICTION = 1e-9
+# Cap on what a demand has to spare, over the worst miss.
+FAR = 1e3
+
+
+def nearest_feasible(model: Model, at: Evaluation) -> Evaluation | None:
+    """Return the nearest evaluation that meets all demands; None if no step leads to one."""
+    lows, highs = model.bounds.T
+    for _ in range(MOST_STEPS):
+        spare = model.worst(at)[0]
+        if spare >= 0.0:
+            break
+        missed = np.abs(at.values[model.equalities]).max(initial=-spare)
+        if not missed <= NEARLY:
+            return None
+        step = _shortest(model, at)
+        if step is None:
+            return None
+        try:
+            at = model.at(np.clip(at.u + step, lows, highs))
+        except DesignError:
+            return None
+    return at if model.worst(at)[0] >= 0.0 else None
+
+
+def _shortest(model: Model, at: Evaluation) -> FloatArray | None:
+    """Return the shortest step that meets all demands and bounds to first order."""
+    from scipy.optimize import nnls
+
+    lows, highs = model.bounds.T
+    equal, identity = model.equalities, np.eye(len(at.u))
+    low, high = np.isfinite(lows), np.isfinite(highs)
+    # The step is to make rows · step at least what is missing.
+    rows = np.vstack([at.gradients, -at.gradients[equal], identity[low], -identity[high]])
+    missing = np.concatenate(
+        [-at.values, at.values[equal], (lows - at.u)[low], (at.u - highs)[high]]
+    )
+    # The step is proportional to the misses, so these may be in units of the worst one.
+    unit = missing.max()
+    goal = np.zeros(len(at.u) + 1)
+    goal[-1] = 1.0
+    matrix = np.vstack([rows.T, np.maximum(missing / unit, -FAR)])
+    factors, norm = nnls(matrix, goal)
+    if norm <= CONTRADICTION:
+        return None
+    residual = matrix @ factors - goal
+    return -unit * residual[:-1] / residual[-1]

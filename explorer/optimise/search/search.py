@@ -23,18 +23,15 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_ascii, format_number
-from explorer.optimise.curves import CALLED
 from explorer.optimise.outcome import Iterate, Phase, Run, Status
 from explorer.optimise.problem import OVER_BOX, Problem
+from explorer.optimise.record import OBJECTIVE_SYMBOLS
 from explorer.optimise.search.demands.geometry import MET
-from explorer.optimise.search.feasible import nearest_feasible
 from explorer.optimise.search.model import Evaluation, Model, reported_objective
-from explorer.optimise.search.opening import open_workspace
-from explorer.optimise.search.optimality import optimality
-from explorer.optimise.search.sqp import Stop, solve
-from explorer.optimise.search.starts import promising_starts
+from explorer.optimise.search.optimality import nearest_feasible, optimality
+from explorer.optimise.search.sqp import Stop, Trail, solve
+from explorer.optimise.search.starts import open_workspace, promising_starts
 from explorer.optimise.search.state import State, scales
-from explorer.optimise.search.trail import Trail
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.slices.volume import find_emptying_limits
 
@@ -147,9 +144,7 @@ class Search:
     def _attempt(self, values: Sequence[float], *, is_relaxed: bool = False) -> Attempt:
         """Search from some values of the variables.
 
-        Args:
-            values: The values.
-            is_relaxed: Whether the clearance is not demanded, but only looked at in the end.
+        If it is relaxed, the clearance is not demanded, but only looked at in the end.
         """
         problem, trail = self.problem, self.trail
         trail.begin()
@@ -339,13 +334,9 @@ class Search:
     def _verdict(
         self, model: Model, at: Evaluation, missed: FloatArray, *, is_done: bool
     ) -> Attempt:
-        """Return the result of an attempt.
+        """Return the result of an attempt from its last place.
 
-        Args:
-            model: The problem.
-            at: The last place.
-            missed: Positions where legs are too near there, shape (k, 3).
-            is_done: Whether the place solved the problem before these positions were demanded.
+        Legs are too near at the missed positions, shape (k, 3), if it solved the problem otherwise.
         """
         spare, worst = model.worst(at)
         holding, best = optimality(model, at).holding, self.trail.best
@@ -371,7 +362,7 @@ class Search:
 
 def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
     """Return the message of a run."""
-    name = CALLED[problem.objective]
+    name = OBJECTIVE_SYMBOLS[problem.objective]
     # F compares numbers of unit size.
     size = 1.0 if problem.objective == "match-volume" else 0.0
     objective = attempt.best.objective

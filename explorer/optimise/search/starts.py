@@ -1,4 +1,9 @@
-"""The designs that searches start from, out of a low-discrepancy sequence."""
+"""The designs that searches start from: out of a low-discrepancy sequence, or opened ones.
+
+An empty workspace has no volume to increase. But a position breaks each limit by some amount, so
+it is opened by a search for a position and a design together, as near to the start as possible,
+with a ball of some radius around the position within all limits.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +12,13 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from explorer.errors import DesignError, InputError
+from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import DISTANCES, Problem, distance_of
+from explorer.optimise.search.demands.geometry import DegenerateDemand, GapDemand
 from explorer.optimise.search.model import Model
+from explorer.optimise.search.sqp import slsqp
+from explorer.optimise.search.state import UNBOUNDED, State, scaled_bounds
+from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace
 
 # Designs tried for each start, before the bounds are taken to allow no more.
 TRIES = 64
@@ -58,10 +68,8 @@ def promising_starts(
 ) -> Iterator[tuple[float, ...]]:
     """Yield values of the variables that miss the demands by little, the best first.
 
-    Args:
-        problem: The problem.
-        seed: Seed of the sequence that the values are taken from.
-        before_each: Called before each evaluation; may raise.
+    They are taken from the sequence with a seed. `before_each` is called before each evaluation,
+    and may raise.
     """
     candidates = list(more_starts(problem, CANDIDATES, seed))
     missed: list[float] = []
@@ -73,3 +81,98 @@ def promising_starts(
         )
     for index in np.argsort(missed):
         yield candidates[index]
+
+
+# Number of positions on each axis among which the search begins at the least broken one.
+SEARCHED = 13
+# Radius of the ball in an open workspace, over the edge of a cube of the demanded volume or over
+# the size of the start.
+ROOM = 0.1
+# Cost of moving the position, relative to that of changing the design.
+COST_OF_PLACE = 0.01
+MOST_ITERATIONS = 60
+# Value of each limit where no design exists.
+NO_DESIGN = -1e3
+
+
+def open_workspace(
+    problem: Problem, start: FloatArray, *, see: Callable[[State, str], None]
+) -> FloatArray | None:
+    """Return scaled variables at which a ball fits into the workspace, or None without success.
+
+    Each iterate is seen with the limit that it breaks most.
+    """
+    here, size, n = State(problem, start), problem.size, len(start)
+    volume = problem.demands.volume
+    radius = ROOM * (size if volume is None else volume ** (1.0 / 3.0))
+    sides: list[DegenerateDemand | GapDemand] = []
+    if problem.demands.least > 0.0:
+        sides.append(DegenerateDemand(problem.demands.least, here))
+    if here.design.limits.gap > 0.0:
+        sides.append(GapDemand(here))
+    names = [limit.name for limit in here.limits if isinstance(limit, BallOrCylinder | HalfSpace)]
+    labels = [*names, *(name for side in sides for name in side.names)]
+    count = len(labels)
+    place = _least_broken(here) / size
+    first = np.concatenate([start, place])
+    last: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+
+    def slacks(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if last and np.array_equal(last[0][0], x):
+            return last[0][1:]
+        values: list[float] = []
+        rows: list[FloatArray] = []
+        try:
+            state = State(problem, x[:n])
+            limits = {limit.name: limit for limit in state.limits}
+        except DesignError:
+            return np.full(count, NO_DESIGN), np.zeros((count, len(x)))
+        for name in names:
+            limit = limits.get(name)
+            if not isinstance(limit, BallOrCylinder | HalfSpace):
+                # No position keeps this limit here.
+                values.append(NO_DESIGN)
+                rows.append(np.zeros(len(x)))
+                continue
+            slack, by_u, by_p = state.slack(limit, x[None, n:] * size)
+            norm = float(np.linalg.norm(limit.normal)) if isinstance(limit, HalfSpace) else 1.0
+            values.append((float(slack[0]) / norm - radius) / size)
+            rows.append(np.concatenate([by_u[0] / size, by_p[0]]) / norm)
+        for side in sides:
+            value, gradient = side.measure(state)
+            values.extend(value.tolist())
+            rows.extend(np.concatenate([row, np.zeros(3)]) for row in gradient)
+        last[:] = [(x.copy(), np.array(values), np.array(rows))]
+        return last[0][1:]
+
+    costs = np.concatenate([np.ones(n), np.full(3, COST_OF_PLACE)])
+
+    def slope(x: FloatArray) -> FloatArray:
+        see(State(problem, x[:n]), labels[int(slacks(x)[0].argmin())])
+        return costs * (x - first)
+
+    end = slsqp(
+        lambda x: 0.5 * float(costs @ (x - first) ** 2),
+        slope,
+        first,
+        np.vstack([scaled_bounds(problem), [UNBOUNDED] * 3]),
+        [("ineq", lambda x: slacks(x)[0], lambda x: slacks(x)[1])],
+        most=MOST_ITERATIONS,
+        precision=1e-8,
+    )
+    u = end[:n]
+    return u if State(problem, u).volume > 0.0 else None
+
+
+def _least_broken(state: State) -> FloatArray:
+    """Return the position on a grid that breaks its limits the least, shape (3,)."""
+    reach = state.longest_leg[0]
+    lows, highs = state.design.limits.box or ((-reach,) * 3, (reach,) * 3)
+    # Not the ends themselves, where a limit is just met.
+    shares = np.linspace(0.0, 1.0, SEARCHED + 2)[1:-1]
+    axes = [low + (high - low) * shares for low, high in zip(lows, highs, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    slack = [
+        limit.slack(grid) for limit in state.limits if isinstance(limit, BallOrCylinder | HalfSpace)
+    ]
+    return grid[int(np.min(slack, axis=0).argmax())]

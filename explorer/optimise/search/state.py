@@ -79,10 +79,9 @@ class State:
         return self.design.home_pose.rotation
 
     def turned(self, turn: FloatArray) -> State:
-        """Return the same place at another orientation: that of home, turned by a rotation.
+        """Return the same place at another orientation: that of home, turned by a rotation (3, 3).
 
-        Args:
-            turn: Rotation along the axes of the base after its yaw is home's, shape (3, 3).
+        The rotation is along the axes of the base after its yaw is home's.
         """
         other = State(self.problem, self.u, self.design)
         own = self.rotation
@@ -168,15 +167,10 @@ class State:
     def slack(
         self, limit: BallOrCylinder | HalfSpace, p: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the slacks of a limit at positions, in design units, and their derivatives.
+        """Return the slacks (k,) of a limit at positions (k, 3), and their derivatives.
 
-        Args:
-            limit: One of `limits`.
-            p: Shape (k, 3).
-
-        Returns:
-            The slacks, at least zero where the limit is kept, shape (k,), their derivatives by
-            the scaled variables with p held, shape (k, n), and by p, shape (k, 3).
+        Those by the scaled variables with the position fixed are (k, n), those by the position (k,
+        3).
         """
         by_limit = np.ones((len(p), 4))
         match limit:

@@ -37,14 +37,9 @@ def project_onto_collisions(
 ) -> FloatArray:
     """Project points (n, 3) onto the surface at which the nearest pair of legs begins to collide.
 
-    Args:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        pairs: Indices of the pairs that count.
-        touching: Distance of the surface beyond a crossing of axes, for pairs without radii.
-        step: Step of the grid on each axis, shape (3,).
-        points: Points near the surface; a point that diverges is returned as it is.
-        beside: For each point a free position on the near side of the surface, shape (n, 3).
+    For pairs without radii that surface is `touching` beyond a crossing of axes. Beside each point
+    is a free position on the near side of the surface, shape (n, 3). A point that diverges is
+    returned as it is. The grid has a step on each axis, shape (3,).
     """
     if not len(points):
         return points

@@ -41,8 +41,9 @@ from explorer.workspace.slices.volume import (
     node_step_of,
     workspace_volume,
 )
+from explorer.workspace.solids.booleans import Surface, carved_solid
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import Surface, carved_solid, workspace_solid
+from explorer.workspace.solids.solids import workspace_solid
 
 # Numbers of nodes on each axis of the workspace's extent, and beyond it on either side.
 DEFAULT_NODES = 40
@@ -210,16 +211,7 @@ def _paper_nodes(
 
 
 class _Carver:
-    """A cutter of the workspace within the limits along the collisions of chosen pairs.
-
-    Args:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        start: A valid position, shape (3,).
-        whole: The workspace within the limits.
-        volume: Exact volume of the workspace, in cubed design units.
-        nodes: Number of nodes on each axis.
-    """
+    """A cutter of the workspace within the limits, of known volume, along collisions of legs."""
 
     def __init__(
         self,

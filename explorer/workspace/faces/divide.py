@@ -34,12 +34,7 @@ class Division(NamedTuple):
 
 
 def divide(faces: IntArray, high: BoolArray) -> Division:
-    """Divide the faces that have vertices on either side of a level.
-
-    Args:
-        faces: Indices of vertices, shape (m, 3).
-        high: Whether each vertex is above the level, or at it, shape (n,).
-    """
+    """Divide the faces (m, 3) with vertices on either side of a level, high for n vertices."""
     count = len(high)
     sides = high[faces]
     number = sides[:, 0].astype(np.int64) + sides[:, 1] + sides[:, 2]
@@ -77,14 +72,9 @@ def find_roots(
 ) -> FloatArray:
     """Return where n functions of a parameter from 0 to 1 are zero, shape (n,).
 
-    They are found by the method of false position in the Illinois variant, which keeps the root
-    between two ends.
-
-    Args:
-        value: Values (n,) at parameters (n,).
-        low: Values at 0, negative, shape (n,).
-        high: Values at 1, not negative, shape (n,).
-        tolerance: Largest absolute value of a function at its root.
+    They are negative at 0 and not negative at 1. Their roots are found to a tolerance of their
+    values by the method of false position in the Illinois variant, which keeps the root between two
+    ends.
     """
     start, end = np.zeros(len(low)), np.ones(len(low))
     at = -low / (high - low)

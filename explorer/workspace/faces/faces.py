@@ -141,11 +141,7 @@ def _cut_by_all(limits: Sequence[Smooth], surfaces: Surfaces, box: Box) -> _Cut:
 def _snap(cut: _Cut, surfaces: Surfaces, values: FloatArray, rounding: float) -> _Cut:
     """Move vertices near the surface of a limit onto it, so that no triangle becomes a sliver.
 
-    Args:
-        cut: Triangles that are not cut yet.
-        surfaces: The limits' surfaces.
-        values: Distance of each vertex from each surface, infinite from its own, shape (k, n).
-        rounding: Distance within which a vertex is on a surface.
+    Values (k, n) are the distance of each vertex from each surface, infinite from its own.
     """
     room = np.full(len(cut.vertices), np.inf)
     for one, other in ((0, 1), (1, 2), (2, 0)):

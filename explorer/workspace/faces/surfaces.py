@@ -62,13 +62,8 @@ class Surfaces:
     ) -> tuple[FloatArray, FloatArray]:
         """Return points (n, 3) on several surfaces at once, and their distances from these, (n,).
 
-        They are found by Newton's method, whose steps are as short as possible.
-
-        Args:
-            points: Points near their surfaces, shape (n, 3).
-            which: Indices of the limits on whose surfaces each point is to lie, -1 for none,
-                shape (n, k).
-            error: Largest distance to aim at.
+        They are found by Newton's method, whose steps are as short as possible, up to an error. The
+        limits of each point are given by their indices, -1 for none, shape (n, k).
         """
         count, number = which.shape
         flat, none = np.maximum(which, 0).ravel(), which < 0

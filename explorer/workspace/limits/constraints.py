@@ -197,12 +197,9 @@ def constraints(
 def constraints_over(
     design: Design, rotations: ArrayLike, tool: ArrayLike | None = None
 ) -> list[tuple[Constraint, ...]]:
-    """Return the limits of a design at each of n orientations as solids of positions of a point.
+    """Return the limits of a design at n orientations (n, 3, 3) as solids of positions of a point.
 
-    Args:
-        design: The manipulator.
-        rotations: Platform to base, shape (n, 3, 3).
-        tool: The point in the platform frame, shape (3,), in design units; None for b4.
+    The point is in the platform frame, shape (3,), in design units; None for b4.
 
     Raises:
         InputError: not rotations, or not a point.

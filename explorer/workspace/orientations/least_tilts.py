@@ -159,17 +159,9 @@ def least_tilt_rows(
 ) -> None:
     """Write the least of the greatest tilts over all azimuths, of n positions, in radians.
 
-    Args:
-        row: Row of `Rules`.
-        demands: Demands of `Rules`.
-        positions: Positions of the tool, shape (n, 3).
-        tool: Tool point in platform coordinates, shape (3,).
-        torsions: Torsion of each position, shape (n,).
-        azimuths: Azimuths at equal distances once around, shape (m,).
-        tilts: Scratch array, shape (m,).
-        least: Least tilt of each position, negative where tilt zero violates a limit, shape (n,).
-        towards: Azimuth of the least tilt, shape (n,).
-        limits: Number of the limit that ends it, shape (n,).
+    Azimuths are at equal distances once around, and `tilts` is a scratch array, (m,) each. Written
+    are least tilts, negative where tilt zero violates a limit, their azimuths and limits, (n,)
+    each.
     """
     scratch, turn, worst = np.zeros(SCRATCH), np.zeros((3, 3, 3)), np.zeros(WORST)
     count = azimuths.shape[0]

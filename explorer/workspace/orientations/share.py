@@ -137,14 +137,8 @@ def share_rows(
 ) -> None:
     """Write how many orientations of each set satisfy all rules.
 
-    Args:
-        row: Row of `Rules`.
-        demands: Demands of `Rules`.
-        position: Position of the tool, shape (3,).
-        tool: Tool point in platform coordinates, shape (3,).
-        turns: Unit quaternions (w, x, y, z) that turn the sets, shape (m, 4).
-        sizes: Number of orientations of each set, shape (m,).
-        counts: Numbers of orientations that are allowed, shape (m,).
+    Each of m sets of a size is turned by a unit quaternion (w, x, y, z), shape (m, 4). The position
+    is that of the tool.
     """
     base, ends, r = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros((3, 3))
     p = np.zeros(3)

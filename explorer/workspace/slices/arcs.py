@@ -56,9 +56,8 @@ class Slicer(NamedTuple):
 def write_radii(circles: FloatArray, x: float, radii: FloatArray) -> bool:
     """Write the radii of the circles in the slice at x, 0 where a surface does not reach it.
 
-    Returns:
-        Whether the slice can have an area: False if it misses a ball or cylinder that holds the
-        region.
+    Return whether the slice can have an area: it cannot if it misses a surface that holds the
+    region.
     """
     for k in range(circles.shape[0]):
         off = x - circles[k, X]
@@ -98,8 +97,7 @@ def sort_arcs(arcs: FloatArray, count: int) -> None:
 def collect_forbidden_on_circle(k: int, x: float, slicer: Slicer) -> int:
     """Collect the arcs of circle k that other surfaces forbid, sorted by their starts.
 
-    Returns:
-        The count of arcs; -1 if all of the circle is forbidden.
+    Return their count; -1 if all of the circle is forbidden.
     """
     circles, planes, radii, arcs = slicer.circles, slicer.planes, slicer.radii, slicer.arcs
     bearings, count = slicer.bearings, 0
@@ -147,8 +145,7 @@ def collect_forbidden_on_circle(k: int, x: float, slicer: Slicer) -> int:
 def collect_forbidden_on_line(k: int, x: float, slicer: Slicer) -> int:
     """Write the span of line k within the other half-planes and discs; collect its forbidden parts.
 
-    Returns:
-        The count of parts that holes forbid, collected in `arcs`; -1 if all of the line is.
+    Return the count of parts that holes forbid, collected in `arcs`; -1 if all of the line is.
     """
     circles, planes, radii, arcs = slicer.circles, slicer.planes, slicer.radii, slicer.arcs
     ay, az = planes[k, Y], planes[k, Z]

@@ -151,17 +151,10 @@ def integrate_slices(
 ) -> None:
     """Integrate the area of the slices from low to high, and its derivatives.
 
-    Args:
-        circles: Rows, shape (n, 6); at least one of them bounds the region.
-        planes: Rows, shape (m, 4), none of them perpendicular to x.
-        low: Start of the region along x.
-        high: End of the region along x.
-        quadrature: g nodes on [0, 1] with the middle first, their weights, and the factors that
-            give the last eight Legendre coefficients of an integrand, shape (10, g).
-        result: Written: the volume, the areas at low and high, the counts of slices and pieces,
-            and the estimated error of the volume, rounding included; shape (6,).
-        rates: Written: derivatives by (x, y, z, radius) of each circle, then by (x, y, z, offset)
-            of each plane, shape (n + m, 4).
+    The quadrature has g nodes on [0, 1] with the middle first, their weights, and the factors that
+    give the last eight Legendre coefficients of an integrand, shape (10, g). No plane is
+    perpendicular to x. Written are the results, see `TOTAL`, and the derivatives by (x, y, z,
+    radius) of each circle, then by (x, y, z, offset) of each plane, shape (n + m, 4).
     """
     n, m = circles.shape[0], planes.shape[0]
     bearings = np.zeros((n, n + m))

@@ -37,11 +37,7 @@ def level_loops(
         rows: Coordinates on the second axis, ascending, shape (m,).
         values: Values of the field, shape (m, n).
         level: The level, in the unit of the values.
-        field_at: Function from points (k, 2) to values of the field, (k,), that is continuous; None
-            if only the values at nodes are known.
-
-    Returns:
-        Corners of each polygon, each of shape (k, 2).
+        field_at: Continuous function from points (k, 2) to the field; None if only nodes are known.
     """
     # Low values around the grid close the polygons at its ends.
     field = np.pad(np.asarray(values, dtype=np.float64), 1, constant_values=-np.inf)

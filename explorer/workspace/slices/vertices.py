@@ -93,12 +93,10 @@ def add_breaks_on_cylinders(boundary: Boundary) -> None:
 def write_line_of_planes(
     p: FloatArray, q: FloatArray, x: float, y: float, z: float, line: FloatArray
 ) -> float:
-    """Write the line in which two planes with unit normals meet, as (point, direction).
+    """Write the line in which two planes with unit normals meet, as (point, unit direction).
 
-    The point is the one nearest to (x, y, z), the direction has unit length.
-
-    Returns:
-        The sine of the angle between the planes, 0 where they are parallel.
+    The point is the one nearest to (x, y, z). Return the sine of the angle between the planes, 0
+    where they are parallel.
     """
     dx, dy = p[Y] * q[Z] - p[Z] * q[Y], p[Z] * q[X] - p[X] * q[Z]
     dz = p[X] * q[Y] - p[Y] * q[X]

@@ -195,7 +195,7 @@ def wedge(apex: FloatArray, axis: FloatArray, half_angle: float, box: Box) -> Fa
 def cone(apex: FloatArray, axis: FloatArray, half_angle: float, step: float, box: Box) -> Facets:
     """Return the part of a cone in and around a box.
 
-    The axis is a unit vector, the half-angle in radians below a right angle, and the step that
+    The axis is a unit vector, the half-angle is below a right angle, and the step is the angle
     between neighbouring corners of the rim, see `step_of`.
     """
     count = max(8, math.ceil(2.0 * math.pi / step))

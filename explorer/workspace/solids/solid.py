@@ -25,7 +25,7 @@ class Solid:
         empty_because: Names of the limits that empty the workspace, see
             `explorer.workspace.slices.volume.Volume`; () if the solid is not empty.
         agrees: Whether the volume agrees with the exact one, see
-            `explorer.workspace.solids.agreement`. A part or hull takes the value of the whole.
+            `explorer.workspace.solids.solids`. A part or hull takes the value of the whole.
             None if no exact volume is known.
     """
 

@@ -8,7 +8,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.weights import Weights
-from explorer.workspace.nearest_held import nearest_held
+from explorer.workspace.nearest_carrying import nearest_carrying_pose
 
 
 @dataclass(frozen=True)
@@ -65,4 +65,4 @@ class NearestDrawing:
 
 def nearest_position(request: LoadedPose) -> NearestDrawing:
     """Return the nearest position that holds the load of a pose."""
-    return NearestDrawing(request, nearest_held(request))
+    return NearestDrawing(request, nearest_carrying_pose(request))

@@ -33,9 +33,9 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import format_number
-from explorer.optimise.curves import CALLED, GOALS, Curve, curves_of
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import OVER_BOX, YAW, ObjectiveName, Problem
+from explorer.optimise.record import GOALS, OBJECTIVE_SYMBOLS, Curve, curves_of
 from explorer.singularity.colours import css
 from explorer.statics.compliance import is_elastic
 
@@ -271,7 +271,7 @@ def _name(problem: Problem, last: Iterate, curve: Curve) -> str:
     if curve.powers:
         value = format_number(last.value, 2, size=1.0)
         return f"log10 of F = |1 − V / V′|; F = {value}"
-    name = CALLED[problem.objective].capitalize()
+    name = OBJECTIVE_SYMBOLS[problem.objective].capitalize()
     unit = CATALOGUE[GOALS[problem.objective]].unit_in("units")
     return f"{name}{f' ({unit})' if unit else ''}: {format_number(last.value, 6)}"
 

@@ -47,7 +47,6 @@ from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.number_text import decimals_for, format_decimals, format_number
 from explorer.optimise.conflicts import Conflict
-from explorer.optimise.curves import CALLED, GOALS
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import (
     MAXIMA,
@@ -58,6 +57,7 @@ from explorer.optimise.problem import (
     YAW,
     Problem,
 )
+from explorer.optimise.record import GOALS, OBJECTIVE_SYMBOLS
 from explorer.workspace.limits.limit import DIGITS as LIMIT_DIGITS
 from explorer.workspace.limits.table import limits_in_force
 
@@ -132,7 +132,7 @@ def _reached_text(problem: Problem, iterate: Iterate) -> str:
 
 def value_text(problem: Problem, iterate: Iterate) -> str:
     """Return the name and the value of the objective of an iterate, with its unit."""
-    name = CALLED[problem.objective]
+    name = OBJECTIVE_SYMBOLS[problem.objective]
     if problem.objective == "match-volume":
         return f"{name} {format_number(iterate.value, 3, size=1.0)}"
     if iterate.objective is None:

@@ -16,8 +16,11 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.numerics.stages import Watch
 from explorer.workspace.accessible.start import StartError
-from explorer.workspace.accessible.workspace import PairCost, accessible_workspace
-from explorer.workspace.held import HeldWorkspace, held_workspace
+from explorer.workspace.accessible.workspace import (
+    PairCost,
+    accessible_workspace,
+)
+from explorer.workspace.carried_region import CarriedRegion, carried_region
 from explorer.workspace.slices.volume import Volume, workspace_volume
 from explorer.workspace.solids.solid import Solid
 
@@ -145,14 +148,14 @@ def trouble_of(error: ExplorerError) -> Trouble:
 
 def _find_held(selection: Selection, tolerance: float, _: Watch) -> tuple[Part, Solid] | Trouble:
     load = (0.0,) * 6 if selection.load is None else selection.load
-    held = held_workspace(selection.design, np.array(selection.rotation), load, tolerance=tolerance)
+    held = carried_region(selection.design, np.array(selection.rotation), load, tolerance=tolerance)
     # Without a factor something holds the load, or the workspace is empty.
     if held.factor is None:
         return Part(held.held_volume), held.solid
     return Trouble(_reason(held, held.factor))
 
 
-def _reason(held: HeldWorkspace, factor: float) -> str:
+def _reason(held: CarriedRegion, factor: float) -> str:
     (part,) = held.solid.empty_because
     if factor >= 1.0:
         return "the positions that hold it are too few to be drawn"

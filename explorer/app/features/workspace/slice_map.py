@@ -24,7 +24,7 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import decimals_for, format_decimals, format_number
 from explorer.statics.reactions import PART_NAMES
-from explorer.workspace.held import part_names
+from explorer.workspace.carried_region import part_names
 from explorer.workspace.position_bands import MEASURE_WORDS, measure_positions
 from explorer.workspace.solids.solid import Solid
 

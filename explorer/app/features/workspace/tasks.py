@@ -37,8 +37,9 @@ from explorer.workspace.extremes import extent_of
 from explorer.workspace.faces.faces import Faces, workspace_faces
 from explorer.workspace.limits.constraints import HalfSpace, constraints
 from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes
+from explorer.workspace.solids.booleans import convex_hull, cut_solid
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import convex_hull, cut_solid, workspace_solid
+from explorer.workspace.solids.solids import workspace_solid
 
 # Chord tolerance of a live solid, as a share of the reach.
 LIVE_TOLERANCE = 0.004

@@ -20,7 +20,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import Problem
-from explorer.optimise.search.demands.geometry import Measured
+from explorer.optimise.search.demands.geometry import Demand, Measured
 from explorer.optimise.search.state import State
 from explorer.workspace.limits.constraints import YAW, BallOrCylinder, HalfSpace
 
@@ -74,7 +74,7 @@ def first_positions(problem: Problem, design: Design) -> FloatArray:
     return positions[within & clear]
 
 
-class ClearanceDemand:
+class ClearanceDemand(Demand):
     """The least clearance of each pair over some positions.
 
     Args:
@@ -82,8 +82,6 @@ class ClearanceDemand:
         positions: Shape (k, 3).
     """
 
-    is_equality = False
-    is_limit = False
     names = tuple(f"clearance of legs {first} and {second}" for first, second in PAIRS)
 
     def __init__(self, clearance: float, positions: FloatArray) -> None:
@@ -152,14 +150,8 @@ def _distance_slopes(
 ) -> FloatArray:
     """Return the weighted sums of the derivatives of the distances of each pair, shape (6, n).
 
-    By the envelope theorem the closest points may be held in their places on the legs.
-
-    Args:
-        state: The problem at the scaled variables.
-        axes: Axes of the four legs at k positions, shape (k, 4, 2, 3).
-        points: Closest points of each pair, shape (k, 6, 2, 3).
-        distance: Distance of each pair, shape (k, 6).
-        weights: Weight of each position, shape (k, 6).
+    By the envelope theorem the closest points may be held in their places on the legs. There are
+    weights and distances (k, 6), axes (k, 4, 2, 3) and closest points (k, 6, 2, 3) at k positions.
     """
     rows, pairs = np.nonzero(weights > WEIGHT)
     points, distance = points[rows, pairs], distance[rows, pairs, None]

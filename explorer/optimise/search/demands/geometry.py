@@ -6,7 +6,7 @@ exactly zero for an equality. All are measured at a `State`.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,30 +39,25 @@ class Measured(NamedTuple):
     gradients: FloatArray
 
 
-class Demand(Protocol):
-    """One or several conditions of one kind."""
+class Demand:
+    """One or several conditions of one kind.
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each condition."""
-        ...
+    Attributes:
+        names: Name of each condition.
+        is_equality: Whether the values must be zero, rather than at least zero.
+        is_limit: Whether it is a limit of the design, with the tolerance of all limits.
+    """
 
-    @property
-    def is_equality(self) -> bool:
-        """Whether the values must be zero, rather than at least zero."""
-        ...
-
-    @property
-    def is_limit(self) -> bool:
-        """Whether it is a limit of the design, with the tolerance of all limits."""
-        ...
+    names: tuple[str, ...] = ()
+    is_equality = False
+    is_limit = False
 
     def measure(self, state: State) -> Measured:
         """Return the values and their derivatives."""
-        ...
+        raise NotImplementedError
 
 
-class VolumeDemand:
+class VolumeDemand(Demand):
     """The volume of the workspace, exactly or at least, by its cube root.
 
     A volume grows with the cube of the design, so that its cube root is nearly linear:
@@ -72,7 +67,6 @@ class VolumeDemand:
     def __init__(self, volume: float, *, is_equality: bool) -> None:
         self.volume = volume
         self.is_equality = is_equality
-        self.is_limit = False
         self.names = (f"{CATALOGUE['volume'].label} {volume:.6g}",)
 
     def measure(self, state: State) -> Measured:
@@ -81,11 +75,8 @@ class VolumeDemand:
         return Measured(np.array([root - 1.0]), gradient[None, :])
 
 
-class ReachDemand:
+class ReachDemand(Demand):
     """A longest leg of at most some length."""
-
-    is_equality = False
-    is_limit = False
 
     def __init__(self, reach: float) -> None:
         self.reach = reach
@@ -97,14 +88,12 @@ class ReachDemand:
         return Measured(np.array([1.0 - value / self.reach]), -gradient[None, :] / self.reach)
 
 
-class DegenerateDemand:
+class DegenerateDemand(Demand):
     """The distances from degenerate designs, on the side where a run starts.
 
     They are linear, so no step of the solver breaks them after a start that keeps them.
     """
 
-    is_equality = False
-    is_limit = False
     names = ("distance from a3y = 0", "distance from b1y = 0", "distance from b2 = b3")
 
     def __init__(self, least: float, start: State) -> None:
@@ -124,13 +113,12 @@ def _distances(state: State) -> FloatArray:
     return np.array([distance_of(state.design, name) for name in DISTANCES])
 
 
-class GapDemand:
+class GapDemand(Demand):
     """The smallest gap of the carriages, in the order that they have where a run starts.
 
     The order itself is no demand: each design keeps that of its own home pose.
     """
 
-    is_equality = False
     is_limit = True
     names = (GAP,)
 
@@ -150,7 +138,7 @@ def _gap(state: State) -> float:
     return (state.design.b3 - state.design.b2) * float(state.rotation[0, 0])
 
 
-class BoxDemand:
+class BoxDemand(Demand):
     """A required box within the workspace.
 
     A box whose corners lie within a ball, a cylinder or a half-space lies within it; for a
@@ -158,7 +146,6 @@ class BoxDemand:
     point of the box nearest to the centre decides, or the depth of a centre inside the box.
     """
 
-    is_equality = False
     is_limit = True
 
     def __init__(self, start: State) -> None:
@@ -240,7 +227,7 @@ def _slack_outside(
     return slack, by_u, by_p
 
 
-class TiltDemand:
+class TiltDemand(Demand):
     """The required box within the workspace of one tilted orientation.
 
     The azimuths turn with the yaw of home, so that a change of the yaw turns every orientation
@@ -252,7 +239,6 @@ class TiltDemand:
         tilt: The tilt, in degrees.
     """
 
-    is_equality = False
     is_limit = True
 
     def __init__(self, start: State, azimuth: float, tilt: float) -> None:
@@ -277,7 +263,7 @@ def tilt_demands(start: State, tilt: float) -> list[TiltDemand]:
     return [TiltDemand(start, azimuth, tilt) for azimuth in azimuths.tolist()]
 
 
-class MarginDemand:
+class MarginDemand(Demand):
     """The margins over a required box, on one side of each singular plane.
 
     Margins are linear in p, so that the corners of the box have the worst one. The side is that
@@ -288,8 +274,6 @@ class MarginDemand:
         is_open: Whether a box on a plane misses the demand, however large its tolerance.
     """
 
-    is_equality = False
-    is_limit = False
     names = tuple(f"margin δ{i} over the required box" for i in (1, 2, 3))
 
     def __init__(self, start: State, *, is_open: bool = False) -> None:

@@ -21,7 +21,7 @@ from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.optimise.problem import SHIFTS, ObjectiveName
-from explorer.optimise.search.demands.geometry import MarginDemand, Measured
+from explorer.optimise.search.demands.geometry import Demand, MarginDemand, Measured
 from explorer.optimise.search.state import State
 from explorer.statics.load_slopes import (
     BENDING,
@@ -68,12 +68,9 @@ def _spare_slope(share: FloatArray) -> FloatArray:
 
 
 def _worst_nodes(box: BoxStatics, values: FloatArray, counts: BoolArray) -> IntArray:
-    """Return the node with the largest of values (n, m) in each eighth, shape (8, m).
+    """Return the node with the largest of values (n, m) in each eighth of a box, shape (8, m).
 
-    Args:
-        box: The box with its nodes.
-        values: Values at the nodes.
-        counts: Which nodes count, shape (n,); at least one.
+    At least one node counts.
     """
     middle = np.mean(box.box, axis=0)
     eighths = (box.positions > middle) @ np.array([4, 2, 1])
@@ -86,7 +83,7 @@ def _worst_nodes(box: BoxStatics, values: FloatArray, counts: BoolArray) -> IntA
     return np.array(rows)
 
 
-class LoadDemand:
+class LoadDemand(Demand):
     """The limits of actuators, struts and guide under the design's load, over the required box.
 
     The load is the payload's weight and its force of any direction. The limits are those of the
@@ -97,9 +94,6 @@ class LoadDemand:
         most: Largest share of a limit allowed; None for that at the start, so that the values are
             of unit size whatever the load.
     """
-
-    is_equality = False
-    is_limit = False
 
     def __init__(self, start: State, most: float | None = None) -> None:
         self.side = MarginDemand(start, is_open=True)
@@ -129,7 +123,7 @@ class LoadDemand:
         return Measured(spare_of(share), _spare_slope(share)[:, None] * by @ state.rows(CHAIN))
 
 
-class DisplacementDemand:
+class DisplacementDemand(Demand):
     """The largest displacement of the tool by a cause, over the required box.
 
     Args:
@@ -137,9 +131,6 @@ class DisplacementDemand:
         cause: Cause: the errors of the actuators, or the deflection under the design's load.
         most: Largest displacement allowed, in design units.
     """
-
-    is_equality = False
-    is_limit = False
 
     def __init__(self, start: State, cause: Cause, most: float | None = None) -> None:
         self.side = MarginDemand(start, is_open=True)
@@ -168,11 +159,6 @@ def _miss_beyond_plane(state: State, side: MarginDemand, count: int) -> Measured
     """Return the values of demands on a box without a node on its side of all planes.
 
     They are equal and negative, the more so the deeper the box is beyond a plane.
-
-    Args:
-        state: The problem where the search is.
-        side: The demand that the box is on its side of all planes.
-        count: Number of demands.
     """
     value, gradient = side.measure(state)
     worst = int(value.argmin())

@@ -20,7 +20,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, reactions
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
-from explorer.workspace.nearest_held import nearest_held
+from explorer.workspace.nearest_carrying import nearest_carrying_pose
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = OPTIMAL.home_pose
@@ -48,7 +48,7 @@ def distances_held(loaded: LoadedPose, positions: FloatArray) -> FloatArray:
 def check_none_is_nearer(loaded: LoadedPose) -> None:
     """Check that a position is found and that no random position that holds is nearer."""
     assert loaded.share > 1.0
-    found = nearest_held(loaded)
+    found = nearest_carrying_pose(loaded)
     assert found is not None
     assert found.quaternion == loaded.pose.quaternion
     distance = float(np.linalg.norm(np.subtract(found.position, loaded.pose.position)))
@@ -74,7 +74,7 @@ def test_small_part_far_from_the_pose_is_found() -> None:
     pose = Pose.of(case["start"], np.array(case["rotation"]))
     loaded = LoadedPose(design, pose, tuple(case["load"]))
     check_none_is_nearer(loaded)
-    found = nearest_held(loaded)
+    found = nearest_carrying_pose(loaded)
     assert found is not None
     far = np.linalg.norm(np.subtract(case["holds_at"], case["start"]))
     assert np.linalg.norm(np.subtract(found.position, case["start"])) <= far
@@ -89,7 +89,7 @@ def test_mode_of_the_pose_counts_in_another_mode_than_home(margin: float | None)
 
 def test_a_position_that_holds_the_load_is_its_own_nearest() -> None:
     loaded = LoadedPose(OPTIMAL, HOME, LOAD)
-    found = nearest_held(loaded)
+    found = nearest_carrying_pose(loaded)
     assert found is not None
     assert found.position == pytest.approx(HOME.position, abs=1e-12)
 
@@ -102,14 +102,17 @@ def test_a_position_that_holds_the_load_is_its_own_nearest() -> None:
     ],
 )
 def test_none_is_found_where_limits_or_actuators_leave_none(change: dict[str, Any]) -> None:
-    assert nearest_held(LoadedPose(msgspec.structs.replace(LIMITED, **change), HOME, LOAD)) is None
+    assert (
+        nearest_carrying_pose(LoadedPose(msgspec.structs.replace(LIMITED, **change), HOME, LOAD))
+        is None
+    )
 
 
 def test_from_a_singular_pose_it_is_in_the_mode_of_home() -> None:
     loaded = LoadedPose(
         LIMITED, Pose((10.0, 5.0, 0.0), HOME.quaternion), (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
     )
-    found = nearest_held(loaded)
+    found = nearest_carrying_pose(loaded)
     assert found is not None
     signs = np.sign(margins(found.position, found.rotation))
     assert signs.tolist() == np.sign(margins(HOME.position, HOME.rotation)).tolist()

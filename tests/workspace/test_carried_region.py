@@ -36,7 +36,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.statics.held import largest_shares as shares_of_case, load_case
 from explorer.statics.reactions import PART_NAMES, limit_shares
 from explorer.statics.weights import design_weights
-from explorer.workspace.held import held_workspace
+from explorer.workspace.carried_region import carried_region
 from explorer.workspace.limits.constraints import constraints, satisfies, slacks
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -73,7 +73,7 @@ def largest_shares(
 @pytest.mark.parametrize("case", long_after(2, SHEETS_LAST), ids=lambda case: str(case["name"]))
 def test_volume_is_that_of_reference_cases(case: dict[str, Any]) -> None:
     design = decode_design(json.dumps(case["design"]).encode(), "the reference")
-    part = held_workspace(design, case["rotation"], case["load"])
+    part = carried_region(design, case["rotation"], case["load"])
     assert part.volume == pytest.approx(case["volume"], rel=1e-3)
     error = 3.0 * case["error"] + 0.005 * case["held_volume"]
     assert part.held_volume == pytest.approx(case["held_volume"], abs=error)
@@ -102,7 +102,7 @@ def test_volume_at_any_orientation_is_that_of_positions_in_the_mode_of_home(seed
             home = Pose.of(home.position, rotation)
         design = msgspec.structs.replace(design, home=home)
         whole = workspace_solid(design, rotation)
-    part = held_workspace(design, rotation, load)
+    part = carried_region(design, rotation, load)
     at = rng.uniform(whole.vertices.min(axis=0), whole.vertices.max(axis=0), (400_000, 3))
     signs = np.sign(margins(home.position, home.rotation))
     at = at[(np.sign(margins(at, rotation)) == signs).all(axis=1)]
@@ -118,7 +118,7 @@ def test_volume_at_any_orientation_is_that_of_positions_in_the_mode_of_home(seed
 @pytest.mark.parametrize("name", ["bending", "all parts"])
 def test_new_faces_lie_where_a_part_takes_its_limit(name: str) -> None:
     design = CASES[name]
-    solid = held_workspace(design, nodes=20).solid
+    solid = carried_region(design, nodes=20).solid
     # A force of any direction alone asks as much of pull as of push, and has one face.
     assert len(solid.faces) < 25_000
     parts = [index for index, limit in enumerate(solid.limits) if limit in PART_NAMES]
@@ -153,7 +153,7 @@ UNBOUNDED = msgspec.structs.replace(
 def test_thin_and_long_parts_are_found_whole(force: float, error: float) -> None:
     """The volume is that of random positions, and only limits and parts bound it."""
     load = np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0])
-    part = held_workspace(UNBOUNDED, load=load)
+    part = carried_region(UNBOUNDED, load=load)
     signed = msgspec.structs.replace(UNBOUNDED, limits=Limits(margin=0.0))
     rotation = UNBOUNDED.home_pose.rotation
     limits = constraints(signed, rotation)
@@ -181,7 +181,7 @@ def test_thin_and_long_parts_are_found_whole(force: float, error: float) -> None
 @pytest.mark.parametrize("moment", [3.0, 5.0])
 def test_faces_have_the_name_of_the_smaller_limit_of_the_moment(moment: float) -> None:
     design = msgspec.structs.replace(CASES["bending"], guide=Guide(moment_nm=moment))
-    solid = held_workspace(design, nodes=16).solid
+    solid = carried_region(design, nodes=16).solid
     used = {solid.limits[int(index)] for index in np.unique(solid.limit_of_face)}
     is_of_guide = moment == 3.0
     names = PART_NAMES[10:] if is_of_guide else PART_NAMES[6:8]
@@ -195,7 +195,7 @@ def test_load_that_nothing_holds_names_the_part() -> None:
     design = msgspec.structs.replace(
         OPTIMAL, payload=Payload(500.0), actuators=Actuators(push_n=(1.0, 1.0, 1.0, 1.0, 1.0, 1.0))
     )
-    part = held_workspace(design)
+    part = carried_region(design)
     assert part.held_volume == 0.0
     assert part.solid.is_empty
     assert part.solid.empty_because[0] in PART_NAMES
@@ -203,7 +203,7 @@ def test_load_that_nothing_holds_names_the_part() -> None:
 
 @pytest.mark.long
 def test_without_limits_the_whole_holds_any_load() -> None:
-    part = held_workspace(OPTIMAL, load=LOAD)
+    part = carried_region(OPTIMAL, load=LOAD)
     assert part.held_volume == pytest.approx(part.volume, rel=1e-12)
 
 
@@ -215,12 +215,12 @@ def test_scale_of_a_design_does_not_matter() -> None:
         unit_mm=design.unit_mm / size,
         payload=Payload(2.0, (size * x, size * y, size * z)),
     )
-    ours, theirs = (held_workspace(each, nodes=16) for each in (design, larger))
+    ours, theirs = (carried_region(each, nodes=16) for each in (design, larger))
     assert theirs.held_volume == pytest.approx(size**3 * ours.held_volume, rel=1e-4)
 
 
 def test_bad_input_is_refused() -> None:
     with pytest.raises(InputError, match="nodes on an axis"):
-        held_workspace(OPTIMAL, nodes=2)
+        carried_region(OPTIMAL, nodes=2)
     with pytest.raises(InputError, match="load"):
-        held_workspace(OPTIMAL, load=(np.nan,) * 6)
+        carried_region(OPTIMAL, load=(np.nan,) * 6)

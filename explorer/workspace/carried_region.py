@@ -1,4 +1,4 @@
-"""The part of a workspace where a load is held within the limits of the machine, as a solid.
+"""The carried region: the part of a workspace in which the machine carries a load, as a solid.
 
 Each limit of a part of the machine is a surface of its own, which is smooth where it bounds the
 workspace. A grid of positions finds it, and each of its vertices is moved onto the true surface, so
@@ -36,8 +36,9 @@ from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.nodes import Grid, make_grid
 from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, constraints, slacks
 from explorer.workspace.slices.volume import home_rotation, workspace_volume
+from explorer.workspace.solids.booleans import Surface, carved_solid, cut_solid
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.solids.solids import Surface, carved_solid, cut_solid, workspace_solid
+from explorer.workspace.solids.solids import workspace_solid
 
 # Numbers of nodes on each axis of the box about the part, and beyond it on either side.
 DEFAULT_NODES = 20
@@ -60,8 +61,8 @@ FINER, FINEST, SETTLED = 1.6, 72, 3e-3
 
 
 @dataclass(frozen=True)
-class HeldWorkspace:
-    """The part of a constant-orientation workspace where a load is held.
+class CarriedRegion:
+    """The part of a constant-orientation workspace in which the machine carries a load.
 
     Attributes:
         volume: Exact volume of the workspace with the signs of home, in cubed design units.
@@ -90,15 +91,15 @@ def part_names(design: Design) -> tuple[str, ...]:
     return (*PART_NAMES[:6], *moments, *PART_NAMES[8:10])
 
 
-def held_workspace(
+def carried_region(
     design: Design,
     rotation: ArrayLike | None = None,
     load: ArrayLike = (0.0,) * 6,
     *,
     nodes: int = DEFAULT_NODES,
     tolerance: float | None = None,
-) -> HeldWorkspace:
-    """Return the positions at which a load is held within the limits of actuators and machine.
+) -> CarriedRegion:
+    """Return the positions at which the machine carries a load within its limits.
 
     Beyond a singular plane no load is held on the way, so that only positions with the signs of
     the margins count that the home pose has in its own orientation. The payload's weight and its
@@ -131,20 +132,20 @@ def held_workspace(
     exact = workspace_volume(design, r)
     whole = workspace_solid(design, r, tolerance, volume=exact)
     if whole.is_empty:
-        return HeldWorkspace(exact.volume, 0.0, whole)
-    load_here = _LoadHere(load_case(design, r, w), r, constraints(design, r), part_names(design))
-    solid = _held_part(whole, load_here, nodes)
+        return CarriedRegion(exact.volume, 0.0, whole)
+    local = _LocalLoad(load_case(design, r, w), r, constraints(design, r), part_names(design))
+    solid = _carried_part(whole, local, nodes)
     if solid.is_empty:
-        best = _best_within(whole, load_here)
+        best = _best_within(whole, local)
         factor = 1.0 / max(best.share, LEAST_SHARE)
-        empty = replace(solid, empty_because=(load_here.part_names[best.part],))
-        return HeldWorkspace(exact.volume, 0.0, empty, best.position, factor)
+        empty = replace(solid, empty_because=(local.part_names[best.part],))
+        return CarriedRegion(exact.volume, 0.0, empty, best.position, factor)
     # The mesh of the whole lacks a share of the exact volume, and so does its part.
-    return HeldWorkspace(exact.volume, solid.volume * exact.volume / whole.volume, solid)
+    return CarriedRegion(exact.volume, solid.volume * exact.volume / whole.volume, solid)
 
 
 @dataclass(frozen=True)
-class _LoadHere:
+class _LocalLoad:
     """A load at one orientation, with the limits of the workspace there.
 
     Attributes:
@@ -188,7 +189,7 @@ class Best(NamedTuple):
     part: int
 
 
-def _held_part(whole: Solid, load: _LoadHere, nodes: int) -> Solid:
+def _carried_part(whole: Solid, load: _LocalLoad, nodes: int) -> Solid:
     """Return the part of a workspace that holds a load.
 
     It is carved out of a box about the nodes of a coarse grid that hold the load, which grows on
@@ -252,7 +253,7 @@ def _without_limits(solid: Solid, dropped: set[int]) -> Solid:
     return replace(solid, limit_of_face=new, limits=tuple(solid.limits[index] for index in kept))
 
 
-def _carve(near: Solid, load: _LoadHere, nodes: int) -> tuple[Solid, FloatArray]:
+def _carve(near: Solid, load: _LocalLoad, nodes: int) -> tuple[Solid, FloatArray]:
     """Return the positions of a solid that hold a load, by a grid, and the step of that."""
     lows, highs = near.vertices.min(axis=0), near.vertices.max(axis=0)
     grid = make_grid(lows, highs, nodes, BEYOND)
@@ -299,7 +300,7 @@ def _highest_around(values: FloatArray) -> FloatArray:
     return values
 
 
-def _best_within(whole: Solid, load: _LoadHere) -> Best:
+def _best_within(whole: Solid, load: _LocalLoad) -> Best:
     """Return the best position found within the limits."""
     grid = _coarse_grid(whole)
     tried = np.vstack([whole.vertices, positions_within(whole, grid, load.allows)])
@@ -313,11 +314,6 @@ def positions_within(
     """Return allowed positions all over a workspace, shape (n, 3).
 
     They are nodes of a grid, and middles between vertices, which a thin workspace also has.
-
-    Args:
-        whole: The workspace.
-        grid: Grid over its extent.
-        allows: Function of positions (n, 3) to whether they are allowed, (n,).
     """
     vertices = whole.vertices
     others = np.random.default_rng(0).permutation(len(vertices))
@@ -335,15 +331,9 @@ def best_positions(
 ) -> list[Best]:
     """Return positions where the largest share of a limit has a local minimum.
 
-    Grids about the best of the positions given that lie apart follow the least shares, and
-    shrink where none is less.
-
-    Args:
-        tried: Positions that are allowed, shape (n, 3), n > 0.
-        step: Distance of these on each axis, shape (3,).
-        shares: Function of positions (n, 3) to the largest shares and the parts, (n,) each.
-        allows: Function of positions (n, 3) to whether they are allowed, (n,).
-        enough: Share at which a search for a lesser one ends.
+    Grids about the best of the allowed positions tried, (n, 3), that lie apart follow the least
+    shares, and shrink where none is less. A search ends at a share that is enough. The positions
+    are a step apart on each axis, shape (3,).
     """
     values, parts = shares(tried)
     cube = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, FOLLOWING)] * 3), axis=-1).reshape(-1, 3)

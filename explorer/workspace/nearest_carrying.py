@@ -1,4 +1,4 @@
-"""The nearest position at which a load is held, at one orientation and without a singular plane.
+"""The nearest position that carries a load, at one orientation, no singular plane in between.
 
 Positions all over the workspace of the pose's mode are tried first. From the nearest ones that hold
 the load, descents of the distance follow, along the limits of the machine and of the design. Finer
@@ -20,7 +20,7 @@ from explorer.numerics.descent import descend
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, reactions
 from explorer.workspace.accessible.nodes import make_grid
-from explorer.workspace.held import best_positions, positions_within
+from explorer.workspace.carried_region import best_positions, positions_within
 from explorer.workspace.limits.constraints import Constraint, constraints, slacks
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 from explorer.workspace.solids.solids import workspace_solid
@@ -34,7 +34,7 @@ BEGINNINGS, ROUNDS = 6, 4
 KEPT, FAR, NEARER = 1e-6, 100.0, 1e-6
 
 
-def nearest_held(loaded: LoadedPose) -> Pose | None:
+def nearest_carrying_pose(loaded: LoadedPose) -> Pose | None:
     """Return the nearest pose of the same orientation that holds the load; None if none is found.
 
     It keeps all limits and clearances of the design and has the signs of the margins of the given
@@ -152,9 +152,9 @@ class _Search:
     def _shares(self, positions: FloatArray) -> FloatArray:
         """Return the shares of the limits at positions (..., 3), shape (..., 12)."""
         loaded = self.loaded
-        held = reactions(
+        reacted = reactions(
             Configuration(loaded.design, positions, loaded.pose.rotation, loaded.tool),
             loaded.load,
             loaded.weights,
         )
-        return limit_shares(loaded.design, held)
+        return limit_shares(loaded.design, reacted)
