@@ -25,7 +25,7 @@ from explorer.statics.held import largest_shares, load_case
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints, slacks
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.nodes import count_nodes
+from explorer.workspace.slices.nodes import mark_nodes
 from explorer.workspace.slices.volume import home_rotation, workspace_volume
 from explorer.workspace.solids.solids import workspace_solid
 
@@ -73,24 +73,14 @@ def _voxels() -> tuple[float, float]:
     lows, highs = region.ends
     step = float((highs - lows).max()) / VOXELS
     counts = np.ceil((highs - lows) / step).astype(np.int64)
-    found = np.zeros(7, dtype=np.int64)
+    within = np.zeros(counts, dtype=np.bool_)
 
-    def count() -> None:
-        count_nodes(
-            int(counts.prod()),
-            region.circles,
-            region.planes,
-            region.cones,
-            np.array([region.low, region.high]),
-            0.0,
-            lows / step + 0.5,
-            counts,
-            step,
-            found,
-        )
+    def count() -> int:
+        mark_nodes(within.size, *region.rows, lows + 0.5 * step, np.full(3, step), 0.0, within)
+        return int(np.count_nonzero(within))
 
     duration = best_of(3, count)
-    return int(found[0]) * step**3, duration
+    return count() * step**3, duration
 
 
 def _solid() -> Row:

@@ -155,13 +155,6 @@ def test_box_on_or_across_a_plane_is_refused_where_forces_or_errors_count(index:
             assert bool(found) == is_singular, (problem.objective, problem.demands, place)
 
 
-def test_box_on_the_base_is_refused_only_where_forces_or_errors_count() -> None:
-    box = ((8.0, 3.0, 0.0), (12.0, 7.0, 8.0))
-    (conflict,) = find_conflicts(problem_of(machine(), box, "smallest-reach", **DEMANDS[0]))
-    assert "on or across the singular plane δ3 = 0, where no load is held" in conflict.message
-    assert not find_conflicts(problem_of(machine(), box, "largest-volume"))
-
-
 @pytest.mark.parametrize(
     ("index", "objective"), list(enumerate([*OVER_BOX, "smallest-reach", "largest-volume"]))
 )

@@ -108,25 +108,6 @@ def test_path_margins_move_in_the_base_plane_lies_in_incidence_3() -> None:
     assert still.lies_in == still.crossings == ()
 
 
-def test_path_margins_touch_of_zero_changes_no_sign() -> None:
-    # δ3 is linear, so it touches at a corner: down to the base plane and up again.
-    x, y, z = HOME.position
-    down = Pose((x, y, 0.0), (0.8, 0.3, -0.4, 0.2))
-    start, end = Pose((x - 1, y, z), down.quaternion), Pose((x + 1, y, z), down.quaternion)
-    (touch,) = [c for c in path_margins([start, down, end]).crossings if c.incidence == 3]
-    assert (touch.move, touch.share, touch.changes_sign) == (0, 1.0, False)
-    below = Pose((x + 1, y, -z), down.quaternion)
-    (through,) = [c for c in path_margins([start, down, below]).crossings if c.incidence == 3]
-    assert (through.move, through.share, through.changes_sign) == (0, 1.0, True)
-    # δ1 = −n·p of a platform that nods to where it just points at a1, and back.
-    nod = 2.0 * math.atan2(1.0, 2.0)
-    first = Rotation.from_euler("y", 0.0).as_matrix()
-    last = Rotation.from_euler("y", nod).as_matrix()
-    position = (-2.0, 0.5, 1.0)
-    found = path_margins([Pose.of(position, first), Pose.of(position, last)])
-    assert [c.share for c in found.crossings if c.incidence == 1] == pytest.approx([0.5])
-
-
 @pytest.mark.parametrize("angle", [0.3, 0.7, 1.0, 1.2, 1.5])
 def test_path_margins_margin_that_touches_zero_changes_no_sign(angle: float) -> None:
     # A tool at 1 above b4 and the base plane turns about x, so that δ3 = 1 − cos θ.

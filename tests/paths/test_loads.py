@@ -17,7 +17,7 @@ from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
-from explorer.paths.loads import FIRST_SAMPLES, TOLERANCE, DemandedLoad, path_loads
+from explorer.paths.loads import TOLERANCE, DemandedLoad, path_loads
 from explorer.statics.reactions import limit_shares, reactions
 from explorer.statics.weights import Weights, design_weights
 
@@ -80,23 +80,6 @@ def test_path_loads_of_moves_near_singular_poses_bound_dense_samples(seed: int) 
     assert along.share >= 0.999 * most
     assert most <= along.bound <= (1.0 + TOLERANCE) * along.share
     assert along.place == pytest.approx(1.0, abs=0.05)
-
-
-@pytest.mark.parametrize("seed", range(30))
-def test_bound_of_few_long_intervals_holds(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
-    """A budget that ends at once leaves bounds over long intervals, or none."""
-    rng = np.random.default_rng([7, seed])
-    design, weights = random_machine(OPTIMAL, seed), None
-    if seed % 2:
-        weights = random_weights(design, seed)
-    size, angle = ((0.3, 0.05), (0.5, 0.0), (0.0, 0.1))[seed % 3]
-    move = random_move(design.home_pose, seed, size, angle)
-    load = rng.normal(size=6) * 20.0
-    monkeypatch.setattr("explorer.paths.loads.MOST_SAMPLES", 1)
-    along = path_loads(design, move, load, weights=weights)
-    assert len(along.at) == FIRST_SAMPLES + 2
-    assert dense_shares(design, move, load, weights, np.zeros(3)).max() <= along.bound
-    assert along.share < along.bound
 
 
 def test_path_loads_samples_have_the_shares_of_their_poses() -> None:

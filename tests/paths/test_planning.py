@@ -131,32 +131,6 @@ def test_smooth_detour_in_free_space_becomes_straight() -> None:
     assert Smoother(PROOFS).smooth([HOME, corner, end]) == (HOME, end)
 
 
-def test_plan_path_valid_straight_move_needs_no_search(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setitem(sys.modules, "ompl.base", None)
-    x, y, z = HOME.position
-    goal = Pose((x + 1.0, y, z - 1.0), HOME.quaternion)
-    path = plan_path(DESIGN, HOME, goal)
-    assert path.poses == (HOME, goal)
-    assert path.length == pytest.approx(math.sqrt(2.0))
-    # To stay is a path as well.
-    assert plan_path(DESIGN, HOME, HOME).length == 0.0
-
-
-def test_line_in_the_folds_joins_nearly_all_pairs_within_the_limits_of_the_optimum() -> None:
-    design = PRESETS["paper-optimal"]
-    proofs = Proofs(design, Rules.of(design))
-    poses = valid_poses(design)
-    lines = [
-        proofs.prove_line(*to_folds(*positions_and_rotations(ends))) is not None
-        for ends in itertools.pairwise(poses)
-        if order(ends[0]) == order(ends[1])
-    ]
-    assert len(lines) > 1000
-    assert np.mean(lines) > 0.95
-
-
 @pytest.mark.parametrize("moves", [2, 3])
 def test_plan_path_line_in_the_folds_of_some_moves_needs_no_search(
     moves: int, monkeypatch: pytest.MonkeyPatch
@@ -261,10 +235,6 @@ def test_plan_path_mode_other_than_the_home_has_a_path() -> None:
 def test_plan_path_tool_that_is_no_point_is_refused(tool: tuple[float, float, float]) -> None:
     with pytest.raises(InputError, match="tool must"):
         plan_path(DESIGN, HOME, HOME, tool=tool)
-
-
-def test_plan_path_tool_of_whole_numbers_is_that_of_floats() -> None:
-    assert plan_path(DESIGN, HOME, HOME, tool=(1, 2, 3)).tool == (1.0, 2.0, 3.0)
 
 
 @pytest.mark.parametrize("seconds", [0.0, math.nan, math.inf])

@@ -19,7 +19,7 @@ from explorer.numerics.arrays import FloatArray
 REFERENCE: dict[str, Any] = read_reference("workspace")
 DEFECTS: dict[str, Any] = read_reference("defects_solid")
 
-SIZES = (10.0, 1e-2, 1e5)
+SIZES = (10.0, 1e-3, 1e4)
 NEARNESS = (1.0, 1e-3, 1e-6)
 HALF_ANGLES = (1e-3, 30.0, 60.0, 89.999, 90.0, 90.0001, 120.0, 179.0, 180.0)
 # Minima as shares of the maximum; the last ones make shells far thinner than a chord.

@@ -10,7 +10,6 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from limited_designs import scaled_design
 from long_cases import long_after
 from machines import FULL, PRESS, six
 from reference import read_reference
@@ -205,18 +204,6 @@ def test_load_that_nothing_holds_names_the_part() -> None:
 def test_without_limits_the_whole_holds_any_load() -> None:
     part = carried_region(OPTIMAL, load=LOAD)
     assert part.held_volume == pytest.approx(part.volume, rel=1e-12)
-
-
-def test_scale_of_a_design_does_not_matter() -> None:
-    design, size = CASES["actuators"], 1e3
-    x, y, z = design.payload.centre
-    larger = msgspec.structs.replace(
-        scaled_design(design, size),
-        unit_mm=design.unit_mm / size,
-        payload=Payload(2.0, (size * x, size * y, size * z)),
-    )
-    ours, theirs = (carried_region(each, nodes=16) for each in (design, larger))
-    assert theirs.held_volume == pytest.approx(size**3 * ours.held_volume, rel=1e-4)
 
 
 def test_bad_input_is_refused() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from machines import FULL, six
 
 from explorer import PRESETS, Actuators, Design, Payload, Struts, Tool, inverse, reactions
-from explorer.export.drawings.slices import Slices
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
@@ -211,48 +209,3 @@ def test_levels_of_forces_are_round_numbers_that_suit_the_load(factor: float) ->
 def asked_force(factor: float, rotation: FloatArray) -> float:
     held = reactions(Configuration(OPTIMAL, OPTIMAL.home_pose.position, rotation), factor * LOAD)
     return float(np.abs(held.actuators).max())
-
-
-def is_within(polygons: list[Any], points: FloatArray) -> FloatArray:
-    """Return whether points (n, 2) are within polygons by the even-odd rule, shape (n,)."""
-    crossings = np.zeros(len(points), dtype=np.int64)
-    for polygon in polygons:
-        start, end = polygon, np.roll(polygon, -1, axis=0)
-        for (u0, v0), (u1, v1) in zip(start, end, strict=True):
-            spans = (v0 > points[:, 1]) != (v1 > points[:, 1])
-            if not spans.any():
-                continue
-            across = u0 + (points[spans, 1] - v0) / (v1 - v0) * (u1 - u0)
-            crossings[spans] += points[spans, 0] < across
-    return crossings % 2 == 1
-
-
-@pytest.mark.parametrize(
-    ("measure", "rotation", "axis"),
-    [(each, ORIENTATIONS[k % 3], "xyz"[(k + 1) % 3]) for k, each in enumerate(MEASURES)],
-)
-def test_map_holds_positions_in_the_bands_of_what_is_asked(
-    measure: PositionMeasure, rotation: FloatArray, axis: str
-) -> None:
-    """Also near the singular planes, where bands are narrower than the cells of the grid."""
-    bands = position_bands(LOADED, rotation, measure, warn_below=1.0, load=LOAD)
-    extent = np.array([0.0, -12.0, -10.0]), np.array([20.0, 22.0, 18.0])
-    slices = Slices(LOADED, rotation, *extent, bands)
-    index = "xyz".index(axis)
-    level = (9.0, 4.0, 6.0)[index]
-    points = near_planes(rotation, 4000)
-    points[:, index] = level
-    points = np.clip(points, extent[0] + 1e-9, extent[1] - 1e-9)
-    expected = asked(LOADED, points, rotation, measure)
-    beyond = slices.beyond(axis, level)
-    in_plane = [k for k in range(3) if k != index]
-    wrong = total = 0
-    for edge, end in zip(bands.edges[1:], bands.levels[1:], strict=True):
-        within = is_within(list(beyond(edge)), points[:, in_plane])
-        # Between the corners of a polygon its sides are straight.
-        is_clear = np.abs(expected / end - 1.0) > 0.02
-        wrong += int((within != (expected <= end))[is_clear].sum())
-        total += int(is_clear.sum())
-    assert total > 5000
-    # Between two planes that are closer than a cell no corner of the grid has their sign.
-    assert wrong / total < 2e-3

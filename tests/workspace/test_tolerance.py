@@ -187,26 +187,3 @@ def test_optimum_on_the_gap_has_a_workspace(index: int) -> None:
     assert outcome.best.volume > 0.0
     assert_file_meets_demands(outcome)
     assert outcome.converged
-
-
-@pytest.mark.parametrize("seed", long_after(3, range(10)))
-def test_optimum_on_limits_read_from_its_file_satisfies_them(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    design = decode_design(json.dumps(DEFECTS[0]["design"]).encode(), "the start")
-    x = np.array(design.variables) * rng.uniform(0.7, 1.4, 6)
-    apart = abs((x[5] - x[4]) * design.home_pose.rotation[0, 0])
-    design = limited(
-        design.with_variables(x.tolist()),
-        gap=float(apart * rng.uniform(0.5, 2.0)),
-        margin=float(rng.choice([0.0, 0.3])),
-    )
-    middle, half = np.array(design.home_pose.position), rng.uniform(0.2, 1.0, 3)
-    problem = make_problem(
-        design,
-        "largest-margin",
-        free=["yaw", *(SHIFTS if seed % 2 else ())],
-        reach=float(1.1 * design.reach) if seed % 3 else None,
-        required_box=box_between(middle - half, middle + half),
-    )
-    outcome = optimise_design(problem, iterations=150)
-    assert_file_meets_demands(outcome)

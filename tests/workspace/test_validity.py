@@ -12,11 +12,10 @@ from limited_designs import limited, ordinary_case, troubled_case
 from scipy.spatial.transform import Rotation
 from tool_moves import tool_move
 
-from explorer import JOINTS, PRESETS, Design, InputError, Pose, evaluate
+from explorer import PRESETS, Design, InputError, Pose, evaluate
 from explorer.legs.moves import moves_are_clear, poses_between
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.numerics.compiled import MANY_ROWS
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import poses_are_valid
 
@@ -64,20 +63,6 @@ def test_pose_without_violations_or_collisions_is_valid(seed: int) -> None:
         expected, nearness = verdict_of(design, pose)
         if nearness > 1e-12 * design.reach:
             assert valid == expected, (design, pose)
-
-
-@pytest.mark.parametrize("bound", ["l1", "d2", "d4", "l4"])
-def test_pose_on_a_limit_is_valid(bound: str) -> None:
-    home = OPTIMAL.home_pose
-    length = float(evaluate(OPTIMAL, home).joints[JOINTS.index(bound)])
-    for low, high, expected in (
-        (0.0, length, True),
-        (length, 2.0 * length, True),
-        (0.0, length * (1.0 - 1e-9), False),
-        (length * (1.0 + 1e-9), 2.0 * length, False),
-    ):
-        design = limited(OPTIMAL, **{bound: (low, high)})
-        assert poses_are_valid(design, home.position, home.rotation) == expected
 
 
 def test_leg_without_a_direction_at_home_violates_its_cone() -> None:
@@ -181,17 +166,6 @@ def test_move_of_half_a_turn_which_has_no_shorter_way_is_invalid() -> None:
 
     assert is_valid(math.pi - 1e-6).any()
     assert not is_valid(math.pi).any()
-
-
-def test_poses_and_moves_few_or_many_have_the_same_answers() -> None:
-    moves = random_moves(11, MANY_ROWS, 0.5)
-    found = moves_are_valid(THICK, *(each.reshape(2, -1, *each.shape[1:]) for each in moves))
-    assert found.shape == (2, MANY_ROWS // 2)
-    for index in range(0, MANY_ROWS, 25):
-        alone = moves_are_valid(THICK, *(each[index] for each in moves))
-        assert alone.shape == ()
-        assert alone == found.ravel()[index]
-        assert poses_are_valid(THICK, moves[0][index], moves[1][index])
 
 
 def test_poses_not_finite_are_refused() -> None:

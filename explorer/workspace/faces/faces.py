@@ -14,8 +14,7 @@ import numpy as np
 
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
 from explorer.workspace.faces.divide import divide, find_roots
-from explorer.workspace.faces.patterns import pattern
-from explorer.workspace.faces.surfaces import Smooth, Surfaces
+from explorer.workspace.faces.surfaces import Smooth, Surfaces, pattern
 from explorer.workspace.limits.constraints import Constraint, Never
 from explorer.workspace.limits.region import box_of, contract_box
 from explorer.workspace.solids.facets import Box

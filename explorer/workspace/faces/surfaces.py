@@ -1,4 +1,4 @@
-"""The surfaces of limits, as functions of points that belong to several of them at once."""
+"""The surfaces of limits: functions of points on several of them at once, and triangles on them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,24 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray, IntArray, dot
 from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace
+from explorer.workspace.solids.facets import (
+    BEYOND,
+    Box,
+    Facets,
+    facing_part,
+    frame_about,
+    sphere_part,
+)
 
+# Largest angle between the normals at two ends of an edge, in radians.
+WIDEST = 0.06
+# Most distance of a face from the true surface, and longest edge, as shares of the box's size.
+CHORD, LONGEST = 1.0 / 4000.0, 1.0 / 40.0
+# Directions around a cone at the least, and rows along it at the most.
+FEWEST, MOST_ROWS = 24, 48
+# Largest angle in radians at which a box is seen as a small one.
+NARROW = 0.25
+NONE: Facets = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
 # Most Newton steps onto surfaces; points start within a chord of them.
 STEPS = 4
 # Share of steps that keeps them finite where surfaces touch.
@@ -98,3 +115,134 @@ def _row_of(limit: Smooth) -> list[float]:
             along = 0.0 if limit.flat else 1.0
             origin = limit.apex * [along, 1.0, 1.0]
             return [*origin, along, 1.0, 1.0, *-limit.axis, math.cos(limit.half_angle), 0.0]
+
+
+def pattern(limit: BallOrCylinder | HalfSpace | Cone, box: Box) -> Facets:
+    """Return triangles that cover the surface of a limit within a box, and more.
+
+    They have no certain orientation.
+    """
+    if isinstance(limit, HalfSpace):
+        return _plane(limit.normal / np.linalg.norm(limit.normal), limit, box)
+    if isinstance(limit, Cone):
+        return _wedge(limit, box) if limit.flat else _cone(limit, box)
+    start = 0 if limit.is_ball else 1
+    centre = limit.centre[start:]
+    nearest, farthest = box.distances(centre)
+    if not nearest <= limit.radius <= farthest:
+        return NONE
+    edge = _edge(limit.radius, box)
+    towards, angle = _part_near(centre, limit.radius, box)
+    if limit.is_ball:
+        points, faces = sphere_part(angle, edge / limit.radius)
+        return limit.centre + limit.radius * (points @ frame_about(towards)), faces
+    count = max(3, math.ceil(2.0 * angle * limit.radius / edge))
+    turns = math.atan2(towards[1], towards[0]) + np.linspace(-angle, angle, count + 1)
+    rows = _rows(box.lows[0], box.highs[0], edge)
+    points = np.empty((len(turns), len(rows), 3))
+    points[..., 0] = rows
+    points[..., 1] = (centre[0] + limit.radius * np.cos(turns))[:, None]
+    points[..., 2] = (centre[1] + limit.radius * np.sin(turns))[:, None]
+    return points.reshape(-1, 3), _grid_faces(len(turns), len(rows))
+
+
+def _part_near(centre: FloatArray, radius: float, box: Box) -> tuple[FloatArray, float]:
+    """Return the unit direction from a centre to a box, and the angle about it that holds the box.
+
+    The base that closes the part of a solid passes below a box, which takes an angle as large as
+    the square root of the box's size. A surface needs no base, so that around a small box the
+    angle at which the box is seen will do.
+    """
+    to_middle = box.middle[3 - len(centre) :] - centre
+    seen = _seen(float(np.linalg.norm(to_middle)), box)
+    if seen > NARROW:
+        return facing_part(centre, radius, box, 0.0)
+    return to_middle / np.linalg.norm(to_middle), seen
+
+
+def _seen(distance: float, box: Box) -> float:
+    """Return the half-angle at which a box is seen, and a little more; π from inside."""
+    half = (0.5 + BEYOND) * box.size
+    return math.asin(half / distance) if half < distance else math.pi
+
+
+def _edge(radius: float, box: Box) -> float:
+    """Return the length of edges on a surface with a radius."""
+    chord = math.sqrt(8.0 * radius * CHORD * box.size)
+    return min(WIDEST * radius, chord, LONGEST * box.size)
+
+
+def _rows(low: float, high: float, edge: float) -> FloatArray:
+    """Return evenly spaced numbers between two, and a little beyond."""
+    more = 1e-3 * (high - low)
+    count = max(2, math.ceil((high - low) / edge) + 1)
+    return np.linspace(low - more, high + more, count)
+
+
+def _grid_faces(rows: int, columns: int) -> IntArray:
+    """Return the faces of a grid of points, in the order of `reshape`."""
+    first: IntArray = (
+        np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1, dtype=np.int64)
+    ).ravel()
+    right, up = first + 1, first + columns
+    return np.concatenate(
+        [np.stack([first, right, up + 1], axis=1), np.stack([first, up + 1, up], axis=1)]
+    )
+
+
+def _plane(normal: FloatArray, limit: HalfSpace, box: Box) -> Facets:
+    offset = limit.offset / float(np.linalg.norm(limit.normal))
+    along = box.corners @ normal
+    if not along.min() <= offset <= along.max():
+        return NONE
+    frame = frame_about(normal)
+    flat = box.corners @ frame[:2].T
+    edge = LONGEST * box.size
+    u, v = (_rows(flat[:, k].min(), flat[:, k].max(), edge) for k in (0, 1))
+    points = np.empty((len(u), len(v), 3))
+    points[..., 0], points[..., 1], points[..., 2] = u[:, None], v, offset
+    return points.reshape(-1, 3) @ frame, _grid_faces(len(u), len(v))
+
+
+def _cone(limit: Cone, box: Box) -> Facets:
+    near, far = box.distances(limit.apex)
+    radius = far * math.sin(limit.half_angle)
+    edge = _edge(radius, box)
+    frame = frame_about(limit.axis)
+    across = frame[:2] @ (box.middle - limit.apex)
+    seen = _seen(float(np.linalg.norm(across)), box)
+    count = max(FEWEST, math.ceil(2.0 * seen * radius / edge))
+    turns = math.atan2(across[1], across[0]) + np.linspace(-seen, seen, count + 1)
+    spacing = max(edge, (far - near) / (MOST_ROWS - 1))
+    rows = np.maximum(_rows(near, far, spacing), 0.0)
+    sine, cosine = math.sin(limit.half_angle), math.cos(limit.half_angle)
+    rim = [sine * np.cos(turns), sine * np.sin(turns), np.full(count + 1, cosine)]
+    points = limit.apex + rows[:, None, None] * (np.column_stack(rim) @ frame)
+    faces = _grid_faces(len(rows), count + 1)
+    if seen < math.pi:
+        return points.reshape(-1, 3), faces
+    # The last direction is the first.
+    row, column = faces // (count + 1), faces % (count + 1) % count
+    return points.reshape(-1, 3), row * (count + 1) + column
+
+
+def _wedge(limit: Cone, box: Box) -> Facets:
+    """Return the two half-planes of the legs that slide along x."""
+    across = float(np.linalg.norm(limit.axis[1:]))
+    if across <= abs(math.cos(limit.half_angle)):
+        return NONE
+    apex = limit.apex[1:]
+    near, far = box.distances(apex)
+    turn = math.acos(math.cos(limit.half_angle) / across)
+    middle = math.atan2(limit.axis[2], limit.axis[1])
+    edge = LONGEST * box.size
+    x, rows = _rows(box.lows[0], box.highs[0], edge), _rows(near, far, edge)
+    points = np.empty((2, len(x), len(rows), 3))
+    for side, at in zip(points, (middle - turn, middle + turn), strict=True):
+        side[..., 0] = x[:, None]
+        side[..., 1], side[..., 2] = (
+            apex[0] + np.maximum(rows, 0.0) * math.cos(at),
+            apex[1] + np.maximum(rows, 0.0) * math.sin(at),
+        )
+    faces = _grid_faces(len(x), len(rows))
+    return points.reshape(-1, 3), np.concatenate([faces, faces + len(x) * len(rows)])

@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.legs.segments import closest_shares, square_at
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins_of
 from explorer.mechanism.pose import checked_rotation
@@ -49,7 +48,7 @@ from explorer.workspace.limits.quantities import (
     write_ends,
     write_speeds,
 )
-from explorer.workspace.limits.valid_poses import Rules, is_valid
+from explorer.workspace.limits.valid_poses import Rules, is_valid, square_between
 
 # The share of the reach by which a limit may be exceeded between poses that satisfy it, and the
 # share of this tolerance that signs and clearances must exceed on the way, to be certain.
@@ -258,11 +257,7 @@ def safe_share_of_clearances(check: MoveCheck, least: float) -> float:
             pair += 1
             if radius < 0.0:
                 continue
-            first, second = vector(base, i), vector(base, j)
-            u, v = minus(vector(ends, i), first), minus(vector(ends, j), second)
-            w = minus(first, second)
-            s, t = closest_shares(u, v, w)
-            clearance = math.sqrt(square_at(s, t, u, v, w)) - radius
+            clearance = math.sqrt(square_between(i, j, base, ends)) - radius
             if clearance < least:
                 return -1.0
             share = min(share, lasting_share(clearance, speeds[L1 + i] + speeds[L1 + j]))

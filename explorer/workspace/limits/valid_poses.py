@@ -133,6 +133,16 @@ def satisfies_limits(
 
 
 @helper
+def square_between(i: int, j: int, base: FloatArray, ends: FloatArray) -> float:
+    """Return the squared distance of the axes of two legs."""
+    first, second = vector(base, i), vector(base, j)
+    u, v = minus(vector(ends, i), first), minus(vector(ends, j), second)
+    w = minus(first, second)
+    s, t = closest_shares(u, v, w)
+    return square_at(s, t, u, v, w)
+
+
+@helper
 def is_clear(i: int, j: int, radius: float, base: FloatArray, ends: FloatArray) -> bool:
     """Return whether the axes of two legs are farther apart than a sum of radii."""
     if radius < 0.0:
@@ -143,11 +153,7 @@ def is_clear(i: int, j: int, radius: float, base: FloatArray, ends: FloatArray) 
         c, d = base[j, axis], ends[j, axis]
         if max(min(a, b) - max(c, d), min(c, d) - max(a, b)) > radius:
             return True
-    first, second = vector(base, i), vector(base, j)
-    u, v = minus(vector(ends, i), first), minus(vector(ends, j), second)
-    w = minus(first, second)
-    s, t = closest_shares(u, v, w)
-    return square_at(s, t, u, v, w) > radius * radius
+    return square_between(i, j, base, ends) > radius * radius
 
 
 @helper

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.workspace.limits.region import (
     AXIS_X,
@@ -28,8 +28,6 @@ from explorer.workspace.limits.region import (
 
 # The most ends of z-intervals in one column: two for each surface and two of the column.
 ENDS = 64
-# Entries of the result of `count_nodes`: the number of nodes, their lowest and highest indices.
-COUNT, LOWS, HIGHS, RESULTS = 0, 1, 4, 7
 # A discriminant that is negative by less than this share of b² counts as zero.
 DOUBLE_ROOT = 1e-12
 
@@ -68,42 +66,27 @@ def is_within(
     return True
 
 
-@kernel("void(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8, f8[::1], i8[::1], f8, i8[::1])")
-def count_nodes(
+@kernel("void(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8, b1[:,:,::1])")
+def mark_nodes(
     circles: FloatArray,
     planes: FloatArray,
     cones: FloatArray,
-    ends: FloatArray,
-    slack: float,
     first: FloatArray,
-    counts: IntArray,
-    step: float,
-    result: IntArray,
+    step: FloatArray,
+    slack: float,
+    within: BoolArray,
 ) -> None:
-    """Count the nodes of a grid that satisfy all limits, to within a slack in design units.
+    """Write whether nodes satisfy all limits, to within a slack in design units, (nx, ny, nz).
 
-    A node is an index times the step; `first` has the indices of the first node, `counts` the
-    number of nodes on each axis, and `ends` the ends of the x-range. The results are written,
-    see `COUNT`, shape (RESULTS,).
+    The first node and the step on each axis have the shape (3,).
     """
-    result[COUNT] = 0
-    for i in range(counts[0]):
-        x = (first[0] + i) * step
-        if x < ends[0] or x > ends[1]:
-            continue
-        for j in range(counts[1]):
-            y = (first[1] + j) * step
-            for k in range(counts[2]):
-                z = (first[2] + k) * step
-                if not is_within(x, y, z, circles, planes, cones, slack):
-                    continue
-                node = (int(first[0]) + i, int(first[1]) + j, int(first[2]) + k)
-                for axis in range(3):
-                    if result[COUNT] == 0 or node[axis] < result[LOWS + axis]:
-                        result[LOWS + axis] = node[axis]
-                    if result[COUNT] == 0 or node[axis] > result[HIGHS + axis]:
-                        result[HIGHS + axis] = node[axis]
-                result[COUNT] += 1
+    for i in range(within.shape[0]):
+        x = first[0] + i * step[0]
+        for j in range(within.shape[1]):
+            y = first[1] + j * step[1]
+            for k in range(within.shape[2]):
+                z = first[2] + k * step[2]
+                within[i, j, k] = is_within(x, y, z, circles, planes, cones, slack)
 
 
 @helper

@@ -20,10 +20,10 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace, constraints
-from explorer.workspace.limits.region import box_of
+from explorer.workspace.limits.region import region_of
 
-# Shares of the size of the region: curves that differ by less than SAME are the same, ends of edges
-# closer than CORNER are one corner, and edges shorter than SHORT are dropped.
+# Shares of the size of the region: directions that differ by less than SAME are the same, ends of
+# edges closer than CORNER are one corner, and edges shorter than SHORT are dropped.
 SAME = 1e-11
 CORNER = 1e-6
 SHORT = 1e-9
@@ -103,15 +103,6 @@ class _Curve:
     def is_circle(self) -> bool:
         return self.radius > 0.0
 
-    def is_same(self, other: _Curve, tolerance: float) -> bool:
-        if self.is_circle != other.is_circle or self.side != other.side:
-            return False
-        if self.is_circle:
-            off = max(math.dist(self.centre, other.centre), abs(self.radius - other.radius))
-            return off <= tolerance
-        turned = math.dist(self.normal, other.normal)
-        return turned <= SAME and abs(self.offset - other.offset) <= tolerance
-
 
 def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) -> Outline | None:
     """Return the outline of a slice of the constant-orientation workspace.
@@ -136,20 +127,17 @@ def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) 
     if any(isinstance(limit, Cone) for limit in limits):
         return None
     empty = Outline(axis, level, ())
-    box = box_of(limits)
-    if box is None:
+    region = region_of(limits)
+    if region.box is None:
         return empty
-    size = float(np.abs(box).max())
+    size = float(np.abs(region.box).max())
+    ends = [end for end in (region.low_limit, region.high_limit) if end is not None]
     curves: list[_Curve] = []
-    for limit_index, limit in enumerate(limits):
-        if not isinstance(limit, BallOrCylinder | HalfSpace):
-            continue
-        limit_curves = _curves_of(limit, axes, level, limit_index)
+    for index, limit in enumerate([*region.circle_limits, *region.plane_limits, *ends]):
+        limit_curves = _curves_of(limit, axes, level, index)
         if limit_curves is None:
             return empty
-        for curve in limit_curves:
-            if not any(curve.is_same(other, SAME * size) for other in curves):
-                curves.append(curve)
+        curves += limit_curves
     edges = [edge for curve in curves for edge in _edges_of(curve, curves, size)]
     loops = _join(edges, CORNER * size)
     return None if loops is None else replace(empty, loops=loops)
@@ -247,38 +235,29 @@ def _slack(curve: _Curve, points: FloatArray) -> FloatArray:
 
 def _find_meetings(curve: _Curve, other: _Curve) -> list[float]:
     """Return the parameters of a curve at which it meets another."""
-    if not curve.is_circle:
-        return _find_meetings_on_line(curve, other)
-    if other.is_circle:
-        du, dv = other.centre[0] - curve.centre[0], other.centre[1] - curve.centre[1]
-        distance = math.hypot(du, dv)
-        numerator = curve.radius**2 + distance**2 - other.radius**2
-        denominator = 2.0 * curve.radius * distance
-    else:
+    (u, v), offset = curve.normal, curve.offset
+    if curve.is_circle:
+        # Where two circles meet, they meet the line through both points.
+        (cu, cv), r = curve.centre, curve.radius
         du, dv = other.normal
-        numerator = other.offset - du * curve.centre[0] - dv * curve.centre[1]
-        denominator = curve.radius
-    if abs(numerator) >= denominator:
-        return []
-    bearing, half = math.atan2(dv, du), math.acos(numerator / denominator)
-    return [(bearing + sign * half) % (2.0 * math.pi) for sign in (-1.0, 1.0)]
-
-
-def _find_meetings_on_line(line: _Curve, other: _Curve) -> list[float]:
-    (u, v), offset = line.normal, line.offset
+        along = other.offset - du * cu - dv * cv
+        if other.is_circle:
+            du, dv = other.centre[0] - cu, other.centre[1] - cv
+            along = 0.5 * (r**2 + du**2 + dv**2 - other.radius**2)
+        most = r * math.hypot(du, dv)
+        if abs(along) >= most:
+            return []
+        bearing, half = math.atan2(dv, du), math.acos(along / most)
+        return [(bearing + sign * half) % (2.0 * math.pi) for sign in (-1.0, 1.0)]
     if other.is_circle:
         cu, cv = other.centre
         off = offset - u * cu - v * cv
         square = (other.radius - off) * (other.radius + off)
-        if square <= 0.0:
-            return []
-        middle, half = -v * cu + u * cv, math.sqrt(square)
-        return [middle - half, middle + half]
+        middle, half = -v * cu + u * cv, math.sqrt(max(square, 0.0))
+        return [middle - half, middle + half] if square > 0.0 else []
     slope = other.normal[1] * u - other.normal[0] * v
-    if abs(slope) <= SAME:
-        return []
     along = other.normal[0] * u + other.normal[1] * v
-    return [(other.offset - along * offset) / slope]
+    return [(other.offset - along * offset) / slope] if abs(slope) > SAME else []
 
 
 def _join(edges: list[Edge], corner: float) -> tuple[tuple[Edge, ...], ...] | None:
@@ -289,16 +268,12 @@ def _join(edges: list[Edge], corner: float) -> tuple[tuple[Edge, ...], ...] | No
         while True:
             end = loop[-1].end
             gap = math.dist(end, loop[0].start)
-            nearest = min(
-                range(len(unjoined)), key=lambda k: math.dist(end, unjoined[k].start), default=None
-            )
-            if nearest is not None and math.dist(end, unjoined[nearest].start) < gap:
-                if math.dist(end, unjoined[nearest].start) > corner:
-                    return None
-                loop.append(unjoined.pop(nearest))
-            elif gap <= corner:
-                break
-            else:
+            gaps = [math.dist(end, other.start) for other in unjoined]
+            nearest = min([gap, *gaps])
+            if nearest > corner:
                 return None
+            if nearest == gap:
+                break
+            loop.append(unjoined.pop(gaps.index(nearest)))
         loops.append(tuple(loop))
     return tuple(loops)

@@ -149,18 +149,23 @@ def workspace_nodes(
     empty = NodeCount(width, 0, 0.0, None)
     first, number = node_range(region, width)
     check_node_count(number, width, MOST_NODES)
-    counts = number.astype(np.int64)
-    if not counts.all():
-        return empty
-    result = np.zeros(nodes.RESULTS, dtype=np.int64)
-    slack = design.tolerance
-    ends = np.array([region.low - slack, region.high + slack])
-    node_count = int(counts.prod())
-    nodes.count_nodes(node_count, *region.rows, ends, slack, first, counts, width, result)
-    count = int(result[nodes.COUNT])
+    within = np.zeros(number.astype(np.int64), dtype=np.bool_)
+    slack, steps = design.tolerance, np.full(3, width)
+    nodes.mark_nodes(within.size, *region.rows, first * width, steps, slack, within)
+    # Planes across x are no rows of the region.
+    x = (first[0] + np.arange(len(within))) * width
+    within[(x < region.low - slack) | (x > region.high + slack)] = False
+    count = int(np.count_nonzero(within))
     if not count:
         return empty
-    low_x, low_y, low_z, high_x, high_y, high_z = (result[nodes.LOWS :] * width).tolist()
+    others = ((1, 2), (0, 2), (0, 1))
+    taken = [np.flatnonzero(within.any(axis=other)) for other in others]
+    low_x, low_y, low_z = (
+        float((start + index[0]) * width) for start, index in zip(first, taken, strict=True)
+    )
+    high_x, high_y, high_z = (
+        float((start + index[-1]) * width) for start, index in zip(first, taken, strict=True)
+    )
     extent = (low_x, low_y, low_z), (high_x, high_y, high_z)
     return NodeCount(width, count, count * width**3, extent)
 

@@ -148,25 +148,28 @@ def cylinder(
 def prism(outline: FloatArray, box: Box) -> Facets:
     """Return the prism along x over a convex outline (n, 2) in y and z, counter-clockwise."""
     count = len(outline)
-    ends = [
-        np.column_stack([np.full(count, x), outline])
-        for x in (
-            box.lows[0] - BEYOND * box.size,
-            box.highs[0] + BEYOND * box.size,
-        )
-    ]
+    beyond = BEYOND * box.size
+    x = np.repeat([box.lows[0] - beyond, box.highs[0] + beyond], count)
+    points = np.column_stack([x, np.concatenate([outline, outline])])
+    return points, np.concatenate([_tube(count), _fan(count)[:, [0, 2, 1]], _fan(count) + count])
+
+
+def _tube(count: int) -> IntArray:
+    """Return the faces between a ring of corners and the ring that follows it."""
     indices = np.arange(count)
     following = (indices + 1) % count
-    inner = np.arange(1, count - 1)
-    faces = np.concatenate(
+    return np.concatenate(
         [
             np.column_stack([indices, following, following + count]),
             np.column_stack([indices, following + count, indices + count]),
-            np.column_stack([np.zeros_like(inner), inner + 1, inner]),
-            np.column_stack([np.zeros_like(inner), inner, inner + 1]) + [count, count, count],
         ]
     )
-    return np.concatenate(ends), faces
+
+
+def _fan(count: int) -> IntArray:
+    """Return the faces within a ring of corners."""
+    inner = np.arange(1, count - 1)
+    return np.column_stack([np.zeros_like(inner), inner, inner + 1])
 
 
 def half_space(normal: FloatArray, offset: float, box: Box) -> Facets:
@@ -204,18 +207,10 @@ def cone(apex: FloatArray, axis: FloatArray, half_angle: float, step: float, box
     turns = 2.0 * math.pi / count * np.arange(count)
     rim = np.column_stack([width * np.cos(turns), width * np.sin(turns), np.full(count, height)])
     points = np.concatenate([[[0.0, 0.0, 0.0]], rim, rim + [0.0, 0.0, wall]])
-    indices = 1 + np.arange(count)
-    following = 1 + (np.arange(count) + 1) % count
-    inner = np.arange(1, count - 1)
-    faces = np.concatenate(
-        [
-            np.column_stack([np.zeros_like(indices), following, indices]),
-            np.column_stack([indices, following, following + count]),
-            np.column_stack([indices, following + count, indices + count]),
-            np.column_stack([np.zeros_like(inner), inner, inner + 1]) + 1 + count,
-        ]
-    )
-    return apex + points @ frame_about(axis), faces
+    indices = np.arange(count)
+    tip = np.column_stack([np.zeros_like(indices), 1 + (indices + 1) % count, 1 + indices])
+    faces = [tip, _tube(count) + 1, _fan(count) + 1 + count]
+    return apex + points @ frame_about(axis), np.concatenate(faces)
 
 
 def _far_rim(apex: FloatArray, half_angle: float, box: Box) -> tuple[float, float, float]:
@@ -273,11 +268,9 @@ def _unit_cap(size: int, rings: int) -> tuple[FloatArray, IntArray, IntArray, fl
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     # Flat triangles lie below a sphere of radius one by this much on average.
     outward = 1.0 + float((areas * squares).sum() / areas.sum()) / 24.0
-    rim = first[-2] + np.arange(int(counts[-1]))
-    inner = np.arange(1, len(rim) - 1)
-    base = np.column_stack([np.zeros_like(inner), inner + 1, inner])
     # A whole sphere ends in a point, which is no rim.
-    return points, faces, rim[base], outward
+    base = first[-2] + _fan(int(counts[-1]))[:, [0, 2, 1]]
+    return points, faces, base, outward
 
 
 def _stitch_rings(counts: IntArray, first: IntArray) -> IntArray:
