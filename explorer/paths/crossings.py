@@ -77,10 +77,7 @@ class PathMargins:
 def path_margins(poses: Sequence[Pose], tool: ArrayLike | None = None) -> PathMargins:
     """Return the least margins over a path of straight moves, and its singular poses.
 
-    Args:
-        poses: Corners of the path, two or more.
-        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
-            for b4.
+    The tool, shape (3,), moves straight in the platform frame; b4 if None.
 
     Raises:
         InputError: There are fewer than two poses, or the tool is not finite.

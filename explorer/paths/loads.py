@@ -243,8 +243,7 @@ def path_loads(
     Args:
         design: The manipulator, with its tool, payload and limits.
         poses: Corners of the path, two or more.
-        load: (F; M) on the platform at the tool point of the design, base axes, shape (6,), in N
-            and N × unit.
+        load: (F; M) at the tool point of the design, base axes, shape (6,), in N and N × unit.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
         weights: All masses, the payload's included; None for the payload alone.
 

@@ -197,7 +197,7 @@ def _carried_part(whole: Solid, load: _LocalLoad, nodes: int) -> Solid:
     volume hardly changes. If no node holds the load, the best position within the limits counts;
     the part is empty if that does not hold it either.
     """
-    grid = _coarse_grid(whole)
+    grid = make_grid(*whole.ends, COARSE, 0)
     positions = grid.positions.reshape(-1, 3)
     kept = positions[load.holds(positions) & load.allows(positions)]
     if not len(kept):
@@ -235,7 +235,7 @@ def _crop(whole: Solid, box: FloatArray) -> tuple[Solid, dict[int, tuple[int, in
     The end and the axis of each side are found by the index of its limit in the part.
     """
     part, sides = whole, dict[int, tuple[int, int]]()
-    ends = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
+    ends = whole.ends
     for axis, unit in enumerate(np.eye(3)):
         for end, sign in enumerate((-1.0, 1.0)):
             level = float(box[end, axis])
@@ -255,8 +255,7 @@ def _without_limits(solid: Solid, dropped: set[int]) -> Solid:
 
 def _carve(near: Solid, load: _LocalLoad, nodes: int) -> tuple[Solid, FloatArray]:
     """Return the positions of a solid that hold a load, by a grid, and the step of that."""
-    lows, highs = near.vertices.min(axis=0), near.vertices.max(axis=0)
-    grid = make_grid(lows, highs, nodes, BEYOND)
+    grid = make_grid(*near.ends, nodes, BEYOND)
     positions = grid.positions.reshape(-1, 3)
     limits = np.flatnonzero(np.isfinite(load.case[LIMITS:INWARD]))
     values = limit_values(load.case, load.rotation, limits, positions)
@@ -302,7 +301,7 @@ def _highest_around(values: FloatArray) -> FloatArray:
 
 def _best_within(whole: Solid, load: _LocalLoad) -> Best:
     """Return the best position found within the limits."""
-    grid = _coarse_grid(whole)
+    grid = make_grid(*whole.ends, COARSE, 0)
     tried = np.vstack([whole.vertices, positions_within(whole, grid, load.allows)])
     shares = partial(largest_shares, load.case, load.rotation)
     return min(best_positions(tried, grid.step, shares, load.allows), key=lambda best: best.share)
@@ -357,7 +356,3 @@ def best_positions(
                 size *= 0.5
         found.append(best)
     return found
-
-
-def _coarse_grid(whole: Solid) -> Grid:
-    return make_grid(whole.vertices.min(axis=0), whole.vertices.max(axis=0), COARSE, 0)

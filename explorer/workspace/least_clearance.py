@@ -30,7 +30,7 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.descent import descend
-from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, constraints
+from explorer.workspace.limits.constraints import Cone, Constraint, constraints
 from explorer.workspace.limits.region import box_of
 from explorer.workspace.slices.volume import home_rotation
 
@@ -170,13 +170,11 @@ class _Domain:
         """Return signed distances of positions (n, 3) within the domain, or their upper bounds."""
         least = self._spare_margins(p).min(axis=-1, initial=math.inf)
         for limit in self.limits:
-            slack = limit.slack(p)
-            if isinstance(limit, HalfSpace):
-                slack = slack / float(np.linalg.norm(limit.normal))
-            elif isinstance(limit, Cone):
-                # The slack of a cone is an angle, not a distance; only its sign is used.
-                slack = np.where(slack >= 0.0, math.inf, -math.ulp(0.0))
-            least = np.minimum(least, slack)
+            distance = limit.signed_distance(p)
+            if isinstance(limit, Cone):
+                # It is right near the cone alone; only its sign is used.
+                distance = np.where(distance >= 0.0, math.inf, -math.ulp(0.0))
+            least = np.minimum(least, distance)
         return least
 
     def descend(self, pair: int, least: float, position: FloatArray) -> tuple[float, FloatArray]:

@@ -49,7 +49,7 @@ def nearest_carrying_pose(loaded: LoadedPose) -> Pose | None:
         return None
     limits = constraints(loaded.design, loaded.pose.rotation, signs)
     search = _Search(loaded, Rules.of(loaded.design, signs), limits)
-    ends = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
+    ends = whole.ends
     grid = make_grid(*ends, NODES, 0)
     tried = np.vstack([search.here, positions_within(whole, grid, search.allows)])
     found = search.nearest(tried, grid.step)

@@ -115,11 +115,14 @@ def position_bands(
     def measured(points: FloatArray) -> FloatArray:
         return measure_positions(design, rotation, measure, points, load)[0]
 
-    if measure == "margin":
-        return _proximity(measure, warn_below, measured)
-    if measure == "condition":
-        return _proximity(measure, warning_condition(design.reach, warn_below), measured)
-    return _unbounded(design, rotation, measure, measured)
+    if measure not in ("margin", "condition"):
+        return _unbounded(design, rotation, measure, measured)
+    is_margin = measure == "margin"
+    unit = warn_below if is_margin else warning_condition(design.reach, warn_below)
+    levels = tuple(unit * edge for edge in BAND_EDGES)
+    return PositionBands(
+        measure, BAND_EDGES, band_colours(), levels, lambda points: measured(points) / unit
+    )
 
 
 def measure_positions(
@@ -158,7 +161,7 @@ def measure_positions(
 
 
 def is_unstated(design: Design, measure: PositionMeasure) -> bool:
-    """Return whether a design states nothing of what makes a measure more than zero.
+    """Return whether a design lacks the input without which a measure is zero.
 
     A share needs a limit of a part, the worst error an error of an actuator, and the deflection a
     stiffness of the actuators or the tube of a strut.
@@ -177,8 +180,8 @@ def is_unstated(design: Design, measure: PositionMeasure) -> bool:
 def measured_limits(design: Design, measure: PartMeasure) -> FloatArray | None:
     """Return the limits of which the largest share is the measure, shape (2, 10).
 
-    They are those of the design, as None, for a share. For a force or a moment they are one newton
-    or one newton metre, in N × unit, of each part concerned.
+    They are those of the design, as None, for a share, and else one newton or one newton metre, in
+    N × unit, of each part concerned.
     """
     if measure == "share":
         return None
@@ -188,18 +191,6 @@ def measured_limits(design: Design, measure: PartMeasure) -> FloatArray | None:
     else:
         limits[:, 6:8] = 1e3 / design.unit_mm
     return limits
-
-
-def _proximity(
-    measure: PositionMeasure, unit: float, measured: Callable[[FloatArray], FloatArray]
-) -> PositionBands:
-    """Return the bands of the proximity to singularities."""
-    levels = tuple(unit * edge for edge in BAND_EDGES)
-
-    def values(points: FloatArray) -> FloatArray:
-        return measured(points) / unit
-
-    return PositionBands(measure, BAND_EDGES, band_colours(), levels, values)
 
 
 def _unbounded(

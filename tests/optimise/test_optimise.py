@@ -38,13 +38,7 @@ from explorer.optimise.defaults import paper_problem, paper_start, reach_problem
 from explorer.optimise.demands import AZIMUTHS
 from explorer.optimise.outcome import Iterate, Outcome
 from explorer.optimise.problem import DISTANCES, ObjectiveName, Problem, Variable, distance_of
-from explorer.optimise.record import (
-    Settings,
-    decode_record,
-    encode_record,
-    load_record,
-    record_of,
-)
+from explorer.optimise.record import Settings, decode_record, encode_record, load_record, record_of
 from explorer.optimise.search.model import Model
 from explorer.optimise.search.optimality import optimality
 from explorer.optimise.search.starts import more_starts
@@ -426,10 +420,7 @@ def make_from(start: Design = OPTIMAL, *, bound: Any = None, **arguments: Any) -
         ({}, "match-volume needs a volume"),
         ({"volume": -1.0}, "must be a positive, finite number; got -1"),
         (VOLUME | {"clearance": math.nan}, "clearance demanded must be a finite"),
-        (
-            VOLUME | {"clearance": 0.1, "clearance_margin": 0.0},
-            "positive clearance",
-        ),
+        (VOLUME | {"clearance": 0.1, "clearance_margin": 0.0}, "positive clearance"),
         (VOLUME | {"least": 5.0}, "below the least allowed 5"),
         (VOLUME | {"stroke_ratio": 1.0}, "stroke ratio is longest over shortest"),
         ({"objective": "largest-margin", "free": ["yaw"]}, "needs a required box"),
@@ -478,9 +469,7 @@ LARGE_BOX = ((6.0, 1.0, 1.0), (14.0, 9.0, 11.0))
 def loaded(force: float, **actuators: Any) -> Design:
     """Return the paper's optimum without a box, with a force and its actuators."""
     return msgspec.structs.replace(
-        limited(OPTIMAL, box=None),
-        payload=Payload(force_n=force),
-        actuators=Actuators(**actuators),
+        limited(OPTIMAL, box=None), payload=Payload(force_n=force), actuators=Actuators(**actuators)
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import msgspec
@@ -62,24 +61,6 @@ def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
     given = Configuration(design, *there, design.tool.position), load
     here = limit_shares(design, reactions(*given, weights or design_weights(design)))[0]
     assert here[along.part] == here.max() == pytest.approx(along.share, rel=1e-10)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_path_loads_of_moves_near_singular_poses_bound_dense_samples(seed: int) -> None:
-    rng = np.random.default_rng([4, seed])
-    design = random_machine(OPTIMAL, seed)
-    home = design.home_pose
-    x, y, _ = home.position
-    # b4 dips towards the base plane, δ3 = 0, without touching it.
-    low = 10.0 ** -float(rng.uniform(1.0, 4.0))
-    poses = [home, Pose((x + 1.0, y, low), home.quaternion), home]
-    load = rng.normal(size=6) * 20.0
-    along = path_loads(design, poses, load)
-    moves = [dense_shares(design, m, load, None, np.zeros(3)) for m in itertools.pairwise(poses)]
-    most = max(float(each.max()) for each in moves)
-    assert along.share >= 0.999 * most
-    assert most <= along.bound <= (1.0 + TOLERANCE) * along.share
-    assert along.place == pytest.approx(1.0, abs=0.05)
 
 
 def test_path_loads_samples_have_the_shares_of_their_poses() -> None:

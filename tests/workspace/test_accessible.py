@@ -8,7 +8,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from limited_designs import limited, ordinary_case, scaled_design
+from limited_designs import limited, ordinary_case
 from long_cases import long_after
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order
@@ -147,14 +147,6 @@ def test_blocked_volume_is_that_of_a_pair_alone() -> None:
     # The pair (2, 4) has the sum of radii 0.4 in both designs.
     again = {pair.legs: pair.blocked_volume for pair in alone.pairs}
     assert again[(2, 4)] == pytest.approx(blocked[(2, 4)], rel=1e-3)
-
-
-@pytest.mark.parametrize("by", [1e-4, pytest.param(1e4, marks=pytest.mark.long)])
-def test_accessible_workspace_of_a_scaled_design_is_scaled(by: float) -> None:
-    small, large = thick(OPTIMAL, 0.01), scaled_design(thick(OPTIMAL, 0.01), by)
-    one, other = accessible_workspace(small, nodes=12), accessible_workspace(large, nodes=12)
-    assert other.accessible_volume / by**3 == pytest.approx(one.accessible_volume, rel=2e-5)
-    assert other.accessible_node_count == one.accessible_node_count
 
 
 def test_accessible_workspace_within_empty_limits_is_empty() -> None:

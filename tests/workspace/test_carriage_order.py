@@ -41,9 +41,7 @@ MIRRORED = np.diag([-1.0, -1.0, 1.0]) @ OPTIMAL.home_pose.rotation
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_order_with_d3_less_d1_of_the_other_sign_than_at_home_is_a_violation(
-    seed: int,
-) -> None:
+def test_order_with_d3_less_d1_of_the_other_sign_than_at_home_is_a_violation(seed: int) -> None:
     design, _ = ordinary_case(seed)
     home = design.home_pose
     rotations = Rotation.random(20, random_state=np.random.default_rng(seed)).as_matrix()
@@ -51,13 +49,7 @@ def test_order_with_d3_less_d1_of_the_other_sign_than_at_home_is_a_violation(
     at_home = evaluate(design, home).joints
     other = (joints[:, 3] - joints[:, 1]) * (at_home[3] - at_home[1]) < 0.0
     assert 0 < other.sum() < len(other)
-    only = limited(
-        design,
-        **dict.fromkeys(LENGTHS, (0.0, 1e3)),
-        guide=None,
-        box=None,
-        margin=None,
-    )
+    only = limited(design, **dict.fromkeys(LENGTHS, (0.0, 1e3)), guide=None, box=None, margin=None)
     plain = limited(only, carriage_order="any")
     within = orientations_within(only, home.position, rotations)
     np.testing.assert_array_equal(within, ~other)

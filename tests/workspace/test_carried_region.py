@@ -136,9 +136,7 @@ def test_new_faces_lie_where_a_part_takes_its_limit(name: str) -> None:
 # The design file of the manual's page on loads: no limits of lengths, and a rounded home.
 COUNT = 300_000
 UNBOUNDED = msgspec.structs.replace(
-    PRESS,
-    home=Pose((10.0, 5.0, 9.0), (0.80334, 0.0, 0.0, -0.59552)),
-    limits=Limits(),
+    PRESS, home=Pose((10.0, 5.0, 9.0), (0.80334, 0.0, 0.0, -0.59552)), limits=Limits()
 )
 
 

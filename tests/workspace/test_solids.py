@@ -122,9 +122,7 @@ def test_solid_between_near_minima_and_maxima_has_the_exact_volume(seed: int) ->
     assert_lies_on_its_limits(solid, design, rotation)
 
 
-def test_solid_not_refined_disagrees_and_so_do_its_parts(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_solid_not_refined_disagrees_and_so_do_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("explorer.workspace.solids.solids.MOST_REFINED", 0)
     design, volume = lens(1e-3)
     solid = workspace_solid(design)
@@ -234,17 +232,6 @@ def test_solid_of_coincident_limits_is_closed() -> None:
     solid = workspace_solid(equal)
     assert solid.is_watertight
     assert solid.volume == pytest.approx(workspace_volume(equal).volume, rel=1e-4)
-
-
-def test_solid_of_nearly_coincident_cylinders_is_closed() -> None:
-    # Near the identity the axes of both cylinders nearly coincide.
-    for angle in 10.0 ** -np.arange(1.0, 14.0, 4.0):
-        rotation = Rotation.from_rotvec([0.0, angle, angle]).as_matrix()
-        design = limited(OPTIMAL, margin=None)
-        solid = workspace_solid(design, rotation)
-        assert solid.is_watertight
-        exact = workspace_volume(design, rotation).volume
-        assert solid.volume == pytest.approx(exact, rel=1e-4)
 
 
 @pytest.mark.parametrize(

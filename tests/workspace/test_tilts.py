@@ -12,21 +12,14 @@ from limited_designs import limited, ordinary_case, troubled_case
 from long_cases import long_after
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, Design, InputError, evaluate, inverse
+from explorer import PRESETS, Design, InputError, evaluate
 from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.table import CARRIAGE_ORDER
-from explorer.workspace.orientations.share import (
-    orientation_capability,
-    orientations_within,
-)
+from explorer.workspace.orientations.share import orientation_capability, orientations_within
 from explorer.workspace.orientations.tilts import greatest_tilt, greatest_tilts, tilt_map
-from explorer.workspace.orientations.torsions import (
-    is_connected,
-    tilt_by_torsion,
-    torsion_range,
-)
+from explorer.workspace.orientations.torsions import is_connected, tilt_by_torsion, torsion_range
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -316,19 +309,3 @@ def test_orientations_of_two_torsions_are_connected_within_the_range_of_torsions
         assert is_connected(design, p, middle, turned_to(torsion))
     for torsion in np.linspace(span.high + 0.01, span.low + 359.99, 9).tolist():
         assert not is_connected(design, p, middle, turned_to(torsion))
-
-
-def test_torsion_range_whose_half_turn_ends_on_a_limit_has_both_ends() -> None:
-    design = PRESETS["paper-optimal"]
-    free = limited(design, margin=None, carriage_order="any", box=None)
-    p = design.home_pose.position
-    rng = np.random.default_rng(0)
-    for torsion in rng.uniform(-180.0, 180.0, 12).tolist():
-        longest = float(inverse(free, p, tilted(0.0, np.zeros(1), torsion + 180.0)[0])[0])
-        for bound in longest + 1e-15 * longest * np.arange(-3, 4):
-            found = torsion_range(limited(free, l1=(0.0, float(bound))), p, torsion)
-            assert math.isnan(found.low) == math.isnan(found.high)
-            if not math.isnan(found.low):
-                assert torsion - 360.0 <= found.low <= torsion <= found.high <= torsion + 360.0
-                assert found.high - found.low <= 360.0 + 1e-9
-                assert (found.low_limit is None) == (found.high_limit is None)

@@ -12,13 +12,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from limited_designs import (
-    REFERENCE,
-    limited,
-    ordinary_case,
-    reference_case,
-    scaled_design,
-)
+from limited_designs import REFERENCE, limited, ordinary_case, reference_case
 from long_cases import long_after
 from scipy.spatial.transform import Rotation
 
@@ -28,11 +22,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import YAW, constraints
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.nodes import column_lengths
-from explorer.workspace.slices.volume import (
-    home_rotation,
-    workspace_nodes,
-    workspace_volume,
-)
+from explorer.workspace.slices.volume import home_rotation, workspace_nodes, workspace_volume
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -118,19 +108,6 @@ def test_volume_gradient_is_that_of_central_differences(seed: int) -> None:
             workspace_volume(*varied(design, rotation, name, by)).volume for by in (1e-5, -1e-5)
         )
         assert rate == pytest.approx((ahead - behind) / 2e-5, abs=1e-5 * largest), name
-
-
-@pytest.mark.parametrize(("seed", "s"), [(0, 1e-4), (1, 1e3)])
-def test_volume_of_a_scaled_design_scales_with_the_cube(seed: int, s: float) -> None:
-    design, rotation = ordinary_case(seed)
-    larger = scaled_design(design, s)
-    found, large = (workspace_volume(each, rotation) for each in (design, larger))
-    assert large.volume == pytest.approx(found.volume * s**3, rel=1e-9)
-    for name, rate in found.gradient.items():
-        power = 3 if name == YAW else 2
-        assert large.gradient[name] == pytest.approx(rate * s**power, rel=1e-6, abs=1e-6 * s**power)
-    count = workspace_nodes(design, rotation, 0.5).count
-    assert workspace_nodes(larger, rotation, 0.5 * s).count == count
 
 
 @pytest.mark.parametrize(

@@ -29,11 +29,7 @@ from explorer.optimise.search.demands.geometry import (
     VolumeDemand,
     tilt_demands,
 )
-from explorer.optimise.search.demands.loads import (
-    CAUSES,
-    DisplacementDemand,
-    LoadDemand,
-)
+from explorer.optimise.search.demands.loads import CAUSES, DisplacementDemand, LoadDemand
 from explorer.optimise.search.state import UNBOUNDED, State, scaled_bounds, scales
 
 MISSED = 1e3

@@ -69,19 +69,11 @@ def slsqp(
 
 
 def solve(
-    model: Model,
-    start: FloatArray,
-    *,
-    see: Callable[[Evaluation], None],
-    most: int,
+    model: Model, start: FloatArray, *, see: Callable[[Evaluation], None], most: int
 ) -> Ended:
-    """Run SLSQP on a model, to the end or until `Stop` is raised.
+    """Run SLSQP on a model from scaled variables, to the end or until `Stop` is raised.
 
-    Args:
-        model: The problem.
-        start: Scaled variables, shape (n,), of a design that can exist.
-        see: Called with each accepted iterate, the start among them; may raise `Stop`.
-        most: Most iterations.
+    Each accepted iterate is seen, the start among them.
     """
     seen: list[Evaluation] = []
 

@@ -28,11 +28,7 @@ CANDIDATES = 64
 
 
 def check_starts(starts: int) -> None:
-    """Refuse a number of starts that no search has.
-
-    Raises:
-        InputError: it is less than one, or more than `MOST_STARTS`.
-    """
+    """Raise an `InputError` if a number of starts is less than one or more than `MOST_STARTS`."""
     if not 1 <= starts <= MOST_STARTS:
         raise InputError(f"the number of starts must lie within 1 to {MOST_STARTS}; got {starts}")
 

@@ -15,10 +15,7 @@ import numpy as np
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import decode_design, encode_design
-from explorer.mechanism.pose import (
-    rotation_from_yaw_pitch_roll,
-    yaw_pitch_roll_from_rotation,
-)
+from explorer.mechanism.pose import rotation_from_yaw_pitch_roll, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.demands import Box
 from explorer.optimise.problem import REACH, YAW, Problem

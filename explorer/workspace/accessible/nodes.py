@@ -101,9 +101,7 @@ class Survey:
     def accessible_from(self, start: FloatArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
         """Return which nodes are accessible within the limits, shape (nx, ny, nz).
 
-        Args:
-            start: Position that keeps all limits and clearances, shape (3,).
-            pairs: Indices of the pairs that count.
+        The start, shape (3,), keeps all limits and clearances. Only some pairs may count.
         """
         return self._component(self.nodes_near(start, pairs), self.within, pairs)
 

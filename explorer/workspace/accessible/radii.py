@@ -116,8 +116,7 @@ def radius_curve(
     stages.begin("least clearances")
     least = least_clearances(thin, r)
     stages.begin("grid of positions")
-    lows, highs = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
-    surveyed = survey(thin, r, make_cell_grid(lows, highs, cells))
+    surveyed = survey(thin, r, make_cell_grid(*whole.ends, cells))
     stages.begin("widest paths")
     widest = 0.5 * _bottleneck_clearances(surveyed, p)[surveyed.within]
     radii = np.linspace(0.0, float(widest.max(initial=0.0)), POINTS)

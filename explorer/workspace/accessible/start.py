@@ -36,11 +36,9 @@ class StartError(InputError):
 
 
 def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> None:
-    """Check that a position (3,) keeps the limits and that no legs collide there.
+    """Raise a `StartError` unless a position (3,) keeps the limits and no legs collide there.
 
-    Raises:
-        StartError: the position is not valid; the message names the limits or the pairs of
-            legs, and the nearest valid position.
+    Its message names the limits or the pairs of legs, and the nearest valid position.
     """
     faults = start_faults(design, rotation, position)
     if not faults:

@@ -22,14 +22,7 @@ from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.stages import Stages, Watch, unwatched
 from explorer.workspace.accessible.collision_surface import nearest_pair, project_onto_collisions
-from explorer.workspace.accessible.nodes import (
-    ALL_PAIRS,
-    SLACK,
-    Grid,
-    Survey,
-    make_grid,
-    survey,
-)
+from explorer.workspace.accessible.nodes import ALL_PAIRS, SLACK, Grid, Survey, make_grid, survey
 from explorer.workspace.accessible.start import check_start, start_faults
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.limits.constraints import Constraint, constraints
@@ -195,9 +188,7 @@ def _paper_nodes(
     Both counts are None if the grid has more nodes than `most`.
     """
     first, counts = node_range(region_of(limits), step)
-    with np.errstate(over="ignore"):
-        is_too_fine = most is not None and not float(np.prod(counts)) <= most
-    if is_too_fine:
+    if most is not None and float(np.prod(counts)) > most:
         return None, None
     check_node_count(counts, step, MOST_PAPER_NODES)
     if not counts.all():
@@ -210,27 +201,26 @@ def _paper_nodes(
     return int(surveyed.within.sum()), accessible
 
 
+@dataclass(frozen=True)
 class _Carver:
     """A cutter of the workspace within the limits, of known volume, along collisions of legs."""
 
-    def __init__(
-        self,
-        design: Design,
-        rotation: FloatArray,
-        start: FloatArray,
-        whole: Solid,
-        volume: float,
-        nodes: int,
-    ) -> None:
-        self.design, self.rotation, self.start = design, rotation, start
-        self.whole, self.volume, self.nodes = whole, volume, nodes
-        self.radii = radii_of_pairs(design)
+    design: Design
+    rotation: FloatArray
+    start: FloatArray
+    whole: Solid
+    volume: float
+    nodes: int
+
+    @cached_property
+    def radii(self) -> FloatArray:
+        """Sums of the radii of the pairs, shape (6,)."""
+        return radii_of_pairs(self.design)
 
     @cached_property
     def survey(self) -> Survey:
         """The survey of the grid, needed only if a pair may collide."""
-        lows, highs = self.whole.vertices.min(axis=0), self.whole.vertices.max(axis=0)
-        grid = make_grid(lows, highs, self.nodes, BEYOND)
+        grid = make_grid(*self.whole.ends, self.nodes, BEYOND)
         return survey(self.design, self.rotation, grid)
 
     def blocks(self, pair: int) -> bool:

@@ -65,10 +65,7 @@ def divide(faces: IntArray, high: BoolArray) -> Division:
 
 
 def find_roots(
-    value: Callable[[FloatArray], FloatArray],
-    low: FloatArray,
-    high: FloatArray,
-    tolerance: float,
+    value: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray, tolerance: float
 ) -> FloatArray:
     """Return where n functions of a parameter from 0 to 1 are zero, shape (n,).
 

@@ -192,12 +192,7 @@ def _cut_by(cut: _Cut, surfaces: Surfaces, index: int, rounding: float) -> _Cut:
 
 
 def _cross(
-    cut: _Cut,
-    surfaces: Surfaces,
-    index: int,
-    value: FloatArray,
-    ends: IntArray,
-    rounding: float,
+    cut: _Cut, surfaces: Surfaces, index: int, value: FloatArray, ends: IntArray, rounding: float
 ) -> tuple[FloatArray, IntArray]:
     """Return the points at which edges (k, 2) cross a surface, and the other cuts of the edges.
 
@@ -258,12 +253,7 @@ def _compact(cut: _Cut) -> _Cut:
     """Leave out the vertices that no triangle has."""
     used = _used(cut)
     number = np.cumsum(used) - 1
-    return _Cut(
-        cut.vertices[used],
-        cut.owner[used],
-        cut.cuts[used],
-        number[cut.triangles],
-    )
+    return _Cut(cut.vertices[used], cut.owner[used], cut.cuts[used], number[cut.triangles])
 
 
 def _normals(vertices: FloatArray, triangles: IntArray) -> FloatArray:

@@ -69,10 +69,7 @@ class Surfaces:
 
     def distances_from(self, points: FloatArray, index: int) -> FloatArray:
         """Return signed distances (n,) of points (n, 3) from one surface, see `distances`."""
-        limit = self._limits[index]
-        slack = limit.slack(points)
-        is_distance = isinstance(limit, BallOrCylinder)
-        return slack if is_distance else np.copysign(limit.distance(points), slack)
+        return self._limits[index].signed_distance(points)
 
     def settle(
         self, points: FloatArray, which: IntArray, error: float

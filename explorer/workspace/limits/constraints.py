@@ -22,19 +22,7 @@ from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, position_array
 from explorer.workspace.limits.limit import Bound, Demand, LegAngle
-from explorer.workspace.limits.quantities import (
-    D1,
-    D2,
-    D3,
-    D4,
-    DELTA1,
-    DELTA2,
-    L1,
-    L4,
-    ORDER,
-    X,
-    Z,
-)
+from explorer.workspace.limits.quantities import D1, D2, D3, D4, DELTA1, DELTA2, L1, L4, ORDER, X, Z
 from explorer.workspace.limits.table import demands_of
 
 YAW = "yaw"
@@ -49,8 +37,24 @@ ACROSS = np.array([0.0, 1.0, 1.0])
 PARALLEL = 1e-15
 
 
+class _Distances:
+    """Distances that follow from the slack of a limit."""
+
+    def slack(self, p: FloatArray) -> FloatArray:
+        """Return the slack of positions (..., 3); negative where violated."""
+        raise NotImplementedError
+
+    def signed_distance(self, p: FloatArray) -> FloatArray:
+        """Return the distances of positions (..., 3) from the surface, negative outside."""
+        return self.slack(p)
+
+    def distance(self, p: FloatArray) -> FloatArray:
+        """Return the distances of positions (..., 3) from the surface; infinite if it has none."""
+        return np.abs(self.signed_distance(p))
+
+
 @dataclass(frozen=True)
-class BallOrCylinder:
+class BallOrCylinder(_Distances):
     """A limit on the distance of p from a point (a ball) or from a line along x (a cylinder).
 
     Attributes:
@@ -77,17 +81,13 @@ class BallOrCylinder:
         )
         return self.radius - distance if self.inside else distance - self.radius
 
-    def distance(self, p: FloatArray) -> FloatArray:
-        """Return the distances of positions (..., 3) from the surface."""
-        return np.abs(self.slack(p))
-
     def shifted(self, offset: FloatArray) -> BallOrCylinder:
         """Return the limit of positions that are moved by a constant vector, shape (3,)."""
         return replace(self, centre=self.centre + offset)
 
 
 @dataclass(frozen=True)
-class HalfSpace:
+class HalfSpace(_Distances):
     """The positions with normal · p <= offset.
 
     Attributes:
@@ -106,9 +106,9 @@ class HalfSpace:
         """Return the slack of positions (..., 3) in design units; negative where violated."""
         return self.offset - p @ self.normal
 
-    def distance(self, p: FloatArray) -> FloatArray:
-        """Return the distances of positions (..., 3) from the surface."""
-        return np.abs(self.slack(p)) / float(np.linalg.norm(self.normal))
+    def signed_distance(self, p: FloatArray) -> FloatArray:
+        """Return the distances of positions (..., 3) from the surface, negative outside."""
+        return self.slack(p) / float(np.linalg.norm(self.normal))
 
     def shifted(self, offset: FloatArray) -> HalfSpace:
         """Return the limit of positions that are moved by a constant vector, shape (3,)."""
@@ -120,7 +120,7 @@ class HalfSpace:
 
 
 @dataclass(frozen=True)
-class Cone:
+class Cone(_Distances):
     """The positions at which a leg lies within the cone of a joint.
 
     Attributes:
@@ -141,9 +141,9 @@ class Cone:
         """Return the slack of positions (..., 3) in radians; negative outside the cone."""
         return self.half_angle - angle_between(self._leg(p), self.axis)
 
-    def distance(self, p: FloatArray) -> FloatArray:
+    def signed_distance(self, p: FloatArray) -> FloatArray:
         """Return the distances of positions (..., 3) from the nearby surface, to first order."""
-        return np.abs(self.slack(p)) * np.linalg.norm(self._leg(p), axis=-1)
+        return self.slack(p) * np.linalg.norm(self._leg(p), axis=-1)
 
     def shifted(self, offset: FloatArray) -> Cone:
         """Return the limit of positions that are moved by a constant vector, shape (3,)."""
@@ -154,7 +154,7 @@ class Cone:
 
 
 @dataclass(frozen=True)
-class Never:
+class Never(_Distances):
     """A limit that no position satisfies at this orientation."""
 
     name: str
@@ -162,10 +162,6 @@ class Never:
     def slack(self, p: FloatArray) -> FloatArray:
         """Return minus infinity for positions (..., 3)."""
         return np.full(p.shape[:-1], -math.inf)
-
-    def distance(self, p: FloatArray) -> FloatArray:
-        """Return infinity for positions (..., 3), since the limit has no surface."""
-        return np.full(p.shape[:-1], math.inf)
 
     def shifted(self, _: FloatArray) -> Never:
         """Return the limit itself."""
@@ -180,10 +176,7 @@ def constraints(
 ) -> tuple[Constraint, ...]:
     """Return the limits of a design at an orientation, in the order of the design file.
 
-    Args:
-        design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        signs: Sign triple to demand instead of the home's, even if no margin is demanded.
+    A sign triple may be demanded instead of the home's, even if no margin is demanded.
 
     Raises:
         InputError: not a rotation.

@@ -199,8 +199,7 @@ def contract_box(
         half += 1e-12 * (size + float(np.abs([lows, highs]).max()))
         for limit in limits:
             if not isinstance(limit, Cone):
-                steepest = np.linalg.norm(limit.normal) if isinstance(limit, HalfSpace) else 1.0
-                satisfiable = limit.slack(middles) >= -half * float(steepest)
+                satisfiable = limit.signed_distance(middles) >= -half
                 cells, middles = cells[satisfiable], middles[satisfiable]
         if not len(cells):
             return None

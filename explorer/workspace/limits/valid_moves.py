@@ -72,19 +72,18 @@ def moves_are_valid(
 ) -> BoolArray:
     """Return whether straight moves are proven to satisfy all limits and clearances, shape (...).
 
-    A move that turns by half a turn is not valid, since neither way is the shorter one.
+    A move that turns by half a turn is not valid, since neither way is the shorter one. The ends
+    are positions of b4 in the base frame, shape (..., 3), and rotations from platform to base.
 
     Args:
         design: The manipulator.
-        start_position: b4 in the base frame, shape (..., 3), in design units.
-        start_rotation: Platform to base, shape (..., 3, 3).
-        end_position: As the start.
-        end_rotation: As the start.
+        start_position: Position at the start.
+        start_rotation: Rotation at the start.
+        end_position: Position at the end.
+        end_rotation: Rotation at the end.
         rules: Rules of the design, if they have been computed before.
-        tolerance: Length by which limits may be exceeded on the way, in design units; a
-            10,000th of the reach if None.
-        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
-            for b4.
+        tolerance: Length by which limits may be exceeded; a 10,000th of the reach if None.
+        tool: Point that moves straight in the platform frame, shape (3,); None for b4.
 
     Raises:
         InputError: a pose that is not finite or not a rotation, or not a point.

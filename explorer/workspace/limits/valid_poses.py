@@ -76,11 +76,9 @@ class Rules:
         return Rules(row, self.demands)
 
     def tighten(self, margin: float, clearance: float) -> Rules:
-        """Return rules that demand at least a margin and a clearance.
+        """Return rules that demand at least a margin and a clearance beyond the radii, in units.
 
-        Args:
-            margin: Least margin in design units; ignored if the rules demand no margin.
-            clearance: Clearance beyond the radii, in design units.
+        The margin is ignored if the rules demand none.
         """
         row, demands = self.row.copy(), self.demands.copy()
         row[RADII:] = np.where(row[RADII:] < 0.0, row[RADII:], row[RADII:] + clearance)
@@ -234,10 +232,7 @@ def violations(
 ) -> list[tuple[Violation, ...]]:
     """Return the limits that each pose of a batch violates, in the order of the design file.
 
-    Args:
-        configuration: A design in n poses, or in one.
-        signs: Sign triple to demand instead of the home's, even if no margin is demanded.
-        order: Sign of d3 − d1 to demand, 0 for either; the design's if None.
+    For the signs and the order of the carriages see `demands_of`.
     """
     design = configuration.design
     demands, row = demands_of(design, signs, order), configuration.variables

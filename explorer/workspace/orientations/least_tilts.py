@@ -132,10 +132,7 @@ def write_worst_azimuths(search: TurnSearch, torsion: float, worst: FloatArray) 
                 if sign * p[i] + arm > bound:
                     end = sign * arm
                     worst[count] = azimuth_towards(
-                        v,
-                        end if i == 0 else 0.0,
-                        end if i == 1 else 0.0,
-                        end if i == 2 else 0.0,
+                        v, end if i == 0 else 0.0, end if i == 1 else 0.0, end if i == 2 else 0.0
                     )
                     count += 1
     return count

@@ -21,12 +21,7 @@ from explorer.mechanism.tool_point import one_tool
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, position_array
 from explorer.workspace.limits.valid_poses import Rules
 from explorer.workspace.orientations.least_tilts import least_tilt_rows
-from explorer.workspace.orientations.sets import (
-    MOST_ANGLES,
-    even_angles,
-    one_angle,
-    one_position,
-)
+from explorer.workspace.orientations.sets import MOST_ANGLES, even_angles, one_angle, one_position
 from explorer.workspace.orientations.turns import NO_LIMIT, limit_names, tilt_rows
 
 AZIMUTHS = 72
@@ -116,10 +111,7 @@ def tilt_map(
 
 
 def greatest_tilt(
-    design: Design,
-    position: ArrayLike,
-    torsion: float | None = None,
-    tool: ArrayLike | None = None,
+    design: Design, position: ArrayLike, torsion: float | None = None, tool: ArrayLike | None = None
 ) -> GreatestTilt:
     """Return the greatest tilt of a position in every azimuth.
 

@@ -108,10 +108,7 @@ def torsion_range(
 
 
 def tilt_by_torsion(
-    design: Design,
-    position: ArrayLike,
-    torsions: int = TORSIONS,
-    tool: ArrayLike | None = None,
+    design: Design, position: ArrayLike, torsions: int = TORSIONS, tool: ArrayLike | None = None
 ) -> TiltByTorsion:
     """Return the greatest tilt in every azimuth of a position at a number of torsions once around.
 

@@ -155,9 +155,7 @@ def add_breaks_of_line(boundary: Boundary, k: int) -> None:
         rest = planes[k, OFFSET] / norm - ay * circles[j, Y] - az * circles[j, Z]
         x, r, ball = circles[j, X], circles[j, RADIUS], circles[j, IS_BALL]
         for root in real_roots(
-            ax * ax + ball,
-            -2.0 * (rest * ax + ball * x),
-            rest * rest - r * r + ball * x * x,
+            ax * ax + ball, -2.0 * (rest * ax + ball * x), rest * rest - r * r + ball * x * x
         ):
             along = rest - ax * root
             y, z = circles[j, Y] + along * ay, circles[j, Z] + along * az

@@ -105,16 +105,10 @@ class _Curve:
 
 
 def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) -> Outline | None:
-    """Return the outline of a slice of the constant-orientation workspace.
+    """Return the outline of a slice of a workspace across "x", "y" or "z"; None if there is none.
 
-    None if a limit on a swing bounds it, since a plane does not cut a cone in circles, or if
-    edges cannot be distinguished in double precision.
-
-    Args:
-        design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        axis: Axis across which to cut, "x", "y" or "z". The slice's own axes are the other two.
-        level: Coordinate on this axis, in design units.
+    There is none if a limit on a swing bounds it, since a plane does not cut a cone in circles, or
+    if edges cannot be distinguished in double precision. The level is the coordinate on the axis.
 
     Raises:
         InputError: no such axis, or not a rotation.

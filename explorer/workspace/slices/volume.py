@@ -21,12 +21,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import positive
-from explorer.workspace.limits.constraints import (
-    BallOrCylinder,
-    Constraint,
-    HalfSpace,
-    constraints,
-)
+from explorer.workspace.limits.constraints import BallOrCylinder, Constraint, HalfSpace, constraints
 from explorer.workspace.limits.region import Region, region_of
 from explorer.workspace.slices import nodes
 from explorer.workspace.slices.integration import (
@@ -120,10 +115,7 @@ def workspace_volume(
 
 
 def volume_within(region: Region, columns: int = COLUMNS) -> tuple[float, float]:
-    """Return the volume of a region and its error, as in `Volume`.
-
-    Regions with cones are divided in a number of columns per axis.
-    """
+    """Return the volume of a region and its error; with cones, of a number of columns per axis."""
     if len(region.cones):
         return _volume_of_columns(region, columns)
     volume, error, _ = _volume_of_slices(region)
@@ -135,10 +127,7 @@ def workspace_nodes(
 ) -> NodeCount:
     """Return the node count of the constant-orientation workspace.
 
-    Args:
-        design: The manipulator.
-        rotation: Platform to base, shape (3, 3); that of the home pose if None.
-        step: Step of the grid in design units; the design's, or else reach / 15, if None.
+    The rotation is that of the home pose if None, and the step that of `node_step_of`.
 
     Raises:
         InputError: not a rotation, a step that is not positive, or a grid of too many nodes.
@@ -171,11 +160,7 @@ def workspace_nodes(
 
 
 def node_step_of(design: Design, step: float | None = None) -> float:
-    """Return the step of the paper's grid: the given one, the design's, or reach / 15.
-
-    Raises:
-        InputError: the step is not positive.
-    """
+    """Return the step of the paper's grid, a positive one: given, the design's, or reach / 15."""
     width = step if step is not None else design.node_step or design.reach / STEPS_IN_REACH
     return positive("the node step", width)
 
@@ -189,11 +174,7 @@ def node_range(region: Region, step: float) -> tuple[FloatArray, FloatArray]:
 
 
 def check_node_count(counts: FloatArray, step: float, most: int) -> None:
-    """Refuse a grid with `counts` nodes per axis, (3,), that has more than `most` nodes.
-
-    Raises:
-        InputError: the grid has too many nodes.
-    """
+    """Raise an `InputError` if a grid, given by its nodes per axis (3,), has more than `most`."""
     count = float(np.prod(counts))
     if count > most:
         coarsest = step * (count / most) ** (1.0 / 3.0)

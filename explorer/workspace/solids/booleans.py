@@ -107,12 +107,7 @@ class Surface:
 def carved_solid(
     whole: Solid, surfaces: Iterable[Surface], seed: FloatArray | None = None
 ) -> Solid:
-    """Return a workspace less what surfaces remove.
-
-    Args:
-        whole: The workspace.
-        surfaces: The surfaces.
-        seed: Position in the part to return, shape (3,); None for all parts.
+    """Return a workspace less what surfaces remove: the part with a seed (3,), or all parts.
 
     Raises:
         ExplorerError: a boolean fails.
@@ -187,11 +182,7 @@ def _below_zero(surface: Surface, frame: Frame, face_id: int, near: Manifold) ->
 
 
 def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
-    """Return the part of a mesh in a half-space; the limit of faces in its plane is its name.
-
-    Raises:
-        ExplorerError: the boolean fails.
-    """
+    """Return the part of a mesh in a half-space; the limit of faces in its plane is its name."""
     if solid.is_empty:
         return solid
     body, frame, origins = _body_of(solid)
@@ -206,11 +197,7 @@ def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
 
 
 def convex_hull(solid: Solid) -> Solid:
-    """Return the convex hull of a mesh; the limit of all its faces is `HULL`.
-
-    Raises:
-        ExplorerError: the hull fails.
-    """
+    """Return the convex hull of a mesh; the limit of all its faces is `HULL`."""
     from manifold3d import Manifold
 
     if solid.is_empty:
@@ -236,8 +223,7 @@ def _in_order(faces: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def _frame_of(solid: Solid) -> Frame:
-    lows, highs = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    return frame_around(lows, highs, solid.tolerance)
+    return frame_around(*solid.ends, solid.tolerance)
 
 
 def _body_of(solid: Solid) -> tuple[Manifold, Frame, dict[int, int]]:

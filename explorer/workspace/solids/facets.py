@@ -303,9 +303,7 @@ def _stitch_rings(counts: IntArray, first: IntArray) -> IntArray:
     inner, outer = counts[pair], counts[pair + 1]
     inner_point, outer_point = first[pair] + passed[0] % inner, first[pair + 1] + passed[1] % outer
     third_point = np.where(
-        side == 0,
-        first[pair] + (passed[0] + 1) % inner,
-        first[pair + 1] + (passed[1] + 1) % outer,
+        side == 0, first[pair] + (passed[0] + 1) % inner, first[pair + 1] + (passed[1] + 1) % outer
     )
     # Rings go from the pole outwards, each counter-clockwise about z.
     return np.column_stack([inner_point, outer_point, third_point])

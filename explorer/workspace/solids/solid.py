@@ -50,12 +50,18 @@ class Solid:
         """Whether the mesh has no face, as a workspace thinner than the tolerance may have."""
         return len(self.faces) == 0
 
+    @property
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """(lows, highs) of the vertices, each (3,), of a mesh that is not empty."""
+        return self.vertices.min(axis=0), self.vertices.max(axis=0)
+
     @cached_property
     def volume(self) -> float:
         """The volume within the mesh, in cubed design units."""
         if self.is_empty:
             return 0.0
-        middle = 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
+        lows, highs = self.ends
+        middle = 0.5 * (lows + highs)
         a, b, c = ((self.vertices - middle)[self.faces[:, k]] for k in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 

@@ -94,14 +94,11 @@ def inclusive_solid(
     tolerance: float | None = None,
     tool: ArrayLike | None = None,
 ) -> Solid:
-    """Return the inclusive workspace of n orientations, the union over them, as a mesh.
+    """Return the inclusive workspace of n orientations (n, 3, 3), the union over them, as a mesh.
 
-    Args:
-        design: The manipulator.
-        rotations: Platform to base, shape (n, 3, 3).
-        tolerance: As in `workspace_solid`.
-        tool: Point of the platform whose positions count, shape (3,), in design units; None for
-            b4. The workspace of each orientation is moved by its own vector.
+    The positions are those of a point of the platform, shape (3,), in design units, or of b4 if
+    None; the workspace of each orientation is moved by its own vector. For the tolerance see
+    `workspace_solid`.
 
     Raises:
         InputError: not rotations, not a point, or no usable tolerance.
