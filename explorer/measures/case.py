@@ -124,7 +124,7 @@ class Case:
     def accessible_volume(self) -> tuple[float, str]:
         """The volume that a collision-free move from home leads to; else NaN and the reason."""
         # Both load the kernel of solids.
-        from explorer.workspace.accessible.start import StartError
+        from explorer.workspace.accessible.nodes import StartError
         from explorer.workspace.accessible.workspace import accessible_workspace
 
         try:

@@ -63,8 +63,8 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE
+from explorer.workspace.accessible.nodes import StartError, check_start
 from explorer.workspace.accessible.radii import RadiusCurve
-from explorer.workspace.accessible.start import StartError, check_start
 from explorer.workspace.accessible.workspace import accessible_workspace
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks

@@ -6,7 +6,6 @@ import csv
 import itertools
 import math
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -88,17 +87,6 @@ def test_trajectory_csv_reads_back_to_the_last_bit() -> None:
     assert [[float(word) for word in row[-3:]] for row in rows] == of_tool.tool_position.tolist()
     for earlier, later in itertools.pairwise(values[:, 0].tolist()):
         assert earlier < later
-
-
-@pytest.mark.parametrize("unit", [0.1, 1.0 / 3.0, 25.4])
-def test_trajectory_csv_header_has_the_exact_unit(unit: float) -> None:
-    found = trajectory(msgspec.structs.replace(DESIGN, unit_mm=unit), [HOME, HOME], samples=2)
-    # A path without motion takes no time.
-    assert found.duration == 0.0
-    assert np.isfinite(found.joints).all()
-    head = trajectory_csv(found).partition("\n")[0].split(",")
-    units = {name.partition(" [")[2].removesuffix(" mm]") for name in head if "[" in name}
-    assert [float(each) for each in units] == [unit]
 
 
 def test_trajectory_bad_input_is_refused() -> None:

@@ -29,9 +29,8 @@ from explorer.legs.moves import moves_are_clear
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.accessible.nodes import Grid, survey
+from explorer.workspace.accessible.nodes import Grid, check_start, nearest_clear_position, survey
 from explorer.workspace.accessible.radii import radius_curve, with_radius
-from explorer.workspace.accessible.start import check_start, nearest_clear_position
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.slices.volume import home_rotation, workspace_nodes

@@ -31,7 +31,7 @@ from explorer.workspace.limits.constraints import Never, constraints
 from explorer.workspace.limits.table import CARRIAGE_ORDER
 from explorer.workspace.orientations.share import orientations_within
 from explorer.workspace.slices.volume import workspace_nodes
-from explorer.workspace.solids.solids import inclusive_solid, total_solid, workspace_solid
+from explorer.workspace.solids.solids import workspace_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -74,17 +74,6 @@ def test_workspace_with_the_carriages_in_the_other_order_is_empty() -> None:
     plain = limited(design, carriage_order="any")
     assert workspace_volume(plain, MIRRORED).volume > 1000.0
     assert workspace_nodes(plain, MIRRORED).count > 100
-
-
-def test_inclusive_and_total_solids_respect_the_order() -> None:
-    design = limited(OPTIMAL, margin=None)
-    both = np.stack([design.home_pose.rotation, MIRRORED])
-    alone = workspace_solid(design).volume
-    assert inclusive_solid(design, both).volume == pytest.approx(alone, rel=1e-3)
-    assert total_solid(design, both).empty_because == (CARRIAGE_ORDER,)
-    plain = limited(design, carriage_order="any")
-    assert inclusive_solid(plain, both).volume > 1.005 * alone
-    assert not total_solid(plain, both).is_empty
 
 
 def yawed(yaw: float) -> Pose:

@@ -81,13 +81,6 @@ def test_share_is_the_same_for_a_seed_and_none_outside_the_box() -> None:
     assert (outside.share, outside.standard_error) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("n", [2, 19, 1001])
-def test_any_number_of_orientations_is_counted_in_full(n: int) -> None:
-    free = limited(OPTIMAL, margin=None, carriage_order="any", box=None)
-    assert orientation_share(free, [1.0, 1.0, 1.0], n).share == 1.0
-    assert 0.0 <= orientation_share(OPTIMAL, OPTIMAL.home_pose.position, n).share <= 1.0
-
-
 def test_unusable_positions_numbers_and_seeds_are_refused() -> None:
     p = OPTIMAL.home_pose.position
     refused: list[tuple[str, dict[str, Any]]] = [

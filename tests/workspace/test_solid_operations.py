@@ -110,16 +110,6 @@ def test_inclusive_and_total_solids_are_union_and_intersection_of_those_of_the_t
     assert (abs(inclusive.volume - at_b4.volume) > 0.01 * at_b4.volume) == any(tool)
 
 
-def test_inclusive_and_total_solids_of_one_orientation_are_its_workspace() -> None:
-    one = workspace_solid(OPTIMAL)
-    same = np.array([home_rotation(OPTIMAL)] * 3)
-    for family in (inclusive_solid(OPTIMAL, same), total_solid(OPTIMAL, same)):
-        assert family.volume == pytest.approx(one.volume, rel=1e-9)
-        assert {family.limits[k] for k in family.limit_of_face} == {
-            one.limits[k] for k in one.limit_of_face
-        }
-
-
 def test_inclusive_and_total_solids_empty_name_limits() -> None:
     opposite = rotation_from_yaw_pitch_roll([(-73.1, 0.0, 0.0), (73.1, 0.0, 0.0)])
     nothing = total_solid(OPTIMAL, opposite)

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from explorer.measures.statics import BoxStatics
-from explorer.mechanism.design import LENGTHS, VARIABLES, Design
+from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
@@ -125,9 +125,7 @@ class State:
         for index, (name, scale) in enumerate(zip(problem.names, scales(problem), strict=True)):
             unit = np.zeros(n)
             unit[index] = scale
-            if name in VARIABLES:
-                chain[name] = unit
-            elif name == YAW:
+            if name == YAW:
                 chain[YAW_PARAMETER] = np.radians(unit)
             elif name == REACH:
                 chain.update({f"{length} maximum": unit for length in LENGTHS})

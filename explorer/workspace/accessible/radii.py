@@ -21,8 +21,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.stages import Stages, Watch, unwatched
-from explorer.workspace.accessible.nodes import Survey, make_cell_grid, survey
-from explorer.workspace.accessible.start import check_start
+from explorer.workspace.accessible.nodes import Survey, check_start, make_cell_grid, survey
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.slices.volume import home_rotation, workspace_volume
 from explorer.workspace.solids.solids import workspace_solid

@@ -22,8 +22,16 @@ from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.stages import Stages, Watch, unwatched
 from explorer.workspace.accessible.collision_surface import nearest_pair, project_onto_collisions
-from explorer.workspace.accessible.nodes import ALL_PAIRS, SLACK, Grid, Survey, make_grid, survey
-from explorer.workspace.accessible.start import check_start, start_faults
+from explorer.workspace.accessible.nodes import (
+    ALL_PAIRS,
+    SLACK,
+    Grid,
+    Survey,
+    check_start,
+    make_grid,
+    start_faults,
+    survey,
+)
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.limits.constraints import Constraint, constraints
 from explorer.workspace.limits.region import region_of

@@ -15,7 +15,7 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.numerics.stages import Watch
-from explorer.workspace.accessible.start import StartError
+from explorer.workspace.accessible.nodes import StartError
 from explorer.workspace.accessible.workspace import (
     PairCost,
     accessible_workspace,
