@@ -84,11 +84,7 @@ MOST_ANGLES = 100_000
 
 
 def one_position(position: ArrayLike) -> FloatArray:
-    """Return one position (3,) after checking it.
-
-    Raises:
-        InputError: The position is not finite, or there are several.
-    """
+    """Return one position (3,); an `InputError` says if it is not finite, or there are several."""
     p = position_array("position", position)
     if p.ndim != 1:
         raise InputError(f"give one position, three numbers; got the shape {p.shape}")
@@ -96,11 +92,7 @@ def one_position(position: ArrayLike) -> FloatArray:
 
 
 def one_angle(name: str, angle: ArrayLike) -> float:
-    """Return one angle after checking it.
-
-    Raises:
-        InputError: The angle is not finite, or there are several.
-    """
+    """Return one angle; an `InputError` says if it is not finite, or there are several."""
     value = finite_array(name, angle, ())
     if value.ndim:
         raise InputError(f"give one {name}, a number; got the shape {value.shape}")
@@ -108,11 +100,7 @@ def one_angle(name: str, angle: ArrayLike) -> float:
 
 
 def whole_number(name: str, value: ArrayLike, least: int, most: int | None = None) -> int:
-    """Return a whole number from `least` to `most` after checking it; 3.0 counts as whole.
-
-    Raises:
-        InputError: The value is not one whole number, or beyond the bounds.
-    """
+    """Return a whole number from `least` to `most`, or raise an `InputError`; 3.0 is whole."""
     array = np.asarray(value)
     if not (array.ndim == 0 and array.dtype.kind in "iuf" and float(array).is_integer()):
         raise InputError(f"{name} must be a whole number; got {value}")
@@ -125,10 +113,6 @@ def whole_number(name: str, value: ArrayLike, least: int, most: int | None = Non
 
 
 def even_angles(name: str, count: ArrayLike, fewest: int = 3) -> FloatArray:
-    """Return angles in degrees at equal distances once around from 0 on, shape (count,).
-
-    Raises:
-        InputError: Not a whole number, or too few or too many angles.
-    """
+    """Return a checked number of angles in degrees at equal distances once around from 0 on."""
     number = whole_number(f"the number of {name}", count, fewest, MOST_ANGLES)
     return np.asarray(np.arange(number) * (360.0 / number), dtype=np.float64)
