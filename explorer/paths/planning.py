@@ -16,6 +16,7 @@ import dataclasses
 import math
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -166,7 +167,7 @@ def plan_path(
     for kernel in (divide_line, valid_move_rows, valid_rows, write_poses):
         kernel.compile()
     started = time.perf_counter()
-    planner = _Planner(design, start, goal, seed, tool, demanded_load)
+    planner = _Planner(design, (start, goal), seed, tool, demanded_load)
     rules = Rules.of(design, ends[0].signs, _order(ends[0]))
     margin, clearance = _preferred_bounds(*ends)
     demanded = _Demand(rules, 0.0, 0.0)
@@ -197,37 +198,33 @@ class _Demand(NamedTuple):
     clearance: float
 
 
+@dataclass
 class _Planner:
-    """Searches for paths between two poses, under one demand after another.
+    """Searches for paths between two poses, under one demand after another."""
 
-    Attributes:
-        checked: Number of lines checked so far.
-    """
+    design: Design
+    ends: tuple[Pose, Pose]
+    seed: int
+    tool: Triple | None
+    load: DemandedLoad | None
+    checked: int = 0
 
-    def __init__(
-        self,
-        design: Design,
-        start: Pose,
-        goal: Pose,
-        seed: int,
-        tool: Triple | None,
-        load: DemandedLoad | None,
-    ) -> None:
-        self.checked = 0
-        self._design = design
-        self._ends = start, goal
-        self._folds = to_folds(*positions_and_rotations(self._ends))
-        self._seed = seed
-        self._tool = tool
-        self._load = load
+    @cached_property
+    def folds(self) -> FloatArray:
+        """Fold coordinates of both ends, shape (2, 6)."""
+        return to_folds(*positions_and_rotations(self.ends))
+
+    @cached_property
+    def tolerance(self) -> float:
+        """Length by which limits may be exceeded between poses, in design units."""
         # The signs of margins have to be certain, also of ends with small ones.
-        least = float(np.abs(margins(*positions_and_rotations(self._ends))).min())
-        self._tolerance = min(DEFAULT_TOLERANCE * design.reach, least)
+        least = float(np.abs(margins(*positions_and_rotations(self.ends))).min())
+        return min(DEFAULT_TOLERANCE * self.design.reach, least)
 
     def plan_line(self, demand: _Demand) -> PlannedPath | None:
         """Return the straight line in the folds if it is proven valid."""
         self.checked += 1
-        corners = self._proofs(demand).prove_line(*self._folds)
+        corners = self._proofs(demand).prove_line(*self.folds)
         if corners is None:
             return None
         poses = self._poses(corners)
@@ -237,21 +234,21 @@ class _Planner:
         """Return a smoothed path of OMPL's search, or None if the time was too short."""
         proofs = self._proofs(demand)
         tree = TreeSearch(proofs)
-        first, last = self._folds
+        first, last = self.folds
         corners = tree.find_path(first, last, seconds)
         self.checked += tree.checked
         if corners is None:
             return None
         unsmoothed = self._poses(corners)
-        return self._path(demand, unsmoothed, Smoother(proofs, self._seed).smooth(unsmoothed))
+        return self._path(demand, unsmoothed, Smoother(proofs, self.seed).smooth(unsmoothed))
 
     def _proofs(self, demand: _Demand) -> Proofs:
-        return Proofs(self._design, demand.rules, self._tool, self._load, self._tolerance)
+        return Proofs(self.design, demand.rules, self.tool, self.load, self.tolerance)
 
     def _poses(self, corners: FloatArray) -> tuple[Pose, ...]:
         """Return the poses of corners, with the given ends, from which they differ by rounding."""
         between = zip(*from_folds(corners[1:-1]), strict=True)
-        start, goal = self._ends
+        start, goal = self.ends
         return (start, *(Pose.of(p, r) for p, r in between), goal)
 
     def _path(
@@ -260,12 +257,12 @@ class _Planner:
         return PlannedPath(
             poses=poses,
             unsmoothed=unsmoothed,
-            length=float(lengths_of_moves(self._design, poses).sum()),
-            margin=max(self._design.limits.margin or 0.0, demand.margin),
+            length=float(lengths_of_moves(self.design, poses).sum()),
+            margin=max(self.design.limits.margin or 0.0, demand.margin),
             clearance=demand.clearance,
             seconds=0.0,
             checked=0,
-            tool=self._tool,
+            tool=self.tool,
         )
 
 

@@ -16,6 +16,7 @@ import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import msgspec
@@ -68,33 +69,26 @@ class Attempt(NamedTuple):
     best: Iterate
 
 
+@dataclass
 class Search:
     """A run of the optimiser from one start.
 
-    Args:
+    Attributes:
         problem: The problem.
         start: Values of its variables to start from.
-        most: Most steps of the solver.
+        steps_left: Most steps of the solver.
         trail: Record of every iterate.
         to_beat: Best iterate of the runs so far that converged; None if none did.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        start: Sequence[float],
-        most: int,
-        trail: Trail,
-        to_beat: Iterate | None = None,
-    ) -> None:
-        self.problem = problem
-        self.start = tuple(start)
-        self.steps_left = most
-        self.trail = trail
-        self.to_beat = to_beat
-        self.steps = 0
-        self.evaluations = 0
-        self.largest_volume = 0.0
+    problem: Problem
+    start: tuple[float, ...]
+    steps_left: int
+    trail: Trail
+    to_beat: Iterate | None = None
+    steps: int = 0
+    evaluations: int = 0
+    largest_volume: float = 0.0
 
     def run(self) -> Run:
         """Search, and return the run."""
