@@ -64,7 +64,7 @@ class Iterate(Step, frozen=True, kw_only=True):
         return math.inf if self.objective is None else self.objective
 
 
-class SearchResult(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RunSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The result of the search from one start.
 
     Attributes:
@@ -86,13 +86,13 @@ class SearchResult(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     message: str
 
 
-class Run(SearchResult, frozen=True, kw_only=True):
+class Run(RunSummary, frozen=True, kw_only=True):
     """The search from one start, with its best iterate."""
 
     best: Iterate
 
 
-class RunRecord(SearchResult, frozen=True, kw_only=True):
+class RunRecord(RunSummary, frozen=True, kw_only=True):
     """A run in a file, with the index of its best iterate in the history."""
 
     best: int

@@ -21,7 +21,7 @@ from explorer.files.writing import read_at_most
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.outcome import Iterate, Outcome, RunRecord, SearchResult, Step
+from explorer.optimise.outcome import Iterate, Outcome, RunRecord, RunSummary, Step
 from explorer.optimise.problem import ObjectiveName, Problem
 
 # Largest record that is read, in bytes; real ones are much smaller.
@@ -70,7 +70,7 @@ def record_of(outcome: Outcome, settings: Settings) -> Record:
         design=outcome.design,
         chosen=outcome.chosen,
         runs=tuple(
-            RunRecord(best=run.best.number, **_fields(SearchResult, run)) for run in outcome.runs
+            RunRecord(best=run.best.number, **_fields(RunSummary, run)) for run in outcome.runs
         ),
         history=tuple(map(step_of, outcome.history)),
         seconds=outcome.seconds,

@@ -590,6 +590,6 @@ def test_charts_are_of_one_start_and_of_the_demands() -> None:
     # An exact match is drawn as the least power.
     small = start()
     first, second = iterates_of(small, 2)
-    ended = run_of(end(small, (first, replace(second, objective=0.0))))
+    ended = run_of(end(small, (first, msgspec.structs.replace(second, objective=0.0))))
     powers = curves_of(ended.problem, charted_iterates(ended))[0].values
     assert powers.tolist() == [np.log10(first.value), -16.0]
