@@ -11,7 +11,7 @@ from .errors import (
     NoAnswerError as NoAnswerError,
 )
 from .legs.clearance import leg_clearances as leg_clearances
-from .legs.tetrahedra import tetrahedra_overlap as tetrahedra_overlap
+from .legs.interference import tetrahedra_overlap as tetrahedra_overlap
 from .measures.snapshot import Snapshot as Snapshot, evaluate as evaluate
 from .mechanism.configuration import Configuration as Configuration
 from .mechanism.design import JOINTS as JOINTS, Design as Design, Limits as Limits

@@ -16,7 +16,7 @@ from explorer.mechanism.machine import Six
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.equilibrium import SINGULAR
+from explorer.statics.forces import SINGULAR
 from explorer.statics.reactions import has_limits
 
 if TYPE_CHECKING:

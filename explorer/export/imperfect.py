@@ -23,8 +23,18 @@ from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray, finite_array, position_array
 from explorer.prototype.chains import ACTUATED, Chains, Places
-from explorer.statics import error_sources
-from explorer.statics.accuracy import A1_COLUMN, A3_COLUMN, B_COLUMN, GUIDE_COLUMN, TILT_COLUMN
+from explorer.statics.accuracy import (
+    A1_COLUMN,
+    A3_COLUMN,
+    B_COLUMN,
+    GUIDE_COLUMN,
+    SOURCES,
+    TILT_COLUMN,
+    UNITS,
+    drawing_values,
+    error_by_source,
+    source_errors,
+)
 from explorer.statics.compliance import is_elastic
 
 # Largest error of the joints of a solved pose, as a share of the reach.
@@ -36,7 +46,7 @@ def draw_deviations(design: Design, seed: int) -> FloatArray:
 
     Each is drawn uniformly within ± its largest error, by NumPy's `default_rng(seed)`, as the RMS
     errors of `explorer.statics.accuracy` take them. The order is that of
-    `explorer.statics.error_sources.SOURCES`: the offsets of the encoders of the six actuators, then
+    `explorer.statics.accuracy.SOURCES`: the offsets of the encoders of the six actuators, then
     the 23 dimensions. Lengths are in design units, tilts in radians.
 
     Args:
@@ -49,13 +59,13 @@ def draw_deviations(design: Design, seed: int) -> FloatArray:
     """
     if seed < 0:
         raise InputError(f"the seed must not be negative; got {seed}")
-    errors = error_sources.source_errors(design)
+    errors = source_errors(design)
     if not (errors.any() or is_elastic(design)):
         raise InputError(
             "the design states no errors, so that no machine differs from it: give its file "
             "tolerances, actuators.error_mm, actuators.stiffness_n_mm or struts.outer_mm"
         )
-    return errors * np.random.default_rng(seed).uniform(-1.0, 1.0, len(error_sources.SOURCES))
+    return errors * np.random.default_rng(seed).uniform(-1.0, 1.0, len(SOURCES))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +87,7 @@ class ImperfectMachine:
     seed: int | None = None
 
     def __post_init__(self) -> None:
-        given = finite_array("deviations", self.deviations, (len(error_sources.SOURCES),))
+        given = finite_array("deviations", self.deviations, (len(SOURCES),))
         if given.ndim != 1:
             raise InputError("a machine has one set of deviations, not a batch")
 
@@ -192,8 +202,8 @@ class ImperfectMachine:
     def remarks(self) -> list[str]:
         """Return what differs from the perfect machine, as lines of text."""
         seed = "" if self.seed is None else f", drawn with seed {self.seed}"
-        values = error_sources.drawing_values(self.design, self.deviations)
-        rows = zip(error_sources.SOURCES, values.tolist(), error_sources.UNITS, strict=True)
+        values = drawing_values(self.design, self.deviations)
+        rows = zip(SOURCES, values.tolist(), UNITS, strict=True)
         return [
             f"An imperfect machine{seed}.",
             "Values of the six actuated joints are what their encoders read: the true ones less",
@@ -226,7 +236,7 @@ class ImperfectMachine:
             return np.zeros(6)
         home = self.design.home_pose
         tool = self.design.tool.position
-        slopes = error_sources.error_by_source(Configuration.at(self.design, home, tool))
+        slopes = error_by_source(Configuration.at(self.design, home, tool))
         if not np.isfinite(slopes).all():
             raise NoAnswerError(
                 "the home pose is singular, so that errors have no bound there; choose another home"

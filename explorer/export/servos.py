@@ -22,8 +22,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES, Chains
 from explorer.prototype.weights import Mass, machine_weights, total_mass
 from explorer.statics.compliance import stiffness_of
-from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.forces import actuator_forces
+from explorer.statics.forces import actuator_forces, twists_of_actuators
 from explorer.statics.weights import carry
 from explorer.workspace.limits.table import joint_ranges
 

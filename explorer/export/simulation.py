@@ -38,8 +38,8 @@ from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED, BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Chains
 from explorer.prototype.weights import BALL, ROD, Mass, bar_masses, leg_radii
+from explorer.statics.accuracy import source_errors
 from explorer.statics.compliance import is_elastic
-from explorer.statics.error_sources import source_errors
 
 DENSITY = 1240.0
 """The default density of the bodies, in kg/m³: that of printed PLA."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from explorer.mechanism.design import JOINTS
 from explorer.paths.trajectory import Trajectory
+from explorer.statics.accuracy import IS_TILT, SOURCES
 from explorer.statics.budget.costs import PARTS, SourceCosts
-from explorer.statics.error_sources import IS_TILT, SOURCES
 
 _TRAJECTORY_COLUMNS = ("time_s", *JOINTS, "x", "y", "z", "qw", "qx", "qy", "qz")
 """The names of the columns, without the unit of lengths."""

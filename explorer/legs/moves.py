@@ -223,24 +223,6 @@ def move_clearances(
     return MoveClearances(bound - radii, least - radii, share)
 
 
-def moves_are_clear(
-    design: Design,
-    start_position: ArrayLike,
-    start_rotation: ArrayLike,
-    end_position: ArrayLike,
-    end_rotation: ArrayLike,
-    *,
-    clearance: float = 0.0,
-    tool: ArrayLike | None = None,
-) -> BoolArray:
-    """Return whether all pairs have more than a clearance over whole moves, shape (...).
-
-    Arguments and errors are those of `move_clearances`; see `pairs_are_clear` for the accuracy.
-    """
-    arrays = (start_position, start_rotation, end_position, end_rotation)
-    return np.asarray(pairs_are_clear(design, *arrays, clearance=clearance, tool=tool).all(axis=-1))
-
-
 def pairs_are_clear(
     design: Design,
     start_position: ArrayLike,

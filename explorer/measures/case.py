@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from explorer.measures.clearance import clearance_beyond, clearance_margin_of
 from explorer.measures.indices import PoseIndices
+from explorer.measures.size import clearance_beyond, clearance_margin_of
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design

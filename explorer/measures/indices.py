@@ -14,7 +14,7 @@ import numpy as np
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.singularity.jacobian import jacobian_of, singular_values
-from explorer.statics.equilibrium import twists_of_actuators
+from explorer.statics.forces import twists_of_actuators
 
 
 @dataclass(frozen=True)

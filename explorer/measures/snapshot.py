@@ -21,9 +21,8 @@ from explorer.mechanism.kinematics import (
 from explorer.mechanism.margins import describe_modes, mode_name, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.bruhat import incidences
 from explorer.singularity.freedoms import Freedoms, freedoms
-from explorer.singularity.gaps import FlagGaps, flag_gaps
+from explorer.singularity.gaps import FlagGaps, flag_gaps, least_turns
 from explorer.singularity.jacobian import (
     determinant,
     scaled_margins,
@@ -35,8 +34,7 @@ from explorer.singularity.nearest import (
     nearest_singular_poses,
     singularities_of,
 )
-from explorer.singularity.strata import GENERIC, inversions, stratum
-from explorer.singularity.turning import least_turns
+from explorer.singularity.strata import GENERIC, incidences, inversions, stratum
 from explorer.workspace.limits.valid_poses import Violation, violations
 
 

@@ -19,20 +19,12 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.accuracy import ToolError, actuator_errors, tool_errors
+from explorer.statics.accuracy import ToolError, actuator_errors, worst_errors
 from explorer.statics.compliance import (
     compliance_of,
     largest_deflection,
     principal_compliances,
     stiffness_of,
-)
-from explorer.statics.load_slopes import (
-    BENDING,
-    TURN,
-    compliance_slopes,
-    deflection_slopes,
-    error_slopes,
-    share_slopes,
 )
 from explorer.statics.reactions import (
     Reactions,
@@ -41,7 +33,17 @@ from explorer.statics.reactions import (
     part_limits,
     reactions,
 )
-from explorer.statics.slopes import PARAMETERS, TwistSlopes, twist_slopes
+from explorer.statics.slopes import (
+    BENDING,
+    PARAMETERS,
+    TURN,
+    TwistSlopes,
+    compliance_slopes,
+    deflection_slopes,
+    error_slopes,
+    share_slopes,
+    twist_slopes,
+)
 from explorer.statics.weights import design_weights, payload_wrench
 
 
@@ -84,7 +86,7 @@ class BoxStatics:
     @cached_property
     def errors(self) -> ToolError:
         """The worst errors of the tool at the nodes, each of shape (n,)."""
-        return tool_errors(self.configuration, actuator_errors(self.design)).worst
+        return worst_errors(self.configuration, actuator_errors(self.design))
 
     @cached_property
     def compliances(self) -> FloatArray:

@@ -1,6 +1,6 @@
 """The exact intervals of each joint in which the joints close, with the other joints fixed.
 
-Each of the three discriminants of `explorer.mechanism.trilateration` is a polynomial of degree
+Each of the three discriminants of `explorer.mechanism.kinematics` is a polynomial of degree
 at most four in a carriage position or in the square of a length. Their real roots bound the
 intervals, and one trial between two neighbouring roots shows whether the joints close there.
 """

@@ -7,6 +7,7 @@ has eight assembly modes.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, LENGTHS, Design
-from explorer.mechanism.trilateration import solve_rows
+from explorer.mechanism.folds import write_rotation
 from explorer.numerics.arrays import (
     FARTHEST,
     BoolArray,
@@ -23,6 +24,132 @@ from explorer.numerics.arrays import (
     finite_array,
     for_kernel,
 )
+from explorer.numerics.compiled import helper, kernel
+
+# Relative rounding of one operation.
+EPSILON = 2.0**-52
+# Number of error bounds below zero within which a discriminant counts as zero.
+ROUNDINGS = 8.0
+
+
+@helper
+def sine_of(cosine: float) -> float:
+    """Return the sine, 0 or more, of a cosine within ±1."""
+    return math.sqrt((1.0 - cosine) * (1.0 + cosine))
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[:,:,::1], f8[:,:,:,::1], b1[::1], f8[:,::1])")
+def solve_rows(
+    variables: FloatArray,
+    joints: FloatArray,
+    positions: FloatArray,
+    rotations: FloatArray,
+    feasible: BoolArray,
+    discriminants: FloatArray,
+) -> None:
+    """Solve the forward kinematics of each row of joints.
+
+    Joints that do not close yield poses in which each cosine beyond ±1 is ±1: finite and rigid, but
+    with other joints.
+
+    Args:
+        variables: Design variables X, shape (6,).
+        joints: (l1, d1, d2, d3, d4, l4), shape (n, 6).
+        positions: Output, b4 in the base frame, shape (n, 8, 3).
+        rotations: Output, platform to base, shape (n, 8, 3, 3).
+        feasible: Output, whether the joints close, shape (n,).
+        discriminants: Output, δ1², δ2², δ3², shape (n, 3); some negative number where a
+            trilateration fails.
+    """
+    for row in range(joints.shape[0]):
+        a3x, a3y, b1x, b1y, b2, b3 = variables
+        l1, d1, d2, d3, d4, l4 = joints[row]
+
+        # h and g are the distances of b4 from the guide and of a1 from the line b2b3. First-order
+        # bounds of rounding errors have a leading e.
+        span = b3 - b2
+        ends = abs(b3) + abs(b2)
+        c = (d3 - d1) / span
+        ec = EPSILON * (abs(d3) + abs(d1) + abs(c) * ends) / abs(span)
+        sine_square = (1.0 - c) * (1.0 + c)
+        e_sine = 2.0 * abs(c) * ec + EPSILON * abs(sine_square)
+        px = d1 - b2 * c
+        epx = abs(b2) * ec + EPSILON * (abs(d1) + abs(b2 * c))
+        t = -b2 / span
+        pull = t * (1.0 - t) * span * span
+        h_square = (1.0 - t) * d2 * d2 + t * d4 * d4 - pull * sine_square
+        eh = abs(pull) * e_sine + EPSILON * (
+            abs(1.0 - t) * d2 * d2 + abs(t) * d4 * d4 + abs(pull * sine_square)
+        ) * (1.0 + ends / abs(span))
+        lean = (d4 * d4 - d2 * d2 - (b3 + b2) * span * sine_square) / (2.0 * span)
+        e_lean = 0.5 * abs(b3 + b2) * e_sine + EPSILON * (
+            (d4 * d4 + d2 * d2) / (2.0 * abs(span)) + abs(lean) * (1.0 + ends / abs(span))
+        )
+        along = c * px + lean
+        e_along = abs(px) * ec + abs(c) * epx + e_lean
+        r_square = px * px + h_square
+        er = 2.0 * abs(px) * epx + eh + EPSILON * px * px
+        g_square = r_square - along * along
+        side = px - a3x
+        py = (side * side + h_square + a3y * a3y - l4 * l4) / (2.0 * a3y)
+        epy = (
+            2.0 * abs(side) * epx
+            + eh
+            + EPSILON * (side * side + abs(h_square) + a3y * a3y + l4 * l4)
+        ) / (2.0 * abs(a3y))
+        b1_square = b1x * b1x + b1y * b1y
+        across = (l1 * l1 - r_square - b1_square - 2.0 * b1x * along) / (2.0 * b1y)
+        e_across = (
+            er + 2.0 * abs(b1x) * e_along + EPSILON * (l1 * l1 + abs(r_square) + b1_square)
+        ) / (2.0 * abs(b1y))
+
+        square1 = g_square - across * across
+        e1 = er + (2.0 * abs(along) + e_along) * e_along + (2.0 * abs(across) + e_across) * e_across
+        square2 = sine_square * h_square - lean * lean
+        e2 = abs(sine_square) * eh + abs(h_square) * e_sine + (2.0 * abs(lean) + e_lean) * e_lean
+        if sine_square < 0.0 or h_square < 0.0:
+            # Their product may be positive. The sine is made a length by the largest one.
+            size = max(abs(a3x), abs(a3y), abs(b1x), abs(b1y), abs(b2), abs(b3))
+            size = max(size, l1, abs(d1), d2, abs(d3), d4, l4)
+            square2 = min(square2, size * size * sine_square, h_square)
+            e2 += size * size * e_sine + eh
+        square3 = h_square - py * py
+        e3 = eh + (2.0 * abs(py) + epy) * epy
+        feasible[row] = (
+            square1 >= -ROUNDINGS * e1 and square2 >= -ROUNDINGS * e2 and square3 >= -ROUNDINGS * e3
+        )
+        discriminants[row, 0] = square1
+        discriminants[row, 1] = square2
+        discriminants[row, 2] = square3
+
+        # Where a cosine is beyond ±1, the fold is flat. Undefined ones are 0.
+        c = min(1.0, max(-1.0, c))
+        h = math.sqrt(max(0.0, h_square))
+        r = math.sqrt(px * px + h * h)
+        cos_b, sin_b = (px / r, h / r) if r > 0.0 else (1.0, 0.0)
+        cos_e = min(1.0, max(-1.0, along / r)) if r > 0.0 else c
+        sin_e = sine_of(cos_e)
+        cos2 = (cos_b * cos_e - c) / (sin_b * sin_e) if sin_b * sin_e > 0.0 else 1.0
+        if abs(cos2) >= 1.0:
+            # The lines are in one plane, so that ε follows from β and the angle between them.
+            cos2 = math.copysign(1.0, cos2)
+            sine = math.copysign(sine_of(c), sin_b * cos_e + cos2 * cos_b * sin_e)
+            cos_e = cos_b * c + sin_b * sine
+            sin_e = cos2 * (cos_b * sine - sin_b * c)
+        cos1 = min(1.0, max(-1.0, -across / (r * sin_e))) if r * sin_e > 0.0 else 1.0
+        cos3 = min(1.0, max(-1.0, py / h)) if h > 0.0 else 1.0
+        sin1, sin2, sin3 = sine_of(cos1), sine_of(cos2), sine_of(cos3)
+        angles = (cos_b, sin_b), (cos_e, sin_e)
+        for mode in range(8):
+            folds = (
+                (cos1, sin1 if mode & 4 else -sin1),
+                (cos2, sin2 if mode & 2 else -sin2),
+                (cos3, sin3 if mode & 1 else -sin3),
+            )
+            positions[row, mode, 0] = px
+            positions[row, mode, 1] = h * cos3
+            positions[row, mode, 2] = h * folds[2][1]
+            write_rotation(angles, folds, rotations[row, mode])
 
 
 class ForwardKinematics(NamedTuple):

@@ -49,7 +49,10 @@ def finite_array(
         )
     allowed = np.isfinite(array) & (np.abs(array) <= most)
     if not allowed.all():
-        raise InputError(f"{name} {size_problem(float(array[~allowed].flat[0]), most=most)}")
+        odd = float(array[~allowed].flat[0])
+        if not math.isfinite(odd):
+            raise InputError(f"{name} must be finite numbers; got {odd}")
+        raise InputError(f"{name} {size_problem(odd, most=most)}")
     return array
 
 

@@ -219,6 +219,8 @@ def _with_compiled_helpers(function: Function, helpers: dict[Function, Any]) -> 
             if helpers[called] is None:
                 helpers[called] = numba.njit(**OPTIONS)(_with_compiled_helpers(called, helpers))
             names[name] = helpers[called]
-    copy = FunctionType(function.__code__, names, function.__name__, function.__defaults__)
+    # Compiled code names the file of an exception, which differs from machine to machine.
+    code = function.__code__.replace(co_filename=function.__module__)
+    copy = FunctionType(code, names, function.__name__, function.__defaults__)
     copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
     return copy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TypeAlias
 
 from explorer.numerics.arrays import FloatArray
@@ -44,3 +45,9 @@ def dot3(a: Vector, b: Vector) -> float:
 def cross3(a: Vector, b: Vector) -> Vector:
     """Return a × b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@helper
+def norm3(a: Vector) -> float:
+    """Return the length of a vector."""
+    return math.sqrt(dot3(a, a))

@@ -31,7 +31,7 @@ from explorer.optimise.problem import (
     with_box,
 )
 from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.statics.equilibrium import SINGULAR
+from explorer.statics.forces import SINGULAR
 from explorer.workspace.limits.table import GAP
 
 # Excess over its bound that makes a demand impossible, as a share: searches have tolerances.

@@ -12,8 +12,7 @@ from collections.abc import Iterable
 import msgspec
 
 from explorer.errors import InputError
-from explorer.measures.clearance import MARGIN_OF_CLEARANCE
-from explorer.measures.size import longest_leg
+from explorer.measures.size import MARGIN_OF_CLEARANCE, longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.optimise.demands import Box, Demands

@@ -31,8 +31,7 @@ from explorer.numerics.arrays import (
     rotate,
 )
 from explorer.paths.crossings import PathMargins, path_margins
-from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS
+from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, twists_of_actuators
 from explorer.statics.reactions import LIMITED, Reactions, limit_shares, reactions
 from explorer.statics.weights import Weights, design_weights
 

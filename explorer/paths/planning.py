@@ -35,7 +35,7 @@ from explorer.paths.loads import ROUNDING, DemandedLoad
 from explorer.paths.proofs import Proofs, divide_line, positions_and_rotations
 from explorer.paths.smoothing import Smoother, lengths_of_moves
 from explorer.paths.tree_search import TreeSearch
-from explorer.singularity.bruhat import incidences
+from explorer.singularity.strata import incidences
 from explorer.statics.reactions import PART_NAMES
 from explorer.statics.weights import Weights
 from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_rows

@@ -30,10 +30,9 @@ from explorer.reproduce.claim import (
     random_folds,
     random_poses,
 )
-from explorer.singularity.bruhat import is_below
+from explorer.singularity.freedoms import UNCOUPLED
 from explorer.singularity.jacobian import jacobian
-from explorer.singularity.strata import STRATA, inversions, stratum
-from explorer.singularity.uncoupled import UNCOUPLED
+from explorer.singularity.strata import STRATA, inversions, is_below, stratum
 
 OPTIMAL = PRESETS["paper-optimal"]
 # Number of neighbours of a pose, and their distance in folds.

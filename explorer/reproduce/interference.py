@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from explorer.legs.clearance import PAIRS, leg_clearances
-from explorer.legs.interference import step_is_free
+from explorer.legs.interference import step_overlaps
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import BoolArray, FloatArray
@@ -216,7 +216,7 @@ def _shares_of_steps(nodes: FloatArray, collides: Collides) -> tuple[tuple[float
 
 
 def _four_collides(start: FloatArray, end: FloatArray) -> BoolArray:
-    return ~step_is_free(OPTIMAL, start, ROTATION, end, ROTATION)
+    return np.asarray(step_overlaps(OPTIMAL, start, ROTATION, end, ROTATION).any(axis=-1))
 
 
 def _table(mechanisms: Sequence[Interference]) -> list[str]:

@@ -11,8 +11,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from explorer.numerics.arrays import FloatArray
+from explorer.mechanism.margins import margins
+from explorer.mechanism.pose import checked_rotation
+from explorer.numerics.arrays import FloatArray, dot, position_array
 
 # Sine between two lines up to which they count as parallel: rounding errors of a rotation.
 PARALLEL = 1e-14
@@ -63,3 +66,26 @@ def flag_gaps(position: FloatArray, rotation: FloatArray) -> FlagGaps:
     base = np.array([(0.0, 0.0, 0.0), on_guide, (x, y, 0.0)])
     platform = np.array([height * rotation[:, 2], on_line, (x, y, z)])
     return FlagGaps(base, platform, (abs(height), distance, abs(z)), are_parallel)
+
+
+def least_turns(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """Return the least turns to δ1 = 0, δ2 = 0 and δ3 = 0, shape (..., 3), in radians.
+
+    They are from 0, for a pose that has the incidence, to a quarter turn.
+
+    Args:
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+
+    Raises:
+        InputError: The position is not finite, or the rotation is not one.
+    """
+    p, r = position_array("position", position), checked_rotation(rotation)
+    line = r[..., :, 0]
+    from_line = np.cross(line, p)
+    distance = np.sqrt(dot(p, p))
+    arm = np.maximum(np.hypot(p[..., 1], p[..., 2]), np.sqrt(dot(from_line, from_line)))
+    sizes = np.abs(margins(p, r))
+    arms = np.stack(np.broadcast_arrays(distance, arm, distance), axis=-1)
+    sines = np.divide(sizes, arms, out=np.zeros(sizes.shape), where=arms > 0.0)
+    return np.arcsin(np.minimum(sines, 1.0))

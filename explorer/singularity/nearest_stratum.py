@@ -27,9 +27,15 @@ from explorer.mechanism.displacement import PlatformPoints, displacement
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.angle_minima import ANGLES, grid_minima, minimise, powers_of
-from explorer.singularity.bruhat import OF_INCIDENCES, Stratum, codimension, is_below
 from explorer.singularity.nearest import nearest_singularities
-from explorer.singularity.strata import STRATA, stratum
+from explorer.singularity.strata import (
+    OF_INCIDENCES,
+    STRATA,
+    Stratum,
+    codimension,
+    is_below,
+    stratum,
+)
 
 X, _, Z = np.eye(3)
 

@@ -1,7 +1,8 @@
-"""Errors of the tool from the actuators' errors and from the geometric dimensions.
+"""Errors of the tool from its 29 sources: the actuators' errors and the geometric dimensions.
 
 The model is linear: the tool moves by J⁻¹ times the errors of the joints, and by −J⁻¹ ∂q/∂g times
-the errors of the dimensions g while the actuators hold their values.
+the errors of the dimensions g while the actuators hold their values. The sums Σ e_i v_i for errors
+e_i within ±b_i fill a zonotope, whose farthest vertex is the exact worst error.
 
 Errors are independent, and each is uniform within ± its bound, as those of the machines that
 `explorer.export.imperfect` draws. Root-mean-square errors are those of this model.
@@ -17,11 +18,12 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration, computed_once
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import DIMENSIONS
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, for_kernel, lengths_of
 from explorer.numerics.compiled import helper, kernel
-from explorer.statics.equilibrium import A3X, A3Y, B1X, B1Y, B2, B3, twists_of_actuators
+from explorer.numerics.vectors import Vector, along, cross3, dot3, vector
+from explorer.statics.forces import A3X, A3Y, B1X, B1Y, B2, B3, twists_of_actuators
 
 # First columns of the dimensions, in the order of `DIMENSIONS`.
 A1_COLUMN, A3_COLUMN, GUIDE_COLUMN, TILT_COLUMN, B_COLUMN = 0, 3, 6, 9, 11
@@ -48,22 +50,6 @@ class ToolError(NamedTuple):
     turn: FloatArray
 
 
-class ToolErrors(NamedTuple):
-    """Errors of the tool for errors of the actuators within their bounds.
-
-    Attributes:
-        worst: Largest displacement and turn over the 64 corners of the cube of errors, exact for
-            the linear model.
-        rms: Root-mean-square errors for independent errors that are uniform within the bounds.
-        by_actuator: Errors that each actuator alone causes, with axes of six in the order of
-            `JOINTS`.
-    """
-
-    worst: ToolError
-    rms: ToolError
-    by_actuator: ToolError
-
-
 @helper
 def largest_at_corners(twists: FloatArray, row: int, errors: FloatArray) -> float:
     """Return the largest |Σ ± e_i v_i| over all signs, with v_i three rows of J⁻¹ from `row`."""
@@ -88,29 +74,14 @@ def largest_at_corners(twists: FloatArray, row: int, errors: FloatArray) -> floa
     return math.sqrt(largest)
 
 
-@kernel("void(f8[:,:,::1], f8[:,::1], f8[:,:,::1])")
-def error_rows(twists: FloatArray, errors: FloatArray, out: FloatArray) -> None:
-    """Write the errors of n poses, shape (n, 2, 8): displacement and turn.
-
-    The eight columns are the worst, the root mean square, and those of each actuator alone.
-    """
+@kernel("void(f8[:,:,::1], f8[:,::1], f8[:,::1])")
+def worst_rows(twists: FloatArray, errors: FloatArray, out: FloatArray) -> None:
+    """Write the largest displacements and turns of n poses, shape (n, 2)."""
     for k in range(twists.shape[0]):
-        e = errors[k % errors.shape[0]]
-        if math.isinf(twists[k, 0, 0]):
-            for i in range(8):
-                out[k, 0, i] = math.inf
-                out[k, 1, i] = math.inf
-            continue
         for half in range(2):
-            row = 3 * half
-            total = 0.0
-            for i in range(6):
-                x, y, z = twists[k, row, i], twists[k, row + 1, i], twists[k, row + 2, i]
-                square = e[i] * e[i] * (x * x + y * y + z * z)
-                out[k, half, 2 + i] = math.sqrt(square)
-                total += square
-            out[k, half, 0] = largest_at_corners(twists[k], row, e)
-            out[k, half, 1] = math.sqrt(total)
+            out[k, half] = math.inf
+            if not math.isinf(twists[k, 0, 0]):
+                out[k, half] = largest_at_corners(twists[k], 3 * half, errors[k % len(errors)])
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1])")
@@ -176,8 +147,8 @@ def worst_error(
     errors: ArrayLike,
     tool: ArrayLike | None = None,
 ) -> ToolError:
-    """Return the `worst` of `tool_errors` of `Configuration(design, position, rotation, tool)`."""
-    return tool_errors(Configuration(design, position, rotation, tool), errors).worst
+    """Return `worst_errors` of `Configuration(design, position, rotation, tool)`."""
+    return worst_errors(Configuration(design, position, rotation, tool), errors)
 
 
 def pose_error_by_geometry(
@@ -187,8 +158,11 @@ def pose_error_by_geometry(
     return error_by_geometry(Configuration(design, position, rotation, tool))
 
 
-def tool_errors(configuration: Configuration, errors: ArrayLike) -> ToolErrors:
-    """Return the errors of the tool for actuator errors within ±errors.
+def worst_errors(configuration: Configuration, errors: ArrayLike) -> ToolError:
+    """Return the largest errors of the tool for actuator errors within ±errors.
+
+    They are exact for the linear model: the largest over the 64 corners of the cube of errors.
+    With six sources this is faster than `largest_error`.
 
     Args:
         configuration: Design and poses, with the tool point.
@@ -197,23 +171,14 @@ def tool_errors(configuration: Configuration, errors: ArrayLike) -> ToolErrors:
     Raises:
         InputError: An error is negative or not finite, or batch axes do not broadcast.
     """
-    e = np.asarray(errors, dtype=np.float64)
-    if e.shape[-1:] != (6,) or not (np.isfinite(e) & (e >= 0.0)).all():
-        text = np.array2string(e, threshold=12).replace("\n", "")
-        raise InputError(
-            f"the errors of the actuators must be six finite numbers, none negative; got {text}"
-        )
+    e = _checked(errors)
+    if e.shape[-1:] != (6,):
+        raise InputError(f"give the errors of six actuators; got the shape {e.shape}")
     c = configuration.spread(e)
-    out = np.empty((len(c.positions), 2, 8))
-    twists = twists_of_actuators(c).reshape(-1, 6, 6)
-    error_rows(len(out), twists, c.rows_or_one(e), out)
-    halves = out.reshape(*c.batch, 2, 8)
-    # The root mean squares of the rows are those of errors as standard deviations.
-    return ToolErrors(
-        ToolError(halves[..., 0, 0], halves[..., 1, 0]),
-        ToolError(UNIFORM * halves[..., 0, 1], UNIFORM * halves[..., 1, 1]),
-        ToolError(halves[..., 0, 2:], halves[..., 1, 2:]),
-    )
+    out = np.empty((len(c.positions), 2))
+    worst_rows(len(out), twists_of_actuators(c).reshape(-1, 6, 6), c.rows_or_one(e), out)
+    halves = out.reshape(*c.batch, 2)
+    return ToolError(halves[..., 0], halves[..., 1])
 
 
 @computed_once
@@ -236,3 +201,246 @@ def error_by_geometry(configuration: Configuration) -> FloatArray:
 def actuator_errors(design: Design) -> FloatArray:
     """Return the largest errors of a design's actuators, shape (6,), in design units."""
     return np.array(design.actuators.error_mm) / design.unit_mm
+
+
+SOURCES = (*JOINTS, *DIMENSIONS)
+"""The 29 sources of errors, in the order of every array axis of 29."""
+
+IS_TILT = np.array(["tilt" in name for name in SOURCES])
+"""Whether each source is a tilt of the guide, shape (29,)."""
+
+UNITS = tuple("degrees" if is_tilt else "mm" for is_tilt in IS_TILT.tolist())
+"""Units of the errors of the sources on a drawing."""
+
+# Sine of the angle up to which vectors count as parallel or in one plane. In the farthest sum S
+# each vector w has w · S ≥ |w|², so that the wrong sign of one within this angle of the plane
+# across S changes |S| by less than this share squared, which is rounding.
+FLAT = 1e-8
+
+
+class LargestError(NamedTuple):
+    """The largest errors of the tool for errors of the sources within their bounds.
+
+    Displacement and turn are the largest each for itself; both are infinite in a singular pose.
+
+    Attributes:
+        displacement: Largest displacement of the tool point, shape (...), in design units.
+        turn: Largest turn of the tool, shape (...), in radians.
+        vectors: That displacement and that turn, base axes, shape (..., 2, 3); NaN if infinite.
+        signs: Signs of the sources' errors that cause them, shape (..., 2, n); 0 for a source
+            that moves nothing.
+    """
+
+    displacement: FloatArray
+    turn: FloatArray
+    vectors: FloatArray
+    signs: FloatArray
+
+
+@helper
+def toward(total: Vector, side: float, w: Vector) -> Vector:
+    """Return the total plus w where `side` is positive, and minus w elsewhere."""
+    return along(total, 1.0 if side > 0.0 else -1.0, w)
+
+
+@helper
+def merge_parallel(columns: FloatArray, scale: float, w: FloatArray, u: FloatArray) -> int:
+    """Write vectors of which no two are parallel, and unit vectors along them; return their number.
+
+    Args:
+        columns: Vectors to merge, shape (3, m).
+        scale: Size that vectors are divided by.
+        w: Result, shape (m, 3): sums of parallel vectors that point to one side.
+        u: Result, shape (m, 3).
+    """
+    count = 0
+    for k in range(columns.shape[1]):
+        v = (columns[0, k] / scale, columns[1, k] / scale, columns[2, k] / scale)
+        length = math.sqrt(dot3(v, v))
+        if length == 0.0:
+            continue
+        unit = (v[0] / length, v[1] / length, v[2] / length)
+        i = 0
+        while i < count:
+            across = cross3(unit, vector(u, i))
+            if dot3(across, across) <= FLAT * FLAT:
+                break
+            i += 1
+        if i == count:
+            count += 1
+            u[i, 0], u[i, 1], u[i, 2] = unit
+            w[i, 0], w[i, 1], w[i, 2] = v
+        else:
+            w[i, 0], w[i, 1], w[i, 2] = toward(vector(w, i), dot3(unit, vector(u, i)), v)
+    return count
+
+
+@helper
+def longest_sum(w: FloatArray, u: FloatArray, count: int) -> Vector:
+    """Return the longest sum Σ ± w_i of vectors of which no two are parallel.
+
+    It is a vertex of the zonotope, which is the farthest one in a cone of directions. An edge n of
+    that cone is perpendicular to two vectors i and j. Vectors out of the plane of i and j have
+    the sign of their product with n; those in it have that with the normal of i in the plane, and i
+    has both. The vectors of a plane span a polygon with i along one of its edges; every corner of
+    it ends an edge of another vector too, so that pairs with i < j suffice.
+    """
+    longest, most = vector(w, 0), 0.0
+    for i in range(count):
+        for j in range(i + 1, count):
+            normal = cross3(vector(u, i), vector(u, j))
+            flat = FLAT * math.sqrt(dot3(normal, normal))
+            inner = cross3(normal, vector(u, i))
+            out, within = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+            for k in range(count):
+                if k != i:
+                    side = dot3(normal, vector(u, k))
+                    if abs(side) > flat:
+                        out = toward(out, side, vector(w, k))
+                    else:
+                        within = toward(within, dot3(inner, vector(u, k)), vector(w, k))
+            for corner in range(4):
+                total = toward(out, 0.5 - (corner & 1), within)
+                total = toward(total, 1.0 - (corner & 2), vector(w, i))
+                square = dot3(total, total)
+                if square > most:
+                    longest, most = total, square
+    return longest
+
+
+@kernel("void(f8[:,:,::1], f8[:,::1])")
+def farthest_rows(vectors: FloatArray, signs: FloatArray) -> None:
+    """Write the signs of the longest sum Σ ± w_i for each of n sets of vectors.
+
+    Args:
+        vectors: Columns w_i, shape (n, 3, m).
+        signs: Result, shape (n, m): 1 or -1; 0 for a zero vector, and for all vectors of a set of
+            which one is not finite.
+    """
+    m = vectors.shape[2]
+    w, u = np.zeros((m, 3)), np.zeros((m, 3))
+    for n in range(vectors.shape[0]):
+        scale, finite = 0.0, True
+        for k in range(m):
+            signs[n, k] = 0.0
+            for axis in range(3):
+                size = abs(vectors[n, axis, k])
+                scale, finite = max(scale, size), finite and math.isfinite(size)
+        if scale == 0.0 or not finite:
+            continue
+        total = longest_sum(w, u, merge_parallel(vectors[n], scale, w, u))
+        # Every vector of the longest sum points to its side.
+        for k in range(m):
+            v = (vectors[n, 0, k] / scale, vectors[n, 1, k] / scale, vectors[n, 2, k] / scale)
+            side = dot3(total, v)
+            if side != 0.0:
+                signs[n, k] = 1.0 if side > 0.0 else -1.0
+
+
+def source_errors(design: Design) -> FloatArray:
+    """Return the largest errors of the sources of a design, shape (29,).
+
+    They have the order of `SOURCES`: the errors of the actuators, then the tolerances of the
+    dimensions. Lengths are in design units, tilts of the guide in radians.
+    """
+    return np.concatenate([actuator_errors(design), design.tolerances.values(design.unit_mm)])
+
+
+def drawing_values(design: Design, errors: FloatArray) -> FloatArray:
+    """Return errors of the sources, shape (29,), in the units of `UNITS`.
+
+    Args:
+        design: The manipulator.
+        errors: Errors in design units and radians, shape (29,).
+    """
+    return np.where(IS_TILT, np.degrees(errors), errors * design.unit_mm)
+
+
+@computed_once
+def error_by_source(configuration: Configuration) -> FloatArray:
+    """Return the tool's error per error of each source, J⁻¹ and −J⁻¹ ∂q/∂g, shape (..., 6, 29).
+
+    Rows are the displacement and the turn of the tool, base axes; columns have the order of
+    `SOURCES`. All entries are infinite in a singular pose.
+    """
+    by_joint, by_geometry = twists_of_actuators(configuration), error_by_geometry(configuration)
+    return np.concatenate([by_joint, by_geometry], axis=-1)
+
+
+def largest_error(by_source: FloatArray, bounds: ArrayLike) -> LargestError:
+    """Return the largest errors for errors of the sources within ±bounds.
+
+    They are exact for the linear model: the largest over all combinations of signs. Some of the
+    sources alone are a slice of both arguments.
+
+    Args:
+        by_source: Errors of the tool per error of each source, shape (..., 6, n).
+        bounds: Bounds of the sources' errors, shape (..., n), not negative.
+
+    Raises:
+        InputError: A bound is negative or not finite.
+    """
+    limits = _checked(bounds)
+    halves = _halves(by_source, limits)
+    signs = np.empty((*halves.shape[:-2], halves.shape[-1]))
+    count = math.prod(signs.shape[:-1])
+    farthest_rows(
+        count, halves.reshape(count, *halves.shape[-2:]), signs.reshape(count, signs.shape[-1])
+    )
+    vectors = np.einsum("...ij,...j->...i", halves, signs)
+    finite = np.isfinite(vectors).all(axis=-1)
+    size = np.where(finite, lengths_of(vectors), np.inf)
+    vectors = np.where(finite[..., None], vectors, np.nan)
+    return LargestError(size[..., 0], size[..., 1], vectors, signs)
+
+
+def errors_alone(by_source: FloatArray, bounds: ArrayLike) -> ToolError:
+    """Return the largest errors of the tool by each source alone, each of shape (..., n).
+
+    Args:
+        by_source: Errors of the tool per error of each source, shape (..., 6, n).
+        bounds: Bounds of the sources' errors, shape (..., n), not negative.
+
+    Raises:
+        InputError: A bound is negative or not finite.
+    """
+    limits = _checked(bounds)
+    halves = _halves(by_source, limits)
+    sizes = np.sqrt(np.einsum("...ij,...ij->...j", halves, halves))
+    # A source without an error moves nothing, also in a singular pose.
+    sizes = np.where(limits[..., None, :] > 0.0, sizes, 0.0)
+    return ToolError(sizes[..., 0, :], sizes[..., 1, :])
+
+
+def rms_of_sources(by_source: FloatArray, bounds: ArrayLike) -> ToolError:
+    """Return the root-mean-square errors of the tool for errors that are uniform within ±bounds.
+
+    The errors of the sources are independent.
+
+    Args:
+        by_source: Errors of the tool per error of each source, shape (..., 6, n).
+        bounds: Bounds of the sources' errors, shape (..., n), not negative.
+
+    Raises:
+        InputError: A bound is negative or not finite.
+    """
+    halves = _halves(by_source, UNIFORM * _checked(bounds))
+    size = np.sqrt(np.einsum("...ij,...ij->...", halves, halves))
+    size = np.where(np.isfinite(size), size, np.inf)
+    return ToolError(size[..., 0], size[..., 1])
+
+
+def _halves(by_source: FloatArray, bounds: FloatArray) -> FloatArray:
+    """Return displacements and turns by sources at their bounds, shape (..., 2, 3, n)."""
+    # Zero times infinity is no number, where a source has no error in a singular pose.
+    with np.errstate(invalid="ignore"):
+        moved = for_kernel(by_source * bounds[..., None, :])
+    return moved.reshape(*moved.shape[:-2], 2, 3, moved.shape[-1])
+
+
+def _checked(bounds: ArrayLike) -> FloatArray:
+    limits = np.asarray(bounds, dtype=np.float64)
+    if not (np.isfinite(limits) & (limits >= 0.0)).all():
+        text = np.array2string(limits, threshold=12).replace("\n", "")
+        raise InputError(f"the bounds of errors must be finite numbers, none negative; got {text}")
+    return limits

@@ -18,12 +18,10 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, finite_array, lengths_of
 from explorer.numerics.compiled import helper, kernel
-from explorer.statics.equilibrium import B2, B3, STRUT_ROWS, twists_of_actuators
+from explorer.statics.forces import B2, B3, STRUT_ROWS, twists_of_actuators
 
 # Number of halvings, of the logarithm where it can be, that find the worst force to rounding.
 HALVINGS = 70
-# Largest share of all forces and displacements that is counted as none.
-NO_PULL = 1e-150
 
 
 class PrincipalCompliances(NamedTuple):
@@ -207,10 +205,7 @@ def largest_deflection(
     block = np.where(regular[..., None, None], compliance[..., :3, :3], 0.0)
     soft, axes = np.linalg.eigh(block)
     along = np.einsum("...ji,...j->...i", axes, np.where(regular[..., None], moved, 0.0))
-    soft = np.maximum(soft, 0.0)
-    with np.errstate(over="ignore"):
-        regular &= np.isfinite(soft[..., -1] * most)
-    soft = np.where(regular[..., None], soft, 0.0)
+    soft = np.where(regular[..., None], np.maximum(soft, 0.0), 0.0)
     direction = _farthest_direction(soft, along, most)
     farthest = lengths_of(soft * (most[..., None] * direction) + along)
     pushed = most[..., None] * np.einsum("...ij,...j->...i", axes, direction)
@@ -231,8 +226,6 @@ def _farthest_direction(soft: FloatArray, along: FloatArray, most: FloatArray) -
     size = np.where(size > 0.0, size, 1.0)
     g, force = along / size, softest * most[..., None] / size
     pull = s * g
-    # Its square would be zero, and the lower bound with it.
-    pull[np.abs(pull) < NO_PULL] = 0.0
     gaps = force * (1.0 - s**2)
     low: FloatArray = np.abs(pull[..., -1])
     high: FloatArray = np.linalg.norm(pull, axis=-1)
@@ -281,8 +274,7 @@ def compliance_shares(
 ) -> ComplianceShares:
     """Return which parts of the deflection's work guide, struts and actuators take.
 
-    The shares add up to 1; they are NaN where nothing gives way, in singular poses, and where
-    struts are so soft that the compliance overflows.
+    The shares add up to 1; they are NaN where nothing gives way, and in singular poses.
 
     Args:
         configuration: Design and poses, with the tool point.
@@ -300,19 +292,13 @@ def compliance_shares(
     twists = twists_of_actuators(poses).reshape(-1, 6, 6)
     regular = np.isfinite(twists[:, 0, 0])
     forces = np.einsum("nji,nj->ni", np.where(regular[:, None, None], twists, 0.0), poses.rows(w))
-    # Shares do not change with the size of the load; squares of large forces would overflow.
-    largest = np.abs(forces).max(axis=1, keepdims=True)
-    forces = np.divide(forces, largest, out=np.zeros_like(forces), where=largest > 0.0)
     lengths = poses.joints[..., STRUT_ROWS].reshape(-1, 2)
     work = forces**2 * poses.rows(soft)
-    with np.errstate(over="ignore", invalid="ignore"):
-        bent = (forces[:, [1, 3]] ** 2 * poses.rows(bending) * lengths**3).sum(axis=1)
+    bent = (forces[:, [1, 3]] ** 2 * poses.rows(bending) * lengths**3).sum(axis=1)
     guide, actuators = work[:, [1, 3]].sum(axis=1), work[:, [0, 2, 4, 5]].sum(axis=1)
     total: FloatArray = guide + actuators + bent
     parts = [
-        np.divide(
-            part, total, out=np.full(total.shape, np.nan), where=(total > 0.0) & (total < np.inf)
-        )
+        np.divide(part, total, out=np.full(total.shape, np.nan), where=total > 0.0)
         for part in (guide, bent, actuators)
     ]
     return ComplianceShares(*(part.reshape(poses.batch) for part in parts))

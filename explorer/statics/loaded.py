@@ -13,7 +13,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Payload, Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.statics.equilibrium import twists_of_actuators
+from explorer.statics.forces import twists_of_actuators
 from explorer.statics.reactions import (
     Reactions,
     has_limits,

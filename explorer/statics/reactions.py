@@ -11,7 +11,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import Payload
 from explorer.numerics.arrays import BoolArray, FloatArray, dot
-from explorer.statics.equilibrium import (
+from explorer.statics.forces import (
     GUIDE_ROWS,
     STRUT_ROWS,
     forces_of,
@@ -46,7 +46,6 @@ class Reactions(NamedTuple):
         joints: Forces of the legs on the platform at b1 to b4, base axes, shape (..., 4, 3), in N.
         bending: Bending moments of struts 2 and 3 at their carriages, shape (..., 2), in N × unit.
         guide_force: Forces of carriages 2 and 3 across the guide, shape (..., 2), in N.
-        guide_moment: Moments of carriages 2 and 3 on the guide, shape (..., 2), in N × unit.
         spread: Most by which the payload's force of any direction increases each of these, in the
             order of `LIMITED`, shape (..., 12).
     """
@@ -55,8 +54,12 @@ class Reactions(NamedTuple):
     joints: FloatArray
     bending: FloatArray
     guide_force: FloatArray
-    guide_moment: FloatArray
     spread: FloatArray
+
+    @property
+    def guide_moment(self) -> FloatArray:
+        """Moments of carriages 2 and 3 on the guide, shape (..., 2), in N × unit."""
+        return self.bending
 
 
 def reactions(
@@ -85,14 +88,12 @@ def reactions_beside(configuration: Configuration, load: ArrayLike, carried: Car
     """Return `reactions` to a load beside weights of which it is known what they do."""
     forces = forces_of(configuration, carried.wrench + np.asarray(load, dtype=np.float64))
     signed = _signed(configuration, forces, carried)
-    moments = np.abs(signed[..., _MOMENTS])
     across = signed[..., 8:].reshape(*signed.shape[:-1], 2, 2)
     return Reactions(
         actuators=forces,
         joints=_joint_forces(configuration, forces, carried),
-        bending=moments,
+        bending=np.abs(signed[..., _MOMENTS]),
         guide_force=np.sqrt(dot(across, across)),
-        guide_moment=moments,
         spread=_spread(configuration, forces.shape[:-1]),
     )
 
@@ -250,9 +251,7 @@ def _linear_range(
     ends = np.stack(np.broadcast_arrays(-lows - start, highs - start))
     # A part that the mass does not load keeps its limits with every mass, or with none.
     bounds = np.stack([np.where(every, -np.inf, np.inf), np.where(every, np.inf, -np.inf)])
-    # Of a mass that loads a part all but not, the bound is infinite.
-    with np.errstate(over="ignore"):
-        np.divide(ends, slope, out=bounds, where=moves)
+    np.divide(ends, slope, out=bounds, where=moves)
     is_possible = lows + highs >= 0.0
     least = np.where(moves, np.where(is_possible, bounds.min(axis=0), np.inf), bounds[0])
     most = np.where(moves, np.where(is_possible, bounds.max(axis=0), -np.inf), bounds[1])
@@ -265,19 +264,12 @@ def _square_range(
     """Return the least and the largest m with |start + m slope| ≤ limit, of vectors (..., 2)."""
     if np.isinf(limit).all():
         return np.full(start.shape[:-1], -np.inf), np.full(start.shape[:-1], np.inf)
-    # Squares of large forces would overflow; so slopes are scaled by a size, and forces by one.
-    steepest = np.abs(slope).max(axis=-1)
-    steepest = np.where(steepest > 0.0, steepest, 1.0)
-    size = np.maximum(np.abs(start).max(axis=-1), np.where(np.isinf(limit), 0.0, np.abs(limit)))
-    size = np.where(size > 0.0, size, 1.0)
-    slope, start, limit = slope / steepest[..., None], start / size[..., None], limit / size
     a, b, c = dot(slope, slope), dot(start, slope), limit**2 - dot(start, start)
     every = (c >= 0.0) & (limit >= 0.0)
     least, most = np.where(every, -np.inf, np.inf), np.where(every, np.inf, -np.inf)
     square = b * b + a * c
     crosses = (a > 0.0) & (square >= 0.0) & (limit >= 0.0)
     root = np.sqrt(np.where(crosses, square, 0.0))
-    with np.errstate(over="ignore"):
-        np.divide(-b - root, a, out=least, where=crosses)
-        np.divide(root - b, a, out=most, where=crosses)
-        return least * (size / steepest), most * (size / steepest)
+    np.divide(-b - root, a, out=least, where=crosses)
+    np.divide(root - b, a, out=most, where=crosses)
+    return least, most

@@ -9,7 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.accuracy import UNIFORM, ToolError
+from explorer.statics.accuracy import (
+    UNIFORM,
+    LargestError,
+    ToolError,
+    error_by_source,
+    errors_alone,
+    largest_error,
+    rms_of_sources,
+    source_errors,
+)
 from explorer.statics.compliance import (
     ComplianceShares,
     PrincipalCompliances,
@@ -20,15 +29,7 @@ from explorer.statics.compliance import (
     principal_compliances,
     stiffness_of,
 )
-from explorer.statics.equilibrium import GUIDE_ROWS, twists_of_actuators
-from explorer.statics.error_sources import (
-    LargestError,
-    error_by_source,
-    errors_alone,
-    largest_error,
-    rms_of_sources,
-    source_errors,
-)
+from explorer.statics.forces import GUIDE_ROWS, twists_of_actuators
 from explorer.statics.loaded import LoadedPose
 
 BY_ACTUATORS, BY_DIMENSIONS, BY_ALL = slice(0, 6), slice(6, 29), slice(0, 29)

@@ -23,7 +23,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, finite_array
-from explorer.statics.held import (
+from explorer.statics.load_cases import (
     INWARD,
     LIMITS,
     PARTS,
@@ -149,7 +149,7 @@ class _LocalLoad:
     """A load at one orientation, with the limits of the workspace there.
 
     Attributes:
-        case: What `explorer.statics.held.load_case` returns.
+        case: What `explorer.statics.load_cases.load_case` returns.
         rotation: Platform to base, shape (3, 3).
         limits: Limits of positions.
         part_names: Names of the parts that may give way.

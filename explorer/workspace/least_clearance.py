@@ -29,7 +29,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.descent import descend
+from explorer.numerics.search import descend
 from explorer.workspace.limits.constraints import Cone, Constraint, constraints
 from explorer.workspace.limits.region import box_of
 from explorer.workspace.slices.volume import home_rotation

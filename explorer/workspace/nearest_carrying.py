@@ -16,7 +16,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.numerics.descent import descend
+from explorer.numerics.search import descend
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, reactions
 from explorer.workspace.accessible.nodes import make_grid

@@ -32,9 +32,9 @@ from explorer.singularity.colours import (
     warning_condition,
 )
 from explorer.singularity.jacobian import inverse_condition, jacobian_of
-from explorer.statics.accuracy import actuator_errors, tool_errors
+from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, deflection, is_elastic, stiffness_of
-from explorer.statics.held import largest_shares, load_case
+from explorer.statics.load_cases import largest_shares, load_case
 from explorer.statics.reactions import has_limits
 from explorer.statics.weights import payload_wrench
 from explorer.workspace.limits.constraints import constraints, slacks
@@ -149,7 +149,7 @@ def measure_positions(
             rates = jacobian_of(at.with_tool(np.zeros(3)))
             return inverse_condition(rates, design.reach), whole
         case "error":
-            moved = tool_errors(at, actuator_errors(design)).worst.displacement
+            moved = worst_errors(at, actuator_errors(design)).displacement
             return moved * design.unit_mm, whole
         case "deflection":
             wrench = payload_wrench(design, rotation) + w

@@ -57,12 +57,11 @@ from explorer.measures.blocks.block import Share
 from explorer.measures.blocks.budget import tolerance_budget
 from explorer.measures.blocks.forces import most_held, reaction_tables, verdict
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.design_file import PRESETS, typical_machine
 from explorer.mechanism.pose import Pose
-from explorer.mechanism.typical import typical_machine
 from explorer.singularity.colours import SINGULAR
+from explorer.statics.accuracy import SOURCES
 from explorer.statics.budget.costs import stated_tolerances
-from explorer.statics.error_sources import SOURCES
 from explorer.statics.forces import actuator_forces, strut_bending
 
 OPTIMAL = PRESETS["paper-optimal"]

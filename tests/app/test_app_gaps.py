@@ -48,9 +48,8 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.bruhat import incidences
 from explorer.singularity.colours import SINGULAR, proximity_colour
-from explorer.singularity.strata import GENERIC, STRATA
+from explorer.singularity.strata import GENERIC, STRATA, incidences
 
 OPTIMAL = PRESETS["paper-optimal"]
 Drawn = dict[str, dict[str, Any]]

@@ -66,11 +66,10 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.displacement import displacement
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
-from explorer.singularity.bruhat import OF_INCIDENCES, incidences
+from explorer.singularity.gaps import least_turns
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_stratum
-from explorer.singularity.strata import GENERIC, STRATA
-from explorer.singularity.turning import least_turns
+from explorer.singularity.strata import GENERIC, OF_INCIDENCES, STRATA, incidences
 
 OPTIMAL = PRESETS["paper-optimal"]
 BATCHED = ("batched_positions", "batched_scales")

@@ -12,7 +12,7 @@ from benchmarks.samples import DESIGN, SIZE, around_home
 from benchmarks.table import Row, per_second, seconds, times
 from benchmarks.timing import best_of
 from explorer import accessible_workspace, leg_clearances, tetrahedra_overlap
-from explorer.legs.moves import moves_are_clear
+from explorer.legs.moves import pairs_are_clear
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import warm
@@ -60,7 +60,7 @@ def run() -> Iterator[Row]:
     )
     start, end = positions[:MOVES], positions[:MOVES] + 0.02 * SIZE
     turn = rotations[:MOVES]
-    duration = best_of(ROUNDS // 4, lambda: moves_are_clear(DESIGN, start, turn, end, turn))
+    duration = best_of(ROUNDS // 4, lambda: pairs_are_clear(DESIGN, start, turn, end, turn))
     yield Row("one straight move proved free of collisions", seconds(duration / MOVES))
     thick = with_radius(DESIGN, RADIUS)
     yield Row(

@@ -24,16 +24,20 @@ from explorer import (
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
-from explorer.statics.accuracy import actuator_errors, tool_errors
+from explorer.statics.accuracy import (
+    actuator_errors,
+    error_by_source,
+    largest_error,
+    source_errors,
+    worst_errors,
+)
 from explorer.statics.compliance import (
     compliance_of,
     compliance_shares,
     principal_compliances,
     stiffness_of,
 )
-from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.error_sources import error_by_source, largest_error, source_errors
-from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS
+from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, twists_of_actuators
 
 FORCE_POSES, POSES, ROUNDS = 100_000, 10_000, 10
 TENTH = (0.1, 0.1, 0.1)
@@ -92,7 +96,7 @@ def _precision() -> Iterator[Row]:
         soft = compliance_of(poses, stiffness, bending)
         return (
             error_by_source(poses),
-            tool_errors(poses, errors),
+            worst_errors(poses, errors),
             _ellipsoids(twists_of_actuators(poses)[:, :3] * errors),
             principal_compliances(soft),
             deflection(soft, LOAD),
@@ -122,7 +126,7 @@ def _precision() -> Iterator[Row]:
 
     def of_one() -> object:
         pose = Configuration(MACHINE, positions[0], rotations[0])
-        return error_by_source(pose), tool_errors(pose, errors), compliance_of(pose, stiffness)
+        return error_by_source(pose), worst_errors(pose, errors), compliance_of(pose, stiffness)
 
     alone = best_of(100, of_one)
     yield Row("errors and compliance of one pose", seconds(alone))

@@ -21,7 +21,7 @@ from benchmarks.timing import best_of
 from explorer import Actuators, Payload, Struts
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
-from explorer.statics.held import largest_shares, load_case
+from explorer.statics.load_cases import largest_shares, load_case
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints, slacks
 from explorer.workspace.limits.region import region_of

@@ -21,7 +21,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection
-from explorer.statics.held import largest_shares, load_case
+from explorer.statics.load_cases import largest_shares, load_case
 from explorer.workspace.carried_region import part_names
 
 OPTIMAL = PRESETS["paper-optimal"]

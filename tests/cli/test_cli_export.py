@@ -18,10 +18,9 @@ from explorer.cli import run
 from explorer.export.imperfect import ImperfectMachine
 from explorer.export.mesh import FORMATS
 from explorer.export.simulation import simulation_mjcf
-from explorer.mechanism.design_file import encode_design
+from explorer.mechanism.design_file import STIFFNESSES, encode_design
 from explorer.mechanism.machine import Actuators, Payload
-from explorer.mechanism.typical import STIFFNESSES
-from explorer.statics.error_sources import SOURCES
+from explorer.statics.accuracy import SOURCES
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.solids.booleans import convex_hull
 from explorer.workspace.solids.solids import workspace_solid

@@ -13,19 +13,19 @@ from numpy.testing import assert_allclose
 import explorer
 from explorer.measures.size import positions_over
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.typical import typical_machine
+from explorer.mechanism.design_file import typical_machine
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.weights import machine_weights
-from explorer.statics.accuracy import actuator_errors
-from explorer.statics.budget.costs import source_costs, stated_tolerances
-from explorer.statics.compliance import deflection, stiffness_of
-from explorer.statics.error_sources import (
+from explorer.statics.accuracy import (
     SOURCES,
+    actuator_errors,
     error_by_source,
     largest_error,
     rms_of_sources,
     source_errors,
 )
+from explorer.statics.budget.costs import source_costs, stated_tolerances
+from explorer.statics.compliance import deflection, stiffness_of
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.weights import carry, payload_wrench
 

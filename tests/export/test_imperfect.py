@@ -32,16 +32,20 @@ from explorer.export.imperfect import ImperfectMachine, draw_deviations
 from explorer.export.servos import joint_inertia
 from explorer.export.simulation import DENSITY, simulation_joints, simulation_mjcf
 from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design_file import typical_machine
 from explorer.mechanism.machine import Six
-from explorer.mechanism.typical import typical_machine
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED
 from explorer.prototype.weights import bar_masses
-from explorer.statics.accuracy import tool_errors
+from explorer.statics.accuracy import (
+    SOURCES,
+    error_by_source,
+    rms_of_sources,
+    source_errors,
+)
 from explorer.statics.budget.costs import source_costs
 from explorer.statics.compliance import stiffness_of
-from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.error_sources import SOURCES, error_by_source, rms_of_sources, source_errors
+from explorer.statics.forces import twists_of_actuators
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.tool_precision import ToolPrecision
 
@@ -151,10 +155,10 @@ def test_rms_errors_are_those_of_drawn_machines(design: Design) -> None:
     semi_axes = precision.ellipsoid.semi_axes
     expected = np.sqrt(np.linalg.eigvalsh(moved[:, :3].T @ moved[:, :3] / len(moved))[::-1])
     assert_allclose(semi_axes, expected, rtol=0.05)
-    # Those of the actuators alone, by their own functions.
-    joints = drawn[:, :6] @ twists_of_actuators(Configuration.at(design, home, TOOL)).T
-    at_home = Configuration.at(design, home, TOOL)
-    alone = tool_errors(at_home, source_errors(design)[:6]).rms
+    # Those of the actuators alone.
+    twists = twists_of_actuators(Configuration.at(design, home, TOOL))
+    joints = drawn[:, :6] @ twists.T
+    alone = rms_of_sources(twists, source_errors(design)[:6])
     found = float(np.sqrt((joints[:, :3] ** 2).sum(axis=1).mean()))
     assert float(alone.displacement) == pytest.approx(found, rel=0.03)
 

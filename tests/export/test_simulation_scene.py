@@ -31,12 +31,12 @@ from explorer.export.imperfect import ImperfectMachine
 from explorer.export.simulation import DENSITY, SimulationModel, simulation_mjcf
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DOWN, LENGTHS, Swing
+from explorer.mechanism.design_file import typical_machine
 from explorer.mechanism.machine import STANDARD_GRAVITY
-from explorer.mechanism.typical import typical_machine
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import ACTUATED
 from explorer.prototype.weights import bar_masses, machine_weights
-from explorer.statics.error_sources import SOURCES
+from explorer.statics.accuracy import SOURCES
 from explorer.statics.weights import carry
 
 UNLIMITED = msgspec.structs.replace(

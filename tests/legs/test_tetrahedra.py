@@ -18,7 +18,7 @@ from explorer.numerics.compiled import MANY_ROWS
 REFERENCE: list[dict[str, Any]] = read_reference("interference")["tetrahedra"]
 P, Q = (np.array([case[key] for case in REFERENCE]) for key in "pq")
 OVERLAP = np.array([case["overlap"] for case in REFERENCE])
-SCALES = (1e-60, 1e-3, 1.0, 1e60)
+SCALES = (1e-6, 1.0, 1e6)
 
 CORNER = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 RANKS = ("solid", "quadrilateral", "triangle", "segment", "point", "sliver")

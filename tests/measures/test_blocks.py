@@ -21,8 +21,7 @@ from explorer.measures.blocks.singularity import (
     gains,
     margin_table,
 )
-from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.typical import typical_machine
+from explorer.mechanism.design_file import PRESETS, typical_machine
 from explorer.singularity.ellipsoids import performance, singularity_free_ball
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.tool_precision import ToolPrecision

@@ -13,8 +13,8 @@ from explorer import Actuators, Payload, Struts
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
-from explorer.measures.clearance import clearance_beyond, clearance_margin_of
 from explorer.measures.measurements import Measurements, measure_design
+from explorer.measures.size import clearance_beyond, clearance_margin_of
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design

@@ -26,7 +26,7 @@ from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import measure_design, reason_for_missing
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
-from explorer.statics.accuracy import actuator_errors, tool_errors
+from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, stiffness_of
 from explorer.statics.reactions import limit_shares
 from explorer.statics.weights import design_weights, payload_wrench
@@ -70,7 +70,7 @@ def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
     shares = limit_shares(MACHINE, held)
     poses = Configuration(*given, MACHINE.tool.position)
     soft = compliance_of(poses, *stiffness_of(MACHINE))
-    worst = tool_errors(poses, actuator_errors(MACHINE)).worst
+    worst = worst_errors(poses, actuator_errors(MACHINE))
     bent = deflection(soft, payload_wrench(MACHINE, rotation))
     sampled = {
         "load_share": shares.max(),

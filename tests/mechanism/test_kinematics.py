@@ -30,9 +30,9 @@ from explorer.mechanism.kinematics import (
     ForwardKinematics,
     checked_joints,
     discriminants,
+    solve_rows,
 )
 from explorer.mechanism.margins import mode_of, signs_of
-from explorer.mechanism.trilateration import solve_rows
 from explorer.numerics.arrays import FARTHEST, FloatArray
 from explorer.singularity.jacobian import determinant
 from explorer.singularity.strata import inversions

@@ -12,7 +12,7 @@ from explorer import PRESETS, Actuators, Payload, Struts
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import KERNELS, warm
 from explorer.statics.forces import actuator_forces
-from explorer.statics.held import largest_shares, limit_values, load_case, settle_on_limit
+from explorer.statics.load_cases import largest_shares, limit_values, load_case, settle_on_limit
 from explorer.statics.slopes import twist_slopes
 from explorer.workspace.orientations.share import orientation_share
 from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from clear_moves import moves_are_clear
 from limited_designs import limited
 from long_cases import long_after
 from numpy.testing import assert_allclose
@@ -28,7 +29,7 @@ from explorer import (
     inverse,
     to_folds,
 )
-from explorer.legs.moves import move_clearances, moves_are_clear, poses_between
+from explorer.legs.moves import move_clearances, poses_between
 from explorer.mechanism.displacement import displacement
 from explorer.paths.crossings import path_margins
 from explorer.paths.planning import EndError, NoPathError, PlannedPath, plan_path

@@ -36,8 +36,8 @@ from explorer.reproduce.kinematics import (
     random_paths,
 )
 from explorer.reproduce.six_legs import SixLegs, octahedral, six_four_twin
+from explorer.singularity.freedoms import UNCOUPLED
 from explorer.singularity.strata import STRATA
-from explorer.singularity.uncoupled import UNCOUPLED
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
 from explorer.workspace.orientations.share import orientation_share

@@ -10,10 +10,9 @@ from strategies import Case, all_cases
 
 from explorer import PRESETS, Pose, inverse, margins
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.bruhat import conditions, incidences
 from explorer.singularity.freedoms import Freedoms, FreeTurn, freedoms
 from explorer.singularity.nearest_stratum import nearest_in_stratum
-from explorer.singularity.strata import GENERIC, STRATA
+from explorer.singularity.strata import GENERIC, STRATA, conditions, incidences
 
 DESIGN = PRESETS["paper-optimal"]
 SINGULAR = [w for w in STRATA if w != GENERIC]

@@ -28,11 +28,18 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.displacement import PlatformPoints, displacement
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
-from explorer.singularity.bruhat import COVERED, OF_INCIDENCES, Stratum, conditions, is_below
 from explorer.singularity.nearest import nearest_singular_poses
 from explorer.singularity.nearest_lines import Constants, bound_over, terms_at, value_at
 from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_stratum, seen_stratum
-from explorer.singularity.strata import GENERIC, STRATA
+from explorer.singularity.strata import (
+    COVERED,
+    GENERIC,
+    OF_INCIDENCES,
+    STRATA,
+    Stratum,
+    conditions,
+    is_below,
+)
 
 OPTIMAL = PRESETS["paper-optimal"]
 

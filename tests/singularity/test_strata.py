@@ -21,18 +21,20 @@ from strategies import QUARTER_TURNS, Case, ordinary_cases, ordinary_designs, si
 
 from explorer import PRESETS, margins, stratum
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.bruhat import (
+from explorer.singularity.strata import (
     COVERED,
+    GENERIC,
     OF_INCIDENCES,
+    STRATA,
     WORDS,
     Stratum,
     codimension,
     conditions,
     describe_stratum,
     incidences,
+    inversions,
     is_below,
 )
-from explorer.singularity.strata import GENERIC, STRATA, inversions
 
 
 def seen(position: FloatArray, rotation: FloatArray) -> tuple[int, ...]:

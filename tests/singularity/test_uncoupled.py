@@ -15,9 +15,9 @@ from strategies import Case, all_cases, ordinary_cases
 from explorer import PRESETS, Pose, inverse, margins
 from explorer.errors import InputError
 from explorer.numerics.arrays import FloatArray
+from explorer.singularity.freedoms import UNCOUPLED
+from explorer.singularity.gaps import least_turns
 from explorer.singularity.jacobian import jacobian, scaled_margins
-from explorer.singularity.turning import least_turns
-from explorer.singularity.uncoupled import UNCOUPLED
 
 DESIGN = PRESETS["paper-optimal"]
 HOME = DESIGN.home_pose

@@ -28,6 +28,13 @@ from explorer.measures.size import positions_over
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
+from explorer.statics.accuracy import (
+    SOURCES,
+    error_by_source,
+    largest_error,
+    rms_of_sources,
+    source_errors,
+)
 from explorer.statics.budget.allocation import tolerance_budget
 from explorer.statics.budget.costs import (
     IS_TILT,
@@ -37,13 +44,6 @@ from explorer.statics.budget.costs import (
     source_influences,
     stated_tolerances,
     with_tolerances,
-)
-from explorer.statics.error_sources import (
-    SOURCES,
-    error_by_source,
-    largest_error,
-    rms_of_sources,
-    source_errors,
 )
 
 OPTIMAL = PRESETS["paper-optimal"]

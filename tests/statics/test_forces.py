@@ -35,8 +35,7 @@ from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
-from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.forces import worst_direction
+from explorer.statics.forces import twists_of_actuators, worst_direction
 from explorer.statics.reactions import limit_shares
 from explorer.statics.slopes import PARAMETERS, twist_slopes
 from explorer.statics.weights import Weights, carry

@@ -47,10 +47,9 @@ from explorer.app.state.view import (
 )
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design import JOINTS
-from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.design_file import PRESETS, typical_machine
 from explorer.mechanism.folds import pose_of_folds
 from explorer.mechanism.pose import Pose
-from explorer.mechanism.typical import typical_machine
 from explorer.optimise.defaults import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.sweep.results import load_results
 from explorer.sweep.run import run_study

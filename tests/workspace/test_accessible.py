@@ -8,6 +8,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
+from clear_moves import moves_are_clear
 from limited_designs import limited, ordinary_case
 from long_cases import long_after
 from scipy.sparse import coo_array
@@ -25,7 +26,6 @@ from explorer import (
     workspace_volume,
 )
 from explorer.legs.clearance import PAIRS, distance_gradients
-from explorer.legs.moves import moves_are_clear
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray

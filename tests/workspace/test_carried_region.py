@@ -32,7 +32,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import decode_design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.held import largest_shares as shares_of_case, load_case
+from explorer.statics.load_cases import largest_shares as shares_of_case, load_case
 from explorer.statics.reactions import PART_NAMES, limit_shares
 from explorer.statics.weights import design_weights
 from explorer.workspace.carried_region import carried_region

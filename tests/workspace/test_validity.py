@@ -7,13 +7,14 @@ import math
 import msgspec
 import numpy as np
 import pytest
+from clear_moves import moves_are_clear
 from hypothesis import given, strategies as st
 from limited_designs import limited, ordinary_case, troubled_case
 from scipy.spatial.transform import Rotation
 from tool_moves import tool_move
 
 from explorer import PRESETS, Design, InputError, Pose, evaluate
-from explorer.legs.moves import moves_are_clear, poses_between
+from explorer.legs.moves import poses_between
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.workspace.limits.valid_moves import moves_are_valid

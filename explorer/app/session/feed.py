@@ -12,7 +12,7 @@ from explorer.app.session.jobs import LONG_SECONDS, Worker
 from explorer.app.session.session import Session
 from explorer.app.session.worker import CANCELLED, Channel
 from explorer.app.state.frame import Frame
-from explorer.numerics.stages import Watch, unwatched
+from explorer.numerics.search import Watch, unwatched
 
 # Seconds after which a drawing that the user cancelled ends with its process.
 CANCEL_SECONDS = 2.0

@@ -25,6 +25,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
+from explorer.statics.accuracy import SOURCES
 from explorer.statics.budget.allocation import ToleranceBudget, costs_or_budget
 from explorer.statics.budget.costs import (
     PARTS,
@@ -32,7 +33,6 @@ from explorer.statics.budget.costs import (
     stated_tolerances,
     with_tolerances,
 )
-from explorer.statics.error_sources import SOURCES
 
 PROGRAM = "explorer budget"
 WORDS = {"box": "nodes of a grid over the box", "workspace": "nodes of a grid in the workspace"}

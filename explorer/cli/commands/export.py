@@ -314,7 +314,7 @@ def simulation_json(model: SimulationModel) -> dict[str, Any]:
 
 def imperfect_json(machine: ImperfectMachine) -> dict[str, Any]:
     """Return deviations and errors of the tool at home as plain values."""
-    from explorer.statics.error_sources import SOURCES, UNITS, drawing_values, source_errors
+    from explorer.statics.accuracy import SOURCES, UNITS, drawing_values, source_errors
 
     design = machine.design
     off, most = (

@@ -18,8 +18,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
-from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.forces import WorstDirection, worst_direction
+from explorer.statics.forces import WorstDirection, twists_of_actuators, worst_direction
 from explorer.statics.loaded import LoadedPose, WorstForce
 from explorer.statics.reactions import LIMITED
 from explorer.statics.weights import Weights

@@ -21,9 +21,9 @@ from explorer.measures.blocks.singularity import (
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.measures.verdict import verdict
 from explorer.mechanism.pose import Triple
-from explorer.singularity.bruhat import incidences
 from explorer.singularity.ellipsoids import performance
 from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.singularity.strata import incidences
 
 
 @dataclass(frozen=True, kw_only=True)

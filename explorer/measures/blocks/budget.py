@@ -18,10 +18,9 @@ from explorer.measures.blocks.block import (
     Table,
 )
 from explorer.mechanism.design import JOINTS
-from explorer.statics.accuracy import RMS_ERRORS
+from explorer.statics.accuracy import IS_TILT, RMS_ERRORS, SOURCES
 from explorer.statics.budget.allocation import ToleranceBudget
 from explorer.statics.budget.costs import PARTS, SourceCosts
-from explorer.statics.error_sources import IS_TILT, SOURCES
 
 DIGITS = 3
 

@@ -22,9 +22,8 @@ from explorer.measures.blocks.block import (
     direction,
 )
 from explorer.mechanism.design import JOINTS
-from explorer.statics.accuracy import RMS_ERRORS
+from explorer.statics.accuracy import IS_TILT, RMS_ERRORS, SOURCES
 from explorer.statics.compliance import is_elastic
-from explorer.statics.error_sources import IS_TILT, SOURCES
 from explorer.statics.tool_precision import GROUPS, ToolPrecision
 
 DIGITS = 3

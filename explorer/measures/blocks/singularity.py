@@ -26,10 +26,9 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, TETRAHEDRA
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.number_text import format_number
-from explorer.singularity.bruhat import Stratum, describe_stratum, incidences
 from explorer.singularity.ellipsoids import Performance, SingularityFreeBall
 from explorer.singularity.freedoms import FreeTurn
-from explorer.singularity.strata import GENERIC, inversions
+from explorer.singularity.strata import GENERIC, Stratum, describe_stratum, incidences, inversions
 
 VERDICT_HINT = (
     "The distance is the root-mean-square displacement of b1 to b4 (Nawratil's metric) to the "

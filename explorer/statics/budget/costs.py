@@ -19,7 +19,7 @@ from explorer.mechanism.machine import DIMENSIONS, Tolerances
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray, position_array
-from explorer.statics.error_sources import (
+from explorer.statics.accuracy import (
     IS_TILT,
     SOURCES,
     error_by_source,

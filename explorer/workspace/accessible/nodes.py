@@ -21,7 +21,7 @@ from explorer.legs.moves import pairs_are_clear
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.numerics.descent import descend
+from explorer.numerics.search import descend
 from explorer.workspace.limits.constraints import constraints, satisfies, slacks
 from explorer.workspace.limits.region import box_of
 from explorer.workspace.limits.valid_poses import poses_are_valid, violations

@@ -20,7 +20,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.numerics.stages import Stages, Watch, unwatched
+from explorer.numerics.search import Stages, Watch, unwatched
 from explorer.workspace.accessible.nodes import Survey, check_start, make_cell_grid, survey
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.slices.volume import home_rotation, workspace_volume

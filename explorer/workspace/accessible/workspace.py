@@ -20,7 +20,7 @@ from explorer.legs.clearance import PAIRS, radii_of_pairs
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.numerics.stages import Stages, Watch, unwatched
+from explorer.numerics.search import Stages, Watch, unwatched
 from explorer.workspace.accessible.collision_surface import nearest_pair, project_onto_collisions
 from explorer.workspace.accessible.nodes import (
     ALL_PAIRS,

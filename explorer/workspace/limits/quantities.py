@@ -13,7 +13,7 @@ import numpy as np
 from explorer.mechanism.margins import margins_at
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.numerics.vectors import Vector, cross3, dot3, minus, vector
+from explorer.numerics.vectors import cross3, dot3, minus, norm3, vector
 
 # Quantities, those first that take the least time: b4, the margins, the carriages, their distance,
 # d3 − d1, the lengths in the order of the legs, and the angle in radians of a leg from an axis.
@@ -44,12 +44,6 @@ def write_ends(
         base[0, i] = base[1, i] = base[2, i] = base[3, i] = 0.0
     base[1, 0], base[2, 0] = ends[1, 0], ends[2, 0]
     base[3, 0], base[3, 1] = row[A3], row[A3 + 1]
-
-
-@helper
-def norm3(v: Vector) -> float:
-    """Return the length of a vector."""
-    return math.sqrt(dot3(v, v))
 
 
 @helper

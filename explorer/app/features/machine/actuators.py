@@ -19,8 +19,8 @@ from explorer.app.state.actions import Set
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.mechanism.design import JOINTS
+from explorer.mechanism.design_file import STIFFNESSES
 from explorer.mechanism.machine import Six
-from explorer.mechanism.typical import STIFFNESSES
 from explorer.numerics.number_text import format_number
 
 # A limit of the forces that is switched on begins with this, in N.

@@ -42,8 +42,8 @@ from explorer.app.widgets.markup import (
 )
 from explorer.measures.blocks.block import Look
 from explorer.measures.catalogue import CATALOGUE
-from explorer.measures.clearance import CERTAIN
 from explorer.measures.measurements import Measurements
+from explorer.measures.size import CERTAIN
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.number_text import decimals_for, format_decimals, format_number
 from explorer.optimise.conflicts import Conflict

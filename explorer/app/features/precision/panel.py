@@ -26,7 +26,7 @@ from explorer.app.widgets.markup import box, dim
 from explorer.measures.blocks.precision import deflections, tool_errors
 from explorer.measures.blocks.source import Source, load_source
 from explorer.mechanism.design import Design
-from explorer.mechanism.typical import typical_machine
+from explorer.mechanism.design_file import typical_machine
 from explorer.statics.compliance import is_elastic
 from explorer.statics.tool_precision import ToolPrecision
 

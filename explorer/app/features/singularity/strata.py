@@ -23,15 +23,17 @@ from explorer.app.widgets.markup import box, dim
 from explorer.measures.blocks.singularity import stratum_sentence
 from explorer.measures.verdict import DISTANCE_SHARE
 from explorer.numerics.number_text import format_fitted
-from explorer.singularity.bruhat import (
+from explorer.singularity.colours import css, proximity_colour
+from explorer.singularity.strata import (
     COVERED,
+    GENERIC,
     OF_INCIDENCES,
+    STRATA,
     Stratum,
     codimension,
     describe_stratum,
+    inversions,
 )
-from explorer.singularity.colours import css, proximity_colour
-from explorer.singularity.strata import GENERIC, STRATA, inversions
 
 # In pixels, as in the stylesheet: from row to row, and the height of a node.
 ROW, NODE_HEIGHT = 50, 30

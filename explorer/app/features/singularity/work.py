@@ -14,9 +14,9 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
-from explorer.singularity.bruhat import Stratum, codimension, describe_stratum
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_stratum, seen_stratum
+from explorer.singularity.strata import Stratum, codimension, describe_stratum
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.numerics.stages import Watch
+from explorer.numerics.search import Watch
 from explorer.workspace.accessible.nodes import StartError
 from explorer.workspace.accessible.workspace import (
     PairCost,

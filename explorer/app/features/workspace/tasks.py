@@ -31,7 +31,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.stages import unwatched
+from explorer.numerics.search import unwatched
 from explorer.statics.reactions import has_limits
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.faces.faces import Faces, workspace_faces

@@ -19,7 +19,7 @@ from explorer.optimise.demands import AZIMUTHS, Box
 from explorer.optimise.problem import DISTANCES, SHIFTS, distance_of
 from explorer.optimise.search.state import State
 from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.statics.equilibrium import SINGULAR
+from explorer.statics.forces import SINGULAR
 from explorer.workspace.limits.constraints import YAW, BallOrCylinder, Constraint, HalfSpace
 from explorer.workspace.limits.table import GAP
 

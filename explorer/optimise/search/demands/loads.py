@@ -23,9 +23,14 @@ from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.optimise.problem import SHIFTS, ObjectiveName
 from explorer.optimise.search.demands.geometry import Demand, MarginDemand, Measured
 from explorer.optimise.search.state import State
-from explorer.statics.load_slopes import BENDING, deflection_slopes, error_slopes, share_slopes
 from explorer.statics.reactions import LIMITED, part_limits
-from explorer.statics.slopes import twist_slopes
+from explorer.statics.slopes import (
+    BENDING,
+    deflection_slopes,
+    error_slopes,
+    share_slopes,
+    twist_slopes,
+)
 from explorer.workspace.limits.constraints import YAW
 
 CHAIN = (*VARIABLES, YAW, *SHIFTS)

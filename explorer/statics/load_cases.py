@@ -2,7 +2,7 @@
 
 A part has two limits: its value must not exceed the largest and not fall below the least one. The
 load is held where the share s of every limit is at most 1. Each limit has a function of position
-that is zero there, 1 where the share is far below zero and −1 where it is beyond all numbers:
+that is zero there, 1 where the share is far below zero and −1 where it is infinite:
 (1 − s) / √(1 + s²). It is smooth, also towards a singular plane of the home mode, whether the share
 grows there or not. Beyond the plane it goes on along the line through its values on the plane and a
 little before it. The plane itself is a limit of the workspace.
@@ -17,15 +17,14 @@ import numpy as np
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.vectors import norm3
 from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.statics.equilibrium import B2, B3, holding_forces, is_singular
+from explorer.statics.forces import B2, B3, holding_forces, is_singular
 from explorer.statics.reactions import part_limits
 from explorer.statics.weights import payload_wrench
 
 # Least and largest value of the functions.
 LOWEST, HIGHEST = -4.0, 2.0
-# A share whose square is near the end of the range of numbers counts as infinite.
-INFINITE = 1e150
 # Distance from a singular plane of a position on it, over |p|: what is below rounding at this
 # distance does not grow towards the plane. Step of the line beyond, over the way to the plane.
 BESIDE, AHEAD = 1e-9, 1e-3
@@ -85,15 +84,15 @@ def write_shares(case: FloatArray, r: FloatArray, p: FloatArray, out: FloatArray
         gy = holding_forces(x, p, r, (0.0, 1.0, 0.0), (-t[2], 0.0, t[0]))
         gz = holding_forces(x, p, r, (0.0, 0.0, 1.0), (t[1], -t[0], 0.0))
         e = (
-            force * length(gx[0], gy[0], gz[0]),
-            force * length(gx[1], gy[1], gz[1]),
-            force * length(gx[2], gy[2], gz[2]),
-            force * length(gx[3], gy[3], gz[3]),
-            force * length(gx[4], gy[4], gz[4]),
-            force * length(gx[5], gy[5], gz[5]),
+            force * norm3((gx[0], gy[0], gz[0])),
+            force * norm3((gx[1], gy[1], gz[1])),
+            force * norm3((gx[2], gy[2], gz[2])),
+            force * norm3((gx[3], gy[3], gz[3])),
+            force * norm3((gx[4], gy[4], gz[4])),
+            force * norm3((gx[5], gy[5], gz[5])),
         )
-    d2 = length(0.0, p[1] + x[B2] * r[1, 0], p[2] + x[B2] * r[2, 0])
-    d4 = length(0.0, p[1] + x[B3] * r[1, 0], p[2] + x[B3] * r[2, 0])
+    d2 = norm3((0.0, p[1] + x[B2] * r[1, 0], p[2] + x[B2] * r[2, 0]))
+    d4 = norm3((0.0, p[1] + x[B3] * r[1, 0], p[2] + x[B3] * r[2, 0]))
     values = (f[0], f[1], f[2], f[3], f[4], f[5], f[1] * d2, f[3] * d4, f[2], f[4])
     spreads = (e[0], e[1], e[2], e[3], e[4], e[5], e[1] * d2, e[3] * d4, e[2], e[4])
     for i in range(PARTS):
@@ -104,7 +103,7 @@ def write_shares(case: FloatArray, r: FloatArray, p: FloatArray, out: FloatArray
 @helper
 def room_of(share: float) -> float:
     """Return the function of a limit for a share of it."""
-    if abs(share) > INFINITE:
+    if math.isinf(share):
         return -1.0 if share > 0.0 else 1.0
     return (1.0 - share) / math.sqrt(1.0 + share * share)
 
@@ -122,7 +121,7 @@ def move_into_mode(case: FloatArray, p: FloatArray, near: FloatArray) -> bool:
 
     It is `p` itself, or on one singular plane, or where two of them meet.
     """
-    least = BESIDE * length(p[0], p[1], p[2])
+    least = BESIDE * norm3((p[0], p[1], p[2]))
     lacks = (lacking(case, 0, p, least), lacking(case, 1, p, least), lacking(case, 2, p, least))
     for i in range(3):
         near[i] = p[i]
@@ -186,12 +185,6 @@ def value_at(
 
 
 @helper
-def length(x: float, y: float, z: float) -> float:
-    """Return the length of a vector."""
-    return math.sqrt(x * x + y * y + z * z)
-
-
-@helper
 def rate_along(
     case: FloatArray,
     r: FloatArray,
@@ -233,7 +226,7 @@ def follow_slope(
         x = rate_along(case, r, limit, at, 0, h, work, shares)
         y = rate_along(case, r, limit, at, 1, h, work, shares)
         z = rate_along(case, r, limit, at, 2, h, work, shares)
-        steepness = length(x, y, z)
+        steepness = norm3((x, y, z))
         if steepness == 0.0:
             return False
         step = min(1.0, STEP_OF_CELL * cell * steepness / abs(value)) * value / steepness**2
