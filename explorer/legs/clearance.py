@@ -147,13 +147,7 @@ def point_rates(axes: FloatArray, points: FloatArray) -> FloatArray:
 
 @kernel("void(f8[:,:,:,::1], f8[:,::1], f8[:,:,:,::1])")
 def pair_rows(axes: FloatArray, distance: FloatArray, points: FloatArray) -> None:
-    """Write the distances and closest points of the six pairs of four axes.
-
-    Args:
-        axes: Shape (n, 4, 2, 3).
-        distance: Output, shape (n, 6).
-        points: Output, shape (n, 6, 2, 3).
-    """
+    """Write distances and closest points (n, 6, 2, 3) of the pairs of axes (n, 4, 2, 3)."""
     for row in range(axes.shape[0]):
         pair = 0
         for i in range(4):

@@ -97,14 +97,9 @@ def project(
 ) -> tuple[bool, bool, bool]:
     """Return whether on some axis the projections are apart, overlap slightly, overlap deeply.
 
-    The loop has no branch, so that compilers turn it into vector instructions.
-
-    Args:
-        bodies: Vertices, shape (2, 3, 4).
-        axes: Axes, shape (3, n).
-        count: Number of axes to use.
-        tolerance: Gap of projections that counts as touching, over the axis' length.
-        size: Largest extent of the bodies.
+    Bodies are vertices (2, 3, 4), axes the first `count` of (3, n); a gap up to the tolerance, over
+    the axis' length, is a touch. The loop has no branch, so that compilers make vector instructions
+    of it.
     """
     (ax, ay, az), (bx, by, bz) = vertex(bodies, 0, 0), vertex(bodies, 0, 1)
     (cx, cy, cz), (dx, dy, dz) = vertex(bodies, 0, 2), vertex(bodies, 0, 3)
@@ -171,16 +166,7 @@ def connections_separate(
 def overlaps(
     p: FloatArray, q: FloatArray, row: int, bodies: FloatArray, edges: FloatArray, axes: FloatArray
 ) -> bool:
-    """Return whether a pair overlaps.
-
-    Args:
-        p: First bodies, shape (n, 4, 3).
-        q: Second bodies, shape (n, 4, 3).
-        row: Index of the pair.
-        bodies: Working space for vertices, shape (2, 3, 4).
-        edges: Working space for edges, shape (2, 3, 6).
-        axes: Working space, shape (3, 36).
-    """
+    """Return whether a pair of bodies (n, 4, 3) overlaps; the last three are working space."""
     largest, size, apart = compare_boxes(p, q, row)
     if apart:
         return False

@@ -71,9 +71,9 @@ def tangent_error(leg: int, half: float, angle: float, parts: FloatArray) -> flo
 def normal_rate(
     n: Vector, u: Vector, du: Vector, v: Vector, dv: Vector, s: float, t: float
 ) -> Vector:
-    """Return the rate at which a direction turns to stay perpendicular to the segments.
+    """Return the rate at which a direction n turns to stay perpendicular to the segments u and v.
 
-    A segment counts if its closest point, at s along u or t along v, lies in its interior.
+    A segment counts if its closest point, at s or t, lies in its interior.
     """
     uu, vv, uv = dot3(u, u), dot3(v, v), dot3(u, v)
     a, b = 0.0, 0.0
@@ -160,22 +160,13 @@ def least_rows(
     least: FloatArray,
     share: FloatArray,
 ) -> None:
-    """Write the least distance of each pair of legs over each move, and a lower bound of it.
+    """Write the least distance of each pair of legs over n moves, and a lower bound of it.
 
-    Args:
-        start: Point that moves straight at the start, shape (n, 3).
-        step: Its displacement, shape (n, 3).
-        angle: Rotation of the platform, in radians, shape (n,).
-        parts: Parts of each leg's platform end, see `explorer.legs.moves`, shape
-            (n, 4, 3, 3).
-        a3: Base end of leg 4, shape (3,).
-        tolerance: Largest difference of `least` and `bound`, shape (n,).
-        target: Distance of each pair, shape (6,). The search ends once it is certain whether the
-            least distance is greater. NaN for a search to the tolerance, −inf for a pair to
-            leave out.
-        bound: Output, lower bound, shape (n, 6); nothing is written for pairs left out.
-        least: Output likewise, least distance of all evaluated poses, shape (n, 6).
-        share: Output likewise, share of the move at which it occurs, shape (n, 6).
+    A point starts at `start` (n, 3) and goes by `step` (n, 3) while the platform turns by `angle`
+    (n,); `parts` (n, 4, 3, 3) are those of `explorer.legs.moves`. The search of a pair ends within
+    the tolerance (n,), or once it is certain whether the least distance is greater than the target
+    (6,): NaN for a search to the tolerance, −inf for a pair to leave out, of which nothing is
+    written.
     """
     middles, halves = np.zeros(DEEPEST), np.zeros(DEEPEST)
     for row in range(start.shape[0]):

@@ -36,9 +36,8 @@ def square_at(s: float, t: float, u: Vector, v: Vector, r: Vector) -> float:
 
 @helper
 def closest_shares(u: Vector, v: Vector, r: Vector) -> tuple[float, float]:
-    """Return the s and t, both from 0 to 1, at which |r + s u − t v| is least.
+    """Return the shares s and t, 0 to 1, of two segments u and v at which |r + s u − t v| is least.
 
-    They are the shares of two segments with the directions u and v at their closest points;
     r leads from the start of the second segment to the start of the first.
     """
     uu, vv, uv, ur, vr = dot3(u, u), dot3(v, v), dot3(u, v), dot3(u, r), dot3(v, r)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
 
 from explorer.measures.case import Case
 from explorer.measures.measure import (
@@ -21,7 +24,16 @@ from explorer.measures.measure import (
 )
 from explorer.measures.size import BOX_NODES
 from explorer.measures.statics import BoxStatics
-from explorer.mechanism.design import JOINTS
+from explorer.mechanism.design import JOINTS, Design
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.reactions import largest_payload, part_limits
+from explorer.statics.slopes import (
+    BENDING,
+    TURN,
+    compliance_slopes,
+    deflection_slopes,
+    error_slopes,
+)
 
 ELSEWHERE = COMPARE | STUDIES | REPORT
 
@@ -98,14 +110,14 @@ LOAD_MEASURES = (
         ("is_loaded", "is_limited"),
         title="largest share of a limit",
         unit="share",
-        gradient=lambda statics: statics.share_gradient,
+        gradient=lambda statics: statics.share_slopes(part_limits(statics.design)),
     ),
     LoadMeasure(
         "worst_actuator",
         "worst actuator",
         "The actuator with the largest share of its limit under the payload's weight and force; 1 "
         "to 6 stand for l1, d1, d2, d3, d4, l4",
-        lambda statics: statics.worst_actuator,
+        lambda statics: float(statics.shares[:6].argmax() + 1) if statics.is_regular else math.nan,
         ("is_loaded", "limits_actuators"),
         sense=None,
         names=JOINTS,
@@ -115,7 +127,9 @@ LOAD_MEASURES = (
         "largest_payload",
         "largest payload",
         "The largest mass in place of the payload that keeps all limits",
-        lambda statics: statics.largest_payload,
+        lambda statics: (
+            float(largest_payload(statics.configuration).min()) if statics.is_regular else 0.0
+        ),
         ("is_limited",),
         unit="kg",
         sense="more",
@@ -127,7 +141,7 @@ LOAD_MEASURES = (
         lambda statics: statics.largest_bending,
         ("is_loaded",),
         unit="N m",
-        gradient=lambda statics: statics.bending_gradient,
+        gradient=lambda statics: statics.share_slopes(_bending_limits(statics.design)),
         in_report=False,
     ),
     LoadMeasure(
@@ -137,26 +151,34 @@ LOAD_MEASURES = (
         lambda statics: statics.worst_error,
         ("has_errors",),
         power=1,
-        gradient=lambda statics: statics.error_gradient,
+        gradient=lambda statics: statics.slopes_at(
+            statics.errors.displacement, partial(error_slopes, statics.design)
+        ),
     ),
     LoadMeasure(
         "worst_turn",
         "worst turn",
         "The largest turn of the tool by the errors of the actuators",
-        lambda statics: statics.worst_turn,
+        lambda statics: math.degrees(statics.worst(statics.errors.turn)),
         ("has_errors",),
         unit="°",
-        gradient=lambda statics: statics.turn_gradient,
+        gradient=lambda statics: statics.slopes_at(
+            statics.errors.turn,
+            partial(error_slopes, statics.design, rows=TURN),
+            math.degrees(1.0),
+        ),
         in_report=False,
     ),
     LoadMeasure(
         "softest_compliance",
         "softest compliance",
         "The largest displacement of the tool per force at it",
-        lambda statics: statics.softest_compliance,
+        lambda statics: statics.design.unit_mm * statics.worst(statics.softest),
         ("is_elastic",),
         unit="mm/N",
-        gradient=lambda statics: statics.compliance_gradient,
+        gradient=lambda statics: statics.slopes_at(
+            statics.softest, partial(compliance_slopes, statics.design), statics.design.unit_mm
+        ),
     ),
     LoadMeasure(
         "deflection",
@@ -165,9 +187,18 @@ LOAD_MEASURES = (
         lambda statics: statics.largest_deflection,
         ("is_loaded", "is_elastic"),
         power=1,
-        gradient=lambda statics: statics.deflection_gradient,
+        gradient=lambda statics: statics.slopes_at(
+            statics.deflections, partial(deflection_slopes, statics.design, statics.rotation)
+        ),
     ),
 )
+
+
+def _bending_limits(design: Design) -> FloatArray:
+    """Return limits (2, 10) of which a bending moment of 1 N m is a share of 1."""
+    limits = np.full((2, 10), np.inf)
+    limits[:, BENDING] = 1e3 / design.unit_mm
+    return limits
 
 
 def loads() -> Iterable[Measure]:

@@ -7,7 +7,6 @@ among its nodes. Where a box is on or across a singular plane, all of them are i
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,19 +27,12 @@ from explorer.statics.compliance import (
 )
 from explorer.statics.reactions import (
     Reactions,
-    largest_payload,
     limit_shares,
-    part_limits,
     reactions,
 )
 from explorer.statics.slopes import (
-    BENDING,
     PARAMETERS,
-    TURN,
     TwistSlopes,
-    compliance_slopes,
-    deflection_slopes,
-    error_slopes,
     share_slopes,
     twist_slopes,
 )
@@ -114,99 +106,48 @@ class BoxStatics:
         """The largest shares of the limits over the nodes, shape (12,), as in `LIMITED`."""
         return self.node_shares.max(axis=0)
 
+    def worst(self, values: FloatArray) -> float:
+        """Return the largest of values at the nodes; infinite if the box has singular positions."""
+        return float(values.max()) if self.is_regular else np.inf
+
     @property
     def largest_share(self) -> float:
         """The largest share of any limit."""
-        return float(self.shares.max()) if self.is_regular else np.inf
-
-    @property
-    def worst_actuator(self) -> float:
-        """The place in `JOINTS`, from 1, of the actuator with the largest share; NaN for all."""
-        return float(self.shares[:6].argmax() + 1) if self.is_regular else math.nan
+        return self.worst(self.node_shares)
 
     @property
     def largest_bending(self) -> float:
         """The largest bending moment of a strut, in N m."""
-        metres = 1e-3 * self.design.unit_mm
         bending = self.held.bending + self.held.spread[:, 6:8]
-        return metres * float(bending.max()) if self.is_regular else np.inf
-
-    @property
-    def largest_payload(self) -> float:
-        """The largest mass in place of the payload that keeps all limits everywhere, in kg."""
-        if not self.is_regular:
-            return 0.0
-        return float(largest_payload(self.configuration).min())
+        return 1e-3 * self.design.unit_mm * self.worst(bending)
 
     @property
     def worst_error(self) -> float:
         """The worst displacement of the tool by the actuators' errors, in design units."""
-        return float(self.errors.displacement.max()) if self.is_regular else np.inf
-
-    @property
-    def worst_turn(self) -> float:
-        """The worst turn of the tool by the actuators' errors, in degrees."""
-        return math.degrees(self.errors.turn.max()) if self.is_regular else np.inf
-
-    @property
-    def softest_compliance(self) -> float:
-        """The largest displacement of the tool per force, in mm/N."""
-        return self.design.unit_mm * float(self.softest.max()) if self.is_regular else np.inf
+        return self.worst(self.errors.displacement)
 
     @property
     def largest_deflection(self) -> float:
         """The largest displacement of the tool under the load, in design units."""
-        return float(self.deflections.max()) if self.is_regular else np.inf
+        return self.worst(self.deflections)
 
-    @property
-    def share_gradient(self) -> Mapping[str, float]:
-        """Derivatives of the largest share by design variables, and by yaw in radians."""
-        return self._largest_slopes(part_limits(self.design))
-
-    @property
-    def bending_gradient(self) -> Mapping[str, float]:
-        """Derivatives of the largest bending moment, as those of the largest share."""
-        limits = np.full((2, 10), np.inf)
-        limits[:, BENDING] = 1e3 / self.design.unit_mm
-        return self._largest_slopes(limits)
-
-    @property
-    def error_gradient(self) -> Mapping[str, float]:
-        """Derivatives of the worst displacement, as those of the largest share."""
-        return self._slopes_at(self.errors.displacement, lambda at: error_slopes(self.design, at))
-
-    @property
-    def turn_gradient(self) -> Mapping[str, float]:
-        """Derivatives of the worst turn in degrees, as those of the largest share."""
-        found = self._slopes_at(self.errors.turn, lambda at: error_slopes(self.design, at, TURN))
-        return {name: math.degrees(slope) for name, slope in found.items()}
-
-    @property
-    def compliance_gradient(self) -> Mapping[str, float]:
-        """Derivatives of the softest compliance in mm/N, as those of the largest share."""
-        found = self._slopes_at(self.softest, lambda at: compliance_slopes(self.design, at))
-        return {name: self.design.unit_mm * slope for name, slope in found.items()}
-
-    @property
-    def deflection_gradient(self) -> Mapping[str, float]:
-        """Derivatives of the largest deflection, as those of the largest share."""
-        return self._slopes_at(
-            self.deflections, lambda at: deflection_slopes(self.design, self.rotation, at)
-        )
-
-    def _slopes_at(
+    def slopes_at(
         self,
         values: FloatArray,
         slopes_of: Callable[[TwistSlopes], tuple[FloatArray, FloatArray]],
+        factor: float = 1.0,
     ) -> Mapping[str, float]:
-        """Return the derivatives at the node with the largest value; {} if it is infinite."""
+        """Return derivatives at the node with the largest value; {} if it is infinite.
+
+        They are those by the design variables, and by the yaw in radians, times a factor.
+        """
         if not self.is_regular:
             return {}
         slopes = twist_slopes(self.design, self.positions[[values.argmax()]], self.rotation)
-        return _by_name(slopes_of(slopes)[1][0])
+        return _by_name(factor * slopes_of(slopes)[1][0])
 
-    def _largest_slopes(self, limits: FloatArray) -> Mapping[str, float]:
-        """Return the derivatives of the largest share of limits (2, 10); {} if it is infinite."""
+    def share_slopes(self, limits: FloatArray) -> Mapping[str, float]:
+        """Return those of the largest share of limits of the parts, shape (2, 10)."""
         if not self.is_regular:
             return {}
         slopes = twist_slopes(self.design, self.positions, self.rotation)

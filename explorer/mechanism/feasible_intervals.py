@@ -78,13 +78,12 @@ def nearest_feasible(
 def _discriminants(
     design: Design, joints: FloatArray, scale: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return δ1², δ2², δ3² as polynomials, shape (3, 6, 5), and the joints, shape (6, 2).
+    """Return δ1², δ2², δ3² over scale², shape (3, 6, 5), and the joints, shape (6, 2).
 
-    The polynomials are divided by scale². Those of index j on the middle axis have joint j as
-    their variable, by way of an unknown that is of moderate size even where joint j can hardly
-    move; the last axis holds ascending coefficients. Row j of the joints is (offset, slope):
-    joint j over scale, or its square for a length, is offset + slope * unknown. The algebra is
-    that of `trilateration.solve_rows`.
+    The polynomials of index j on the middle axis have joint j as their variable, by way of an
+    unknown of moderate size; the last axis holds ascending coefficients. Joint j over scale, or its
+    square for a length, is offset + slope × unknown, row j of the joints. The algebra is that of
+    `solve_rows`.
     """
     values, squares = np.zeros((6, 6, 3)), np.zeros((6, 6, 3))
     values[:, :, 0], squares[:, :, 0] = joints[:, None], joints[:, None] ** 2
@@ -168,9 +167,8 @@ def _real_roots(polynomials: FloatArray) -> list[list[float]]:
 def _breaks(roots: FloatArray, scale: float, is_length: bool) -> list[float]:
     """Return the ascending values of one joint at which the joints may cease to close.
 
-    No joints close beyond the outer values: |d1 - d3|, and with it every length, is bounded by a
-    few times the largest of the others. A value above `FARTHEST` belongs to a vanishing term
-    and is left out. The roots are those of the joint over `scale`, or of its square for a length.
+    No joints close beyond the outer ones, since |d1 - d3| is bounded, and with it every length. A
+    value above `FARTHEST` belongs to a vanishing term.
     """
     values = np.sort(roots)
     if is_length:

@@ -175,14 +175,10 @@ def write_angles(
     sines: FloatArray,
     cosines: FloatArray,
 ) -> None:
-    """Write the distance, and sines and cosines of the angles and folds, of each row.
+    """Write the distance, and sines and cosines of the angles and folds, of n poses.
 
-    Args:
-        positions: b4 in the base frame, shape (n, 3).
-        rotations: Platform to base, shape (n, 3, 3).
-        coordinates: Output, r in its first column, shape (n, 6).
-        sines: Output, of β, ε, φ1, φ2, φ3, shape (n or more, 5); no zero is a negative one.
-        cosines: Output, shape (n or more, 5).
+    The distance r goes into the first column of the coordinates (n, 6); sines and cosines of β, ε,
+    φ1, φ2 and φ3 have the shape (n or more, 5), and no zero of a sine is a negative one.
     """
     for row in range(positions.shape[0]):
         # A negative zero would turn a fold of π into −π.

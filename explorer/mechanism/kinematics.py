@@ -47,19 +47,11 @@ def solve_rows(
     feasible: BoolArray,
     discriminants: FloatArray,
 ) -> None:
-    """Solve the forward kinematics of each row of joints.
+    """Solve the forward kinematics of n rows of joints (n, 6).
 
     Joints that do not close yield poses in which each cosine beyond ±1 is ±1: finite and rigid, but
-    with other joints.
-
-    Args:
-        variables: Design variables X, shape (6,).
-        joints: (l1, d1, d2, d3, d4, l4), shape (n, 6).
-        positions: Output, b4 in the base frame, shape (n, 8, 3).
-        rotations: Output, platform to base, shape (n, 8, 3, 3).
-        feasible: Output, whether the joints close, shape (n,).
-        discriminants: Output, δ1², δ2², δ3², shape (n, 3); some negative number where a
-            trilateration fails.
+    with other joints; of their discriminants δ1², δ2² and δ3² some are negative. The eight
+    positions are of shape (n, 8, 3).
     """
     for row in range(joints.shape[0]):
         a3x, a3y, b1x, b1y, b2, b3 = variables

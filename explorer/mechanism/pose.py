@@ -178,12 +178,7 @@ def deviation_of(matrix: Sequence[Sequence[float]]) -> tuple[float, float]:
 
 @kernel("void(f8[:,:,::1], f8[::1])")
 def measure_rotations(matrices: FloatArray, bounds: FloatArray) -> None:
-    """Write the largest entry of |R Rᵀ − I| and the least determinant of matrices (n, 3, 3).
-
-    Args:
-        matrices: Matrices of finite numbers.
-        bounds: Output, shape (2,); the determinant is written only if it is below what is there.
-    """
+    """Raise and lower the bounds to the largest entry of |R Rᵀ − I| and the least determinant."""
     for row in range(matrices.shape[0]):
         deviation, determinant = deviation_of(matrices[row])
         bounds[0] = max(bounds[0], deviation)

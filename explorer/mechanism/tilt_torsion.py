@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import FloatArray, finite_array
@@ -45,19 +46,9 @@ def rotation_from_tilt_torsion(tilt_torsion: ArrayLike) -> FloatArray:
     Raises:
         InputError: An angle is not finite.
     """
-    degrees = finite_array("azimuth, tilt and torsion", tilt_torsion, (3,))
-    # Without full turns, exactly: angles near the largest number have no finite difference.
-    angles = np.radians(np.fmod(degrees, 360.0))
-    azimuth, tilt, torsion = angles[..., 0], angles[..., 1], angles[..., 2]
-    c, s = np.cos(azimuth), np.sin(azimuth)
-    a, b = np.cos(torsion - azimuth), np.sin(torsion - azimuth)
-    level, sine = np.cos(tilt), np.sin(tilt)
-    rows = (
-        (c * level * a - s * b, -c * level * b - s * a, c * sine),
-        (s * level * a + c * b, -s * level * b + c * a, s * sine),
-        (-sine * a, sine * b, level),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    angles = finite_array("azimuth, tilt and torsion", tilt_torsion, (3,))
+    turns = np.stack([angles[..., 0], angles[..., 1], angles[..., 2] - angles[..., 0]], axis=-1)
+    return Rotation.from_euler("ZYZ", turns, degrees=True).as_matrix()
 
 
 def tilt_torsion_from_rotation(rotation: ArrayLike) -> FloatArray:

@@ -77,16 +77,10 @@ def single_root(b: FloatArray, degree: int, scratch: FloatArray) -> float:
 
 @helper
 def first_negative(b: FloatArray, degree: int, stack: FloatArray) -> float:
-    """Return the first place in [0, 1] beyond which a polynomial is negative.
+    """Return the first place in [0, 1] beyond which a polynomial is negative, or `NOWHERE`.
 
-    Args:
-        b: Bernstein coefficients, shape (>= degree + 1,).
-        degree: Degree of the polynomial, 1 to `MOST_DEGREE`.
-        stack: Scratch array of the shape `STACK`.
-
-    Returns:
-        The place, or `NOWHERE`. Where the polynomial touches zero to rounding, it may count as
-        negative or not.
+    Where it touches zero to rounding, it may count as negative or not. The stack is working space
+    of the shape `STACK`.
     """
     for i in range(degree + 1):
         stack[0, i] = b[i]

@@ -134,7 +134,7 @@ def format_column(
     ]
 
 
-def format_fitted(value: float, size: float, digits: int) -> str:
+def format_fitted(value: float, size: float, digits: int, *, infinite: str = "infinite") -> str:
     """Return a number whose decimals depend on a size alone, so that it holds still as it changes.
 
     A number that would look like 0, though it is none, has digits of its own.
@@ -143,13 +143,14 @@ def format_fitted(value: float, size: float, digits: int) -> str:
         value: The number.
         size: Size of the largest number expected.
         digits: Number of digits at this size.
+        infinite: Word for infinity.
     """
     value = drop_rounding(value, size)
     decimals = decimals_for(size, digits)
     is_zero = abs(value) < 0.5 * 10.0**-decimals
     if (size != 0.0 and not LEAST_SIZE <= size < MOST_SIZE) or (value != 0.0 and is_zero):
-        return format_number(value, min(digits, 3) if is_zero else digits)
-    return format_decimals(value, decimals)
+        return format_number(value, min(digits, 3) if is_zero else digits, infinite=infinite)
+    return format_decimals(value, decimals, infinite=infinite)
 
 
 def decimals_for(size: float, digits: int) -> int:

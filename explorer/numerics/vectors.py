@@ -24,6 +24,16 @@ def column(matrix: FloatArray, index: int) -> Vector:
 
 
 @helper
+def times(matrix: FloatArray, a: FloatArray) -> Vector:
+    """Return the product of a matrix (3, 3) and a vector (3,)."""
+    return (
+        matrix[0, 0] * a[0] + matrix[0, 1] * a[1] + matrix[0, 2] * a[2],
+        matrix[1, 0] * a[0] + matrix[1, 1] * a[1] + matrix[1, 2] * a[2],
+        matrix[2, 0] * a[0] + matrix[2, 1] * a[1] + matrix[2, 2] * a[2],
+    )
+
+
+@helper
 def minus(a: Vector, b: Vector) -> Vector:
     """Return a − b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

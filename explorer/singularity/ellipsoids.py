@@ -167,9 +167,7 @@ def certified_radius(design: Design, pose: Pose) -> float:
 def _ellipsoid(free: FloatArray, driven: FloatArray) -> Ellipsoid:
     """Return the ellipsoid of the velocities at unit actuator speed.
 
-    Args:
-        free: Velocities at zero actuator speed, by column, shape (3, k).
-        driven: Velocities per unit of actuator speed, by column, shape (3, 6).
+    Columns are velocities: free at zero actuator speed (3, k), and driven per unit of it (3, 6).
     """
     axes, sizes, _ = np.linalg.svd(free @ free.T)
     count = int((sizes > SINGULAR).sum())

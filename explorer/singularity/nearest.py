@@ -160,19 +160,11 @@ def write_point_on_plane(
     q: FloatArray,
     s: FloatArray,
 ) -> float:
-    """Write the nearest pose (q, s) with a1 or b4 on the plane of the other flag.
+    """Write the nearest pose (q, s) with a1 (δ1 = 0) or b4 (δ3 = 0) on the plane of the other flag.
 
-    Args:
-        is_a1: Whether the point is a1, so that δ1 = 0; otherwise it is b4, and δ3 = 0.
-        g: Centroid of the points in the base frame, shape (3,).
-        r: Rotation of the given pose, shape (3, 3).
-        c: Centroid of the points in the platform frame, shape (3,).
-        forms: Quadratic form of the scatter, then four that are overwritten, shape (5, 4, 4).
-        q: Output, position, shape (3,).
-        s: Output, rotation, shape (3, 3).
-
-    Returns:
-        A lower bound of the squared distance.
+    g and c are the centroid of the points in the base frame and in the platform frame; `forms`,
+    shape (5, 4, 4), begins with the quadratic form of the scatter, the others are overwritten.
+    Returns a lower bound of the squared distance.
     """
     # x is the distance of a1 from the turned plane through the centroid, or the height of b4
     # with the centroid where it was.
@@ -208,21 +200,9 @@ def shorten(
     q: FloatArray,
     s: FloatArray,
 ) -> float:
-    """Write (p − shift n, r) into the pose (q, s) if this is nearer to the pose (p, r).
+    """Write (p − shift n, r) into (q, s) if it is nearer than `way`; return the smaller one.
 
     Distances below the square root of rounding cannot be compared by their squares.
-
-    Args:
-        way: Root-mean-square displacement from (p, r) to (q, s).
-        shift: Length of the translation along −n.
-        n: Unit vector.
-        p: Position of the given pose, shape (3,).
-        r: Rotation of the given pose, shape (3, 3).
-        q: Position, shape (3,).
-        s: Rotation, shape (3, 3).
-
-    Returns:
-        The smaller displacement.
     """
     if way <= abs(shift):
         return way
@@ -278,18 +258,9 @@ def nearest_rows(
     nearest_position: FloatArray,
     nearest_rotation: FloatArray,
 ) -> None:
-    """Write the three nearest singular poses of each pose.
+    """Write the three nearest singular poses of each of n poses, see `NearestPoses`.
 
-    Args:
-        points: b1 to b4 in the platform frame, shape (4, 3).
-        c: Centroid of the points, shape (3,).
-        scatter: Scatter of the points, shape (3, 3), with a trace of one.
-        position: Positions of the given poses, shape (n, 3).
-        rotation: Rotations of the given poses, shape (n, 3, 3).
-        distance: Output, shape (n, 3), see `NearestPoses`.
-        bound: Output, shape (n, 3).
-        nearest_position: Output, shape (n, 3, 3).
-        nearest_rotation: Output, shape (n, 3, 3, 3).
+    The points b1 to b4 (4, 3) have the centroid c (3,) and a scatter (3, 3) with a trace of one.
     """
     forms, boxes, g = np.zeros((5, 4, 4)), np.empty((ROOM, 4)), np.empty(3)
     near_q, near_s = np.empty(3), np.empty((3, 3))

@@ -183,9 +183,7 @@ def polish(phi: float, sigma: float, k: Constants) -> Angles:
 def minimise_on_torus(k: Constants, boxes: FloatArray) -> tuple[float, float, float]:
     """Return the angles φ and σ of the minimum of f, and a lower bound of f.
 
-    Args:
-        k: Constants of f.
-        boxes: Working space, shape (ROOM, 4).
+    `boxes` is working space of the shape (ROOM, 4).
     """
     alpha, beta = 0.5 * math.pi / FIRST_PHI, math.pi / FIRST_SIGMA
     last = 0
@@ -243,16 +241,9 @@ def write_on_plane(
     rotation: FloatArray,
     position: FloatArray,
 ) -> None:
-    """Write the best rotation (3, 3) and position (3,) at two angles.
+    """Write the best rotation (3, 3) and position (3,) at the two angles.
 
-    Args:
-        phi: Angle of the plane about the guide.
-        sigma: Angle of the platform about its line.
-        k: Constants of f.
-        centroid: Centroid of the points in the platform frame, shape (3,).
-        g: Centroid of the points of the given pose in the base frame, shape (3,).
-        rotation: Output, shape (3, 3).
-        position: Output, shape (3,).
+    The centroid of the points is in the platform frame, g in the base frame, shape (3,) each.
     """
     _, _, _, da, db, _, sp, cp, ss, cs = terms_at(phi, sigma, k)
     w0, w1 = da + k.l_x * cs, k.m_x - db * cs

@@ -44,14 +44,9 @@ def write_form(s: FloatArray, out: FloatArray) -> None:
 
 @helper
 def diagonalise(a: FloatArray, v: FloatArray) -> int:
-    """Diagonalise a symmetric matrix in place by Jacobi's rotations.
+    """Diagonalise a symmetric matrix a (4, 4) in place by Jacobi's rotations.
 
-    Args:
-        a: Symmetric matrix, shape (4, 4), overwritten by the diagonal matrix of eigenvalues.
-        v: Output, eigenvectors in columns, shape (4, 4).
-
-    Returns:
-        The index of the largest eigenvalue.
+    Writes the eigenvectors into the columns of v; returns the index of the largest eigenvalue.
     """
     for i in range(4):
         for j in range(4):
@@ -99,10 +94,7 @@ def bilinear(q: Quaternion, form: FloatArray, r: Quaternion) -> float:
 
 @helper
 def combine(low: Quaternion, high: Quaternion, form: FloatArray, value: float) -> Quaternion:
-    """Return the unit quaternion between two at which a quadratic form has a given value.
-
-    The value must lie between those of the form at the two quaternions.
-    """
+    """Return the unit quaternion between two at which a form has a value between theirs."""
     a, c = bilinear(low, form, low) - value, bilinear(high, form, high) - value
     dot = low[0] * high[0] + low[1] * high[1] + low[2] * high[2] + low[3] * high[3]
     # Their signs are free; combinations of opposite quaternions would vanish.
@@ -130,15 +122,8 @@ def nearest_quaternion(
 ) -> tuple[Quaternion, float]:
     """Return the unit q that minimises (constant + qᵀ N_x q)² − 2 qᵀ N_M q, and a lower bound.
 
-    Args:
-        scatter: Matrix N_M, shape (4, 4), whose form alone is largest at the identity.
-        form: Matrix N_x, shape (4, 4).
-        constant: Constant term of x.
-        work: Working space, shape (4, 4).
-        vectors: Working space, shape (4, 4).
-
-    Returns:
-        The quaternion (w, x, y, z), and a lower bound of the minimum.
+    `scatter` is N_M, whose form alone is largest at the identity, and `form` is N_x; the last two
+    arguments are working space. All matrices are of shape (4, 4).
     """
     still = (1.0, 0.0, 0.0, 0.0)
     # With the sign of x at rest, x − s is positive at `low` and negative at `high`.

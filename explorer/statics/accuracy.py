@@ -245,13 +245,9 @@ def toward(total: Vector, side: float, w: Vector) -> Vector:
 
 @helper
 def merge_parallel(columns: FloatArray, scale: float, w: FloatArray, u: FloatArray) -> int:
-    """Write vectors of which no two are parallel, and unit vectors along them; return their number.
+    """Write vectors w of which no two are parallel, and units u along them; return their number.
 
-    Args:
-        columns: Vectors to merge, shape (3, m).
-        scale: Size that vectors are divided by.
-        w: Result, shape (m, 3): sums of parallel vectors that point to one side.
-        u: Result, shape (m, 3).
+    The columns (3, m) are divided by the scale; parallel ones are added, pointing to one side.
     """
     count = 0
     for k in range(columns.shape[1]):
@@ -310,12 +306,9 @@ def longest_sum(w: FloatArray, u: FloatArray, count: int) -> Vector:
 
 @kernel("void(f8[:,:,::1], f8[:,::1])")
 def farthest_rows(vectors: FloatArray, signs: FloatArray) -> None:
-    """Write the signs of the longest sum Σ ± w_i for each of n sets of vectors.
+    """Write the signs (n, m) of the longest sum Σ ± w_i of each of n sets of columns (n, 3, m).
 
-    Args:
-        vectors: Columns w_i, shape (n, 3, m).
-        signs: Result, shape (n, m): 1 or -1; 0 for a zero vector, and for all vectors of a set of
-            which one is not finite.
+    Signs are 1 or −1; 0 for a zero vector, and for a set of which one vector is not finite.
     """
     m = vectors.shape[2]
     w, u = np.zeros((m, 3)), np.zeros((m, 3))

@@ -20,7 +20,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins_at, margins_of
 from explorer.numerics.arrays import FloatArray, IntArray, finite_array
 from explorer.numerics.compiled import helper, kernel
-from explorer.numerics.vectors import Vector, along, column, cross3, dot3
+from explorer.numerics.vectors import Vector, along, column, cross3, dot3, times
 
 # Share of |p| up to which a margin is zero but for rounding.
 SINGULAR = 1e-13
@@ -60,15 +60,7 @@ def held_across(q: Vector, u: Vector, point: Vector, delta2: float) -> Vector:
 def holding_forces(
     x: FloatArray, p: FloatArray, r: FloatArray, force: Vector, moment: Vector
 ) -> tuple[float, float, float, float, float, float]:
-    """Return the actuator forces that hold a load in a regular pose.
-
-    Args:
-        x: Design variables, shape (6,).
-        p: b4 in the base frame, shape (3,).
-        r: Platform to base, shape (3, 3).
-        force: Force on the platform, base axes.
-        moment: Moment of the load about b4, base axes.
-    """
+    """Return the actuator forces that hold a force and a moment about b4 in a regular pose."""
     u, v, b4 = column(r, 0), column(r, 1), (p[0], p[1], p[2])
     zero = (0.0, 0.0, 0.0)
     delta1, delta2, delta3 = margins_of(b4, u, column(r, 2))
@@ -108,10 +100,7 @@ def force_rows(
     loads: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Write the actuator forces of n poses, infinite in singular ones.
-
-    Tools, shape (n or 1, 3), are in platform coordinates; loads, shape (n or 1, 6), act there.
-    """
+    """Write the actuator forces that hold loads at tools (n or 1, 3), infinite if singular."""
     for k in range(position.shape[0]):
         p, r = position[k], rotation[k]
         if is_singular(x, p, r):
@@ -119,11 +108,7 @@ def force_rows(
                 out[k, i] = math.inf
             continue
         t, w = tools[k % tools.shape[0]], loads[k % loads.shape[0]]
-        arm = (
-            r[0, 0] * t[0] + r[0, 1] * t[1] + r[0, 2] * t[2],
-            r[1, 0] * t[0] + r[1, 1] * t[1] + r[1, 2] * t[2],
-            r[2, 0] * t[0] + r[2, 1] * t[1] + r[2, 2] * t[2],
-        )
+        arm = times(r, t)
         force = (w[0], w[1], w[2])
         moment = along((w[3], w[4], w[5]), 1.0, cross3(arm, force))
         forces = holding_forces(x, p, r, force, moment)
@@ -139,10 +124,7 @@ def inverse_rows(
     rotation: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Write J⁻¹ of n poses at the tool, shape (n, 6, 6), infinite in singular ones.
-
-    Tools, shape (n or 1, 3), are in platform coordinates.
-    """
+    """Write J⁻¹ of n poses at tools (n or 1, 3), infinite in singular ones."""
     for k in range(position.shape[0]):
         p, r = position[k], rotation[k]
         if is_singular(x, p, r):
@@ -151,11 +133,7 @@ def inverse_rows(
                     out[k, row, i] = math.inf
             continue
         t = tools[k % tools.shape[0]]
-        arm = (
-            r[0, 0] * t[0] + r[0, 1] * t[1] + r[0, 2] * t[2],
-            r[1, 0] * t[0] + r[1, 1] * t[1] + r[1, 2] * t[2],
-            r[2, 0] * t[0] + r[2, 1] * t[1] + r[2, 2] * t[2],
-        )
+        arm = times(r, t)
         for axis in range(3):
             unit = (
                 1.0 if axis == 0 else 0.0,

@@ -170,10 +170,7 @@ def beyond_plane(on_plane: float, ahead: float) -> float:
 def value_at(
     case: FloatArray, r: FloatArray, limit: int, p: FloatArray, near: FloatArray, shares: FloatArray
 ) -> float:
-    """Return the function of a limit at a position.
-
-    `near`, shape (3,), and `shares`, shape (20,), are places to work in.
-    """
+    """Return the function of a limit at a position; the last two arguments are working space."""
     if not move_into_mode(case, p, near):
         return -1.0
     write_shares(case, r, near, shares)
@@ -195,10 +192,7 @@ def rate_along(
     work: FloatArray,
     shares: FloatArray,
 ) -> float:
-    """Return the derivative along an axis by a central difference.
-
-    `work`, shape (2, 3), and `shares`, shape (20,), are places to work in, here and below.
-    """
+    """Return the derivative along an axis by a central difference."""
     for i in range(3):
         work[0, i] = at[i]
     work[0, axis] = at[axis] + h

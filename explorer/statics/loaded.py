@@ -144,13 +144,9 @@ class LoadedPose:
     def _worst_force(
         self, force: float, load: Six, carried: Carried, *, spreads: bool
     ) -> WorstForce:
-        """Return the worst direction of a force beside a load, weights and the payload's force.
+        """Return the worst direction of a force beside a load and weights.
 
-        Args:
-            force: Size of the force, in N.
-            load: The load, as (F; M) at the tool.
-            carried: What the weights do.
-            spreads: Whether the payload's force of any direction acts.
+        The payload's force of any direction acts too if it `spreads`.
         """
         rows = twists_of_actuators(self.configuration)[:3].T
         if not np.isfinite(rows).all():

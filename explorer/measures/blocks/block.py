@@ -57,7 +57,7 @@ class Number:
     def text(self) -> str:
         """The number for people, without its unit."""
         if self.span:
-            return format_fitted(self.value, self.span, self.digits)
+            return format_fitted(self.value, self.span, self.digits, infinite="∞")
         return format_number(self.value, self.digits, size=self.size, infinite="∞")
 
 
@@ -81,7 +81,9 @@ class Vector:
     def texts(self) -> list[str]:
         """The components for people, without their unit."""
         if self.span:
-            return [format_fitted(value, self.span, self.digits) for value in self.values]
+            return [
+                format_fitted(value, self.span, self.digits, infinite="∞") for value in self.values
+            ]
         return format_column(self.values, self.digits, infinite="∞")
 
 
@@ -167,7 +169,10 @@ class Column:
     def texts(self) -> list[str]:
         """The cells for people, without their units; equal units have equal decimals."""
         if self.span:
-            return [format_fitted(value, self.span, self.digits) for value in self.values]
+            return [
+                format_fitted(value, self.span, self.digits, infinite=self.infinite)
+                for value in self.values
+            ]
         if isinstance(self.unit, str):
             return format_column(self.values, self.digits, size=self.size, infinite=self.infinite)
         texts = [""] * len(self.values)

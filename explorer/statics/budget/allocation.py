@@ -225,11 +225,8 @@ def _allocate(
 ) -> tuple[FloatArray, float]:
     """Return the tolerances of least effort, shape (29,), and a lower bound of the effort.
 
-    Args:
-        shares: Displacement and turn per error, over what is wanted of each, shape (n, 6, 29).
-        lengths: Length that counts for a unit of error, shape (29,).
-        held: Errors that are kept, shape (29,), with a worst error below 1; 0 for all others.
-        is_free: Whether the tolerance of each source is sought, shape (29,).
+    Shares (n, 6, 29) are displacement and turn per error, over what is wanted. Lengths (29,) count
+    for a unit of error. Errors that are kept are `held` (29,), with a worst error below 1.
     """
     halves = shares.reshape(-1, 2, 3, len(SOURCES))
     largest = np.sqrt((halves**2).sum(axis=2)).max(axis=(0, 1))
