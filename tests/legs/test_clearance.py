@@ -15,7 +15,6 @@ from explorer import Design, leg_clearances
 from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes, pair_rows
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.compiled import MANY_ROWS
 
 
 def closest_points(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -80,15 +79,6 @@ def test_closest_points_nearly_parallel_crossing_segments_meet(size: float) -> N
     for share in np.linspace(-0.9, 0.9, 7):
         b = np.array([[-1.0, size * (-1.0 - share), 0.0], [1.0, size * (1.0 - share), 0.0]])
         assert closest_points(a[None], b[None])[0] < 1e-15
-
-
-def test_closest_points_few_and_many_pairs_agree() -> None:
-    a, b = random_segments(4, 2 * MANY_ROWS)
-    distance, points = closest_points(a, b)
-    for row in range(0, len(a), 7):
-        alone = closest_points(a[row : row + 1], b[row : row + 1])
-        np.testing.assert_allclose(alone[0][0], distance[row], atol=1e-15)
-        np.testing.assert_allclose(alone[1][0], points[row], atol=1e-12)
 
 
 @given(ordinary_cases())

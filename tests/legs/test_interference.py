@@ -85,17 +85,6 @@ def test_swept_tetrahedra_constant_orientation_hold_the_legs(
     ).all()
 
 
-def test_step_overlaps_batch_matches_its_moves() -> None:
-    many = random_moves(2, 300)
-    found = step_overlaps(OPTIMAL, *many)
-    assert found.shape == (300, 6)
-    assert 0.05 < found.mean() < 0.95
-    for row in range(0, 300, 50):
-        np.testing.assert_array_equal(step_overlaps(OPTIMAL, *(x[row] for x in many)), found[row])
-    table = step_overlaps(OPTIMAL, many[0][:4, None], HOME.rotation, many[2][:5], HOME.rotation)
-    assert table.shape == (4, 5, 6)
-
-
 def test_move_clearance_pair_with_a_shared_joint_is_left_out() -> None:
     start, end = Pose((3, 2, 4), (1, 0.2, 0.1, -0.4)), Pose((4, 3, 5), (1, 0.2, 0.3, -0.4))
     joined = int(joined_pairs(JOINED).argmax())

@@ -15,7 +15,6 @@ from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.size import clearance_beyond, clearance_margin_of
-from explorer.measures.snapshot import evaluate
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
@@ -28,7 +27,7 @@ from explorer.optimise.search.model import Model, reported_objective
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks
-from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import workspace_volume
 from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -40,20 +39,6 @@ each_case = pytest.mark.parametrize("design", CASES, ids=range(len(CASES)))
 def compared(design: Design) -> Measurements:
     """Return the measures that Compare lists."""
     return measure_design(Case(design), measures_in("compare"))
-
-
-@each_case
-def test_measures_of_compare_equal_their_functions(design: Design) -> None:
-    found, home = compared(design), design.home_pose
-    snapshot, nodes = evaluate(design, home), workspace_nodes(design)
-    assert found["volume"] == workspace_volume(design).volume
-    assert (found["node_count"], found["node_volume"]) == (nodes.count, nodes.volume)
-    assert found["node_step"] == nodes.step
-    assert found["inverse_condition"] == pytest.approx(snapshot.inverse_condition, rel=1e-9)
-    assert found["home_margin"] == pytest.approx(np.abs(snapshot.margins).min(), rel=1e-12)
-    clearance = clearance_beyond(design, clearance_margin_of(design))
-    assert (found["least_clearance"], found.nearest) == clearance
-    assert found.empty_because == ()
 
 
 @each_case

@@ -26,7 +26,6 @@ from explorer.mechanism.pose import (
     quaternion_from_rotation,
 )
 from explorer.mechanism.tilt_torsion import (
-    pose_of_tilt_torsion,
     rotation_from_tilt_torsion,
     tilt_torsion_from_rotation,
     tilt_torsion_of,
@@ -99,17 +98,6 @@ def test_small_rotations_and_quarter_turns_convert_to_the_last_digits(rotation: 
         assert_allclose(again, rotation, rtol=0, atol=ROUNDING)
 
 
-def test_conversions_of_a_batch_equal_those_of_its_entries() -> None:
-    several = rotation_from_quaternion(np.random.default_rng(0).normal(size=(2, 3, 4)))
-    assert several.shape == (2, 3, 3, 3)
-    quaternion, turns = quaternion_from_rotation(several), yaw_pitch_roll_from_rotation(several)
-    again = rotation_from_yaw_pitch_roll(turns)
-    for index in np.ndindex(2, 3):
-        assert_allclose(quaternion[index], quaternion_from_rotation(several[index]), atol=ROUNDING)
-        assert_allclose(turns[index], yaw_pitch_roll_from_rotation(several[index]), atol=1e-12)
-        assert_allclose(again[index], several[index], atol=1e-12)
-
-
 @pytest.mark.parametrize(
     "matrix",
     [
@@ -141,11 +129,6 @@ def test_unusable_pose_is_refused(position: Any, quaternion: Any) -> None:
     refusal(Pose, position, quaternion)
 
 
-@pytest.mark.parametrize("quaternion", [np.zeros(4), np.array([[1.0, 0, 0, 0], [0, 0, 0, 0]])])
-def test_quaternion_of_zeros_is_refused_alone_and_in_a_batch(quaternion: FloatArray) -> None:
-    assert "zeros" in refusal(rotation_from_quaternion, quaternion)
-
-
 @given(quaternions, st.sampled_from([1e-9, 1.0, 1e9]))
 def test_pose_keeps_its_quaternion_at_unit_length(
     quaternion: tuple[float, float, float, float], factor: float
@@ -157,15 +140,6 @@ def test_pose_keeps_its_quaternion_at_unit_length(
     assert again == pose
     assert hash(again) == hash(pose)
     assert_allclose(pose.rotation, rotation_from_quaternion(quaternion), rtol=0, atol=1e-14)
-
-
-def test_rotation_is_that_of_the_euler_angles() -> None:
-    angles = np.random.default_rng(0).uniform(-400.0, 400.0, (50, 4, 3))
-    euler = angles.copy()
-    euler[..., 2] -= euler[..., 0]
-    expected = Rotation.from_euler("ZYZ", euler.reshape(-1, 3), degrees=True).as_matrix()
-    found = rotation_from_tilt_torsion(angles)
-    np.testing.assert_allclose(found, expected.reshape(50, 4, 3, 3), atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -191,12 +165,6 @@ def test_azimuth_is_zero_at_tilt_zero_and_torsion_at_tilt_180() -> None:
     assert math.copysign(1.0, level.azimuth) == 1.0
     over = tilt_torsion_of(rotation_from_tilt_torsion([30.0, 180.0, 20.0]))
     assert over == pytest.approx((20.0, 180.0, 0.0), abs=1e-9)
-
-
-def test_pose_has_the_position_and_the_rotation() -> None:
-    pose = pose_of_tilt_torsion([1.0, 2.0, 3.0], [30.0, 20.0, -70.0])
-    assert pose.position == (1.0, 2.0, 3.0)
-    np.testing.assert_allclose(pose.rotation, rotation_from_tilt_torsion([30.0, 20.0, -70.0]))
 
 
 def test_unusable_angles_are_refused() -> None:

@@ -6,7 +6,6 @@ from math import comb
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 from numpy.polynomial import Polynomial
 
 from explorer.numerics.arrays import FloatArray
@@ -15,9 +14,6 @@ from explorer.numerics.bernstein import (
     NOWHERE,
     STACK,
     first_negative,
-    is_negative_nowhere,
-    keep_left,
-    keep_right,
     single_root,
 )
 
@@ -49,25 +45,6 @@ def test_first_negative_place_is_the_first_falling_root() -> None:
         inside = [x for x in real if 0.0 < x < 1.0 and values(b, np.array([x + 1e-6]))[0] < 0.0]
         expected = 0.0 if b[0] < 0.0 else (*inside, NOWHERE)[0]
         assert found == pytest.approx(expected, abs=1e-8)
-
-
-@given(st.integers(0, 10_000), st.floats(0.0, 1.0))
-def test_parts_of_a_polynomial_have_its_values(seed: int, end: float) -> None:
-    b, x = coefficients(seed), np.linspace(0.0, 1.0, 7)
-    degree = len(b) - 1
-    left, right = b.copy(), b.copy()
-    keep_left(left, degree, end)
-    keep_right(right, degree, end)
-    np.testing.assert_allclose(values(left, x), values(b, end * x), atol=1e-12)
-    np.testing.assert_allclose(values(right, x), values(b, end + (1.0 - end) * x), atol=1e-12)
-
-
-@given(st.integers(0, 10_000))
-def test_coefficients_bound_a_polynomial_from_below(seed: int) -> None:
-    b = coefficients(seed)
-    if is_negative_nowhere(b, len(b) - 1):
-        assert (values(b, np.linspace(0.0, 1.0, 101)) >= 0.0).all()
-    assert is_negative_nowhere(np.abs(b), len(b) - 1)
 
 
 @pytest.mark.parametrize("root", [1e-9, 0.25, 0.5, 1.0 - 1e-9])

@@ -305,18 +305,6 @@ def test_nearest_pose_at_the_tolerance_of_incidences_lies_in_the_requested_closu
     assert_allclose([p[1], p[2], n[0], n @ p], 0.0, atol=1e-14)
 
 
-@given(designs(), positions(), rotations())
-@settings(max_examples=FEW)
-def test_nearest_poses_of_designs_of_any_size_are_finite(
-    design: Design, place: FloatArray, rotation: FloatArray
-) -> None:
-    size = max(map(abs, design.variables))
-    for w in STRATA:
-        found = nearest_in_stratum(design, Pose.of(size * place, rotation), w)
-        assert np.isfinite(found.distance)
-        assert is_below(found.seen, w)
-
-
 def test_nearest_pose_of_a_pose_in_the_closure_is_itself_and_of_one_outside_is_not() -> None:
     for w, (position, rotation) in REPRESENTATIVES.items():
         pose = Pose.of(position, rotation)

@@ -23,7 +23,6 @@ from strategies import (
 
 from explorer import (
     PRESETS,
-    InputError,
     evaluate,
     inverse,
     jacobian,
@@ -97,14 +96,6 @@ def test_jacobian_at_the_tool_is_the_derivative_of_inverse_by_its_twists(
     values = np.linalg.slogdet(at_b4), np.linalg.slogdet(matrix)
     assert values[1][0] == values[0][0]
     assert values[1][1] == pytest.approx(values[0][1], abs=1e-6)
-
-
-def test_jacobian_at_tools_of_a_batch_is_that_of_each() -> None:
-    design, p, r = PRESETS["paper-optimal"], (3.0, 4.0, 5.0), np.eye(3)
-    tools = np.random.default_rng(1).normal(size=(5, 3))
-    assert_allclose(jacobian(design, p, r, tools)[3], jacobian(design, p, r, tools[3]), atol=1e-13)
-    with pytest.raises(InputError, match="tool must be finite"):
-        jacobian(design, p, r, (0.0, np.nan, 0.0))
 
 
 @given(ordinary_cases())

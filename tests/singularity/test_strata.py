@@ -24,11 +24,9 @@ from explorer.numerics.arrays import FloatArray
 from explorer.singularity.strata import (
     COVERED,
     GENERIC,
-    OF_INCIDENCES,
     STRATA,
     WORDS,
     Stratum,
-    codimension,
     conditions,
     describe_stratum,
     incidences,
@@ -96,13 +94,6 @@ def test_margin_vanishes_exactly_in_the_closure_of_its_stratum(case: Case) -> No
             assert found == closure
 
 
-def test_stratum_of_coinciding_flags_is_the_identity() -> None:
-    assert seen(np.zeros(3), np.eye(3)) == (1, 2, 3, 4)
-    assert seen(np.zeros(3), np.diag([1.0, -1.0, -1.0])) == (1, 2, 3, 4)
-    assert seen(np.zeros(3), np.diag([-1.0, 1.0, -1.0])) == (1, 2, 3, 4)
-    assert seen(np.array([1.0, 0.0, 0.0]), np.eye(3)) != (1, 2, 3, 4)
-
-
 @pytest.mark.parametrize("w", STRATA)
 def test_small_move_leads_only_to_strata_whose_closure_contains_the_first(
     w: tuple[int, ...],
@@ -153,12 +144,6 @@ def test_order_is_that_of_tableaux_and_the_transitive_closure_of_its_edges() -> 
     for w in sorted(STRATA, key=inversions):
         closures[w] = {w}.union(*(closures[each] for each in COVERED[w]))
         assert closures[w] == {lower for lower in STRATA if is_below(lower, w)}
-
-
-def test_codimensions_count_from_the_generic_stratum() -> None:
-    assert codimension(GENERIC) == 0
-    assert COVERED[GENERIC] == tuple(sorted(OF_INCIDENCES))
-    assert max(map(codimension, STRATA)) == codimension((1, 2, 3, 4)) == 6
 
 
 @pytest.mark.parametrize("w", STRATA)

@@ -22,7 +22,6 @@ from explorer import (
     Tolerances,
     decode_design,
     encode_design,
-    make_prototype,
 )
 from explorer.measures.size import positions_over
 from explorer.mechanism.configuration import Configuration
@@ -38,7 +37,6 @@ from explorer.statics.accuracy import (
 from explorer.statics.budget.allocation import tolerance_budget
 from explorer.statics.budget.costs import (
     IS_TILT,
-    PARTS,
     error_lengths,
     source_costs,
     source_influences,
@@ -325,9 +323,3 @@ def test_budget_over_the_workspace_holds_at_its_nodes() -> None:
     with pytest.raises(NoAnswerError, match="no position"):
         positions_over(empty, "workspace", HOME, None)
     assert "need a box" in refusal(positions_over, design, "box", HOME, None, kind=InputError)
-
-
-def test_parts_of_sources_are_parts_of_the_prototype() -> None:
-    names = {part.name for part in make_prototype(OPTIMAL).parts}
-    assert len(PARTS) == len(SOURCES)
-    assert {name for part in PARTS for name in part.split(", ")} <= names

@@ -89,20 +89,6 @@ def test_forces_at_the_papers_home_are_the_published_ones() -> None:
     assert_allclose(bending, [149.8, 78.9], atol=0.2)
 
 
-@pytest.mark.parametrize("count", [10, 2 * MANY_ROWS])
-def test_forces_of_a_batch_are_those_of_its_poses(count: int) -> None:
-    positions, rotations = random_poses(OPTIMAL, count)
-    rng = np.random.default_rng(1)
-    loads, tools = rng.normal(size=(count, 6)), rng.normal(size=(count, 3))
-    together = actuator_forces(OPTIMAL, positions, rotations, loads, tools)
-    # Unlike a single pose, a batch may run compiled.
-    for k in range(0, count, count // 5):
-        one = actuator_forces(OPTIMAL, positions[k], rotations[k], loads[k], tools[k])
-        assert_allclose(together[k], one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
-    grid = actuator_forces(OPTIMAL, positions[:6].reshape(2, 3, 3), rotations[0], loads[:3])
-    assert grid.shape == (2, 3, 6)
-
-
 def test_twists_of_actuators_invert_the_jacobian() -> None:
     positions, rotations = random_poses(OPTIMAL, 200)
     twists = twists_of_actuators(Configuration(OPTIMAL, positions, rotations))
@@ -174,15 +160,6 @@ def test_joint_forces_balance_the_platform_and_each_leg(gravity: Triple) -> None
             total = (WEIGHTS.carriages[leg] + WEIGHTS.cylinders[leg] + WEIGHTS.rods[leg]) * g
             across = (total - held.joints[k, leg])[1:]
             assert np.linalg.norm(across) == pytest.approx(held.guide_force[k, leg - 1], rel=1e-9)
-
-
-def test_reactions_without_weights_are_those_of_the_load() -> None:
-    positions, rotations = random_poses(OPTIMAL, 20)
-    load = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
-    held = reactions(Configuration(OPTIMAL, positions, rotations), load)
-    assert_allclose(held.actuators, actuator_forces(OPTIMAL, positions, rotations, load))
-    assert_allclose(held.bending, strut_bending(OPTIMAL, positions, rotations, load))
-    assert_allclose(held.guide_force, np.abs(held.actuators[:, [2, 4]]), rtol=1e-12)
 
 
 def test_worst_direction_loads_its_actuator_to_the_limit() -> None:

@@ -25,7 +25,7 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.statics.forces import actuator_forces, largest_force
+from explorer.statics.forces import actuator_forces
 from explorer.statics.load_cases import largest_shares, limit_values, load_case
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, part_limits, reactions
@@ -80,20 +80,6 @@ def test_no_sampled_direction_uses_a_larger_share_than_the_worst(limits: str) ->
         assert there.worst == worst.part
 
 
-def test_largest_payload_takes_a_part_to_its_limit() -> None:
-    for loaded in loaded_poses(limited(), 8):
-        mass = loaded.largest_payload
-        if mass == 0.0:
-            # The load and the other weights alone exceed a limit.
-            free = LoadedPose(limited(payload=Payload(0.0, (1.0, 2.0, 3.0), 2.0)), loaded.pose,
-                              loaded.load, OWN)  # fmt: skip
-            assert free.share > 1.0
-            continue
-        design = limited(payload=Payload(mass, (1.0, 2.0, 3.0), 2.0))
-        share = LoadedPose(design, loaded.pose, loaded.load, OWN).share
-        assert share == pytest.approx(1.0, rel=1e-9)
-
-
 def test_largest_force_takes_a_part_to_its_limit_in_its_worst_direction() -> None:
     rng = np.random.default_rng(6)
     for loaded in loaded_poses(limited(), 5):
@@ -109,15 +95,6 @@ def test_largest_force_takes_a_part_to_its_limit_in_its_worst_direction() -> Non
         there = LoadedPose(bare, loaded.pose, six(load))
         assert there.share == pytest.approx(1.0, rel=1e-12)
         assert there.worst == newton.part
-
-
-def test_largest_force_of_actuators_alone_is_that_of_the_function() -> None:
-    actuators = Actuators(push_n=(50, 50, 50, 50, 50, 50))
-    design = limited(struts=Struts(), guide=Guide(), actuators=actuators)
-    for loaded in loaded_poses(design, 5):
-        pose, most = loaded.pose, np.full(6, 50.0)
-        expected = largest_force(design, pose.position, pose.rotation, most, design.tool.position)
-        assert 1.0 / loaded.newton.share == pytest.approx(float(expected), rel=1e-12)
 
 
 def test_loaded_pose_that_weighs_no_payload_has_no_forces() -> None:
