@@ -13,7 +13,7 @@ from .errors import (
 from .legs.clearance import leg_clearances as leg_clearances
 from .legs.interference import tetrahedra_overlap as tetrahedra_overlap
 from .measures.snapshot import Snapshot as Snapshot, evaluate as evaluate
-from .mechanism.configuration import Configuration as Configuration
+from .mechanism.configuration import Configuration as Configuration, tool_position as tool_position
 from .mechanism.design import JOINTS as JOINTS, Design as Design, Limits as Limits
 from .mechanism.design_file import (
     PRESETS as PRESETS,
@@ -38,13 +38,11 @@ from .mechanism.pose import (
     rotation_from_yaw_pitch_roll as rotation_from_yaw_pitch_roll,
     yaw_pitch_roll_from_rotation as yaw_pitch_roll_from_rotation,
 )
-from .mechanism.tool_point import tool_position as tool_position
 from .optimise.defaults import make_problem as make_problem
 from .optimise.solver import optimise_design as optimise_design
 from .paths.planning import plan_path as plan_path
 from .prototype.assembly import make_prototype as make_prototype
-from .singularity.ellipsoids import performance as performance
-from .singularity.jacobian import jacobian as jacobian
+from .singularity.ellipsoids import jacobian as jacobian, performance as performance
 from .singularity.nearest import nearest_singularities as nearest_singularities
 from .singularity.strata import stratum as stratum
 from .statics.accuracy import (

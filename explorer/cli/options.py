@@ -16,13 +16,13 @@ import tyro
 from explorer.cli.output import write_json, write_lines
 from explorer.cli.values import DESIGN_NAME, OF_DESIGN, OF_HOME, Flag, fold_numbers, hint, numbers
 from explorer.errors import DesignError, ExplorerError, InputError, StorageError
+from explorer.mechanism.configuration import Point, offset_of, tool_offset, tool_position
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design, typical_machine
 from explorer.mechanism.folds import pose_of_folds
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion
-from explorer.mechanism.tool_point import Point, offset_of, tool_offset, tool_position
 from explorer.numerics.arrays import FloatArray
 
 

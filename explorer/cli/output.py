@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.cli.streams import write
+from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.folds import FOLDS, to_folds
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
-from explorer.mechanism.tool_point import tool_position
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_ascii, format_fixed
 

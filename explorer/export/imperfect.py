@@ -15,12 +15,11 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError, NoAnswerError
-from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.configuration import Configuration, tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import checked_joints, inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, checked_rotation
-from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray, finite_array, position_array
 from explorer.prototype.chains import ACTUATED, Chains, Places
 from explorer.statics.accuracy import (

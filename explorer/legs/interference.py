@@ -16,8 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes
-from explorer.legs.segments import closest_shares
+from explorer.legs.clearance import PAIRS, closest_shares, joined_pairs, leg_axes
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import (

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from explorer.legs.segments import closest_shares, square_at
+from explorer.legs.clearance import closest_shares, square_at
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, dot3, minus

@@ -22,10 +22,9 @@ from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, joined_pairs, leg_clearances, radii_of_pairs
 from explorer.legs.interference import step_overlaps
 from explorer.legs.move_bounds import least_rows
-from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.configuration import Configuration, one_tool, tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple, checked_rotation
-from explorer.mechanism.tool_point import one_tool, tool_offset
 from explorer.numerics.arrays import (
     BoolArray,
     FloatArray,

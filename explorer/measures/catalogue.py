@@ -15,9 +15,17 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
-from explorer.measures.case import Case
 from explorer.measures.loads import loads
-from explorer.measures.measure import COMPARE, OPTIMISE, REPORT, STUDIES, WORKSPACE, Measure, Place
+from explorer.measures.measure import (
+    COMPARE,
+    OPTIMISE,
+    REPORT,
+    STUDIES,
+    WORKSPACE,
+    Case,
+    Measure,
+    Place,
+)
 from explorer.measures.size import box_margins, box_tilt, home_tilt, longest_leg
 from explorer.mechanism.design import LENGTHS, VARIABLES
 from explorer.mechanism.margins import MARGIN_KINDS, margins
@@ -63,10 +71,6 @@ def _longest_leg_gradient(case: Case) -> Mapping[str, float]:
     limits, longest = case.design.limits, longest_leg(case.design)
     fixed = [most for name in LENGTHS if (most := getattr(limits, name)[1]) is not None]
     return {} if longest in fixed else _reach_gradient(case)
-
-
-def _clearance_or_nan(clearance: tuple[float, tuple[int, int]] | tuple[None, None]) -> float:
-    return math.nan if clearance[0] is None else clearance[0]
 
 
 def _finite_or_nan(value: float) -> float:
@@ -228,7 +232,7 @@ def _clearances() -> Iterable[Measure]:
         "clearance",
         "The least clearance of any two legs over the workspace, wherever every |δ| is at least a "
         "20th of |a3| or what a study states; certain to a 1000th of |a3|",
-        lambda case: _clearance_or_nan(case.clearance),
+        lambda case: case.clearance[0],
         cost="high",
         reason=lambda case: f"no position is {_off_planes(case)}",
         places=PAGE,
@@ -238,7 +242,7 @@ def _clearances() -> Iterable[Measure]:
         "demanded clearance",
         "The least clearance of any two legs over the workspace, wherever every |δ| is at least "
         "what the demand says",
-        lambda case: _clearance_or_nan(case.demanded_clearance),
+        lambda case: case.demanded_clearance[0],
         cost="high",
         needs=("demanded_margin",),
         places=OPTIMISE,

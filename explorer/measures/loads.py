@@ -9,13 +9,13 @@ from functools import partial
 
 import numpy as np
 
-from explorer.measures.case import Case
 from explorer.measures.measure import (
     COMPARE,
     OPTIMISE,
     REPORT,
     STUDIES,
     WORKSPACE,
+    Case,
     Measure,
     Need,
     Place,

@@ -6,9 +6,8 @@ import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
-from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE
-from explorer.measures.measure import NEED_WORDS, Need
+from explorer.measures.measure import NEED_WORDS, Case, Need
 from explorer.mechanism.design import Design
 
 

@@ -1,7 +1,8 @@
-"""The size of a design, and the positions over which its measures are the worst."""
+"""The size of a design, the positions over which its measures are the worst, and its clearance."""
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import msgspec
@@ -34,10 +35,10 @@ def clearance_margin_of(design: Design) -> float:
 
 def clearance_beyond(
     design: Design, margin: float, rotation: FloatArray | None = None
-) -> tuple[float, tuple[int, int]] | tuple[None, None]:
+) -> tuple[float, tuple[int, int] | None]:
     """Return the least clearance where every |δ| is at least some length, and its two legs.
 
-    The clearance is accurate to a thousandth of the reach. Both are None where the
+    The clearance is accurate to a thousandth of the reach. They are NaN and None where the
     constant-orientation workspace has no such position, or no volume: the positions left may
     then all lie on a surface.
 
@@ -48,7 +49,7 @@ def clearance_beyond(
     """
     r = design.home_pose.rotation if rotation is None else rotation
     if workspace_volume(design, r, explain=False).volume <= 0.0:
-        return None, None
+        return math.nan, None
     own_margin = design.limits.margin or 0.0
     limits = msgspec.structs.replace(design.limits, margin=max(own_margin, margin))
     clearances = least_clearances(
@@ -58,7 +59,9 @@ def clearance_beyond(
         only_least=True,
     ).clearance
     pair = int(clearances.argmin())
-    return (float(clearances[pair]), PAIRS[pair]) if np.isfinite(clearances[pair]) else (None, None)
+    if not np.isfinite(clearances[pair]):
+        return math.nan, None
+    return float(clearances[pair]), PAIRS[pair]
 
 
 BOX_NODES = 9

@@ -19,10 +19,10 @@ warning value of its own, and the pose is near a singularity if any is below:
 - the inverse condition number of J, below 0.01 (`WARN_CONDITION` in `explorer.singularity.colours`,
   which the maps read too): a change of J by this share makes it singular (Eckart and Young). It
   does not say how much forces and errors grow: that is one over the smallest singular value
-  (`explorer.singularity.jacobian.singular_values`). J is singular only where a margin is zero, but
-  margins and distances do not bound its conditioning: in a nearly degenerate design, or far from
-  the base, it is low in every pose. It counts for the incidence with the least scaled margin
-  (`explorer.singularity.jacobian.scaled_margins`).
+  (`explorer.singularity.ellipsoids.singular_values`). J is singular only where a margin is zero,
+  but margins and distances do not bound its conditioning: in a nearly degenerate design, or far
+  from the base, it is low in every pose. It counts for the incidence with the least scaled margin
+  (`explorer.singularity.ellipsoids.scaled_margins`).
 
 All warning values grow with the user's warning length.
 """

@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import Literal, cast, get_args
 
 import msgspec
+from msgspec.structs import force_setattr as _set
 
 from explorer.errors import DesignError
 from explorer.mechanism.home import best_home
@@ -74,10 +75,6 @@ _MACHINE = {
     "guide": Guide,
     "tolerances": Tolerances,
 }
-
-
-def _set(struct: msgspec.Struct, name: str, value: object) -> None:
-    msgspec.structs.force_setattr(struct, name, value)
 
 
 class Swing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -1,8 +1,17 @@
 """Inverse and forward kinematics in closed form, over any batch, in the order of `JOINTS`.
 
-The inverse kinematics is that of `explorer.mechanism.points`. The forward kinematics finds the
-folds of `explorer.mechanism.folds` by the three trilaterations, each the cosine of one fold, and
-has eight assembly modes.
+The inverse kinematics is that of `explorer.mechanism.points`. The forward kinematics, with its
+eight assembly modes, consists of three trilaterations (the paper's geometric analysis, Figure 2).
+With c = cos between the guide and the line b2b3, X and Y the platform's x and y components of the
+vector from a1 to b4, and r, β, ε and the folds φ1 to φ3 of `explorer.mechanism.folds`, the joints
+determine px, py, c, X and Y, and with them one cosine for each trilateration:
+
+    trilateration 1 (b1 b2 b3 a1):  cos φ1 = −Y / (r sin ε)
+    trilateration 2 (a1 a2 b2 b3):  cos φ2 = (cos β cos ε − c) / (sin β sin ε)
+    trilateration 3 (b4 a1 a2 a3):  cos φ3 = py / (r sin β)
+
+Each cosine has two folds, of opposite signs, or one flat fold: the eight modes. The discriminants
+are the squared margins, equal in all of them.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ import math
 
 import msgspec
 import numpy as np
+from msgspec.structs import force_setattr as _set
 
 from explorer.errors import DesignError
 from explorer.mechanism.pose import Quadruple, Triple
@@ -35,10 +36,6 @@ DIMENSIONS = (
 )
 """The 23 geometric dimensions: points of the base, offset and tilt of the guide, points of the
 platform, in the order of every array axis of 23."""
-
-
-def _set(struct: msgspec.Struct, name: str, value: object) -> None:
-    msgspec.structs.force_setattr(struct, name, value)
 
 
 class Tool(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 Function = Callable[..., Any]
+LLVM = "llvmlite.binding"
 
 # Numba's options for every kernel and helper.
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
@@ -33,6 +34,9 @@ SCALARS: dict[str, Any] = {"f8": ctypes.c_double, "i8": ctypes.c_int64}
 # structure PyArrayObject_fields, on 64-bit machines).
 DATA_AT = object.__basicsize__
 SHAPE_AT = DATA_AT + 16
+
+# Numba and LLVM's binding have few types, and importing them takes half a second and a tenth.
+_import: Callable[[str], Any] = importlib.import_module
 
 # What compiled code calls for its scratch arrays. The structure is that of Numba's arrays: count
 # of references, destructor and its argument, data, size.
@@ -83,7 +87,7 @@ def compile_object(function: Function, helpers: dict[Function, Any], signature: 
         helpers: Functions that it may call, with their compiled forms; None before they are made.
         signature: Its type signature for Numba; all arrays are contiguous.
     """
-    numba, llvm = _numba(), _llvm()
+    numba, llvm = _import("numba"), _import(LLVM)
     # The wrappers for calls from Python would need Numba at run time.
     options = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     dispatcher = numba.njit(signature, **options)(_with_compiled_helpers(function, helpers))
@@ -102,7 +106,7 @@ def load_object(code: bytes, signature: str) -> Function:
     interpreter lock.
     """
     arguments = arguments_of(signature)
-    llvm = _llvm()
+    llvm = _import(LLVM)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
@@ -128,16 +132,6 @@ def load_object(code: bytes, signature: str) -> Function:
     return call
 
 
-def _numba() -> Any:
-    """Return Numba without its types, which are partial; importing it takes half a second."""
-    return importlib.import_module("numba")
-
-
-def _llvm() -> Any:
-    """Return LLVM's binding for Python, without types; importing it takes a tenth of a second."""
-    return importlib.import_module("llvmlite.binding")
-
-
 def processor() -> str:
     """Return the name of this system and its kind of processor, which run the same object code."""
     return f"{sys.platform}-{_processor_type()}"
@@ -146,14 +140,14 @@ def processor() -> str:
 @functools.cache
 def _processor_type() -> str:
     """Return LLVM's name of the kind of processor for which code is made."""
-    features = _llvm().get_host_cpu_features()
+    features = _import(LLVM).get_host_cpu_features()
     is_common = all(features.get(each) for each in COMMON_FEATURES)
-    return COMMON_TYPE if is_common else _llvm().get_host_cpu_name()
+    return COMMON_TYPE if is_common else _import(LLVM).get_host_cpu_name()
 
 
 @functools.cache
 def _target_machine() -> Any:
-    llvm = _llvm()
+    llvm = _import(LLVM)
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     # As for Numba's own code: its calls of mathematical functions may go far.
@@ -211,7 +205,7 @@ def _entry(native: str, arguments: list[tuple[str, int]]) -> str:
 
 def _with_compiled_helpers(function: Function, helpers: dict[Function, Any]) -> Function:
     """Return a copy of a function that calls compiled helpers instead of plain ones."""
-    numba = _numba()
+    numba = _import("numba")
     names = dict(function.__globals__)
     for name in function.__code__.co_names:
         called = names.get(name)

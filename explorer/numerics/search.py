@@ -1,4 +1,4 @@
-"""Local minimisation of a function of a few variables under inequality constraints."""
+"""Local minimisation under constraints, and the stages that a long computation reports."""
 
 from __future__ import annotations
 

@@ -25,11 +25,11 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError, NoAnswerError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.snapshot import Snapshot, evaluate
+from explorer.mechanism.configuration import one_tool
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.folds import FOLD_LINES, from_folds, to_folds, write_poses
 from explorer.mechanism.margins import INCIDENCES, margins, mode_name
 from explorer.mechanism.pose import Pose, Triple
-from explorer.mechanism.tool_point import one_tool
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.loads import ROUNDING, DemandedLoad
 from explorer.paths.proofs import Proofs, divide_line, positions_and_rotations

@@ -14,10 +14,10 @@ import numpy as np
 
 from explorer.legs.moves import poses_between
 from explorer.mechanism.design import Design
-from explorer.mechanism.displacement import displacement
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.proofs import Proofs, positions_and_rotations
+from explorer.singularity.nearest import displacement
 
 # Shortcuts tried in a round, rounds without gain that end the search, and the most rounds.
 TRIES, MOST_IDLE_ROUNDS, MOST_ROUNDS = 24, 4, 60

@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.legs.moves import StraightMoves
+from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose, quaternion_from_rotation
-from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray
 
 # The default speed of the fastest actuator, as a share of the reach per second.

@@ -30,8 +30,8 @@ from explorer.reproduce.claim import (
     random_folds,
     random_poses,
 )
+from explorer.singularity.ellipsoids import jacobian
 from explorer.singularity.freedoms import UNCOUPLED
-from explorer.singularity.jacobian import jacobian
 from explorer.singularity.strata import STRATA, inversions, is_below, stratum
 
 OPTIMAL = PRESETS["paper-optimal"]

@@ -29,7 +29,7 @@ from explorer.reproduce.claim import (
     random_poses,
 )
 from explorer.reproduce.six_legs import six_four_twin
-from explorer.singularity.jacobian import (
+from explorer.singularity.ellipsoids import (
     determinant,
     inverse_condition,
     jacobian,

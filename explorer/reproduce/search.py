@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS

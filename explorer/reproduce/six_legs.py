@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
+from explorer.legs.clearance import write_closest
 from explorer.legs.interference import tetrahedra_overlap
-from explorer.legs.segments import write_closest
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel

@@ -1,4 +1,8 @@
-"""The freedoms that a singular pose leaves the platform while all actuators are locked.
+"""Motions along the flags: six that change one margin, and those that a singular pose frees.
+
+On the axes of each of the two frames there are three uncoupled motions: the translation along x
+moves the flag's point on its line, the rotation about x turns its plane about the line, and the
+rotation about z turns its line in the plane. Each leaves the other two elements of the flag.
 
 The mechanism folds along three lines (`explorer.mechanism.folds`). Where the fold along one is
 flat, and no leg has length zero, a turn about that line changes no joint at first order:
@@ -10,9 +14,8 @@ flat, and no leg has length zero, a turn about that line changes no joint at fir
 - δ3 = 0: a turn about the guide. Legs 1 to 3 meet it, and leg 4 lies in the base plane with it.
 
 These are pure turns: the pitch is zero. Where one incidence holds, the turn is the only freedom.
-Where several hold there may be more freedoms than these turns, and combinations of two turns about
-skew lines are screws. A leg of length zero holds its end in every direction, so that there may be
-no freedom.
+Where several hold there may be more freedoms, and combinations of two turns about skew lines are
+screws. A leg of length zero holds its end in every direction, so that there may be no freedom.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.jacobian import jacobian
+from explorer.singularity.ellipsoids import jacobian
 from explorer.singularity.strata import incidences, stratum
 
 

@@ -1,8 +1,14 @@
-"""The gaps between the elements of the two flags: what is left to each of the three incidences.
+"""What is left to each of the three incidences: gaps between the two flags, and the least turns.
 
 A gap is the shortest segment from an element of the base flag to one of the platform flag: from a1
 to the platform plane (δ1), between the lines a1a2 and b2b3 (δ2), and from the base plane to b4
 (δ3). The mechanism is singular where one of them closes, or where the two lines are parallel.
+
+A least turn is one about b4 or about a1, the points of the two flags, and about any axis through
+them. Each incidence is then the meeting of a line and a plane of which the turn moves one and
+leaves the other, so that the least turn is the angle between the two, and its sine is the margin
+over a length: δ1 and δ3 over |a1 b4|, δ2 over the distance of b4 from the guide (a turn about b4)
+or of a1 from the line b2b3 (a turn about a1). Uncoupled rotations are no shorter.
 """
 
 from __future__ import annotations

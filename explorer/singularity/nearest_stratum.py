@@ -23,11 +23,10 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.displacement import PlatformPoints, displacement
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.angle_minima import ANGLES, grid_minima, minimise, powers_of
-from explorer.singularity.nearest import nearest_singularities
+from explorer.singularity.nearest import PlatformPoints, displacement, nearest_singularities
 from explorer.singularity.strata import (
     OF_INCIDENCES,
     STRATA,

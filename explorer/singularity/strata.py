@@ -1,10 +1,14 @@
-"""The 24 strata of the relative position of two flags in projective space.
+"""The 24 strata of the relative position of two flags in projective space, and their closure order.
 
 The base flag is the point a1, the line a1a2 and the base plane; the platform flag is the point
 b4, the line b2b3 and the platform plane. Their relative position is a permutation w of
 (1, 2, 3, 4), which is a Schubert cell; its number of inversions is the stratum's dimension. The
 closure of a stratum is defined by lower bounds of r_ij, the dimension of the intersection of
 the i-th subspace of one flag with the j-th of the other.
+
+A stratum lies in the closure of another if each of its r_ij is at least as large (the Bruhat order
+of permutations). Conditions that follow from a neighbouring one are redundant; the others, the
+essential set of W. Fulton (1992), describe the stratum.
 """
 
 from __future__ import annotations

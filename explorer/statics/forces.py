@@ -4,6 +4,13 @@ A load is a wrench (F; M) that acts on the platform at the tool point, along the
 in newtons and newtons times the design unit. A positive actuator force pushes its joint's value
 up. The legs are weightless: legs 1 and 4 then carry forces along their axes only; legs 2 and 3 also
 carry a force along the guide, which bends their struts. In a singular pose all forces are infinite.
+
+With u the direction of b2b3 and M the moment about b4, leg 1 alone resists a turn about the line
+b2b3 and leg 4 alone a turn about the guide:
+f(l1) = l1 (M · u) / (b1y δ1) and f(l4) = −l4 x̂ · (M + p × F) / (a3y δ3).
+Legs 2 and 3 hold the rest. Each can push along the guide and along its strut, but not across the
+plane of both; δ2 is what this condition divides by. The forces of six unit loads are the columns of
+−J⁻ᵀ, so the same closed form inverts J.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ import msgspec
 
 from explorer.errors import DesignError, InputError
 from explorer.files.packaged import versions
-from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE
+from explorer.measures.measure import Case
 from explorer.measures.measurements import measure_design, reason_for_missing, unmet_needs
 from explorer.mechanism.design import Design
 from explorer.numerics.compiled import warm

@@ -31,7 +31,7 @@ from explorer.singularity.colours import (
     mix,
     warning_condition,
 )
-from explorer.singularity.jacobian import inverse_condition, jacobian_of
+from explorer.singularity.ellipsoids import inverse_condition, jacobian_of
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, deflection, is_elastic, stiffness_of
 from explorer.statics.load_cases import largest_shares, load_case

@@ -42,8 +42,8 @@ from explorer.app.state.state import Run, State, opened
 from explorer.app.state.studies import Brush, Studies
 from explorer.app.state.view import PrecisionView, PrototypeView, SingularView, View, WorkspaceView
 from explorer.errors import ExplorerError
-from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import VARIABLES, Limits
 from explorer.mechanism.design_file import PRESETS

@@ -53,8 +53,8 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.colours import COMPARED
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.errors import InputError
-from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS

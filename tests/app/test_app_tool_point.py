@@ -60,14 +60,14 @@ from explorer.app.state.state import State, angles_of, opened
 from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.pieces import widgets
+from explorer.mechanism.configuration import Point
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
-from explorer.mechanism.tool_point import Point
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.jacobian import jacobian
+from explorer.singularity.ellipsoids import jacobian
 from explorer.workspace.limits.constraints import constraints
 
 OPTIMAL = PRESETS["paper-optimal"]

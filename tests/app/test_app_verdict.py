@@ -28,7 +28,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import describe_modes
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.singularity.colours import SINGULAR, WARN_SHARE, WARNED, css, proximity_colour
-from explorer.singularity.jacobian import scaled_margins
+from explorer.singularity.ellipsoids import scaled_margins
 from explorer.singularity.strata import COVERED, OF_INCIDENCES, incidences
 from explorer.workspace.position_bands import position_bands
 

@@ -50,8 +50,7 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.singularity.ellipsoids import inverse_condition, jacobian, planes_of_singularity
 from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.reactions import limit_shares, reactions

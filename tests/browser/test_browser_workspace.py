@@ -18,7 +18,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Tool
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.singularity.ellipsoids import inverse_condition, jacobian
 from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection
 from explorer.statics.load_cases import largest_shares, load_case

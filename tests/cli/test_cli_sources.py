@@ -11,8 +11,7 @@ from numpy.testing import assert_allclose
 
 import explorer
 from explorer.measures.blocks.source import load_source, name_of, pose_source
-from explorer.statics.loaded import LoadedPose
-from explorer.statics.tool_precision import ToolPrecision
+from explorer.statics.loaded import LoadedPose, ToolPrecision
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 POSE = explorer.Pose.of_yaw_pitch_roll((8.0, -2.5, 11.0), (-60.0, 9.0, -7.0))

@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 import explorer
 from explorer.cli import COMMANDS
 from explorer.cli.parsing import load_command
+from explorer.mechanism.configuration import pose_with, position_of
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
-from explorer.mechanism.tool_point import pose_with, position_of
 from explorer.singularity.ellipsoids import performance
 from explorer.workspace.orientations.share import orientation_share
 from explorer.workspace.orientations.tilts import tilt_map

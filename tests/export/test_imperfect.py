@@ -46,8 +46,7 @@ from explorer.statics.accuracy import (
 from explorer.statics.budget.costs import source_costs
 from explorer.statics.compliance import stiffness_of
 from explorer.statics.forces import twists_of_actuators
-from explorer.statics.loaded import LoadedPose
-from explorer.statics.tool_precision import ToolPrecision
+from explorer.statics.loaded import LoadedPose, ToolPrecision
 
 TOOL = (0.5, 1.0, -2.0)
 IDEAL = msgspec.structs.replace(PRESETS["paper-optimal"], tool=Tool(TOOL))

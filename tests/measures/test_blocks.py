@@ -23,8 +23,7 @@ from explorer.measures.blocks.singularity import (
 )
 from explorer.mechanism.design_file import PRESETS, typical_machine
 from explorer.singularity.ellipsoids import performance, singularity_free_ball
-from explorer.statics.loaded import LoadedPose
-from explorer.statics.tool_precision import ToolPrecision
+from explorer.statics.loaded import LoadedPose, ToolPrecision
 
 TYPICAL = typical_machine(PRESETS["paper-optimal"])[0]
 MACHINE = msgspec.structs.replace(

@@ -10,10 +10,9 @@ from hypothesis import assume, given
 from numpy.testing import assert_allclose
 from strategies import Case, all_cases, ordinary_cases, singular_cases, uniform_rotations
 
-from explorer.measures.case import Case as MeasuredCase
-from explorer.measures.indices import PoseIndices
+from explorer.measures.measure import Case as MeasuredCase
 from explorer.measures.measurements import measure_design
-from explorer.measures.snapshot import evaluate
+from explorer.measures.snapshot import PoseIndices, evaluate
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose

@@ -20,8 +20,8 @@ from explorer.app.state.compared import unnamed
 from explorer.app.state.studies import StudyPlan, label_of, study_around, title_of
 from explorer.cli.commands.optimise import measure_rows as measure_rows_of_command
 from explorer.export.report.data import gather_report_data
-from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, Measure, measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, encode_design

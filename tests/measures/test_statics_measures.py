@@ -21,8 +21,8 @@ from explorer import (
     deflection,
     reactions,
 )
-from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import measure_design, reason_for_missing
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES

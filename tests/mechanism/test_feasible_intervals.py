@@ -14,10 +14,16 @@ from strategies import Case, cases, designs, ordinary_cases, ordinary_designs, s
 
 from explorer import JOINTS, PRESETS, Design, forward, inverse
 from explorer.mechanism.design import LENGTHS, Limits
-from explorer.mechanism.feasible_intervals import Interval, feasible_intervals, nearest_feasible
+from explorer.mechanism.feasible_intervals import (
+    Interval,
+    feasible_intervals,
+    nearest_feasible,
+    possible_ranges,
+    without_box,
+    without_guide,
+)
 from explorer.mechanism.kinematics import discriminants
 from explorer.mechanism.pose import Pose
-from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
 from explorer.numerics.arrays import BoolArray, FloatArray
 
 joint_indices = st.integers(0, 5)

@@ -34,7 +34,7 @@ from explorer.mechanism.kinematics import (
 )
 from explorer.mechanism.margins import mode_of, signs_of
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.jacobian import determinant
+from explorer.singularity.ellipsoids import determinant
 from explorer.singularity.strata import inversions
 
 REFERENCE: list[dict[str, Any]] = read_reference("kinematics")["cases"]

@@ -24,11 +24,15 @@ from explorer import (
     rotation_from_quaternion,
     stratum,
 )
-from explorer.measures.indices import PoseIndices
+from explorer.measures.snapshot import PoseIndices
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.ellipsoids import singular_plane_distances
-from explorer.singularity.jacobian import determinant, inverse_condition, tetrahedron_volumes
+from explorer.singularity.ellipsoids import (
+    determinant,
+    inverse_condition,
+    singular_plane_distances,
+    tetrahedron_volumes,
+)
 from explorer.singularity.nearest import nearest_singular_poses
 
 EYE = np.eye(3)

@@ -27,7 +27,7 @@ from explorer import (
     workspace_volume,
 )
 from explorer.errors import DesignError
-from explorer.measures.case import Case
+from explorer.measures.measure import Case
 from explorer.measures.size import corners_of, longest_leg
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.configuration import Configuration

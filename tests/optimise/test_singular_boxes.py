@@ -14,7 +14,7 @@ import pytest
 
 from explorer import Actuators, Design, Payload, Struts
 from explorer.export.report.search import charts
-from explorer.measures.case import Case
+from explorer.measures.measure import Case
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Triple
 from explorer.mechanism.design_file import PRESETS

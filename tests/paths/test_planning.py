@@ -30,12 +30,12 @@ from explorer import (
     to_folds,
 )
 from explorer.legs.moves import move_clearances, poses_between
-from explorer.mechanism.displacement import displacement
 from explorer.paths.crossings import path_margins
 from explorer.paths.planning import EndError, NoPathError, PlannedPath, plan_path
 from explorer.paths.proofs import Proofs, positions_and_rotations
 from explorer.paths.smoothing import Smoother, lengths_of_moves
 from explorer.paths.tree_search import load_ompl
+from explorer.singularity.nearest import displacement
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 DESIGN = limited(PRESETS["paper-optimal"], leg_radii=(0.2,) * 4)

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from explorer import PRESETS, InputError, from_folds, to_folds
 from explorer.files.manual import read_page
 from explorer.files.packaged import packaged_file
-from explorer.legs.segments import write_closest
+from explorer.legs.clearance import write_closest
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.folds import FOLDS
 from explorer.mechanism.kinematics import inverse

@@ -10,15 +10,15 @@ from scipy.spatial.transform import Rotation
 from strategies import Case, ordinary_cases, singular_cases
 
 from explorer import PRESETS, Pose, inverse, jacobian, margins
-from explorer.mechanism.displacement import displacement
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import (
     certified_radius,
+    inverse_condition,
     performance,
     planes_of_singularity,
     singularity_free_ball,
 )
-from explorer.singularity.jacobian import inverse_condition
+from explorer.singularity.nearest import displacement
 
 OPTIMAL = PRESETS["paper-optimal"]
 

@@ -25,10 +25,9 @@ from strategies import (
 
 from explorer import PRESETS, Design, InputError, Pose, margins, nearest_singularities, stratum
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.displacement import PlatformPoints, displacement
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
-from explorer.singularity.nearest import nearest_singular_poses
+from explorer.singularity.nearest import PlatformPoints, displacement, nearest_singular_poses
 from explorer.singularity.nearest_lines import Constants, bound_over, terms_at, value_at
 from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_stratum, seen_stratum
 from explorer.singularity.strata import (

@@ -33,7 +33,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import TETRAHEDRA, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.jacobian import determinant, inverse_condition, tetrahedron_volumes
+from explorer.singularity.ellipsoids import determinant, inverse_condition, tetrahedron_volumes
 
 
 def shortest_length(case: Case) -> float:

@@ -13,9 +13,9 @@ from strategies import Case, all_cases, ordinary_cases
 
 from explorer import PRESETS, Pose, inverse, margins
 from explorer.numerics.arrays import FloatArray
+from explorer.singularity.ellipsoids import jacobian, scaled_margins
 from explorer.singularity.freedoms import UNCOUPLED
 from explorer.singularity.gaps import least_turns
-from explorer.singularity.jacobian import jacobian, scaled_margins
 
 DESIGN = PRESETS["paper-optimal"]
 

@@ -27,9 +27,8 @@ from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.forces import actuator_forces
 from explorer.statics.load_cases import largest_shares, limit_values, load_case
-from explorer.statics.loaded import LoadedPose
+from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.statics.reactions import limit_shares, part_limits, reactions
-from explorer.statics.tool_precision import ToolPrecision
 from explorer.statics.weights import Weights, design_weights
 
 OPTIMAL = PRESETS["paper-optimal"]

@@ -111,7 +111,7 @@ def shell_case(seed: int) -> tuple[Design, FloatArray]:
     Some designs have guides, boxes and margins; a quarter of the rotations are about z alone.
     """
     rng = np.random.default_rng([7, seed])
-    size = float(rng.choice([1.0, 10.0, 1e-6, 1e3]))
+    size = float(rng.choice([1.0, 10.0, 1e-2, 1e3]))
     near = float(rng.choice([1.0, 1.0, 1.0, 1e-2])) * size
 
     def between(low: float, high: float) -> float:

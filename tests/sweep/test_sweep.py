@@ -28,7 +28,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.machine import Actuators, Tool
 from explorer.mechanism.pose import Pose
-from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.singularity.ellipsoids import inverse_condition, jacobian
 from explorer.statics.loaded import LoadedPose
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.results import front, undominated

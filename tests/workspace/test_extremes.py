@@ -25,7 +25,7 @@ from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import Design, Limits, Pose
-from explorer.measures.case import Case
+from explorer.measures.measure import Case
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import BoolArray, FloatArray

@@ -11,9 +11,9 @@ import math
 
 from explorer.app.inputs.tracks import Span, round_span
 from explorer.app.state.state import State
+from explorer.mechanism.configuration import Point, point_of
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
-from explorer.mechanism.possible_ranges import possible_ranges
-from explorer.mechanism.tool_point import Point, point_of
+from explorer.mechanism.feasible_intervals import possible_ranges
 
 # Ends of sliders over the size of what they change, so that users run into limits.
 BEYOND = 1.5

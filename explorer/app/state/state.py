@@ -21,6 +21,7 @@ from explorer.app.state.presses import Press
 from explorer.app.state.studies import Studies
 from explorer.app.state.view import View
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Point, offset_of, point_of, pose_with, position_of
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_of
@@ -35,7 +36,6 @@ from explorer.mechanism.tilt_torsion import (
     rotation_from_tilt_torsion,
     tilt_torsion_of,
 )
-from explorer.mechanism.tool_point import Point, offset_of, point_of, pose_with, position_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.optimise.outcome import Iterate

@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from explorer.errors import InputError
-from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import unmet_needs
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import BoolArray

@@ -7,8 +7,8 @@ from typing import Literal
 
 from explorer.errors import InputError
 from explorer.measures.size import PositionSet
+from explorer.mechanism.configuration import Point
 from explorer.mechanism.pose import Triple
-from explorer.mechanism.tool_point import Point
 from explorer.numerics.checks import STIFFEST, numbers, positive
 from explorer.numerics.number_text import format_number
 

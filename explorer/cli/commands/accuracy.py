@@ -19,8 +19,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.machine import DIMENSIONS, Six
 from explorer.mechanism.pose import Triple
 from explorer.statics.accuracy import error_by_geometry
-from explorer.statics.loaded import LoadedPose
-from explorer.statics.tool_precision import BY_ACTUATORS, BY_DIMENSIONS, GROUPS, ToolPrecision
+from explorer.statics.loaded import BY_ACTUATORS, BY_DIMENSIONS, GROUPS, LoadedPose, ToolPrecision
 
 B4: Triple = (0.0, 0.0, 0.0)
 ORDER = "l1 d1 d2 d3 d4 l4"

@@ -10,6 +10,7 @@ from explorer.cli import output
 from explorer.cli.options import DesignOptions, JsonOptions, PointOptions
 from explorer.cli.values import numbers
 from explorer.errors import NoAnswerError
+from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
 from explorer.mechanism.folds import FOLDS
@@ -26,7 +27,6 @@ from explorer.mechanism.pose import (
     yaw_pitch_roll_from_rotation,
 )
 from explorer.mechanism.tilt_torsion import tilt_torsion_from_rotation
-from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray
 
 Joints = tuple[float, float, float, float, float, float]

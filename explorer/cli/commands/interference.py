@@ -34,9 +34,9 @@ from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.blocks.clearances import move_clearances, pose_clearances
 from explorer.measures.snapshot import Snapshot, evaluate
+from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
-from explorer.mechanism.tool_point import tool_position
 
 if TYPE_CHECKING:
     from explorer.legs.moves import MoveClearance

@@ -28,8 +28,8 @@ from explorer.cli.values import (
     whole_number,
 )
 from explorer.errors import InputError, NoAnswerError
-from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.size import longest_leg
 from explorer.mechanism.design import VARIABLES, Design

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 from explorer.cli.options import DesignOptions, JsonOptions, PointOptions
 from explorer.cli.output import degrees, figure, figures, finite, heading, table
 from explorer.cli.values import OF_HOME, finite_number, numbers, whole_number
+from explorer.mechanism.configuration import Point, position_of
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
-from explorer.mechanism.tool_point import Point, position_of
 
 if TYPE_CHECKING:
     from explorer.workspace.orientations.share import OrientationShare

@@ -21,8 +21,7 @@ from explorer.measures.blocks.singularity import (
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.measures.verdict import verdict
 from explorer.mechanism.pose import Triple
-from explorer.singularity.ellipsoids import performance
-from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.singularity.ellipsoids import inverse_condition, jacobian, performance
 from explorer.singularity.strata import incidences
 
 

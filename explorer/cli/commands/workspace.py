@@ -30,8 +30,8 @@ from explorer.cli.values import (
 )
 from explorer.errors import InputError
 from explorer.measures.blocks.clearances import workspace_clearances
-from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Six

@@ -14,8 +14,8 @@ import numpy as np
 
 from explorer.errors import ExplorerError
 from explorer.export.simulation import DENSITY
-from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import Design
@@ -24,8 +24,7 @@ from explorer.mechanism.pose import Pose
 from explorer.optimise.record import Record
 from explorer.prototype.assembly import Bill, bill_of_materials, make_prototype
 from explorer.statics.compliance import largest_deflection
-from explorer.statics.loaded import LoadedPose
-from explorer.statics.tool_precision import ToolPrecision
+from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.workspace.accessible.workspace import AccessibleWorkspace, accessible_workspace
 from explorer.workspace.carried_region import CarriedRegion
 from explorer.workspace.slices.volume import NodeCount, Volume

@@ -19,8 +19,8 @@ from explorer.measures.blocks.block import (
     Vector,
 )
 from explorer.measures.snapshot import Snapshot
+from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
-from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray
 
 if TYPE_CHECKING:

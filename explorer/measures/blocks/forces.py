@@ -22,9 +22,9 @@ from explorer.measures.blocks.block import (
     Words,
     direction,
 )
+from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Pose, Triple
-from explorer.mechanism.tool_point import tool_position
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding
 from explorer.statics.forces import WorstDirection

@@ -24,7 +24,7 @@ from explorer.measures.blocks.block import (
 from explorer.mechanism.design import JOINTS
 from explorer.statics.accuracy import IS_TILT, RMS_ERRORS, SOURCES
 from explorer.statics.compliance import is_elastic
-from explorer.statics.tool_precision import GROUPS, ToolPrecision
+from explorer.statics.loaded import GROUPS, ToolPrecision
 
 DIGITS = 3
 LISTED = 8

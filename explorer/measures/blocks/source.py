@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose, Triple
-from explorer.mechanism.tool_point import tool_position
 from explorer.statics.loaded import LoadedPose
 
 DESIGN_FILE = "design.json"
@@ -104,7 +104,7 @@ def load_source(topic: LoadTopic, loaded: LoadedPose, density: float | None = No
             remark = "The command leaves the weights of the parts out."
     lines.append(f"loaded = LoadedPose({', '.join(arguments)})")
     if topic == "accuracy":
-        imports.append("from explorer.statics.tool_precision import ToolPrecision")
+        imports.append("from explorer.statics.loaded import ToolPrecision")
         lines.append("precision = ToolPrecision(loaded)")
         lines.append("print(precision.worst(), precision.deflection)")
     else:

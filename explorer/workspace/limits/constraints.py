@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import TOLERANCE, Design
 from explorer.mechanism.pose import checked_rotation
-from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, position_array
 from explorer.workspace.limits.limit import Bound, Demand, LegAngle
 from explorer.workspace.limits.quantities import D1, D2, D3, D4, DELTA1, DELTA2, L1, L4, ORDER, X, Z

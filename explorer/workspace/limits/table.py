@@ -14,8 +14,8 @@ import numpy as np
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair, Swing
+from explorer.mechanism.feasible_intervals import possible_ranges, without_box, without_guide
 from explorer.mechanism.margins import MARGIN_KINDS
-from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.limit import Bound, Demand, Entry, LegAngle, Limit, LimitCase, Switch
 from explorer.workspace.limits.quantities import (

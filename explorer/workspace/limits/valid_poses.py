@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.legs.clearance import joined_pairs, radii_of_pairs
-from explorer.legs.segments import closest_shares, square_at
+from explorer.legs.clearance import closest_shares, joined_pairs, radii_of_pairs, square_at
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation

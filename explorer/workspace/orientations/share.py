@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import one_tool, tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
-from explorer.mechanism.tool_point import one_tool, tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import kernel
 from explorer.workspace.limits.valid_poses import Rules, is_valid, valid_rows

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import one_tool
 from explorer.mechanism.design import Design
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
-from explorer.mechanism.tool_point import one_tool
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, position_array
 from explorer.workspace.limits.valid_poses import Rules
 from explorer.workspace.orientations.least_tilts import least_tilt_rows

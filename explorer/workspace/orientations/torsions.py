@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.mechanism.configuration import one_tool
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion, tilt_torsion_of
-from explorer.mechanism.tool_point import one_tool
 from explorer.numerics.arrays import FloatArray, for_kernel
 from explorer.workspace.limits.valid_poses import Rules
 from explorer.workspace.orientations.sets import even_angles, one_angle, one_position

@@ -40,8 +40,7 @@ class Solid:
     def shifted(self, offset: FloatArray) -> Solid:
         """Return the solid moved by a vector in design units, shape (3,).
 
-        A constant-orientation workspace moved by `explorer.mechanism.tool_point.offset_of` is that
-        of the tool point.
+        A constant-orientation workspace moved by `offset_of` the tool is that of the tool point.
         """
         return replace(self, vertices=self.vertices + offset)
 

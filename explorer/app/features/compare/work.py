@@ -20,12 +20,12 @@ from explorer.app.session.feed import Feed
 from explorer.app.state.compared import SLOTS, unnamed
 from explorer.app.state.frame import Frame
 from explorer.errors import ExplorerError
-from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import evaluate
+from explorer.mechanism.configuration import Point, offset_of
 from explorer.mechanism.design import Design
-from explorer.mechanism.tool_point import Point, offset_of
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import Rgb
 from explorer.workspace.solids.solid import Solid

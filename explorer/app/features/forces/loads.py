@@ -24,9 +24,8 @@ from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.statics.loaded import LoadedPose
+from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.statics.reactions import has_limits
-from explorer.statics.tool_precision import ToolPrecision
 from explorer.statics.weights import Weights
 
 # Share of the reach below which and above which the arrow of a typed force has another scale.

@@ -34,9 +34,9 @@ from explorer.app.widgets.blocks import share_colour
 from explorer.app.widgets.colours import GHOST
 from explorer.measures.blocks.block import Share
 from explorer.measures.blocks.forces import shares_of
+from explorer.mechanism.configuration import position_of
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Triple
-from explorer.mechanism.tool_point import position_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding, format_number
 from explorer.singularity.colours import Rgb

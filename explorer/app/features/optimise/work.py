@@ -12,8 +12,8 @@ from explorer.app.session.worker import Channel
 from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
-from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
+from explorer.measures.measure import Case
 from explorer.measures.measurements import measure_design
 from explorer.measures.size import longest_leg
 from explorer.mechanism.design import VARIABLES, Design

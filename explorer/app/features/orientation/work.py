@@ -16,6 +16,7 @@ from explorer.app.state.action import Action
 from explorer.app.state.actions import moved
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tilt_torsion import (
@@ -23,7 +24,6 @@ from explorer.mechanism.tilt_torsion import (
     pose_of_tilt_torsion,
     rotation_from_tilt_torsion,
 )
-from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.workspace.extremes import extent_of

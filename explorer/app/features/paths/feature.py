@@ -17,8 +17,8 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button, running
 from explorer.app.widgets.commands import Key
+from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import rotation_from_quaternion
-from explorer.mechanism.tool_point import position_of
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.singularity.colours import FAR, SINGULAR
 

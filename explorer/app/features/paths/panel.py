@@ -45,9 +45,9 @@ from explorer.app.widgets.chips import Chip, Chips, choose
 from explorer.app.widgets.markup import alert, beside, box, dim, note, sentence, signed
 from explorer.errors import InputError
 from explorer.export.tables import trajectory_csv
+from explorer.mechanism.configuration import position_of
 from explorer.mechanism.margins import margins, mode_name, mode_of
 from explorer.mechanism.pose import Pose, Triple
-from explorer.mechanism.tool_point import position_of
 from explorer.numerics.number_text import format_number, snap_to_decimals
 
 EndName = Literal["start", "goal"]

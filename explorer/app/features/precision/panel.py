@@ -28,7 +28,7 @@ from explorer.measures.blocks.source import Source, load_source
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import typical_machine
 from explorer.statics.compliance import is_elastic
-from explorer.statics.tool_precision import ToolPrecision
+from explorer.statics.loaded import ToolPrecision
 
 LOAD = "the load and the weights of the tab Forces"
 TYPICAL = "precision.typical"

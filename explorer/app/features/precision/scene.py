@@ -28,7 +28,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import Rgb
 from explorer.statics.compliance import is_elastic
-from explorer.statics.tool_precision import ToolPrecision
+from explorer.statics.loaded import ToolPrecision
 
 ERROR: Rgb = (176, 60, 120)
 DEFLECTED: Rgb = (222, 110, 20)
