@@ -11,7 +11,7 @@ import viser
 from desk import Desk
 from services import services_for
 
-from explorer.app.features.designs.panel import DesignsPanel
+from explorer.app.features.designs.feature import DesignsPanel
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.session.session import UNDO

@@ -405,9 +405,8 @@ def test_file_that_cannot_be_written_is_refused_with_what_would_work(
 
 def curve_of(state: State) -> RadiusCurve:
     drawing = follow(show_curve(state), RADIUS_FEED)[0].drawing
-    assert drawing is not None
-    assert drawing.curve is not None
-    return drawing.curve
+    assert isinstance(drawing, RadiusCurve)
+    return drawing
 
 
 def words_of(state: State) -> str:

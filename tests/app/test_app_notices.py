@@ -19,7 +19,7 @@ from services import StubWorker
 
 from explorer.app.browser.browser_facts import BrowserFacts, decode_facts
 from explorer.app.browser.downloads import Downloads
-from explorer.app.features.designs.panel import UNSAVED
+from explorer.app.features.designs.feature import UNSAVED
 from explorer.app.features.help.tour import STEPS, Tour
 from explorer.app.layout import is_narrow
 from explorer.app.server import Running, start

@@ -16,7 +16,7 @@ from services import StubWorker, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.orientation import work
-from explorer.app.features.orientation.feature import ORIENTATION
+from explorer.app.features.orientation.feature import ORIENTATION, nodes_beside_cut
 from explorer.app.features.orientation.maps import (
     CENTRE,
     LEFT,
@@ -30,7 +30,6 @@ from explorer.app.features.orientation.maps import (
     torsion_strip,
 )
 from explorer.app.features.orientation.panel import best_words, range_words, strip_words, summary
-from explorer.app.features.orientation.scene import kept_nodes
 from explorer.app.features.orientation.work import (
     ORIENTATIONS,
     POSITION_FEED,
@@ -163,8 +162,9 @@ def test_position_feed_computes_share_and_torsions() -> None:
 
 
 def test_tilts_over_positions_are_the_greatest_of_each(tilts: TiltsDrawing) -> None:
+    torsion = round(opened(OPTIMAL).tilt_torsion.torsion, work.DIGITS)
     for index in np.random.default_rng(0).integers(len(tilts.tilts), size=20):
-        expected = greatest_tilt(OPTIMAL, tilts.positions[index], tilts.request.torsion).tilt
+        expected = greatest_tilt(OPTIMAL, tilts.positions[index], torsion).tilt
         assert tilts.tilts[index] == pytest.approx(expected, abs=1e-6)
 
 
@@ -284,14 +284,14 @@ def test_panel_marks_values_of_an_older_position_as_outdated_and_shows_a_failure
 def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side(
     tilts: TiltsDrawing, axis: int, flipped: bool
 ) -> None:
-    assert kept_nodes(tilts, WorkspaceView()).all()
+    assert nodes_beside_cut(tilts, WorkspaceView()).all()
     view = WorkspaceView(solid=True, cut=AXES[axis], level=6.0, flipped=flipped)
     request = workspace_request(Frame(Set("view.workspace", view).apply(opened(OPTIMAL))))
     assert request is not None
     surface = draw_workspace(request).surface
     ends = [shell.vertices[:, axis] for shell in surface.shells if len(shell.vertices)]
     low, high = min(map(np.min, ends)), max(map(np.max, ends))
-    kept = tilts.positions[kept_nodes(tilts, view), axis]
+    kept = tilts.positions[nodes_beside_cut(tilts, view), axis]
     assert len(kept)
     assert low - 1e-9 <= kept.min()
     assert kept.max() <= high + 1e-9

@@ -20,7 +20,7 @@ from explorer.app.features.mechanism.incidences import Flags
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.prototype.feature import ASSEMBLIES
 from explorer.app.features.prototype.panel import FIT, PrototypePanel, trouble_of
-from explorer.app.features.prototype.scene import PrototypeScene, shown_places
+from explorer.app.features.prototype.scene import PrototypeScene, places_of
 from explorer.app.features.prototype.work import (
     PARTS_FEED,
     Parts,
@@ -63,8 +63,8 @@ def feed(services: Services) -> PartsFeed:
 
 @pytest.fixture(scope="module")
 def parts() -> Parts:
-    parts = parts_drawing(PartsRequest(OPTIMAL)).parts
-    assert parts is not None
+    parts = parts_drawing(PartsRequest(OPTIMAL))
+    assert isinstance(parts, Parts)
     return parts
 
 
@@ -196,7 +196,7 @@ def test_exploded_parts_of_a_leg_are_free_of_each_other_and_within_the_corners(
     state: State, services: Services, parts: Parts
 ) -> None:
     frame = Frame(state)
-    places = shown_places(Placed(frame), parts)
+    places = places_of(Placed(frame), parts)
     apart = {
         part.name: replace(part, body="base", vertices=part.vertices @ turn.T + origin)
         for part, origin, turn in zip(
@@ -321,8 +321,8 @@ def test_masses_and_counts_are_those_of_the_library(parts: Parts) -> None:
             same = [i for i in bill.items if i.name.partition(" ")[0] == line.kind]
             assert sum(item.mass == mass for item in same) >= line.count
     # Legs of other parts have lines of their own.
-    mixed = parts_drawing(PartsRequest(thick(with_prototype(), 0.2, 0.25, 0.2, 0.15).design)).parts
-    assert mixed is not None
+    mixed = parts_drawing(PartsRequest(thick(with_prototype(), 0.2, 0.25, 0.2, 0.15).design))
+    assert isinstance(mixed, Parts)
     names = [line.name for line in mixed.listed.lines]
     assert {"carriage 2", "carriage 3", "cross 1", "cross 4", "ball 1, 3"} <= set(names)
 

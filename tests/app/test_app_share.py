@@ -8,7 +8,6 @@ import struct
 from dataclasses import dataclass
 from typing import Any
 
-import imageio.v3 as iio
 import msgspec
 import numpy as np
 import pytest
@@ -25,7 +24,6 @@ from explorer.app.features.sharing.view_picture import (
     LEAST,
     MOST,
     check_size,
-    encoded,
     on_background,
 )
 from explorer.app.server import Running
@@ -161,10 +159,3 @@ def test_picture_on_a_background_is_mixed_exactly(seed: int, height: int, width:
     share = pixels[..., 3:] / 255.0
     expected = pixels[..., :3] * share + np.array(colour) * (1.0 - share)
     assert np.abs(on_background(pixels, colour) - expected).max() <= 0.5 + 1e-9
-
-
-@pytest.mark.parametrize("channels", [3, 4])
-def test_picture_is_encoded_without_loss(channels: int) -> None:
-    pixels = np.random.default_rng(1).integers(0, 256, (33, 57, channels), dtype=np.uint8)
-    imageio: Any = iio
-    assert (imageio.imread(encoded(pixels), extension=".png") == pixels).all()

@@ -147,7 +147,7 @@ def test_distances_come_from_the_worker_but_those_of_one_incidence_at_once() -> 
     feed = STRATA_FEED(services_for())
     known = distances_of(Frame(state), feed)
     assert set(known) == {GENERIC, *OF_INCIDENCES}
-    every = strata_distances(StrataRequest(state.design, state.pose)).distances
+    every = strata_distances(StrataRequest(state.design, state.pose))
     assert set(every) == set(STRATA)
     for stratum, distance in known.items():
         assert distance == pytest.approx(every[stratum], rel=1e-9, abs=1e-12)

@@ -28,8 +28,8 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.mechanism.pose_panel import MovePanel
+from explorer.app.features.orientation.feature import OrientationScene
 from explorer.app.features.orientation.panel import OrientationPanel
-from explorer.app.features.orientation.scene import OrientationScene
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.feature import PathScene

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from services import StubWorker, services_for
 
@@ -16,12 +16,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 
 
-class _HasRequest(Protocol):
-    @property
-    def request(self) -> object: ...
-
-
-Drawing = TypeVar("Drawing", bound=_HasRequest)
+Drawing = TypeVar("Drawing")
 
 
 def follow(services: Services, state: State) -> StubWorker:

@@ -28,7 +28,7 @@ from client import press_update, presses_in
 from page_props import differences, shown_by
 from socket_tab import SocketTab
 
-from explorer.app.features.designs.panel import DesignsPanel
+from explorer.app.features.designs.feature import DesignsPanel
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start

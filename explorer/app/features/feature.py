@@ -250,7 +250,7 @@ class Feature:
         bar: Its parts of the bar on top of the page.
         exports: The files that it offers.
         scene: Classes of its parts of the scene.
-        feeds: Classes that request drawings from the worker.
+        feeds: Feeds, which request drawings from the worker; `feed_of` declares one.
         later_feeds: Feeds whose requests come after those of all features' `feeds`, since nobody
             waits for their results while the scene changes.
         runners: Classes that do long work.

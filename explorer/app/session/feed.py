@@ -38,13 +38,8 @@ def watch_of(channel: Channel | None) -> Watch:
     return watch
 
 
-class _Drawn(Protocol):
-    @property
-    def request(self) -> object: ...
-
-
 Request = TypeVar("Request")
-Drawing = TypeVar("Drawing", bound=_Drawn)
+Drawing = TypeVar("Drawing")
 
 
 class Feed(Generic[Request, Drawing]):
@@ -85,7 +80,9 @@ class Feed(Generic[Request, Drawing]):
         self._request_of = request_of
         self._redraw = redraw
         self._lock = threading.RLock()
+        # The newest drawing, and the request that it answers.
         self._drawing: Drawing | None = None
+        self._answered: Request | None = None
         # What has arrived of a newer drawing, and its stage.
         self._part: object = None
         self._stage: Stage | None = None
@@ -118,7 +115,7 @@ class Feed(Generic[Request, Drawing]):
     @property
     def is_current(self) -> bool:
         """Whether the drawing is that of the newest request."""
-        return self._drawing is not None and self._drawing.request == self.request
+        return self._drawing is not None and self._answered == self.request
 
     @property
     def is_settled(self) -> bool:
@@ -155,7 +152,8 @@ class Feed(Generic[Request, Drawing]):
         self._redraw()
 
     def _submit(self) -> None:
-        if self.request is None:
+        request = self.request
+        if request is None:
             return
         self._count += 1
         self._stage, self._submitted = None, now()
@@ -171,8 +169,8 @@ class Feed(Generic[Request, Drawing]):
         self._order = self._worker.submit(
             self._key,
             self._task,
-            (self.request,),
-            self._show_drawing,
+            (request,),
+            lambda drawing: self._show_drawing(request, drawing),
             lambda problem: self._show_problem(count, problem),
             receive if self._has_stages else None,
             is_drawing=self._has_stages,
@@ -197,10 +195,10 @@ class Feed(Generic[Request, Drawing]):
         if count == self._count and not self.is_settled:
             self._redraw()
 
-    def _show_drawing(self, drawing: Drawing) -> None:
+    def _show_drawing(self, request: Request, drawing: Drawing) -> None:
         with self._lock:
             # An older drawing is shown until the newest has arrived.
-            self._drawing, self._part = drawing, None
+            self._drawing, self._answered, self._part = drawing, request, None
             if self.is_current:
                 self.problem = None
                 self._stop_timer()

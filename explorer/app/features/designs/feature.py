@@ -1,10 +1,244 @@
-"""The named designs of the user."""
+"""The user's designs by name: the name in the bar, and a list to save, open, copy and delete."""
 
 from __future__ import annotations
 
-from explorer.app.features.designs.panel import DesignsPanel
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from html import escape
+
+import viser
+
 from explorer.app.features.designs.saved_designs import SavedDesigns, send_design
-from explorer.app.features.feature import Export, Feature, Tab
+from explorer.app.features.feature import Export, Feature, Services, Tab
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
+from explorer.app.session.session import Who
+from explorer.app.state.actions import Open, SetName
+from explorer.app.state.frame import Frame
+from explorer.app.storage.library import Entry
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import Does, open_button, press_button
+from explorer.app.widgets.markup import box, note
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import LARGEST_FILE, PRESETS
+from explorer.numerics.number_text import format_number
+
+# Name of the button that shows why the session is not saved, and its label.
+UNSAVED, UNSAVED_LABEL = "session.unsaved", "Session not saved"
+
+
+class DesignName:
+    """The name, a button that opens the dialog Designs, and a warning while saving fails."""
+
+    def __init__(self, services: Services) -> None:
+        self._saved = None if services.user_data is None else services.get(SavedDesigns)
+        self._autosaver = services.autosaver
+        services.buttons.on(UNSAVED, lambda _, client: self._show_problem(client))
+
+    def __call__(self, frame: Frame) -> str:
+        """Return the name for a frame, as HTML."""
+        live = frame.state.design
+        name = f'<b class="ex-cut">{escape(live.name)}</b>'
+        if self._saved is None:
+            return f'<span class="ex-name">{name}</span>'
+        mark, words = saved_words(live, self._saved.find(live.name))
+        content = f'{name}<span class="ex-dim">{mark}</span>'
+        hint = f"{words} Save, rename, open or upload designs."
+        return open_button("Designs", content, hint=hint, class_name="ex-name") + self._warning()
+
+    def _warning(self) -> str:
+        """Return the button that warns of an unsaved session, as HTML; "" while it is saved."""
+        problem = self._problem
+        if problem is None:
+            return ""
+        look = "ex-tool ex-outlined ex-beyond"
+        return press_button(UNSAVED, "", UNSAVED_LABEL, hint=problem, class_name=look)
+
+    def _show_problem(self, client: viser.ClientHandle) -> None:
+        problem = self._problem
+        if problem is not None:
+            client.add_notification(UNSAVED_LABEL, problem, color="orange")
+
+    @property
+    def _problem(self) -> str | None:
+        return None if self._autosaver is None else self._autosaver.problem
+
+
+def saved_words(live: Design, saved: Design | None) -> tuple[str, str]:
+    """Return in a word and in a sentence whether the saved design of its name is the live one."""
+    if saved == live:
+        return "saved", "Saved."
+    if live == PRESETS.get(live.name):
+        return "preset", "An unchanged preset."
+    if saved is None:
+        return "not saved", "Not saved under a name yet; it comes back with the session."
+    return "changed", "Changed since it was saved."
+
+
+class DesignsPanel:
+    """The live design's name, buttons that save it, and the list of all designs."""
+
+    def __init__(self, services: Services) -> None:
+        gui, session, buttons = services.gui, services.session, services.buttons
+        self._session = session
+        self._saved = saved = services.get(SavedDesigns)
+        self._controls = Controls(gui, session)
+        self._controls.text(
+            "Name",
+            "Name of the live design, under which it is saved.",
+            Bound(lambda frame: frame.state.design.name, lambda _, name: SetName(name)),
+            disabled=lambda state: state.optimisation.is_on,
+        )
+        actions: dict[str, Callable[[Who], None]] = {
+            "Save": lambda who: saved.save(session.settled().design, who),
+            "Save a copy": lambda who: saved.save_copy(session.settled().design, who),
+            "Rename": self._rename,
+            "Download": partial(send_design, services),
+        }
+        self._buttons = gui.add_button_group(
+            "Design",
+            tuple(actions),
+            hint="Save the design under its name or as a copy, give the saved one the name above, "
+            "or download it as a file. A design that is replaced can be brought back.",
+        )
+        self._buttons.on_click(lambda event: actions[self._buttons.value](event.client_id))
+        self.status = gui.add_html("")
+        upload = gui.add_upload_button(
+            "Open a file …",
+            color="gray",
+            icon=viser.Icon.UPLOAD,
+            mime_type="application/json",
+            hint=f"A design file (JSON) of at most {LARGEST_FILE // 1000} kB from this computer.",
+        )
+        upload.on_upload(
+            lambda event: saved.take(upload.value.content, upload.value.name, event.client_id)
+        )
+        self.list = gui.add_html("")
+        self.restore = gui.add_button(
+            "Bring back",
+            color="gray",
+            icon=viser.Icon.ARROW_BACK_UP,
+            hint="Restore the design that was deleted or replaced last.",
+            visible=False,
+        )
+        self.restore.on_click(lambda event: saved.restore(event.client_id))
+        buttons.on("designs.open", self._for_row(self._open))
+        buttons.on("designs.duplicate", self._for_row(self._duplicate))
+        buttons.on("designs.delete", self._for_row(lambda row, _: self._set_asked(row.name)))
+        buttons.on("designs.confirm", self._for_row(self._delete))
+        buttons.on("designs.keep", self._for_row(lambda _, __: self._set_asked(None)))
+        self.rows: tuple[Entry, ...] = ()
+        # Name of the design that the page asks whether to delete.
+        self.asked: str | None = None
+        self._listed: tuple[object, ...] = ()
+        self._markup = ""
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the panel show the frame and the saved designs."""
+        yield from self._controls.updates(frame)
+        live, base = frame.state.design, frame.state.base
+        _, words = saved_words(live, self._saved.find(live.name))
+        yield self.status, "content", note(words)
+        listed = self._saved.entries, base.name, self.asked
+        if listed != self._listed:
+            self._listed, self.rows = listed, rows_of(self._saved.entries)
+            self._markup = list_designs(self.rows, base.name, self.asked)
+        yield self.list, "content", self._markup
+        deleted = self._saved.last_deleted
+        yield self.restore, "visible", deleted is not None
+        if deleted is not None:
+            yield self.restore, "label", f"Bring back {deleted}"
+
+    def _rename(self, who: Who) -> None:
+        state = self._session.settled()
+        self._saved.rename(state.base.name, state.design.name, who)
+
+    def _open(self, row: Entry, who: Who) -> None:
+        if row.name in PRESETS:
+            self._session.do(Open(PRESETS[row.name]), who=who)
+        else:
+            self._saved.open(row.name, who)
+
+    def _duplicate(self, row: Entry, who: Who) -> None:
+        if row.design is not None:
+            self._saved.copy(row.design, who)
+
+    def _delete(self, row: Entry, who: Who) -> None:
+        if row.name == self.asked:
+            self._set_asked(None)
+            self._saved.delete(row.name, who)
+
+    def _set_asked(self, name: str | None) -> None:
+        self.asked = name if name not in PRESETS else None
+        self._session.redraw()
+
+    def _for_row(self, action: Callable[[Entry, Who], None]) -> Does:
+        def press(name: str, client: viser.ClientHandle) -> None:
+            row = next((row for row in self.rows if row.name == name), None)
+            if row is not None:
+                action(row, client.client_id)
+
+        return press
+
+
+def rows_of(entries: Sequence[Entry]) -> tuple[Entry, ...]:
+    """Return the rows of the list: the designs of the user, then the presets."""
+    return (*entries, *(Entry(name, "", design) for name, design in PRESETS.items()))
+
+
+def list_designs(rows: Sequence[Entry], current: str, asked: str | None) -> str:
+    """Return the list in HTML, with the buttons of each row.
+
+    The open design is marked; the row of the design asked for asks whether to delete it.
+    """
+    head = (
+        '<div class="ex-row ex-dim ex-small"><span class="ex-fill">Designs, the last saved on top'
+        '</span><span class="ex-reach">reach |a3|</span><span class="ex-acts"></span></div>'
+    )
+    lines = "".join(
+        _line(row, is_current=row.name == current, is_asked=row.name == asked) for row in rows
+    )
+    return box(head, f'<div class="ex-designs">{lines}</div>')
+
+
+def _line(row: Entry, *, is_current: bool, is_asked: bool) -> str:
+    if row.design is None:
+        problem = escape(row.problem or "")
+        name = (
+            f'<span class="ex-fill ex-beyond" title="{problem}">'
+            f"{escape(row.name)}: cannot be used</span>"
+        )
+        reach = copy = ""
+    else:
+        tag = ' <span class="ex-dim">preset</span>' if row.name in PRESETS else ""
+        name = press_button(
+            "designs.open",
+            row.name,
+            f"{escape(row.name)}{tag}",
+            hint=f"Open {row.name}",
+            class_name="ex-fill ex-cut",
+        )
+        length = row.design.reach
+        reach = (
+            f'{format_number(length)} units <span class="ex-dim">= '
+            f"{format_number(length * row.design.unit_mm)} mm</span>"
+        )
+        copy = _link("duplicate", row.name, "Duplicate")
+    delete = "" if row.name in PRESETS else _link("delete", row.name, "Delete")
+    if is_asked:
+        reach = "Delete it?"
+        copy, delete = _link("confirm", row.name, "Delete"), _link("keep", row.name, "Keep")
+    here = " is-here" if is_current else ""
+    return (
+        f'<div class="ex-row{here}">{name}<span class="ex-reach">{reach}</span>'
+        f'<span class="ex-acts">{copy}{delete}</span></div>'
+    )
+
+
+def _link(act: str, name: str, words: str) -> str:
+    hint = f"{words} {name}"
+    return press_button(f"designs.{act}", name, words, hint=hint, label=hint, class_name="ex-link")
+
 
 DESIGNS = Feature(
     "designs",

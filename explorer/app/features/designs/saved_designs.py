@@ -1,17 +1,15 @@
 """The user's saved designs, read and changed on a thread of their own.
 
 A slow or full disk thus does not hold up the mechanism. Other explorers may change the same
-folder, so it is checked again and again.
+folder, so it is read again after each request.
 """
 
 from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
-
-import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.session.latest import LatestWins
@@ -23,8 +21,6 @@ from explorer.errors import ExplorerError, InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 
-# Seconds between two checks of the folder.
-CHECK_SECONDS = 1.0
 # Most saved designs that the palette offers, the last saved first; the panel lists all.
 MOST_COMMANDS = 200
 
@@ -55,33 +51,20 @@ class SavedDesigns:
         self._library = services.user_data.library
         self._session = services.session
         self._complain = services.complain
-        self._checked_at = 0.0
-        self._stamp: int | None = None
         self.entries: tuple[Entry, ...] = ()
         self.commands: tuple[Command, ...] = ()
         self.last_deleted: str | None = None
         self._requests: LatestWins[_Request] = LatestWins(self._do_all, "designs")
         services.at_end(self.stop)
-        self.look()
+        self.refresh()
 
     def find(self, name: str) -> Design | None:
         """Return the saved design with a name; None if there is none that can be used."""
         return next((each.design for each in self.entries if each.name == name), None)
 
-    def look(self) -> None:
-        """Request to read the folder again if it has changed; return at once."""
-        now = time.monotonic()
-        if now - self._checked_at < CHECK_SECONDS:
-            return
-        self._checked_at = now
-        stamp = self._folder_stamp()
-        if stamp != self._stamp:
-            self._stamp = stamp
-            self.refresh()
-
     def refresh(self) -> None:
         """Request to read the folder again."""
-        self._post("look", lambda: None, None)
+        self._post(lambda: None, None)
 
     def save(self, design: Design, who: Who = None) -> None:
         """Save a design under its name; `restore` brings another one of that name back."""
@@ -91,13 +74,13 @@ class SavedDesigns:
                 raise InputError(
                     f"{design.name!r} is a preset and stays as it is; give yours another name"
                 )
-            self._mark_saved(self._library.save(design.name, design))
+            self._session.do(MarkSaved(self._library.save(design.name, design)))
 
-        self._post(object(), work, who)
+        self._post(work, who)
 
     def save_copy(self, design: Design, who: Who = None) -> None:
         """Save the live design under a new name, which it takes itself."""
-        self._post(object(), lambda: self._mark_saved(self._copy(design)), who)
+        self._post(lambda: self._session.do(MarkSaved(self._copy(design))), who)
 
     def rename(self, old: str, new: str, who: Who = None) -> None:
         """Give a saved design another name."""
@@ -105,29 +88,29 @@ class SavedDesigns:
         def work() -> None:
             if old not in {entry.name for entry in self._library.list()}:
                 raise InputError("the design is not saved yet; save it before you rename it")
-            self._mark_saved(self._library.rename(old, new))
+            self._session.do(MarkSaved(self._library.rename(old, new)))
 
-        self._post(object(), work, who)
+        self._post(work, who)
 
     def open(self, name: str, who: Who = None) -> None:
         """Open a saved design."""
-        self._post(object(), lambda: self._session.do(Open(self._library.open(name))), who)
+        self._post(lambda: self._session.do(Open(self._library.open(name))), who)
 
     def copy(self, design: Design, who: Who = None) -> None:
         """Save a copy of a design under a new name; the live one stays as it is."""
-        self._post(object(), lambda: self._copy(design), who)
+        self._post(lambda: self._copy(design), who)
 
     def delete(self, name: str, who: Who = None) -> None:
         """Delete a saved design; `restore` brings it back."""
-        self._post(object(), lambda: self._library.delete(name), who)
+        self._post(lambda: self._library.delete(name), who)
 
     def restore(self, who: Who = None) -> None:
         """Restore the design that was deleted or replaced last."""
-        self._post(object(), self._library.restore, who)
+        self._post(self._library.restore, who)
 
     def take(self, data: bytes, name: str, who: Who = None) -> None:
         """Open an uploaded design file."""
-        self._post(object(), lambda: self._session.do(Open(decode_design(data, name))), who)
+        self._post(lambda: self._session.do(Open(decode_design(data, name))), who)
 
     def wait_until_idle(self, timeout: float = 10.0) -> bool:
         """Wait until all requests are done; return whether they are."""
@@ -141,11 +124,8 @@ class SavedDesigns:
         taken = {entry.name for entry in self._library.list()} | set(PRESETS)
         return self._library.save(copy_name(design.name, taken), design)
 
-    def _mark_saved(self, design: Design) -> None:
-        self._session.do(MarkSaved(design))
-
-    def _post(self, key: object, work: Callable[[], object], who: Who) -> None:
-        self._requests.post(key, time.monotonic(), _Request(work, who))
+    def _post(self, work: Callable[[], object], who: Who) -> None:
+        self._requests.post(object(), time.monotonic(), _Request(work, who))
 
     def _do_all(self, requests: Sequence[_Request]) -> None:
         for request in requests:
@@ -153,25 +133,15 @@ class SavedDesigns:
                 request.work()
             except ExplorerError as error:
                 self._complain(str(error), request.who)
-        self._stamp = self._folder_stamp()
         self.entries = self._library.list()
-        self.commands = tuple(itertools.islice(self._commands(), MOST_COMMANDS))
+        usable = (entry for entry in self.entries if entry.design is not None)
+        self.commands = tuple(map(self._command, itertools.islice(usable, MOST_COMMANDS)))
         self.last_deleted = self._library.last_deleted
         self._session.redraw()
 
-    def _commands(self) -> Iterator[Command]:
-        """Yield the commands that open the saved designs, in their order."""
-        for entry in self.entries:
-            if entry.design is not None:
-                label = f"Designs › Open {entry.name}"
-                yield Command(label, "Open this saved design.", self._opens(entry.name))
-
-    def _opens(self, name: str) -> Callable[[viser.ClientHandle], None]:
-        return lambda client: self.open(name, client.client_id)
-
-    def _folder_stamp(self) -> int | None:
-        """Return the folder's time of change in ns; None if the folder cannot be read."""
-        try:
-            return self._library.folder.stat().st_mtime_ns
-        except OSError:
-            return None
+    def _command(self, entry: Entry) -> Command:
+        return Command(
+            f"Designs › Open {entry.name}",
+            "Open this saved design.",
+            lambda client: self.open(entry.name, client.client_id),
+        )

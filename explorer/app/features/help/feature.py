@@ -108,7 +108,7 @@ class KeysDialog:
 
 
 def hint_of(name: str) -> str:
-    """Return what a button does, with its keys."""
+    """Return the hint of a button, with its keys."""
     return with_keys(HINTS[name], KEYS.get(name, ()))
 
 

@@ -129,7 +129,7 @@ class RadiusPlot:
         yield self._words, "visible", is_visible
         if is_visible:
             yield self._words, "content", radius_words(frame, feed)
-        curve = feed.drawing.curve if is_visible and feed.drawing is not None else None
+        curve = feed.drawing if is_visible and isinstance(feed.drawing, RadiusCurve) else None
         has_chart = curve is not None and float(curve.radii[-1]) > 0.0
         yield self._chart, "visible", has_chart
         if curve is not None and has_chart:
@@ -195,14 +195,12 @@ def radius_words(frame: Frame, feed: RadiusFeed) -> str:
     """Return the numbers below the chart, or why there is no chart, as HTML."""
     if feed.problem is not None:
         return problem(feed, "The curve could not be drawn", "Compute the curve")
-    drawing = feed.drawing
-    if drawing is None:
+    curve = feed.drawing
+    if curve is None:
         return box(dim(progress(feed).capitalize()))
     note = "" if feed.is_current else f' <span class="ex-dim ex-small">{progress(feed)}</span>'
-    if drawing.curve is None:
-        reason = "" if drawing.trouble is None else drawing.trouble.reason
-        return alert("Nothing is accessible, even without radii", sentence(reason)) + note
-    curve = drawing.curve
+    if not isinstance(curve, RadiusCurve):
+        return alert("Nothing is accessible, even without radii", sentence(curve.reason)) + note
     if float(curve.volumes[0]) <= 0.0:
         return box(dim(f"The workspace is empty.{note}"))
     design = frame.state.design

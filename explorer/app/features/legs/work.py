@@ -30,23 +30,15 @@ class RadiusRequest:
     start: Triple | None
 
 
-@dataclass(frozen=True)
-class RadiusDrawing:
-    """The accessible volume over the radius of the legs, or why there is no curve."""
-
-    request: RadiusRequest
-    curve: RadiusCurve | None
-    trouble: Trouble | None
-
-
-def draw_radius_curve(request: RadiusRequest, channel: Channel | None = None) -> RadiusDrawing:
-    """Return the accessible volume over the radius of all legs; `channel` sends progress."""
+def draw_radius_curve(
+    request: RadiusRequest, channel: Channel | None = None
+) -> RadiusCurve | Trouble:
+    """Return the accessible volume over the radius of all legs, or why there is no curve."""
     design, rotation = request.design, np.array(request.rotation)
     try:
-        curve = radius_curve(design, rotation, start=request.start, watch=watch_of(channel))
+        return radius_curve(design, rotation, start=request.start, watch=watch_of(channel))
     except ExplorerError as error:
-        return RadiusDrawing(request, None, trouble_of(error))
-    return RadiusDrawing(request, curve, None)
+        return trouble_of(error)
 
 
 def _request_for(frame: Frame) -> RadiusRequest | None:
@@ -56,5 +48,5 @@ def _request_for(frame: Frame) -> RadiusRequest | None:
     return RadiusRequest(thin, workspace_rows(frame), workspace_start(frame))
 
 
-RadiusFeed: TypeAlias = Feed[RadiusRequest, RadiusDrawing]
+RadiusFeed: TypeAlias = Feed[RadiusRequest, RadiusCurve | Trouble]
 RADIUS_FEED = feed_of(draw_radius_curve, _request_for, has_stages=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import viser
 
-from explorer.app.features.designs.panel import DesignName
+from explorer.app.features.designs.feature import DesignName
 from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
 from explorer.app.features.mechanism.bodies import Bodies, Legs, TwinLegs
 from explorer.app.features.mechanism.design_panel import DesignPanel

@@ -58,11 +58,7 @@ class StartRun(Action):
     """Start the search for the best design."""
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            NoAnswerError: the limits rule out the demands, or there is no problem to search.
-        """
+        """Return the next state; refuse if the limits rule out the demands."""
         optimisation = state.optimisation
         if optimisation.is_on:
             return state
@@ -94,22 +90,14 @@ class TakePaperProblem(Action):
     template: ClassVar[str] = "The paper's problem"
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: the design is being optimised.
-        """
+        """Return the next state; refuse while the design is being optimised."""
         request = OptimisationRequest(volume=PAPER_VOLUME, clearance=CLEARANCE)
         return with_value(Open(paper_start()).apply(state), "optimisation.request", request)
 
 
 @dataclass(frozen=True)
 class LiftLimit(Action):
-    """Take a limit out of the design, or tie maximum lengths to the reach.
-
-    Attributes:
-        limit: Name of the limit, see `explorer.optimise.conflicts.without_limit`.
-    """
+    """Take a limit out of the design, or tie maximum lengths to the reach; see `without_limit`."""
 
     template: ClassVar[str] = "{action.title}"
 
@@ -126,11 +114,7 @@ class LiftLimit(Action):
         return f"Lift the {LIMIT_NAMES.get(name, name)}"
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: the design is being optimised, or has no such limit.
-        """
+        """Return the next state; refuse during a run, or if the design has no such limit."""
         check_free(state)
         design = without_limit(state.design, self.limit)
         if design is None:
@@ -145,11 +129,7 @@ class TakePaperBox(Action):
     template: ClassVar[str] = "Take the paper's box"
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: the design is being optimised.
-        """
+        """Return the next state; refuse while the design is being optimised."""
         check_free(state)
         return replace(state, design=with_box(state.design, PAPER_BOX))
 
@@ -200,7 +180,7 @@ class EndRun(Action):
         after = _with_run(state, lambda run: replace(run, phase="ended", verdict=self.verdict))
         if self.verdict.best is None:
             return _restore_own(after, run.own)
-        return _with_design(after, _renamed(self.verdict.best.design))
+        return _with_design(after, _rename(self.verdict.best.design))
 
 
 @dataclass(frozen=True)
@@ -215,9 +195,9 @@ class Compare(Action):
     def apply(self, state: State) -> State:
         """Return the next state."""
         run = state.optimisation.run
-        if run is None or run.number != self.number:
-            return state
-        return with_value(state, "optimisation.run.comparison", self.comparison)
+        is_present = run is not None and run.number == self.number
+        path = "optimisation.run.comparison"
+        return with_value(state, path, self.comparison) if is_present else state
 
 
 @dataclass(frozen=True)
@@ -229,9 +209,8 @@ class Accept(Action):
     def apply(self, state: State) -> State:
         """Return the next state."""
         run = state.optimisation.run
-        if run is None or not run.is_undecided:
-            return state
-        return with_value(state, "optimisation.run.accepted", True)
+        is_undecided = run is not None and run.is_undecided
+        return with_value(state, "optimisation.run.accepted", True) if is_undecided else state
 
 
 @dataclass(frozen=True)
@@ -266,7 +245,7 @@ def _with_design(state: State, design: Design) -> State:
     return moved(replace(state, design=design), pose)
 
 
-def _renamed(design: Design) -> Design:
+def _rename(design: Design) -> Design:
     """Return a design with a name that differs from the user's own design."""
     if design.name.endswith(SUFFIX):
         return design

@@ -40,7 +40,7 @@ class Optimiser(Runner):
     def __init__(self, services: Services) -> None:
         self.worker = Worker(services.tell, preload=[optimise.__module__], died=DIED)
         self._session = services.session
-        # The drawings tell whether the page shows all of the last iterate.
+        # The page shows all of the last iterate once these are settled.
         self._drawings = services.get(workspace_feed)
         services.at_end(self.stop)
         self._stopped = threading.Event()
@@ -94,8 +94,8 @@ class Optimiser(Runner):
             "optimise",
             optimise,
             (run.problem, run.starts),
-            self._ended,
-            self._ended,
+            self._keep_end,
+            self._keep_end,
             receive=self._receive,
         )
         threading.Thread(target=self._play, args=(number,), name="iterates", daemon=True).start()
@@ -104,7 +104,7 @@ class Optimiser(Runner):
         with self._lock:
             self._waiting.append(iterate)
 
-    def _ended(self, ending: Outcome | str) -> None:
+    def _keep_end(self, ending: Outcome | str) -> None:
         with self._lock:
             self._ending = ending
         if self._is_cancelled:
@@ -136,12 +136,12 @@ class Optimiser(Runner):
             is_hasty = self._is_cancelled or isinstance(self._ending, str)
             is_over = self._ending is not None and (count == 0 or is_hasty)
             taken = count if is_over else math.ceil((len(run.iterates) + count) / STEPS)
-            shown, self._waiting = tuple(self._waiting[:taken]), self._waiting[taken:]
+            iterates, self._waiting = tuple(self._waiting[:taken]), self._waiting[taken:]
             if not is_over or self._ending is None:
-                return Advance(run.number, shown)
+                return Advance(run.number, iterates)
             self._number = 0
-            verdict = _verdict_of(run, run.iterates + shown, self._ending, self._is_cancelled)
-            return EndRun(run.number, verdict, shown)
+            verdict = _verdict_of(run, run.iterates + iterates, self._ending, self._is_cancelled)
+            return EndRun(run.number, verdict, iterates)
 
     def _compare(self, run: Run) -> None:
         best, problem = run.best, run.problem

@@ -68,7 +68,7 @@ TITLES = {
     "stalled": "Stalled",
     "cancelled": "Cancelled: the best so far",
 }
-# What a design lacks for a problem, and where to change it.
+# Missing inputs of a design, by the limits of refusals, and where to enter them.
 LACKING = {
     NO_LOAD: "payload and limits in the tab Machine",
     NO_ERRORS: "the errors of the actuators in the tab Machine",
@@ -127,14 +127,7 @@ def _reached_text(problem: Problem, iterate: Iterate) -> str:
     """Return what a search has reached: the volume that it matches, or the objective."""
     if problem.objective == "match-volume":
         return f"volume {format_number(iterate.volume, 5)} units³"
-    return value_text(problem, iterate)
-
-
-def value_text(problem: Problem, iterate: Iterate) -> str:
-    """Return the name and the value of the objective of an iterate, with its unit."""
     name = OBJECTIVE_SYMBOLS[problem.objective]
-    if problem.objective == "match-volume":
-        return f"{name} {format_number(iterate.value, 3, size=1.0)}"
     if iterate.objective is None:
         return f"{name} infinite"
     unit = CATALOGUE[GOALS[problem.objective]].unit_in("units")

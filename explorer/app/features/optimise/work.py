@@ -35,7 +35,7 @@ from explorer.optimise.problem import (
     StartError,
 )
 from explorer.optimise.solver import optimise_design
-from explorer.workspace.limits.constraints import Never, constraints
+from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.slices.volume import workspace_volume
 
 # Default volume to match, as a multiple of the present volume.
@@ -117,7 +117,7 @@ def liftable_limits(state: State) -> tuple[str, ...]:
     if state.optimisation.is_on:
         return ()
     refusals = find_refusals(state)
-    found: list[str] = []
+    liftable: list[str] = []
     for limit in dict.fromkeys(refusal.limit for refusal in refusals):
         lifted = without_limit(state.design, limit)
         if lifted is None:
@@ -125,8 +125,8 @@ def liftable_limits(state: State) -> tuple[str, ...]:
         after = _find_refusals(lifted, state.base, state.optimisation.request)
         messages = {refusal.message for refusal in refusals if refusal.limit == limit}
         if all(left.limit != limit and left.message not in messages for left in after):
-            found.append(limit)
-    return tuple(found)
+            liftable.append(limit)
+    return tuple(liftable)
 
 
 def box_on_offer(state: State) -> Box | None:
@@ -149,18 +149,11 @@ def box_within(design: Design) -> Box:
     limits = constraints(design, home.rotation)
     middle = np.array(home.position)
     grid = np.indices((TRIED,) * 3).reshape(3, -1).T / (TRIED - 1.0) - 0.5
-
-    def is_within(edge: float) -> bool:
-        at = middle + edge * grid
-        return all(
-            not isinstance(limit, Never) and bool((limit.slack(at) >= 0.0).all())
-            for limit in limits
-        )
-
     low, high = 0.0, 2.0 * design.reach
     for _ in range(HALVINGS):
         half = 0.5 * (low + high)
-        low, high = (half, high) if is_within(half) else (low, half)
+        is_within = slacks(limits, middle + half * grid).min() >= 0.0
+        low, high = (half, high) if is_within else (low, half)
     edge = SHARE_OF_BOX * low or 0.1 * design.reach
     # Round numbers read better, and the box need not be exact.
     unit = 10.0 ** math.floor(math.log10(edge) - 1.0)

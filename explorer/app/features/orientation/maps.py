@@ -199,32 +199,36 @@ def _region(tilts: TiltMap, edge: float) -> Iterator[str]:
         yield f'<path class="border" stroke="{css(colour_of(limit))}" d="M{path}"/>'
 
 
-def tilt_at(found: TiltByTorsion, torsion: float) -> float:
+def tilt_at(by_torsion: TiltByTorsion, torsion: float) -> float:
     """Return the tilt at a torsion between those of the row; NaN where no tilt is possible."""
-    count = len(found.tilts)
+    count = len(by_torsion.tilts)
     # Without full turns first, since a torsion may be as large as any number.
-    turned = math.remainder(torsion, 360.0) - float(found.torsions[0])
+    turned = math.remainder(torsion, 360.0) - float(by_torsion.torsions[0])
     place = turned * count / 360.0 % count
     left, share = int(place), place % 1.0
-    tilts = found.tilts.tolist()
+    tilts = by_torsion.tilts.tolist()
     return (1.0 - share) * tilts[left % count] + share * tilts[(left + 1) % count]
 
 
-def torsion_strip(found: TiltByTorsion, torsion: float, tilt: float) -> str:
+def torsion_strip(by_torsion: TiltByTorsion, torsion: float, tilt: float) -> str:
     """Return the tilt by torsion as SVG, with marks at the present and the best torsion.
 
     The best torsion is marked only where it allows a larger tilt than the present one, at which
     the greatest tilt in every azimuth is `tilt`, NaN where none is possible. Angles in degrees.
     """
-    largest = 0.0 if math.isnan(found.best.tilt) else found.best.tilt
+    best = by_torsion.best
+    largest = 0.0 if math.isnan(best.tilt) else best.tilt
     top = max(RING, _rounded_up(largest))
-    tilts = [round(t, 1) if math.isfinite(t) else None for t in found.tilts.tolist()]
+    tilts = [round(t, 1) if math.isfinite(t) else None for t in by_torsion.tilts.tolist()]
     facts = {"left": LEFT, "right": RIGHT, "tilts": tilts}
-    pieces = [*_axes(top), *_area(found.torsions, tilts, top)]
+    pieces = [*_axes(top), *_area(by_torsion.torsions, tilts, top)]
     x = _across(torsion)
     pieces.append(f'<path class="here" d="M{x:.1f} {TOP}V{BOTTOM}"/>')
-    if not math.isnan(found.best.tilt) and not found.best.tilt - tilt <= SAME_TILT:
-        x, y = _across(math.remainder(found.best.torsion, 360.0)), _up(found.best.tilt, top)
+    if not math.isnan(by_torsion.best.tilt) and not by_torsion.best.tilt - tilt <= SAME_TILT:
+        x, y = (
+            _across(math.remainder(by_torsion.best.torsion, 360.0)),
+            _up(by_torsion.best.tilt, top),
+        )
         pieces.append(f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="3"/>')
     return (
         caption("Greatest tilt in every azimuth by torsion")

@@ -196,11 +196,10 @@ def summary(
             f"{dim('greatest tilt in every azimuth')}</div>"
             + caption(f"{about}at torsion {_degrees(here.torsion)}{why}")
         )
-    found = feed.drawing
     share = best = "…"
-    if found is not None:
-        share = share_words(found.share)
-        best = best_words(found.by_torsion.best, tilt_here(feed, here, least))
+    if feed.drawing is not None:
+        share = share_words(feed.drawing.share)
+        best = best_words(feed.drawing.by_torsion.best, tilt_here(feed, here, least))
     if feed.problem is not None:
         share = best = "unknown"
         yield problem(feed, "The share and the largest tilt could not be computed", "")

@@ -49,7 +49,7 @@ class SetTiltTorsion(Action):
         """Return the next state."""
         angles = list(state.tilt_torsion)
         angles[self.axis] = self.value
-        return _tilted(state, TiltTorsion(*angles))
+        return _tilt_to(state, TiltTorsion(*angles))
 
     def words(self) -> str:
         """Return what the action does."""
@@ -65,7 +65,7 @@ class GoToTilt(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        return _tilted(state, TiltTorsion(self.azimuth, self.tilt, state.tilt_torsion.torsion))
+        return _tilt_to(state, TiltTorsion(self.azimuth, self.tilt, state.tilt_torsion.torsion))
 
     def words(self) -> str:
         """Return what the action does."""
@@ -73,7 +73,7 @@ class GoToTilt(Action):
         return f"Tilt {tilt}° towards {azimuth}°"
 
 
-def _tilted(state: State, angles: TiltTorsion) -> State:
+def _tilt_to(state: State, angles: TiltTorsion) -> State:
     """Return the state with azimuth, tilt and torsion in degrees, which it keeps as they are."""
     orientation = pose_of_tilt_torsion(state.pose.position, angles)
     pose = state.pose_at(state.position, orientation)
@@ -108,7 +108,6 @@ class PositionRequest:
 class PositionDrawing:
     """The share of orientations that a position can have, and the greatest tilts by torsion."""
 
-    request: PositionRequest
     share: OrientationShare
     by_torsion: TiltByTorsion
 
@@ -117,7 +116,7 @@ def orientations_at(request: PositionRequest) -> PositionDrawing:
     """Return the orientations that a position can have."""
     design, position, tool = request.design, request.position, request.tool
     share = orientation_share(design, position, tool=tool)
-    return PositionDrawing(request, share, tilt_by_torsion(design, position, tool=tool))
+    return PositionDrawing(share, tilt_by_torsion(design, position, tool=tool))
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,6 @@ class TiltsDrawing:
     The step is the largest distance of neighbouring nodes, in design units.
     """
 
-    request: TiltsRequest
     positions: FloatArray
     tilts: FloatArray
     step: float
@@ -148,7 +146,7 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
     rotation = rotation_from_tilt_torsion((0.0, 0.0, request.torsion))
     ends = extent_of(design, rotation)
     if ends is None:
-        return TiltsDrawing(request, np.zeros((0, 3)), np.zeros(0), 0.0)
+        return TiltsDrawing(np.zeros((0, 3)), np.zeros(0), 0.0)
     lows, highs = np.array(ends) + tool_offset(rotation, request.tool)
     # Nodes in the middle of cells: on the surface of the workspace no tilt is left.
     shares = (np.arange(NODES) + 0.5) / NODES
@@ -161,7 +159,7 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
     tilts = np.concatenate(parts)
     known = np.isfinite(tilts)
     step = float((highs - lows).max()) / NODES
-    return TiltsDrawing(request, nodes[known], tilts[known], step)
+    return TiltsDrawing(nodes[known], tilts[known], step)
 
 
 @dataclass(frozen=True)

@@ -71,11 +71,7 @@ def goal_of(state: State) -> Pose | int:
 
 
 def ends_of(state: State) -> tuple[Pose, Pose]:
-    """Return the poses between which the next path leads.
-
-    Raises:
-        InputError: an end is a mode that the present leg lengths do not have.
-    """
+    """Return the poses between which the next path leads; errors are those of `pose_of_end`."""
     return pose_of_end(state, state.paths.start), pose_of_end(state, goal_of(state))
 
 
@@ -132,11 +128,7 @@ class SetPathTime(Action):
     seconds: float
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: there is no path, or the time is not finite.
-        """
+        """Return the next state; refuse without a path, or a time that is not finite."""
         journey = _journey(state)
         if not math.isfinite(self.seconds):
             raise InputError(f"the time must be finite; got {self.seconds}")
@@ -157,11 +149,7 @@ class Play(Action):
     on: bool
 
     def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: there is no path.
-        """
+        """Return the next state; refuse without a path."""
         journey = _journey(state)
         if not self.on:
             return _with(state, journey=replace(journey, is_playing=False))

@@ -58,7 +58,7 @@ class PathScene(ScenePart):
 
 
 def path_chip(frame: Frame) -> str:
-    """Return what is done about a path and the button that ends it, as HTML; "" for nothing."""
+    """Return the path that is planned or played and a button that ends it, as HTML; else ""."""
     state = frame.state
     if state.paths.is_planning:
         cancel = press_button("paths.cancel", "", "Cancel", class_name="ex-button")

@@ -239,7 +239,7 @@ def end_numbers(state: State, end: EndName) -> str:
 
 
 def kind_note(state: State) -> str:
-    """Return what the chosen kind of a path means for its ends, as HTML."""
+    """Return whether a path of the chosen kind exists between the ends, as HTML."""
     if state.paths.kind == "straight":
         return dim("May pass singular poses, which are marked.")
     try:
@@ -269,7 +269,7 @@ def plan_words(state: State) -> str | None:
 
 
 def path_title(state: State, loads: JourneyLoads | None) -> str:
-    """Return the title of the path and what is known of it, and buttons to play and export it."""
+    """Return the title of the path, its crossings and loads, and its buttons, as HTML."""
     journey = state.journey
     if journey is None:
         return box(dim("No path yet. Choose a goal and press Go."))

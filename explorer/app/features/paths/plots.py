@@ -169,7 +169,7 @@ def load_words(loads: JourneyLoads) -> str:
 
 
 def demand_note(state: State) -> str:
-    """Return what the demand for a load means if nothing has a limit, as HTML; "" otherwise."""
+    """Return a hint that no limit can be exceeded by the load that a path must hold; else ""."""
     paths = state.paths
     if has_limits(state.design) or not paths.holds_load or paths.kind != "planned":
         return ""

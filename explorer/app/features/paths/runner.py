@@ -61,11 +61,11 @@ class PathRunner(Runner):
             self._thread.join(timeout=5.0)
 
     def _plan(self, state: State) -> None:
-        request, design, paths = self._request, state.design, state.paths
+        number, design, paths = self._request, state.design, state.paths
         if paths.planning is None:
             return
         tool, view = state.tool, state.view
-        wanted = PlanRequest(
+        request = PlanRequest(
             design,
             *paths.planning,
             paths.seconds,
@@ -79,14 +79,14 @@ class PathRunner(Runner):
             moves = len(path.poses) - 1
             title = f"Planned path of {moves} {'move' if moves == 1 else 'moves'}"
             journey = Journey("planned", title, design, path.poses, is_playing=True, tool=tool)
-            self._finish(request, journey, None)
+            self._finish(number, journey, None)
 
         self._order = self.worker.submit(
             "plan",
             plan,
-            (wanted,),
+            (request,),
             take_path,
-            lambda problem: self._finish(request, None, problem),
+            lambda problem: self._finish(number, None, problem),
         )
 
     def _finish(self, request: int, journey: Journey | None, problem: str | None) -> None:

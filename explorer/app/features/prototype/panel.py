@@ -17,6 +17,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import alert, box, caption, note, row, sentence, table
+from explorer.errors import ExplorerError, TooTightError
 from explorer.mechanism.design import LENGTHS
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.prototype.assembly import Actuator
@@ -61,9 +62,9 @@ class PrototypePanel:
             self._bill = gui.add_html("")
 
     def _fit(self, _: str, client: viser.ClientHandle) -> None:
-        drawing = self._feed.drawing
-        if drawing is not None and drawing.fitting_unit_mm is not None:
-            unit = Set("design.unit_mm", drawing.fitting_unit_mm, "1 unit (mm)")
+        fitting = _fitting_unit_mm(self._feed)
+        if fitting is not None:
+            unit = Set("design.unit_mm", fitting, "1 unit (mm)")
             self._session.do(unit, who=client.client_id)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -82,6 +83,11 @@ class PrototypePanel:
             yield self._bill, "content", parts_table(parts.listed, density)
 
 
+def _fitting_unit_mm(feed: PartsFeed) -> float | None:
+    """Return the mm in a design unit with which the parts fit; None if they do, or none helps."""
+    return feed.drawing.fitting_unit_mm if isinstance(feed.drawing, TooTightError) else None
+
+
 def trouble_of(frame: Frame, feed: PartsFeed) -> str | None:
     """Return as HTML why there are no parts or why they cannot take the pose; None if they can."""
     if frame.state.view.drawn_as != "prototype":
@@ -89,9 +95,9 @@ def trouble_of(frame: Frame, feed: PartsFeed) -> str | None:
     if feed.problem is not None:
         return alert("The parts could not be made", feed.problem)
     drawing = feed.drawing
-    if drawing is not None and drawing.refusal is not None:
-        refusal = alert("No prototype of this design", sentence(str(drawing.refusal)))
-        unit = drawing.fitting_unit_mm
+    if isinstance(drawing, ExplorerError):
+        refusal = alert("No prototype of this design", sentence(str(drawing)))
+        unit = _fitting_unit_mm(feed)
         if unit is None:
             return refusal
         fit = press_button(
@@ -102,9 +108,9 @@ def trouble_of(frame: Frame, feed: PartsFeed) -> str | None:
             class_name="ex-button",
         )
         return refusal + box(fit)
-    if drawing is None or drawing.parts is None:
+    if drawing is None:
         return note("Making the parts …")
-    broken = drawing.parts.prototype.broken_joint_limits(
+    broken = drawing.prototype.broken_joint_limits(
         frame.state.pose.position, frame.snapshot.rotation
     )
     return alert("The parts do not take this pose", sentence("; ".join(broken))) if broken else None

@@ -80,7 +80,7 @@ class PrototypeScene(ScenePart):
         parts = drawn_parts(self._feed)
         if parts is None:
             return NO_POINTS
-        places, seen = shown_places(placed, parts), list[FloatArray]()
+        places, seen = places_of(placed, parts), list[FloatArray]()
         for (vertices, _), origin, rotation in zip(
             parts.meshes, places.origin, places.rotation, strict=True
         ):
@@ -101,7 +101,7 @@ class PrototypeScene(ScenePart):
             yield self._nodes[name], "faces", faces
 
     def _places(self, placed: Placed, parts: Parts) -> Iterator[Update]:
-        places = shown_places(placed, parts)
+        places = places_of(placed, parts)
         names = [part.name for part in parts.prototype.parts]
         positions = (placed.scale * places.origin).tolist()
         turns = quaternion_from_rotation(places.rotation).tolist()
@@ -115,7 +115,7 @@ class PrototypeScene(ScenePart):
                 yield self._nodes[name], "wxyz", tuple(turns[index])
 
 
-def shown_places(placed: Placed, parts: Parts) -> Places:
+def places_of(placed: Placed, parts: Parts) -> Places:
     """Return where the parts are drawn, in their order and in design units."""
     frame = placed.frame
     places = parts.prototype.places(frame.state.pose.position, frame.snapshot.rotation)

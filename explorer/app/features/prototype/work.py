@@ -16,7 +16,7 @@ import numpy as np
 from explorer.app.scene.creases import Drawn, creased
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.frame import Frame
-from explorer.errors import ExplorerError, TooTightError
+from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
 from explorer.prototype.assembly import Actuator, Prototype, bill_of_materials, make_prototype
 from explorer.prototype.shapes import Part
@@ -126,28 +126,14 @@ class Parts:
         return float(self.meshes[0][0][:, 2].min())
 
 
-@dataclass(frozen=True)
-class PartsDrawing:
-    """The parts of a design, or why it has none and what would fit."""
-
-    request: PartsRequest
-    parts: Parts | None
-    refusal: ExplorerError | None
-
-    @property
-    def fitting_unit_mm(self) -> float | None:
-        """Millimetres in one design unit with which the parts fit; None if no unit helps."""
-        return self.refusal.fitting_unit_mm if isinstance(self.refusal, TooTightError) else None
-
-
-def parts_drawing(request: PartsRequest) -> PartsDrawing:
-    """Return the parts of a design, ready to be drawn."""
+def parts_drawing(request: PartsRequest) -> Parts | ExplorerError:
+    """Return the parts of a design, ready to be drawn; or why it has none."""
     try:
         prototype = make_prototype(request.design)
     except ExplorerError as error:
-        return PartsDrawing(request, None, error)
+        return error
     meshes = tuple(creased(part.vertices, part.faces) for part in prototype.parts)
-    return PartsDrawing(request, Parts(prototype, meshes, parts_list(prototype)), None)
+    return Parts(prototype, meshes, parts_list(prototype))
 
 
 def _request_for(frame: Frame) -> PartsRequest | None:
@@ -156,13 +142,13 @@ def _request_for(frame: Frame) -> PartsRequest | None:
     return PartsRequest(msgspec.structs.replace(frame.state.design, name=""))
 
 
-PartsFeed: TypeAlias = Feed[PartsRequest, PartsDrawing]
+PartsFeed: TypeAlias = Feed[PartsRequest, Parts | ExplorerError]
 PARTS_FEED = feed_of(parts_drawing, _request_for)
 
 
 def drawn_parts(feed: PartsFeed) -> Parts | None:
     """Return the parts to draw; None while there are none or none are requested."""
-    return None if feed.drawing is None else feed.drawing.parts
+    return feed.drawing if isinstance(feed.drawing, Parts) else None
 
 
 def export_assembly(design: Design, file_format: str) -> bytes:

@@ -19,7 +19,7 @@ from explorer.errors import InputError, NoAnswerError
 from explorer.numerics.number_text import format_number
 
 LEAST, MOST = 16, 4096
-"""The bounds of width and height, in pixels; browsers draw larger pictures only in part."""
+"""The bounds of width and height, in pixels; some browsers draw larger pictures only in part."""
 
 # A software renderer takes many seconds for the largest picture.
 PATIENCE_SECONDS = 90.0
@@ -78,7 +78,7 @@ def view_picture(
     finally:
         for cover in covers:
             cover.remove()
-    return encoded(pixels if background is None else on_background(pixels, background))
+    return encode_png(pixels if background is None else on_background(pixels, background))
 
 
 def _draw(client: viser.ClientHandle, width: int, height: int) -> Pixels:
@@ -127,7 +127,7 @@ def on_background(pixels: Pixels, colour: Colour) -> Pixels:
     return out
 
 
-def encoded(pixels: Pixels) -> bytes:
+def encode_png(pixels: Pixels) -> bytes:
     """Return pixels (height, width, 3 or 4) as PNG."""
     # Types of its parameters are partly unknown.
     imageio: Any = importlib.import_module("imageio.v3")

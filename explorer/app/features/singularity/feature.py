@@ -1,4 +1,4 @@
-"""The proximity to singularities, and what a singular pose means."""
+"""The proximity to singularities, and the motions that a singular pose allows."""
 
 from __future__ import annotations
 

@@ -89,8 +89,7 @@ def distances_of(frame: Frame, feed: StrataFeed) -> Mapping[Stratum, float]:
     worker computes the others.
     """
     here = frame.snapshot.stratum
-    drawing = feed.drawing if feed.is_current else None
-    distances = {} if drawing is None else dict(drawing.distances)
+    distances = dict(feed.drawing or {}) if feed.is_current else {}
     for stratum, nearest in zip(OF_INCIDENCES, frame.snapshot.nearest, strict=True):
         distances[stratum] = nearest.distance
     distances[here] = 0.0

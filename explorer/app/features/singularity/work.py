@@ -97,21 +97,13 @@ class StrataRequest:
     pose: Pose
 
 
-@dataclass(frozen=True)
-class StrataDistances:
-    """The distances of a pose to the 24 strata, in design units.
+def strata_distances(request: StrataRequest) -> dict[Stratum, float]:
+    """Return the distances of a pose to all strata, in design units.
 
     A distance is the root-mean-square displacement of b1 to b4 to the nearest pose in the stratum.
     """
-
-    request: StrataRequest
-    distances: dict[Stratum, float]
-
-
-def strata_distances(request: StrataRequest) -> StrataDistances:
-    """Return the distances of a pose to all strata."""
     poses = nearest_in_strata(request.design, request.pose)
-    return StrataDistances(request, {w: pose.distance for w, pose in poses.items()})
+    return {stratum: pose.distance for stratum, pose in poses.items()}
 
 
 def _request_for(frame: Frame) -> StrataRequest | None:
@@ -120,6 +112,6 @@ def _request_for(frame: Frame) -> StrataRequest | None:
     return StrataRequest(frame.state.design, frame.state.pose)
 
 
-StrataFeed: TypeAlias = Feed[StrataRequest, StrataDistances]
+StrataFeed: TypeAlias = Feed[StrataRequest, dict[Stratum, float]]
 STRATA_FEED = feed_of(strata_distances, _request_for)
 """The distances to the strata, for the diagram; at a singular pose the list needs some too."""
