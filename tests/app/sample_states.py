@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast, get_args, get_type_hints
 import msgspec
 from hypothesis import strategies as st
 
-from explorer.app.features.compare.panel import Pin, Unpin
+from explorer.app.features.compare.feature import Pin, Unpin
 from explorer.app.features.optimise.actions import (
     Accept,
     Advance,

@@ -17,7 +17,7 @@ from hypothesis import given, strategies as st
 from limited_designs import scaled_design
 from services import StubWorker, services_for
 
-from explorer.app.features.compare.panel import ComparePanel, Pin, Unpin
+from explorer.app.features.compare.feature import ComparePanel, Pin, Unpin
 from explorer.app.features.compare.scene import APART, ComparedScene
 from explorer.app.features.compare.table import (
     DRAWN,
@@ -34,15 +34,14 @@ from explorer.app.features.compare.work import (
     LIVE,
     ComparedRequest,
     CompareFeed,
-    compared_drawing,
+    draw_compared,
     drawing_in,
 )
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import Placed
-from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Open, Set, SetVariable
-from explorer.app.state.compared import Compared, Look, unnamed
+from explorer.app.state.compared import Look, unnamed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.storage.library import Library
@@ -133,24 +132,6 @@ def test_actions_in_any_order_pin_at_most_three_designs_and_none_twice(
     renamed = msgspec.structs.replace(variant(2), name="other")
     with pytest.raises(InputError, match=r"^other is pinned already, as A; change it, or pin"):
         Pin(renamed).apply(compared(variant(2)))
-
-
-def test_pins_are_steps_that_are_undone(desk: Desk) -> None:
-    for action in (Pin(INITIAL), Set("compared.look.overlay", True), Unpin(0)):
-        desk.session.do(action)
-    assert desk.session.wait_until_idle()
-    words = [step.words for step in desk.session.history.steps[1:]]
-    assert words == ["Pin paper-initial", "Overlay on", "Unpin A"]
-    for pinned, look in (
-        (None, Look(overlay=True)),
-        (INITIAL, Look(overlay=True)),
-        (INITIAL, Look()),
-        (None, Look()),
-    ):
-        assert desk.state.compared == Compared((pinned, None, None), look)
-        assert desk.state.compared.slot_of(INITIAL) == (None if pinned is None else 0)
-        desk.session.travel(UNDO)
-    assert desk.state.compared.is_empty
 
 
 @pytest.mark.parametrize("millimetres", [False, True])
@@ -280,7 +261,7 @@ def test_table_compares_loads_of_the_designs_that_have_them() -> None:
 
 
 def test_drawing_has_the_workspace_at_home_and_the_points_of_the_design() -> None:
-    drawing = compared_drawing(ComparedRequest(INITIAL, drawn=True))
+    drawing = draw_compared(ComparedRequest(INITIAL, drawn=True))
     assert drawing.problem is None
     assert drawing.shell is not None
     assert drawing.measurements is not None
@@ -292,11 +273,11 @@ def test_drawing_has_the_workspace_at_home_and_the_points_of_the_design() -> Non
     ends = drawing.outline.reshape(-1, 3)
     for point in ((0.0, 0.0, 0.0), (*INITIAL.a3, 0.0), INITIAL.home_pose.position):
         assert np.abs(ends - np.array(point)).max(axis=1).min() < 1e-9
-    assert compared_drawing(ComparedRequest(INITIAL)).shell is None
+    assert draw_compared(ComparedRequest(INITIAL)).shell is None
 
 
 def test_drawing_with_a_tolerance_that_is_too_fine_keeps_its_numbers() -> None:
-    drawing = compared_drawing(ComparedRequest(OPTIMAL, drawn=True, tolerance=1e-9))
+    drawing = draw_compared(ComparedRequest(OPTIMAL, drawn=True, tolerance=1e-9))
     assert drawing.measurements is not None
     assert drawing.shell is None
     assert "tolerance" in (drawing.problem or "")

@@ -24,12 +24,17 @@ from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
 from explorer.app.features.forces.loads import WEIGHTS_FEED, SetForce
 from explorer.app.features.listed import FEATURES
-from explorer.app.features.machine.panel import SetToolAngle
+from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
-from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
+from explorer.app.features.orientation.work import (
+    RANGE_FEED,
+    TILTS_FEED,
+    GoToTilt,
+    SetTiltTorsion,
+)
 from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
 from explorer.app.features.precision.budget import SetTolerances
-from explorer.app.features.studies.actions import BrushAxes, PickDesign
+from explorer.app.features.studies.actions import PickDesign
 from explorer.app.features.view.feature import CAMERA_HINTS
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Control
@@ -262,7 +267,7 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
 
 OF_VALUES = (
     SetJoint, SetPosition, SetAngle, SetPose, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
-    SetFold, SetVariable, SetName, SetPathTime, PickDesign, BrushAxes,
+    SetFold, SetVariable, SetName, SetPathTime, PickDesign,
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map or a handle gives."""
 

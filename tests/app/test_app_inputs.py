@@ -13,7 +13,7 @@ from desk import Desk
 from hypothesis import given, strategies as st
 
 from explorer.app.features.feature import Services
-from explorer.app.features.machine.panel import MachinePanel
+from explorer.app.features.machine.feature import MachinePanel
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.pose_panel import MovePanel
 from explorer.app.inputs.limits import limit_span, pushed

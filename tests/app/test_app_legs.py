@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -39,7 +39,7 @@ from explorer.app.features.workspace.tasks import (
     STEP,
     WorkspaceDrawing,
     export_mesh,
-    exported_name,
+    file_words,
 )
 from explorer.app.features.workspace.words import drawing_words, nothing_words, workspace_details
 from explorer.app.inputs.ranges import radius_span
@@ -231,14 +231,6 @@ def inside(polygons: list[FloatArray], points: FloatArray) -> BoolArray:
     return crossings % 2 == 1
 
 
-def test_cut_beyond_the_extent_goes_through_the_middle_and_one_within_stays() -> None:
-    for level, found in ((-50.0, 10.0), (None, 10.0), (50.0, 10.0), (17.0, 17.0)):
-        state = show(opened(OPTIMAL), region="limits", cut="x", level=level)
-        mapped = drawing_of(state).slice_map
-        assert mapped is not None
-        assert mapped.level == pytest.approx(found)
-
-
 def test_drawing_with_another_cut_colour_or_hull_computes_no_workspace_anew(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -376,28 +368,23 @@ def test_exported_mesh_has_the_volume_of_the_drawing(what: str) -> None:
     expected = drawing.mesh_volume if what == "workspace" else drawing.hull_volume
     assert expected is not None
     assert mesh.volume == pytest.approx(expected * OPTIMAL.unit_mm**3, rel=1e-4)
-    assert exported_name("accessible", what) == f"accessible {what}"
-    assert exported_name("limits", what) == what
+    assert file_words("accessible", what) == f"accessible {what}"
+    assert file_words("limits", what) == what
 
 
 @pytest.mark.parametrize(
-    ("limits", "region", "what", "file_format", "reason"),
+    ("limits", "file_format", "reason"),
     [
-        ({"l4": (0.0, 12.5)}, "accessible", "workspace", "stl", "no position is accessible from"),
-        ({}, "limits", "hull", STEP, "a convex hull.*export it as 3mf, stl, glb, obj or ply"),
-        ({}, "accessible", "workspace", STEP, "begin to collide.*export it as 3mf, stl, glb"),
+        ({"l4": (0.0, 12.5)}, "stl", "no position is accessible from"),
+        ({}, STEP, "begin to collide.*export it as 3mf, stl, glb"),
     ],
 )
 def test_file_that_cannot_be_written_is_refused_with_what_would_work(
-    limits: dict[str, Any],
-    region: Literal["limits", "accessible"],
-    what: str,
-    file_format: str,
-    reason: str,
+    limits: dict[str, Any], file_format: str, reason: str
 ) -> None:
     design = with_limits(THICK, **limits).design
     with pytest.raises(InputError, match=reason):
-        export_mesh(regions.Selection(design, LEVEL, region), 0.1, what, file_format)
+        export_mesh(regions.Selection(design, LEVEL, "accessible"), 0.1, "workspace", file_format)
 
 
 # The curve of radii

@@ -29,9 +29,8 @@ from explorer.app.features.studies.actions import (
 )
 from explorer.app.features.studies.feed import Request, StudyDrawing, StudyFeed
 from explorer.app.features.studies.figures import parallel, scatter
-from explorer.app.features.studies.panel import StudiesPanel
+from explorer.app.features.studies.panel import PlotEvent, StudiesPanel, event_of
 from explorer.app.features.studies.plot_rows import PlotRows, select_rows, thin_out
-from explorer.app.features.studies.plots import PlotEvent, event_of
 from explorer.app.features.studies.words import status
 from explorer.app.features.studies.work import StudyRunner
 from explorer.app.session.session import UNDO

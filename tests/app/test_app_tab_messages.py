@@ -8,7 +8,7 @@ from typing import Any
 from client import Client, client_of, press_update, wait_for
 
 from explorer.app.features.sharing.feature import send_picture
-from explorer.app.features.view.panel import FORMS, LAYERS
+from explorer.app.features.view.feature import FORMS, LAYERS
 from explorer.app.server import Running
 from explorer.app.state.view import View
 from explorer.mechanism.margins import TETRAHEDRA

@@ -21,7 +21,7 @@ from services import StubDownloads, StubWorker
 from strategies import Case, all_cases
 from workspace_feeds import draw
 
-from explorer.app.features.compare.panel import Pin
+from explorer.app.features.compare.feature import Pin
 from explorer.app.features.compare.scene import ComparedScene
 from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.feature import Services

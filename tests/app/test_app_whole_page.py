@@ -15,7 +15,7 @@ from monkey import Monkey, explorer_with_data
 from page_props import shown_by, shown_texts
 from sample_states import Sample, samples
 
-from explorer.app.features.compare.panel import Pin
+from explorer.app.features.compare.feature import Pin
 from explorer.app.features.optimise.actions import Accept, SetRequest, StartRun
 from explorer.app.server import Running
 from explorer.app.state.action import Action

@@ -35,7 +35,7 @@ from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import WorkspaceView
-from explorer.mechanism.design import Design, Limits
+from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
@@ -108,15 +108,6 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     assert surface_of(feed) is feed.drawing.surface
     feed.follow(Frame(opened(OPTIMAL)))
     assert surface_of(feed) is None
-
-
-def test_empty_workspace_names_the_limit_that_empties_it() -> None:
-    limits = Limits(l1=(0.0, 1.0), box=((10.0, 10.0, 10.0), (11.0, 11.0, 11.0)))
-    state = Set("design.limits", limits).apply(opened(OPTIMAL))
-    drawing = draw_workspace(a_request(design=state.design, hull=True, cut="x", level=1.0))
-    assert drawing.volume == 0.0
-    assert drawing.surface.shells == ()
-    assert drawing.extent is None
 
 
 def area(shells: Sequence[Shell]) -> float:

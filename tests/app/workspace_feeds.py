@@ -15,7 +15,6 @@ from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 
-
 Drawing = TypeVar("Drawing")
 
 

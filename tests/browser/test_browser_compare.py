@@ -9,7 +9,7 @@ from likeness import decoded
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.features.compare.panel import Pin
+from explorer.app.features.compare.feature import Pin
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.state.actions import Set
 from explorer.app.state.view import View

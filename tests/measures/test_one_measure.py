@@ -11,7 +11,7 @@ from command_line import CommandLine
 from report_page import read
 
 from explorer.app.features.compare.table import Column, table
-from explorer.app.features.compare.work import ComparedRequest, compared_drawing
+from explorer.app.features.compare.work import ComparedRequest, draw_compared
 from explorer.app.features.optimise.words import measure_rows
 from explorer.app.features.optimise.work import compare
 from explorer.app.features.sharing.reporting import make_report
@@ -56,7 +56,7 @@ def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture
     paper = problem()
     margin = paper.demands.clearance_margin
     both = compare(paper.start, design, margin, (BOX, BOX))
-    compared = compared_drawing(ComparedRequest(unnamed(design))).measurements
+    compared = draw_compared(ComparedRequest(unnamed(design))).measurements
     assert compared is not None
     studied = measure_design(Case(design), SWIFT).values
     path = folder / "design.json"

@@ -23,7 +23,7 @@ from machines import PRESS
 from playwright.sync_api import Browser, FloatRect, Page
 
 from explorer.app.browser.headless import headless_browser
-from explorer.app.features.compare.panel import Pin
+from explorer.app.features.compare.feature import Pin
 from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign

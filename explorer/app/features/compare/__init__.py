@@ -1,1 +1,1 @@
-"""Designs side by side."""
+"""Up to three pinned designs beside the live one: buttons that pin them, measures, drawing."""

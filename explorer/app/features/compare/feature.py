@@ -1,18 +1,308 @@
-"""Up to three pinned designs beside the live one."""
+"""Up to three pinned designs beside the live one: buttons that pin them, measures, drawing."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from html import escape
+from typing import ClassVar
+
 import viser
 
-from explorer.app.features.compare.panel import ComparePanel
 from explorer.app.features.compare.scene import ComparedScene
-from explorer.app.features.compare.work import FEEDS, compared_drawing
-from explorer.app.features.feature import Feature, Tab
+from explorer.app.features.compare.table import Column, bars, columns_of, notes, table
+from explorer.app.features.compare.work import FEEDS, draw_compared
+from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.feature import Feature, Services, Tab
+from explorer.app.session.session import Change
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Open
+from explorer.app.state.compared import SLOTS, unnamed
+from explorer.app.state.frame import Frame
+from explorer.app.state.parts import with_value
+from explorer.app.state.state import State
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import Buttons, press_button
+from explorer.app.widgets.chips import Chip, Chips, Effect, choose, turn
+from explorer.app.widgets.commands import NO_OPTION
+from explorer.app.widgets.markup import box, swatch
+from explorer.errors import InputError
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS
+
+# Number of designs that have a button of their own; if there are more, a list has them all.
+MOST_BUTTONS = 5
+
+
+@dataclass(frozen=True)
+class Pin(Action):
+    """Pin a copy of a design beside the live one, in the first free place."""
+
+    template: ClassVar[str] = "Pin {action.design.name}"
+
+    design: Design
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is pinned already, or no place is free.
+        """
+        pinned, name = state.compared.pinned, self.design.name
+        slot = state.compared.slot_of(self.design)
+        if slot is not None:
+            raise InputError(
+                f"{name} is pinned already, as {SLOTS[slot]}; change it, or pin another design"
+            )
+        if None not in pinned:
+            raise InputError(
+                f"{name} cannot be pinned: {', '.join(SLOTS)} are taken; unpin one of them first"
+            )
+        return with_value(state, f"compared.pinned.{pinned.index(None)}", self.design)
+
+
+@dataclass(frozen=True)
+class Unpin(Action):
+    """Remove the pinned design from a place, 0 to 2; do nothing if the place is free."""
+
+    template: ClassVar[str] = "Unpin {action.place}"
+
+    slot: int
+
+    @property
+    def place(self) -> str:
+        """The letter of the place."""
+        return SLOTS[self.slot]
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return with_value(state, f"compared.pinned.{self.slot}", None)
+
+
+def _has_pinned(state: State) -> bool:
+    return not state.compared.is_empty
+
+
+def _look(
+    name: str,
+    hint: str,
+    effect: Effect,
+    words: str = "",
+    is_visible: Callable[[State], bool] = lambda _: True,
+) -> Chip:
+    """Return the chip of a way to look at the comparison; its words are its name if ""."""
+    return Chip(words or name, f"Compare › {name}", hint, effect, _has_pinned, is_visible)
+
+
+LOOKS = (
+    _look(
+        "Table",
+        "Show every measure of the designs side by side.",
+        choose("compared.look.shows", "table", "Compared as"),
+    ),
+    _look(
+        "Bars",
+        "Draw the measures of the designs as bars.",
+        choose("compared.look.shows", "bars", "Compared as"),
+    ),
+    _look(
+        "Millimetres",
+        "Give lengths in millimetres, rather than in units of the live design.",
+        turn("compared.look.millimetres", "Millimetres"),
+        "mm",
+    ),
+    _look(
+        "Overlay workspaces",
+        "Draw the workspaces over one another in the colours of the designs, to true size, each "
+        "at the orientation of its home.",
+        turn("compared.look.overlay", "Overlay workspaces"),
+    ),
+    _look(
+        "Live one as it is turned",
+        "Draw the workspace of the live design at its present orientation, rather than at home.",
+        turn("compared.look.at_pose", "Live one as it is turned"),
+        "live as turned",
+        lambda state: state.compared.look.overlay,
+    ),
+    _look(
+        "Outlines",
+        "Outline base, legs and platform of the pinned designs in their home poses.",
+        turn("compared.look.outlines", "Outlines"),
+    ),
+)
+
+
+class ComparePanel:
+    """The table or bars of the compared designs, and buttons that pin and unpin them."""
+
+    def __init__(self, services: Services) -> None:
+        gui, self._session = services.gui, services.session
+        self._feeds = [services.get(feed) for feed in FEEDS]
+        self._library = None if services.user_data is None else services.get(SavedDesigns)
+        self.another = gui.add_dropdown(
+            "Pin another design",
+            (NO_OPTION, *PRESETS),
+            hint="Keep a copy of a preset or of a design of yours beside the live one.",
+            visible=False,
+        )
+        self.another.on_update(self._pin_chosen)
+        self.html = gui.add_html("")
+        self._add_buttons(services.buttons)
+        looks = {chip.command.removeprefix("Compare › "): chip for chip in LOOKS}
+        self._looks = Chips(services.buttons, services.session, "compare.turn", "", looks)
+        self._key: tuple[object, ...] = ()
+        self._content = ""
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the panel show the frame."""
+        compared = frame.state.compared
+        choices = self._choices()
+        yield self.another, "options", (NO_OPTION, *choices)
+        yield self.another, "visible", len(choices) > MOST_BUTTONS
+        if not self._session.is_waiting(self):
+            yield self.another, "value", NO_OPTION
+        columns = columns_of(frame.state, self._feeds)
+        key = (columns, compared, tuple(choices), frame.state.design.name)
+        if key != self._key:
+            self._key, self._content = key, self._page(frame.state, columns, choices)
+        yield self.html, "content", self._content
+
+    def _add_buttons(self, buttons: Buttons) -> None:
+        buttons.on("compare.pin", self._pin)
+        buttons.offer(
+            "Compare › Pin this design",
+            "Keep a copy of the live design as it is now, to compare it with what it becomes.",
+            "compare.pin",
+            is_ready=lambda: None in self._session.state.compared.pinned,
+        )
+        places: tuple[tuple[str, Callable[[int], Change], str, str], ...] = (
+            (
+                "open",
+                _open,
+                "Open pinned",
+                "Make it the live design; undo brings back the present one.",
+            ),
+            (
+                "unpin",
+                lambda slot: lambda _: Unpin(slot),
+                "Unpin",
+                "Remove it from the comparison; undo brings it back.",
+            ),
+        )
+        for verb, change, words, hint in places:
+            name = f"compare.{verb}"
+            buttons.on(name, partial(self._change_place, change), values=SLOTS)
+            for slot, place in enumerate(SLOTS):
+                buttons.offer(
+                    f"Compare › {words} design {place}",
+                    hint,
+                    name,
+                    place,
+                    lambda slot=slot: self._session.state.compared.pinned[slot] is not None,
+                )
+
+    def _change_place(
+        self, change: Callable[[int], Change], place: str, client: viser.ClientHandle
+    ) -> None:
+        self._session.do(change(SLOTS.index(place)), who=client.client_id)
+
+    def _page(
+        self, state: State, columns: tuple[Column, ...], choices: Mapping[str, Design]
+    ) -> str:
+        look = state.compared.look
+        pins = _pin_buttons(state, choices)
+        if state.compared.is_empty:
+            return box(
+                '<div class="ex-before">Pin this design, then change it: the copy stays beside it. '
+                "Or pin another one to compare this design with it. Up to three can be pinned; "
+                "their workspaces can be drawn over one another.</div>",
+                f'<div class="ex-flow">{pins}</div>',
+            )
+        if look.shows == "table":
+            body = table(columns, millimetres=look.millimetres)
+        else:
+            legend = "".join(
+                f'<span class="ex-whole">{swatch(column.colour)}'
+                f"<b>{column.letter}</b> {escape(column.design.name)}</span>"
+                for column in columns
+            )
+            body = (
+                f'<div class="ex-flow ex-apart">{legend}</div>'
+                f"{bars(columns, millimetres=look.millimetres)}"
+            )
+        remarks = "".join(
+            f'<div class="ex-dim ex-after">{note}</div>' for note in notes(state, columns)
+        )
+        return box(
+            f'<div class="ex-flow ex-before">{pins}<span class="ex-divider"></span>'
+            f"{self._looks.buttons(state)}</div>",
+            body,
+            remarks,
+        )
+
+    def _choices(self) -> dict[str, Design]:
+        """Return the designs to pin, by name; no saved design has the name of a preset."""
+        entries = () if self._library is None else self._library.entries
+        own = (entry.design for entry in entries if entry.design is not None)
+        return {**{design.name: design for design in own}, **PRESETS}
+
+    def _pin(self, name: str, client: viser.ClientHandle) -> None:
+        """Pin the live design for "", or the one with a name."""
+        chosen = self._choices().get(name)
+        if chosen is not None or not name:
+            self._session.do(lambda state: Pin(chosen or state.design), who=client.client_id)
+
+    def _pin_chosen(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
+        design = self._choices().get(self.another.value)
+        if event.client_id is not None and design is not None:
+            self._session.post(self, lambda _: Pin(design), who=event.client_id)
+
+
+def _open(slot: int) -> Change:
+    def change(state: State) -> Open:
+        design = state.compared.pinned[slot]
+        if design is None:
+            raise InputError(f"nothing is pinned as {SLOTS[slot]}; pin a design first")
+        return Open(design)
+
+    return change
+
+
+def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:
+    """Return the buttons that pin the live design and others, as HTML."""
+    compared = state.compared
+    is_full = None not in compared.pinned
+    hint = "All three places are taken: unpin one first" if is_full else "Keep a copy as it is now"
+    live = press_button(
+        "compare.pin",
+        "",
+        "Pin this design",
+        hint=hint,
+        class_name="ex-chip is-main",
+        is_disabled=is_full,
+    )
+    if is_full or len(choices) > MOST_BUTTONS:
+        return live
+    others = (
+        press_button(
+            "compare.pin",
+            name,
+            f"+ {escape(name)}",
+            hint=f"Pin {name} beside the live design",
+            label=f"Pin {name}",
+            class_name="ex-chip ex-cut ex-pin",
+        )
+        for name, design in choices.items()
+        if compared.slot_of(design) is None and unnamed(design) != unnamed(state.design)
+    )
+    return live + "".join(others)
+
 
 COMPARE = Feature(
     "compare",
     tabs=(Tab("work", "Compare", ComparePanel, viser.Icon.COLUMNS_3),),
     scene=(ComparedScene,),
     feeds=FEEDS,
-    tasks=(compared_drawing,),
+    tasks=(draw_compared,),
 )

@@ -12,7 +12,7 @@ from explorer.app.state.compared import SLOTS
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import COMPARED, Rgb
-from explorer.app.widgets.markup import meter, swatch
+from explorer.app.widgets.markup import swatch
 from explorer.measures.catalogue import CATALOGUE, Measure, measures_in
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import Design
@@ -152,15 +152,6 @@ def notes(state: State, columns: tuple[Column, ...]) -> list[str]:
     return remarks
 
 
-def progress(columns: Sequence[Column]) -> str:
-    """Return how many of the designs are measured as HTML; "" once all are."""
-    done = sum(column.is_current or column.problem is not None for column in columns)
-    if done == len(columns):
-        return ""
-    share = meter(100.0 * done / len(columns), look="ex-meter is-thin")
-    return f'<div class="ex-dim">measured: {done} of {len(columns)}</div>{share}'
-
-
 def best_of(measure: Measure, values: list[float | None]) -> set[int]:
     """Return the indices of the best values; none if all are equal or no value is better."""
     known = [value for value in values if value is not None]
@@ -217,10 +208,7 @@ def table(columns: Sequence[Column], *, millimetres: bool) -> str:
         for measure in measures_in("compare").values()
         if not measure.needs or any(column.has(measure) for column in columns)
     )
-    return (
-        f'<table class="ex-compare"><tr><td class="ex-head">{progress(columns)}</td>{head}</tr>'
-        f"{rows}</table>"
-    )
+    return f'<table class="ex-compare"><tr><td class="ex-head"></td>{head}</tr>{rows}</table>'
 
 
 def _head(column: Column) -> str:

@@ -87,7 +87,7 @@ class ComparedDrawing:
         return offset_of(design, rotation, at)
 
 
-def compared_drawing(request: ComparedRequest) -> ComparedDrawing:
+def draw_compared(request: ComparedRequest) -> ComparedDrawing:
     """Return the measurements of a design, and its workspace if requested."""
     design = request.design
     measurements: Measurements | None = None
@@ -121,7 +121,7 @@ CompareFeed: TypeAlias = Feed[ComparedRequest, ComparedDrawing]
 
 def _feed_of(column: int, services: Services) -> CompareFeed:
     request, redraw = partial(_request_for, column), services.session.redraw
-    return Feed(services.worker, compared_drawing, request, redraw, key=("compared", column))
+    return Feed(services.worker, draw_compared, request, redraw, key=("compared", column))
 
 
 FEEDS: tuple[Callable[[Services], CompareFeed], ...] = tuple(

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from html import escape
+
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.history.change import ChangeCard, ChangeScene, DesignChange
-from explorer.app.features.history.panel import HistoryPanel
-from explorer.app.session.history import History
+from explorer.app.session.history import History, Step
 from explorer.app.session.session import REDO, UNDO
 from explorer.app.state.frame import Frame
+from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.commands import Key, with_keys
+from explorer.app.widgets.markup import box
 
-PRESS = "history.move"
+GO = "history.go"
+# Rows of the list; the slider reaches all steps.
+ROWS = 24
+# Rows at most of steps that were undone.
+ROWS_AHEAD = 6
+
+
+MOVE = "history.move"
 KEYS = {
     "Undo": (Key("Z", "cmd/ctrl"),),
     "Redo": (Key("Z", "cmd/ctrl+shift"), Key("Y", "cmd/ctrl")),
@@ -22,16 +33,72 @@ MOVES = {"Undo": UNDO, "Redo": REDO}
 ARROWS = {"Undo": "↶", "Redo": "↷"}
 
 
+class HistoryPanel:
+    """The list of the last steps, and a slider over all of them."""
+
+    def __init__(self, services: Services) -> None:
+        gui, self._session = services.gui, services.session
+        self._slider = gui.add_slider(
+            "Go to step",
+            min=0,
+            max=1,
+            step=1,
+            initial_value=0,
+            hint="Run through all that was done; nothing is lost until something is changed.",
+        )
+        self._list = gui.add_html("")
+        self._numbers: tuple[int, ...] = ()
+        self._slider.on_update(self._travel)
+        services.buttons.on(GO, self._go)
+
+    def updates(self, _: Frame) -> Iterator[Update]:
+        """Yield the updates that show the history of the session."""
+        history = self._session.history
+        steps, here = history.steps, history.step
+        yield self._slider, "min", steps[0].number
+        yield self._slider, "max", max(steps[-1].number, steps[0].number + 1)
+        yield self._slider, "disabled", len(steps) == 1
+        if not self._session.is_waiting(self):
+            yield self._slider, "value", here.number
+        last = min(len(steps), max(history.at + 1 + ROWS_AHEAD, ROWS))
+        # The newest step comes first.
+        shown = steps[max(0, last - ROWS) : last][::-1]
+        self._numbers = tuple(step.number for step in shown)
+        yield self._list, "content", box(*(_row(step, here) for step in shown))
+
+    async def _travel(self, event: viser.GuiEvent[viser.GuiSliderHandle[int]]) -> None:
+        if event.client_id is not None:
+            stamp, number = self._slider.update_timestamp, int(self._slider.value)
+            self._session.travel_to(self, number, stamp=stamp, who=event.client_id)
+
+    def _go(self, value: str, client: viser.ClientHandle) -> None:
+        number = next((step for step in self._numbers if str(step) == value), None)
+        if number is not None:
+            self._session.travel_to(object(), number, stamp=None, who=client.client_id)
+
+
+def _row(step: Step, here: Step) -> str:
+    """Return a step as a button in HTML; steps that were undone stay in the list."""
+    look = "is-here" if step.number == here.number else ""
+    return press_button(
+        GO,
+        step.number,
+        f'<span class="ex-index">{step.number}</span>{escape(step.words)}',
+        hint=f"Go to step {step.number}: {step.words}",
+        class_name=f"ex-row {'is-undone' if step.number > here.number else look}".rstrip(),
+    )
+
+
 class UndoButtons:
     """Undo, redo, and the button that opens the list of all steps."""
 
     def __init__(self, services: Services) -> None:
         self._session = services.session
-        services.buttons.on(PRESS, self._move, values=MOVES)
+        services.buttons.on(MOVE, self._move, values=MOVES)
         for name in MOVES:
             # Always ready: a key that is pressed before the page knows of the last step counts.
             hint = f"{name} the last step."
-            services.buttons.offer(f"Edit › {name}", hint, PRESS, name, keys=KEYS[name])
+            services.buttons.offer(f"Edit › {name}", hint, MOVE, name, keys=KEYS[name])
 
     def __call__(self, frame: Frame) -> str:
         """Return the buttons for a frame, as HTML."""
@@ -51,7 +118,7 @@ class UndoButtons:
         words = history.steps[at].words if 0 < at < len(history.steps) else None
         hint = f"{name}: {words}." if words is not None else f"Nothing to {name.lower()}."
         return press_button(
-            PRESS,
+            MOVE,
             name,
             ARROWS[name],
             hint=with_keys(hint, KEYS[name]),

@@ -1,1 +1,1 @@
-"""The machine around the mechanism: tool, payload, gravity, and limits of the parts."""
+"""The machine around the mechanism: tool, payload, gravity, actuators, struts and tolerances."""

@@ -39,6 +39,16 @@ PLATFORM_SHIFT = 0.26
 PLATFORM_OPACITY = 0.82
 
 
+# Sizes in scene units, at thickness one.
+PLATE_TOP = -0.6
+RAIL_HALF_WIDTH, RAIL_TOP = 0.3, -0.42
+TUBE_RADIUS, ROD_RADIUS, COLLAR_RADIUS = 0.17, 0.095, 0.215
+BALL_RADIUS, SOCKET_RADIUS = 0.24, 0.19
+PIN_RADIUS, PIN_HALF_LENGTH = 0.085, 0.34
+# Length of an actuator's cylinder, which does not depend on its stroke, as a share of the reach.
+TUBE_SHARE = 0.34
+
+
 class Bodies(ScenePart):
     """The base plate and the platform plate."""
 
@@ -93,22 +103,11 @@ def platform_plate(placed: Placed) -> Mesh:
     return plate(points, PLATFORM_RADIUS * size, min(near, far), max(near, far))
 
 
-# Sizes in scene units, at thickness one.
-PLATE_TOP = -0.6
-RAIL_HALF_WIDTH, RAIL_TOP = 0.3, -0.42
-TUBE_RADIUS, ROD_RADIUS, COLLAR_RADIUS = 0.17, 0.095, 0.215
-BALL_RADIUS, SOCKET_RADIUS = 0.24, 0.19
-PIN_RADIUS, PIN_HALF_LENGTH = 0.085, 0.34
-# Length of an actuator's cylinder, which does not depend on its stroke, as a share of the reach.
-TUBE_SHARE = 0.34
-
-
-class Telescopes:
+class Telescopes(Rods):
     """Actuators, each with a cylinder at the base end and a rod at the platform end."""
 
     def __init__(self, scene: viser.SceneApi, name: str, count: int) -> None:
-        colours = [TUBE] * count + [ROD] * count + [JOINT] * count + [JOINT] * count
-        self._rods = Rods(scene, name, colours)
+        super().__init__(scene, name, [TUBE] * count + [ROD] * count + [JOINT] * (2 * count))
 
     def along(self, placed: Placed, bases: FloatArray, tips: FloatArray) -> Iterator[Update]:
         """Yield the updates that draw the actuators from bases (n, 3) to tips (n, 3)."""
@@ -119,7 +118,7 @@ class Telescopes:
         tube_ends = bases + unit * np.minimum(TUBE_SHARE * placed.reach, 0.8 * lengths)
         collars = tube_ends - unit * np.minimum(0.3 * size, 0.2 * lengths)
         sockets = tips - unit * np.minimum(0.5 * size, 0.3 * lengths)
-        yield from self._rods.between(
+        yield from self.between(
             np.concatenate([bases, collars, collars, sockets]),
             np.concatenate([tube_ends, tips, tube_ends, tips]),
             size * np.repeat([TUBE_RADIUS, ROD_RADIUS, COLLAR_RADIUS, SOCKET_RADIUS], count),
@@ -129,11 +128,7 @@ class Telescopes:
         """Yield the updates that give some actuators the colour of an alarm."""
         tubes = [OUTLINE if alarm else TUBE for alarm in alarms]
         rods = [OUTLINE if alarm else ROD for alarm in alarms]
-        yield from self._rods.colour([*tubes, *rods, *[JOINT] * (2 * len(alarms))])
-
-    def show(self, visible: bool) -> Iterator[Update]:
-        """Yield the updates that show or hide the actuators."""
-        yield from self._rods.show(visible)
+        yield from self.colour([*tubes, *rods, *[JOINT] * (2 * len(alarms))])
 
 
 class Legs(ScenePart):

@@ -50,6 +50,20 @@ LEVELS = (0.0, math.nextafter(1.0, 0.0), 1.0, FAR_WARNINGS)
 LEAST_LEVEL = 1e-9
 
 
+OPACITY, WEDGE_OPACITY = 0.34, 0.22
+# Radius of the arcs as a share of the reach.
+RADIUS = 0.13
+# Segments of an arc; two more lead from the hinge to its ends.
+SEGMENTS = 24
+# Thicknesses of arcs and of the edges of leaves, in pixels.
+ARC, EDGE = 2.5, 1.5
+# Shares of a fold at the ends of its arc's segments.
+SHARES = np.linspace(0.0, 1.0, SEGMENTS + 1)
+TRIANGLE = np.array([[0, 1, 2]])
+# The triangles between the hinge, the first point, and an arc.
+FAN = np.array([[0, each, each + 1] for each in range(1, SEGMENTS + 1)])
+
+
 def add_fold_sliders(controls: Controls) -> None:
     """Add a slider for each of the six coordinates, visible while these are chosen."""
     for index in range(len(FOLDS)):
@@ -106,20 +120,6 @@ def colour_stops(frame: Frame, index: int, span: Span) -> str:
     if index > 0:
         stops += [(colour, 1.0 - share) for colour, share in reversed(stops[:-1])]
     return ",".join(f"{colour} {100.0 * share:.1f}%" for colour, share in stops)
-
-
-OPACITY, WEDGE_OPACITY = 0.34, 0.22
-# Radius of the arcs as a share of the reach.
-RADIUS = 0.13
-# Segments of an arc; two more lead from the hinge to its ends.
-SEGMENTS = 24
-# Thicknesses of arcs and of the edges of leaves, in pixels.
-ARC, EDGE = 2.5, 1.5
-# Shares of a fold at the ends of its arc's segments.
-SHARES = np.linspace(0.0, 1.0, SEGMENTS + 1)
-TRIANGLE = np.array([[0, 1, 2]])
-# The triangles between the hinge, the first point, and an arc.
-FAN = np.array([[0, each, each + 1] for each in range(1, SEGMENTS + 1)])
 
 
 class Leaves(ScenePart):

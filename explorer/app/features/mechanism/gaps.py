@@ -20,7 +20,6 @@ from explorer.app.features.mechanism.incidences import (
     Approach,
     approaches,
     hovered_margin,
-    is_shown,
 )
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import (
@@ -56,6 +55,22 @@ EDGES = np.array(list(itertools.combinations(range(4), 2)))
 OPACITY = 0.26
 
 
+# Share by which a tetrahedron is drawn smaller about its centroid, so that edges that two of them
+# share lie beside each other.
+INSET = 0.04
+# Pixels by which the edges of the filled tetrahedron are thicker, and thickness of one that fails.
+FILLED_EDGE, FAILING_EDGE = 1.0, 5.0
+
+# Most dashes of one gap, their period in scene units, and the share that is drawn.
+DASHES, PERIOD, DRAWN = 32, 0.32, 0.6
+# Thickness of the dashes in pixels, when they fade in and in full.
+THIN, THICK = 1.0, 3.0
+FOOT_RADIUS = 0.13
+RING_RADIUS, RING_TUBE, CONTACT_RADIUS = 0.85, 0.09, 0.42
+# Ends of gaps that have no mark of their own, as margin and end: a1 and b4 have one.
+FEET = ((0, 1), (1, 0), (1, 1), (2, 0))
+
+
 @dataclass(frozen=True)
 class Stroke:
     """How the edges of a tetrahedron are drawn.
@@ -75,11 +90,6 @@ class Stroke:
 
 # Solid, dashed and dotted, as the lines of the margins in charts; what has gaps is thicker.
 STROKES = (Stroke(1, 1.0, 1.0, 1.8), Stroke(16, 0.9, 0.64, 2.4), Stroke(30, 0.5, 0.36, 3.0))
-# Share by which a tetrahedron is drawn smaller about its centroid, so that edges that two of them
-# share lie beside each other.
-INSET = 0.04
-# Pixels by which the edges of the filled tetrahedron are thicker, and thickness of one that fails.
-FILLED_EDGE, FAILING_EDGE = 1.0, 5.0
 
 
 class Tetrahedra(ScenePart):
@@ -112,7 +122,7 @@ class Tetrahedra(ScenePart):
         for index, approach in enumerate(each):
             corners = np.array([placed.points[name] for name in TETRAHEDRA[index]])
             centre = corners.mean(axis=0)
-            shown, fails = is_shown(placed, index, approach), index in failing
+            shown, fails = approach.is_shown, index in failing
             inner = corners + INSET * (centre - corners)
             yield from self._draw_edges(index, inner, approach, shown=shown, fails=fails)
             is_named = shown and not approach.has_label and state.view.labels
@@ -138,16 +148,6 @@ class Tetrahedra(ScenePart):
         yield edges, "thickness", FAILING_EDGE if fails else thickness
 
 
-# Most dashes of one gap, their period in scene units, and the share that is drawn.
-DASHES, PERIOD, DRAWN = 32, 0.32, 0.6
-# Thickness of the dashes in pixels, when they fade in and in full.
-THIN, THICK = 1.0, 3.0
-FOOT_RADIUS = 0.13
-RING_RADIUS, RING_TUBE, CONTACT_RADIUS = 0.85, 0.09, 0.42
-# Ends of gaps that have no mark of their own, as margin and end: a1 and b4 have one.
-FEET = ((0, 1), (1, 0), (1, 1), (2, 0))
-
-
 class Gaps(ScenePart):
     """The gaps that are near, each with its ends and its label, and the contacts."""
 
@@ -165,7 +165,7 @@ class Gaps(ScenePart):
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the gaps of this frame."""
-        shown = shown_gaps(placed, self._hovered.row)
+        shown = visible_gaps(placed, self._hovered.row)
         ends = {i: each.ends for i, each in shown.items() if each.ends is not None}
         closed = {i: each for i, each in ends.items() if shown[i].is_touching}
         gaps = {i: each for i, each in ends.items() if i not in closed}
@@ -186,7 +186,7 @@ class Gaps(ScenePart):
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the ends of the gaps to incidences that are below their warning value."""
-        shown = shown_gaps(placed, None).values()
+        shown = visible_gaps(placed, None).values()
         ends = [each.ends for each in shown if each.ends is not None and each.level < 1.0]
         return np.concatenate(ends) if ends else NO_POINTS
 
@@ -217,7 +217,7 @@ class Gaps(ScenePart):
         yield from self._contacts.place(positions, turned_to(normals), scales)
 
 
-def shown_gaps(placed: Placed, hovered: int | None) -> dict[int, Approach]:
+def visible_gaps(placed: Placed, hovered: int | None) -> dict[int, Approach]:
     """Return the incidences whose gaps are shown, by the index of their margin.
 
     Args:
@@ -227,7 +227,7 @@ def shown_gaps(placed: Placed, hovered: int | None) -> dict[int, Approach]:
     return {
         index: each
         for index, each in enumerate(approaches(placed, hovered))
-        if each.has_gap and is_shown(placed, index, each)
+        if each.has_gap and each.is_shown
     }
 
 

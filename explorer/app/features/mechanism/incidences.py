@@ -27,6 +27,25 @@ from explorer.app.widgets.assigning import Update
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import proximity_colour
 
+HOVER = "margins.hover"
+# Level, in warning values, from which on an incidence fades in.
+FADE_FROM = 2.0
+# Presence at which lines and planes have reached the ends of the gap.
+ARRIVED = 0.5
+# Farthest that an end of a gap may be from its flag's point, and the longest gap, in reaches.
+FARTHEST = 2.0
+# Length of a gap, as a share of the reach, up to which its ends are one point to the eye.
+CLOSED = 1e-6
+
+POINT_RADIUS = 0.36
+LINE_RADIUS = 0.075
+PLANE_OPACITY = 0.2
+# How far lines and planes go on beyond the end of a gap, as a share of the reach.
+BEYOND = 0.06
+# Ends of a gap.
+BASE, PLATFORM = 0, 1
+ALONG_X = turned_to(np.array([[1.0, 0.0, 0.0]]))[0]
+
 
 class HoveredRow:
     """The row of a table on which a pointer rests.
@@ -64,17 +83,6 @@ class HoveredRow:
             self._session.redraw()
 
 
-HOVER = "margins.hover"
-# Level, in warning values, from which on an incidence fades in.
-FADE_FROM = 2.0
-# Presence at which lines and planes have reached the ends of the gap.
-ARRIVED = 0.5
-# Farthest that an end of a gap may be from its flag's point, and the longest gap, in reaches.
-FARTHEST = 2.0
-# Length of a gap, as a share of the reach, up to which its ends are one point to the eye.
-CLOSED = 1e-6
-
-
 @dataclass(frozen=True)
 class Approach:
     """How near one incidence is.
@@ -82,7 +90,7 @@ class Approach:
     Attributes:
         level: Its level, see `explorer.measures.verdict`.
         presence: How much of it is shown: 0 where it is far, 1 at the warning value and below.
-        is_hovered: Whether a pointer rests on the row of its margin.
+        is_shown: Whether its tetrahedron and its gap are shown at all.
         is_filled: Whether its tetrahedron is filled: that of the row that is pointed at, otherwise
             the nearest one, once it fades in.
         is_touching: Whether the incidence holds and its gap is closed; parallel lines leave one.
@@ -92,7 +100,7 @@ class Approach:
 
     level: float
     presence: float
-    is_hovered: bool
+    is_shown: bool
     is_filled: bool
     is_touching: bool
     ends: FloatArray | None
@@ -138,35 +146,19 @@ def approaches(placed: Placed, hovered: int | None) -> tuple[Approach, Approach,
 
     def approach(index: int) -> Approach:
         level, is_hovered = levels[index], index + 1 == hovered
+        is_on = placed.frame.state.view.tetrahedra[index] or is_hovered
         faded_in = min(1.0, max(0.0, (FADE_FROM - level) / (FADE_FROM - 1.0)))
         return Approach(
             level,
             1.0 if is_hovered else faded_in,
-            is_hovered,
+            # Like the flags, it would stand among parts that are drawn apart.
+            is_on and not placed.is_apart,
             index == filled,
             level == 0.0 and gaps.lengths[index] <= CLOSED * reach,
             ends[index] if farthest[index] <= FARTHEST * reach else None,
         )
 
     return approach(0), approach(1), approach(2)
-
-
-def is_shown(placed: Placed, index: int, approach: Approach) -> bool:
-    """Whether the tetrahedron of a margin and its gap are shown at all."""
-    # Like the flags, they would stand among parts that are drawn apart.
-    if placed.is_apart:
-        return False
-    return placed.frame.state.view.tetrahedra[index] or approach.is_hovered
-
-
-POINT_RADIUS = 0.36
-LINE_RADIUS = 0.075
-PLANE_OPACITY = 0.2
-# How far lines and planes go on beyond the end of a gap, as a share of the reach.
-BEYOND = 0.06
-# Ends of a gap.
-BASE, PLATFORM = 0, 1
-ALONG_X = turned_to(np.array([[1.0, 0.0, 0.0]]))[0]
 
 
 class Extent(NamedTuple):

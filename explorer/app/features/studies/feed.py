@@ -116,11 +116,7 @@ class StudyDrawing:
             step: 1 for the next design, −1 for the previous one.
         """
         indices: list[int] = self.results.columns["index"][self.front_inside].tolist()
-        if not indices:
-            return None
-        if picked not in indices:
-            return indices[0]
-        at = indices.index(picked) + step
+        at = indices.index(picked) + step if picked in indices else 0
         return indices[at] if 0 <= at < len(indices) else None
 
 

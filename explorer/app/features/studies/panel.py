@@ -1,22 +1,31 @@
-"""The tab of studies: open one, brush and pick in its plots, start a small one."""
+"""The tab of studies: open one, brush and pick in its two plots, start a small one.
+
+viser's plots report nothing to the server. The script `plots` sends each of their events as a press
+whose value is a line of JSON. The server draws brushes and picks, for every browser.
+"""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator
-from typing import Literal
+from importlib.util import find_spec
+from typing import Annotated, Any, Literal, cast
 
+import msgspec
 import viser
 
+from explorer.app.browser.browser_facts import decode_text
+from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
-from explorer.app.features.studies.actions import OpenStudy, PickDesign, free_axes
-from explorer.app.features.studies.feed import StudyDrawing
-from explorer.app.features.studies.plots import HINT, StudyPlots
+from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
+from explorer.app.features.studies.feed import PlotJson, StudyDrawing
 from explorer.app.features.studies.words import ALONG, BUTTONS, acts, chips, head, legend, table
-from explorer.app.features.studies.work import Run, study_feed, study_runner
+from explorer.app.features.studies.work import StudyRun, study_runner
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Control
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.tracks import Span
+from explorer.app.look import read_script
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set
@@ -27,6 +36,7 @@ from explorer.app.state.studies import (
     LEAST_PERCENT,
     MOST,
     MOST_PERCENT,
+    Brush,
     Studies,
     StudyPlan,
     label_of,
@@ -40,12 +50,106 @@ from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import Design
 from explorer.sweep.study import NAMES
 
+# Height over width.
+PARALLEL_ASPECT, SCATTER_ASPECT = 0.28, 0.42
+HINT = 'Plots of studies need the extra study: pip install "flagged-explorer[study]"'
+EMPTY = '{"data":[],"layout":{}}'
+
+
 Axis = Literal["across", "up", "colour"]
 AXES: dict[Axis, tuple[str, str]] = {
     "across": ("Across", "Measure or variable from left to right in the scatter plot."),
     "up": ("Up", "Measure or variable from bottom to top in the scatter plot."),
     "colour": ("Coloured by", "Measure or variable that colours the designs in both plots."),
 }
+
+
+class StudyPlots:
+    """Parallel lines and a scatter plot.
+
+    They are added when first needed, since each browser then loads Plotly, some 5 MB.
+
+    Args:
+        services: Services of the page.
+        pick: Function that opens the design with an index in the open study.
+        before: Elements of the tab after which the lines and the points come.
+    """
+
+    def __init__(
+        self,
+        services: Services,
+        pick: Callable[[int, Who], None],
+        before: tuple[viser.GuiHtmlHandle, viser.GuiHtmlHandle],
+    ) -> None:
+        self._server = services.server
+        self._tab = services.tab
+        self._session = services.session
+        self._pick = pick
+        self._before = before
+        services.buttons.on("studies.plot", self._receive)
+        self.handles: tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle] | None = None
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether Plotly is installed."""
+        return find_spec("plotly") is not None
+
+    def updates(self, drawing: StudyDrawing | None) -> Iterator[Update]:
+        """Yield the updates that show a drawing."""
+        plots = None if drawing is None else drawing.plots
+        if plots is not None and self.handles is None and self.is_possible:
+            self.handles = self._add()
+        if self.handles is None:
+            return
+        for handle in self.handles:
+            yield handle, "visible", plots is not None
+        if plots is not None:
+            for handle, plot in zip(self.handles, plots, strict=True):
+                yield handle, "figure", plot
+
+    def _add(self) -> tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle]:
+        gui = self._server.gui
+        # viser only calls `to_json` of a figure.
+        empty = cast("Any", PlotJson(EMPTY))
+        # Each plot comes between the elements before and after it.
+        after_lines, after_points = (handle.order + 0.5 for handle in self._before)
+        with self._tab or contextlib.nullcontext():
+            lines = gui.add_plotly(empty, aspect=PARALLEL_ASPECT, order=after_lines)
+            points = gui.add_plotly(empty, aspect=SCATTER_ASPECT, order=after_points)
+        run_script(self._server, read_script("plots"))
+        return lines, points
+
+    def _receive(self, line: str, client: viser.ClientHandle) -> None:
+        event = event_of(line)
+        # An event in the plot of another study is out of date.
+        if event is None or event.study != self._session.state.studies.name:
+            return
+        if event.index is not None:
+            self._pick(event.index, client.client_id)
+        elif event.brushes:
+            self._session.do(BrushAxes(event.brushes), who=client.client_id)
+
+
+class PlotEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A click on a design in a plot, or a change of its brushes.
+
+    Attributes:
+        study: Name of the study of the plot.
+        index: Index of the design; None for a brush.
+        brushes: New ranges of axes; an axis without ranges is freed.
+    """
+
+    study: str
+    index: Annotated[int, msgspec.Meta(ge=0, le=2**31)] | None = None
+    brushes: tuple[Brush, ...] = ()
+
+
+_DECODER = msgspec.json.Decoder(PlotEvent)
+
+
+def event_of(line: str) -> PlotEvent | None:
+    """Return the event in a line of JSON; None if the script did not write it."""
+    return decode_text(line, _DECODER)
 
 
 class StudiesPanel:
@@ -79,19 +183,17 @@ class StudiesPanel:
             self._add_new_study(gui)
         lines_after = gui.add_html("")
         self._axes_mark = gui.add_html(beside(3), visible=False)
-        self._places: dict[Axis, viser.GuiDropdownHandle[str]] = {
-            axis: gui.add_dropdown(label, none, hint=hint, visible=False)
-            for axis, (label, hint) in AXES.items()
-        }
-        self._axes = [
-            Control[str](session, handle, Bound(self._read_axis(axis), self._write_axis(axis)))
-            for axis, handle in self._places.items()
-        ]
+        self._axes: list[tuple[viser.GuiDropdownHandle[str], Control[str]]] = []
+        for axis, (label, hint) in AXES.items():
+            handle = gui.add_dropdown(label, none, hint=hint, visible=False)
+            bound = Bound(self._read_axis(axis), self._write_axis(axis))
+            self._axes.append((handle, Control[str](session, handle, bound)))
         self.legend = gui.add_html("")
         points_after = gui.add_html(beside(2, wide=True))
         self.plots = StudyPlots(services, self.pick, (lines_after, points_after))
         self.table = gui.add_html("")
-        self.feed, self.runner = services.get(study_feed), services.get(study_runner)
+        self.runner = services.get(study_runner)
+        self.feed = self.runner.feed
         self._add_buttons(services.buttons)
         self._key: tuple[object, ...] = ()
 
@@ -105,12 +207,11 @@ class StudiesPanel:
         axes = (NO_OPTION,) if drawing is None or drawing.plotted is None else drawing.plotted.axes
         has_axes = axes != (NO_OPTION,)
         yield self._axes_mark, "visible", has_axes
-        for handle in self._places.values():
+        for handle, control in self._axes:
             yield handle, "options", axes
             yield handle, "visible", has_axes
-        for control in self._axes:
             yield from control.updates(frame)
-        is_new = self._is_new(studies, run)
+        is_new = run is None and (self._is_new_asked or studies.name is None)
         yield self.form, "visible", is_new
         yield from self._controls.updates(frame)
         # The texts are made again only after a change.
@@ -120,10 +221,6 @@ class StudiesPanel:
             return
         self._key = key
         yield from self._texts(studies, drawing, run, design, is_new=is_new)
-
-    def _is_new(self, studies: Studies, run: Run | None) -> bool:
-        """Return whether the settings of a new study are shown."""
-        return run is None and (self._is_new_asked or studies.name is None)
 
     def pick(self, index: int, who: Who) -> None:
         """Open the design with an index in the open study."""
@@ -142,22 +239,18 @@ class StudiesPanel:
         self,
         studies: Studies,
         drawing: StudyDrawing | None,
-        run: Run | None,
+        run: StudyRun | None,
         design: Design,
         *,
         is_new: bool,
     ) -> Iterator[Update]:
-        yield (
-            self._acts,
-            "content",
-            acts(
-                is_new=is_new,
-                is_open=studies.name is not None,
-                is_complete=drawing is None or drawing.is_complete,
-                run=run,
-            ),
-        )
-        problem = None if is_new else self._problem()
+        can_go_on = drawing is not None and not drawing.is_complete
+        yield self._acts, "content", acts(studies, run, is_new=is_new, can_go_on=can_go_on)
+        problem = None
+        if not is_new and self.feed.problem is not None:
+            problem = alert("This study cannot be shown", self.feed.problem)
+        elif not is_new and not self.plots.is_possible:
+            problem = alert("No plots", HINT)
         plan = studies.plan if is_new else None
         lines = head(None if problem else drawing, run, plan, design.name)
         yield self._head, "content", lines + (problem or "")
@@ -167,11 +260,6 @@ class StudiesPanel:
         yield self.legend, "content", "" if seen is None else legend(seen)
         yield self.table, "content", "" if seen is None else table(seen)
         yield self.chips, "content", chips(studies.plan, design)
-
-    def _problem(self) -> str | None:
-        if self.feed.problem is not None:
-            return alert("This study cannot be shown", self.feed.problem)
-        return None if self.plots.is_possible else alert("No plots", HINT)
 
     def _read_axis(self, axis: Axis) -> Callable[[Frame], str]:
         def read(_: Frame) -> str:

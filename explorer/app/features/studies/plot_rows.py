@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from explorer.app.state.studies import Studies, within
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.sweep.results import Results, costs
-from explorer.sweep.study import Study
 
 MOST_ROWS = 5000
 """Largest number of rows drawn; of more rows, the front and some of the others."""
@@ -34,6 +32,8 @@ class PlotRows:
         inside: Whether each row lies within all brushes, shape (n,).
         studies: Open study, brushes, axes and pick.
         axes: Variables and measures that differ between rows.
+        across, up: Axes of the scatter plot, from left to right and from bottom to top.
+        colour: Axis that colours the plots.
         rows: Rows with values on both axes of the scatter plot, ascending.
         lines: Rows with values on all axes of the parallel lines, ascending.
         count: Number of rows with values on both axes of the scatter plot, drawn or not.
@@ -45,25 +45,13 @@ class PlotRows:
     inside: BoolArray
     studies: Studies
     axes: tuple[str, ...]
+    across: str
+    up: str
+    colour: str
     rows: IntArray
     lines: IntArray
     count: int
     lacking: tuple[int, tuple[str, ...]]
-
-    @property
-    def across(self) -> str:
-        """The axis of the scatter plot from left to right."""
-        return _chosen(self.results.study, self.axes, self.studies.across, 0)
-
-    @property
-    def up(self) -> str:
-        """The axis of the scatter plot from bottom to top."""
-        return _chosen(self.results.study, self.axes, self.studies.up, 1)
-
-    @property
-    def colour(self) -> str:
-        """The axis that colours the plots."""
-        return _chosen(self.results.study, self.axes, self.studies.colour, 0)
 
     def column(self, name: str) -> FloatArray:
         """Return the values of all rows."""
@@ -72,7 +60,7 @@ class PlotRows:
     @property
     def picked(self) -> IntArray:
         """The row of the picked design, none or one, shape (0 or 1,)."""
-        return np.flatnonzero(self.results.columns["index"] == _index(self.studies.picked))
+        return np.flatnonzero(_is_picked(self.results, self.studies))
 
 
 def select_rows(results: Results, front: BoolArray, studies: Studies) -> PlotRows | None:
@@ -92,17 +80,24 @@ def select_rows(results: Results, front: BoolArray, studies: Studies) -> PlotRow
     axes = tuple(name for name, rows in has_value.items() if _has_spread(columns[name][rows]))
     if len(axes) < 2:
         return None
-    across = _chosen(study, axes, studies.across, 0)
-    up = _chosen(study, axes, studies.up, 1)
+    # Without a choice: the first objectives, then measures, then variables.
+    objectives = [objective.measure for objective in study.objectives]
+    order = dict.fromkeys((*objectives, *study.measures, *study.varied))
+    first, second = [name for name in order if name in axes][:2]
+    across = studies.across if studies.across in axes else first
+    up = studies.up if studies.up in axes else second
     on_lines = np.all([has_value[name] for name in axes], axis=0)
     points, lines = np.flatnonzero(has_value[across] & has_value[up]), np.flatnonzero(on_lines)
-    keep = front | (columns["index"] == _index(studies.picked))
+    keep = front | _is_picked(results, studies)
     return PlotRows(
         results,
         front,
         within(columns, studies.brushes),
         studies,
         axes,
+        across,
+        up,
+        studies.colour if studies.colour in axes else first,
         thin_out(points, keep[points], MOST_ROWS),
         thin_out(lines, keep[lines], MOST_ROWS),
         len(points),
@@ -126,20 +121,6 @@ def thin_out(rows: IntArray, keep: BoolArray, most: int) -> IntArray:
     kept = _spread(rows[keep], most)
     others = _spread(rows[~keep], most - len(kept))
     return np.sort(np.concatenate([kept, others]))
-
-
-def default_axes(study: Study, axes: Sequence[str]) -> tuple[str, str]:
-    """Return two different axes: the first objectives, then measures, then variables."""
-    objectives = [objective.measure for objective in study.objectives]
-    order = dict.fromkeys((*objectives, *study.measures, *study.varied))
-    first, second = [name for name in order if name in axes][:2]
-    return first, second
-
-
-def _chosen(study: Study, axes: Sequence[str], name: str | None, place: int) -> str:
-    if name is not None and name in axes:
-        return name
-    return default_axes(study, axes)[place]
 
 
 def sort_front(results: Results, front: BoolArray) -> IntArray:
@@ -170,5 +151,5 @@ def _has_spread(values: NDArray[Any]) -> bool:
     return high - low > NO_SPREAD * max(abs(low), abs(high))
 
 
-def _index(picked: int | None) -> int:
-    return -1 if picked is None else picked
+def _is_picked(results: Results, studies: Studies) -> BoolArray:
+    return results.columns["index"] == (-1 if studies.picked is None else studies.picked)

@@ -10,9 +10,10 @@ import numpy as np
 from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.figures import FRONT, PICKED, SCALE
 from explorer.app.features.studies.plot_rows import MOST_ROWS
-from explorer.app.features.studies.work import Run
+from explorer.app.features.studies.work import StudyRun
 from explorer.app.state.studies import (
     RADIUS,
+    Studies,
     StudyPlan,
     choices_for,
     label_of,
@@ -22,7 +23,7 @@ from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import box, by_theme, dim, meter, signed
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import Design
-from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.arrays import IntArray
 from explorer.numerics.number_text import decimals_for, format_number
 from explorer.optimise.problem import REACH, YAW
 from explorer.sweep.machine import MACHINE
@@ -118,7 +119,7 @@ def failures(drawing: StudyDrawing) -> str:
     )
 
 
-def run_words(run: Run) -> str:
+def run_words(run: StudyRun) -> str:
     """Return how far a study that is being computed is, as HTML."""
     progress = run.progress
     if progress is None:
@@ -128,11 +129,15 @@ def run_words(run: Run) -> str:
         if progress.rate > 0.0:
             words += f" · {format_number(progress.rate, 3)} a second"
         if left := progress.seconds_left:
-            words += f" · {duration(left)} left"
+            whole = max(1, round(left))
+            duration = f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"
+            words += f" · {duration} left"
     return f"{escape(run.name)}: {words}{' · ending' if run.is_cancelled else ''}"
 
 
-def head(drawing: StudyDrawing | None, run: Run | None, plan: StudyPlan | None, design: str) -> str:
+def head(
+    drawing: StudyDrawing | None, run: StudyRun | None, plan: StudyPlan | None, design: str
+) -> str:
     """Return the lines on top of the tab as HTML.
 
     Args:
@@ -156,14 +161,14 @@ def head(drawing: StudyDrawing | None, run: Run | None, plan: StudyPlan | None, 
     return box(*parts)
 
 
-def acts(*, is_new: bool, is_open: bool, is_complete: bool, run: Run | None) -> str:
+def acts(studies: Studies, run: StudyRun | None, *, is_new: bool, can_go_on: bool) -> str:
     """Return the buttons on top of the tab as HTML.
 
     Args:
-        is_new: Whether a new study is being set up.
-        is_open: Whether a study is open.
-        is_complete: Whether all of its designs are computed.
+        studies: The open study.
         run: The study that is being computed; None if none is.
+        is_new: Whether a new study is being set up.
+        can_go_on: Whether designs of the open study are missing.
     """
     if run is not None:
         buttons = _button("cancel")
@@ -171,9 +176,8 @@ def acts(*, is_new: bool, is_open: bool, is_complete: bool, run: Run | None) -> 
         back = press_button(
             "studies.new", "off", "Back", hint="Return to the open study", class_name="ex-button"
         )
-        buttons = back * is_open + _button("start", is_main=True)
+        buttons = back * (studies.name is not None) + _button("start", is_main=True)
     else:
-        can_go_on = is_open and not is_complete
         buttons = _button("continue", is_main=True) * can_go_on + _button("new", value="on")
     return box(f'<div class="ex-ends ex-acts-line">{buttons}</div>')
 
@@ -182,12 +186,6 @@ def _button(name: str, *, value: str = "", is_main: bool = False) -> str:
     words, hint = BUTTONS[name]
     look = "ex-button is-main" if is_main else "ex-button"
     return press_button(f"studies.{name}", value, words, hint=hint, class_name=look)
-
-
-def duration(seconds: float) -> str:
-    """Return a duration in seconds, or in minutes and seconds."""
-    whole = max(1, round(seconds))
-    return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"
 
 
 def legend(drawing: StudyDrawing) -> str:
@@ -226,12 +224,18 @@ def table(drawing: StudyDrawing) -> str:
     rows = window(drawing.front_inside, drawing.request.studies.picked, results.columns["index"])
     if not len(rows):
         return ""
-    names = table_columns(study)
+    objectives = [objective.measure for objective in study.objectives]
+    names = tuple(dict.fromkeys((*objectives, *study.varied)))[:MOST_COLUMNS]
     head = "".join(
         f'<span title="{escape(_hint(name))}">{escape(label_of(name))}{_arrow(study, name)}</span>'
         for name in names
     )
-    decimals = {name: _decimals(results.columns[name][drawing.front]) for name in names}
+    # As many decimals as give the largest value on the front four digits.
+    largest = {name: np.abs(results.columns[name][drawing.front]).max(initial=0) for name in names}
+    decimals = {
+        name: min(6, decimals_for(float(size), 4)) if size > 0 else 0
+        for name, size in largest.items()
+    }
     lines = "".join(_line(drawing, int(row), decimals) for row in rows.tolist())
     count, inside = len(drawing.front), len(drawing.front_inside)
     among = format_number(count)
@@ -258,18 +262,6 @@ def _steps() -> str:
         for words, step in ALONG.items()
     )
     return f'<span class="ex-ends">{"".join(buttons)}</span>'
-
-
-def table_columns(study: Study) -> tuple[str, ...]:
-    """Return the columns of the table: the objectives, then the varied values."""
-    objectives = [objective.measure for objective in study.objectives]
-    return tuple(dict.fromkeys((*objectives, *study.varied)))[:MOST_COLUMNS]
-
-
-def _decimals(values: FloatArray) -> int:
-    """Return the decimals that give the largest of some values four digits."""
-    largest = float(np.abs(values).max(initial=0.0))
-    return min(6, decimals_for(largest, 4)) if largest > 0.0 else 0
 
 
 def _line(drawing: StudyDrawing, row: int, decimals: Mapping[str, int]) -> str:
@@ -320,15 +312,18 @@ def chips(plan: StudyPlan, design: Design) -> str:
         for name, sense in ((name, plan.sense_of(name)) for name in measures)
     )
     return box(
-        _title("Variables that vary; press to choose"),
-        f'<div class="ex-flow">{varying}</div>',
-        _title("Measures; press to measure, again to maximise ↑, to minimise ↓, to leave out"),
-        f'<div class="ex-flow">{measured}</div>',
+        *(
+            f'<div class="ex-caption ex-small ex-after">{title}</div>'
+            f'<div class="ex-flow">{switches}</div>'
+            for title, switches in (
+                ("Variables that vary; press to choose", varying),
+                (
+                    "Measures; press to measure, again to maximise ↑, to minimise ↓, to leave out",
+                    measured,
+                ),
+            )
+        ),
     )
-
-
-def _title(words: str) -> str:
-    return f'<div class="ex-caption ex-small ex-after">{words}</div>'
 
 
 def _arrow(study: Study, name: str) -> str:

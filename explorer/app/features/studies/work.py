@@ -35,7 +35,7 @@ DIED = "the study's process died; finished designs are kept, and Continue starts
 
 
 @dataclass(frozen=True)
-class Run:
+class StudyRun:
     """A study that is being computed.
 
     Attributes:
@@ -80,8 +80,8 @@ def run_in_worker(study: Study, folder: Path, channel: Channel) -> Progress:
         workers.shutdown(cancel_futures=True)
 
 
-def study_feed(services: Services) -> StudyFeed:
-    """Return the drawings of the studies of a page; for `Services.get`.
+def study_runner(services: Services) -> StudyRunner:
+    """Return the runner of the studies of a page, and with it their drawings; for `Services.get`.
 
     Raises:
         RuntimeError: the page offers no studies.
@@ -89,18 +89,8 @@ def study_feed(services: Services) -> StudyFeed:
     if services.studies is None:
         raise RuntimeError("a page without folders of studies draws none")
     feed = StudyFeed(services.studies, services.session.redraw)
-    services.at_end(feed.stop)
-    return feed
-
-
-def study_runner(services: Services) -> StudyRunner:
-    """Return the runner of the studies of a page; for `Services.get`.
-
-    Raises:
-        RuntimeError: the page offers no studies.
-    """
-    feed = services.get(study_feed)
     runner = StudyRunner(services.session, feed, services.complain)
+    services.at_end(feed.stop)
     services.at_end(runner.stop)
     return runner
 
@@ -112,31 +102,22 @@ class StudyRunner:
         session: Session in which studies are opened.
         feed: Drawings of the studies, renewed with new results.
         complain: Called with a message and the client that it is for.
+
+    Attributes:
+        run: The study that is being computed; None if none is.
     """
 
     def __init__(
-        self,
-        session: Session,
-        feed: StudyFeed,
-        complain: Callable[[str, Who], None],
+        self, session: Session, feed: StudyFeed, complain: Callable[[str, Who], None]
     ) -> None:
-        self.worker = Worker(
-            lambda message: complain(message, None),
-            preload=[__name__],
-            died=DIED,
-        )
+        self.worker = Worker(lambda message: complain(message, None), preload=[__name__], died=DIED)
         self._session = session
-        self._feed = feed
+        self.feed = feed
         self._complain = complain
         self._lock = threading.Lock()
-        self._run: Run | None = None
+        self.run: StudyRun | None = None
         self._order = 0
         self._drawn = 0.0
-
-    @property
-    def run(self) -> Run | None:
-        """The study that is being computed, if one is."""
-        return self._run
 
     def start(self, design: Design, plan: StudyPlan, who: Who = None) -> None:
         """Start a small study around a design, and open it.
@@ -146,13 +127,21 @@ class StudyRunner:
             plan: Variables and measures of the study.
             who: Client that gets the message if it cannot be started.
         """
-        self._begin(lambda: self._new(design, plan), who)
+
+        def make() -> tuple[Study, Path]:
+            folder = self.feed.folders.new(design.name)
+            study = study_around(design, plan, folder.name)
+            # The study can be opened and continued before its first part is there.
+            keep_study(folder, study)
+            return study, folder
+
+        self._begin(make, who)
 
     def go_on(self, name: str, who: Who = None) -> None:
         """Continue a study that is not complete."""
 
         def load() -> tuple[Study, Path]:
-            folder = self._feed.folders.folder(name)
+            folder = self.feed.folders.folder(name)
             return study_in(folder), folder
 
         self._begin(load, who)
@@ -160,71 +149,61 @@ class StudyRunner:
     def cancel(self) -> None:
         """End the present study; finished designs are kept."""
         with self._lock:
-            if self._run is None or self._run.is_cancelled:
+            if self.run is None or self.run.is_cancelled:
                 return
-            self._run = replace(self._run, is_cancelled=True)
+            self.run = replace(self.run, is_cancelled=True)
             order = self._order
         self.worker.cancel(order, PATIENCE)
         self._session.redraw()
 
     def wait_until_idle(self, timeout: float = 60.0) -> bool:
         """Wait until no study is being computed; return whether none is."""
-        return self.worker.wait_until_idle(timeout) and self._run is None
+        return self.worker.wait_until_idle(timeout) and self.run is None
 
     def stop(self) -> None:
         """End the process."""
         self.worker.stop()
 
-    def _new(self, design: Design, plan: StudyPlan) -> tuple[Study, Path]:
-        folder = self._feed.folders.new(design.name)
-        study = study_around(design, plan, folder.name)
-        # The study can be opened and continued before its first part is there.
-        keep_study(folder, study)
-        return study, folder
-
     def _begin(self, make_study: Callable[[], tuple[Study, Path]], who: Who) -> None:
         with self._lock:
-            if self._run is not None:
-                message = f"the study {self._run.name!r} is being computed: wait, or cancel it"
+            if self.run is not None:
+                message = f"the study {self.run.name!r} is being computed: wait, or cancel it"
                 self._complain(message, who)
                 return
             try:
                 study, folder = make_study()
-                folders = self._feed.folders.by_name()
+                folders = self.feed.folders.by_name()
                 name = next((name for name, path in folders.items() if path == folder), None)
                 if name is None:
                     raise InputError(f"{str(folder)!r} holds no study")
             except ExplorerError as error:
                 self._complain(str(error), who)
                 return
-            self._run = Run(name, study)
+            self.run = StudyRun(name, study)
             self._order = self.worker.submit(
                 "study",
                 run_in_worker,
                 (study, folder),
-                self._ended,
-                self._failed,
+                lambda _: self._finish(),
+                self._report_failure,
                 receive=self._receive,
             )
-        self._feed.look()
+        self.feed.look()
         self._session.do(OpenStudy(name), who=who)
 
     def _receive(self, progress: Progress) -> None:
         with self._lock:
-            if self._run is not None:
-                self._run = replace(self._run, progress=progress)
+            if self.run is not None:
+                self.run = replace(self.run, progress=progress)
         now = time.monotonic()
         if now - self._drawn >= PACE:
             self._drawn = now
-            self._feed.refresh()
+            self.feed.refresh()
         else:
             self._session.redraw()
 
-    def _ended(self, _: Progress) -> None:
-        self._finish()
-
-    def _failed(self, problem: str) -> None:
-        run = self._run
+    def _report_failure(self, problem: str) -> None:
+        run = self.run
         self._finish()
         # The process of a cancelled study may have been ended.
         if run is not None and not run.is_cancelled:
@@ -232,5 +211,5 @@ class StudyRunner:
 
     def _finish(self) -> None:
         with self._lock:
-            self._run = None
-        self._feed.refresh()
+            self.run = None
+        self.feed.refresh()

@@ -149,20 +149,11 @@ def shadow_outlines(placed: Placed, ground: float) -> list[FloatArray]:
         axes = PLATFORM_RADIUS * size * rotation[:, :2]
         outlines.append(_outline(p["b4"] + centres @ rotation.T, axes, ground))
     if view.legs and (placed.is_schematic or view.is_twin):
-        legs = [(p[base], p[tip]) for base, tip in TWIN] if view.is_twin else _legs(placed)
+        twin = [(p[base], p[tip]) for base, tip in TWIN]
+        legs = twin if view.is_twin else list(zip(*placed.struts, strict=True))
         radius = 0.5 * (TUBE_RADIUS + ROD_RADIUS) * size * np.eye(3)[:, :2]
         outlines += [_outline(np.stack(leg), radius, ground) for leg in legs]
     return outlines
-
-
-def _legs(placed: Placed) -> list[tuple[FloatArray, FloatArray]]:
-    p, along = placed.points, np.array([1.0, 0.0, 0.0])
-    return [
-        (p["a1"], p["b1"]),
-        (p["b2"] * along, p["b2"]),
-        (p["b3"] * along, p["b3"]),
-        (p["a3"], p["b4"]),
-    ]
 
 
 def _outline(centres: FloatArray, axes: FloatArray, ground: float) -> FloatArray:

@@ -26,7 +26,7 @@ from explorer.app.features.workspace.tasks import (
     STEP,
     draw_workspace,
     export_mesh,
-    exported_name,
+    file_words,
     measure_volume,
 )
 from explorer.app.features.workspace.words import volume_text
@@ -70,7 +70,7 @@ def send_workspace(
     if state.view.at == "tool":
         x, y, z = state.offset(rows).tolist()
         offset = x, y, z
-    words = exported_name(region, what, offset).replace(" ", "-")
+    words = file_words(region, what, offset).replace(" ", "-")
     selection = Selection(design, rows, region, start, load)
     services.downloads.compute(
         who,

@@ -44,7 +44,6 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect, turn
 from explorer.app.widgets.commands import Key, shift
 from explorer.app.widgets.markup import alert, box, note, sentence
@@ -79,9 +78,6 @@ COLOURINGS: dict[str, Measure] = {
     "1 / cond J": "condition",
     **{words: measure for measure, (words, _, _) in MEASURE_WORDS.items()},
 }
-NEED_NO_LIMITS = [MEASURE_WORDS[measure][0] for measure in ("force", "bending")]
-# The button of a colouring that needs no limits.
-COLOUR = "workspace.colour"
 ORIENTATIONS = {"of the present pose": "pose", "of the home pose": "home"}
 CUTS: dict[str, Axis | None] = {"none": None, "x": "x", "y": "y", "z": "z"}
 """Axis of the cut by the words on its button."""
@@ -102,7 +98,7 @@ class WorkspacePanel:
         # The drawing whose solid is cut, and its map where the page shows it.
         self._drawing: WorkspaceDrawing | None = None
         self._mapped: SliceMap | None = None
-        self._show, self._cuts = _shown_chips(services), _cut_chips(services)
+        self._show, self._cuts = _part_chips(services), _cut_chips(services)
         self._top = gui.add_html("")
         controls.dropdown(
             "Region",
@@ -158,7 +154,6 @@ class WorkspacePanel:
             )
         buttons.on("workspace.go", self._go_to)
         buttons.on("workspace.read", self._read)
-        buttons.on(COLOUR, self._colour_by, values=COLOURINGS)
         run_script(services.server, read_script("map"))
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -175,7 +170,7 @@ class WorkspacePanel:
         yield self._legend, "visible", view.colour != "plain" or mapped is not None
         words = ""
         if colour != view.colour:
-            words = missing_input(view.colour, map(_colour_button, NEED_NO_LIMITS))
+            words = missing_input(view.colour)
         if colour != "plain" or mapped is not None:
             measure = map_measure(state.design, colour, holds=view.region == "held")
             warn = warnings(state.design.reach, state.warn_below)
@@ -234,11 +229,6 @@ class WorkspacePanel:
         if self._nearest_start is not None:
             self._session.do(StartThere(self._nearest_start), who=event.client_id)
 
-    def _colour_by(self, words: str, client: viser.ClientHandle) -> None:
-        """Colour by what a button in the legend names."""
-        action = Set("view.workspace.colour", COLOURINGS[words], "Colour by", words)
-        self._session.do(action, who=client.client_id)
-
     def _go_to(self, text: str, client: viser.ClientHandle) -> None:
         """Move the point to a position that a page sent, in the orientation of the map."""
         position: Triple | None = decode_text(text, _POSITION)
@@ -256,7 +246,7 @@ class WorkspacePanel:
             run_script_in(client, call_script("map", text, mapped.words_at(position)))
 
 
-def _shown_chips(services: Services) -> Chips:
+def _part_chips(services: Services) -> Chips:
     """Return the switches of what is shown."""
     chips = {
         name: Chip(
@@ -304,12 +294,6 @@ def _set_cut(view: WorkspaceView, axis: Axis | None, words: str) -> Action:
     level = view.level if axis in (None, view.cut) else None
     new = replace(view, cut=axis, level=level, solid=view.solid or axis is not None)
     return Set("view.workspace", new, "Cut open", words)
-
-
-def _colour_button(words: str) -> str:
-    """Return the button of a colouring as HTML."""
-    hint = f"Colour by the {words}."
-    return press_button(COLOUR, words, words, hint=hint, class_name="ex-link")
 
 
 def _region(frame: Frame) -> str:

@@ -215,17 +215,17 @@ def _scale_surface(
     surface: WorkspaceSurface, scale: float
 ) -> tuple[dict[Rgb, Drawn], NDArray[np.float32] | None]:
     """Return the shells of a surface in scene units, by colour, and its edges; None for none."""
-    shells = {shell.colour: _scaled(shell, scale) for shell in surface.shells}
+    shells = {shell.colour: _scale_shell(shell, scale) for shell in surface.shells}
     edges = np.asarray(scale * surface.edges, dtype=np.float32)
     return shells, edges if len(edges) else None
 
 
 @lru_cache(2)
 def _scale_hull(drawing: WorkspaceDrawing, scale: float) -> Drawn | None:
-    return None if drawing.hull is None else _scaled(drawing.hull, scale)
+    return None if drawing.hull is None else _scale_shell(drawing.hull, scale)
 
 
-def _scaled(shell: Shell, scale: float) -> Drawn:
+def _scale_shell(shell: Shell, scale: float) -> Drawn:
     vertices = np.asarray(shell.vertices * scale, dtype=np.float32)
     return vertices, np.asarray(shell.faces, dtype=np.uint32)
 

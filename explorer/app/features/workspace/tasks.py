@@ -245,7 +245,7 @@ def export_mesh(
         selection: The workspace or the part of it.
         tolerance: Chord tolerance, in design units.
         what: "workspace" or "hull".
-        file_format: A format of `explorer.export.mesh`, or `STEP`.
+        file_format: A format of `explorer.export.mesh`, or `STEP` for the workspace itself.
         offset: Vector from b4 to the tool point, of which the positions are; None for b4.
 
     Raises:
@@ -253,7 +253,7 @@ def export_mesh(
             library, or STEP of a solid without exact faces.
     """
     if file_format == STEP:
-        return _exact_file(selection, what, offset)
+        return _exact_file(selection, offset)
     from explorer.export.mesh import mesh_bytes
 
     design, region = selection.design, selection.region
@@ -268,26 +268,24 @@ def export_mesh(
     made = convex_hull(solid) if what == "hull" else solid
     if offset is not None:
         made = made.shifted(np.array(offset))
-    name = f"{design.name} {exported_name(region, what, offset)}"
+    name = f"{design.name} {file_words(region, what, offset)}"
     return mesh_bytes(made, file_format, design, name)
 
 
-def _exact_file(selection: Selection, what: str, offset: Triple | None) -> bytes:
+def _exact_file(selection: Selection, offset: Triple | None) -> bytes:
     """Return a STEP file of the workspace within the limits.
 
     Raises:
-        InputError: a hull, or a part of the workspace; neither has exact faces.
+        InputError: a part of the workspace, which has no exact faces.
         ExplorerError: as of `explorer.export.step.exact_workspace`.
     """
     design, region = selection.design, selection.region
-    meshes = "export it as 3mf, stl, glb, obj or ply"
-    if what == "hull":
-        raise InputError(f"STEP takes exact faces, and a convex hull consists of facets; {meshes}")
     if region != "limits":
         cause = "legs begin to collide" if region == "accessible" else "a part takes its limit"
         raise InputError(
             f"STEP takes exact faces, and the surface along which {cause} consists of facets; "
-            f'{meshes}, or choose the region "within the limits"'
+            "export it as 3mf, stl, glb, obj or ply, or choose the region "
+            '"within the limits"'
         )
     from explorer.export.step import exact_workspace, step_bytes
 
@@ -298,7 +296,7 @@ def _exact_file(selection: Selection, what: str, offset: Triple | None) -> bytes
     return step_bytes(moved, f"workspace of the tool of {design.name}")
 
 
-def exported_name(region: Region, what: str, offset: Triple | None = None) -> str:
+def file_words(region: Region, what: str, offset: Triple | None = None) -> str:
     """Return the name of a file with a "workspace" or a "hull", of b4 or of the tool point."""
     if offset is not None:
         what = f"{what} of the tool"

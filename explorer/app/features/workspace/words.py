@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from explorer.app.features.workspace.feeds import orientation_word, turned_suffix
@@ -45,9 +43,6 @@ from explorer.workspace.position_bands import (
     STEP_COLOURS,
 )
 
-# Bounds of a deviation that are told, in percent.
-DEVIATIONS = (0.001, 0.01, 0.1, 1.0)
-
 
 def volume_headline(frame: Frame, feed: Feed[Selection, MeasuredVolume]) -> str:
     """Return the volume within the limits in large type as HTML."""
@@ -56,8 +51,26 @@ def volume_headline(frame: Frame, feed: Feed[Selection, MeasuredVolume]) -> str:
         return alert("The volume could not be computed", feed.problem)
     if newest is None:
         return '<div class="ex-large ex-dim">computing …</div>'
+    measured, design = newest.measured, newest.request.design
+    if measured.volume <= 0.0:
+        content = alert(
+            "The workspace is empty", f"Emptied by: {', '.join(measured.empty_because)}."
+        )
+    else:
+        litres, size = (0.01 * design.unit_mm) ** 3, design.reach**3
+        cubic_cm, text = (
+            format_number(factor * measured.volume, 4, size=factor * size)
+            for factor in (1e3 * litres, litres)
+        )
+        where = f"within the limits, in the {orientation_word(frame)} orientation"
+        of_tool = ", of the tool" if frame.state.view.at == "tool" else ""
+        error = dim(f"± {format_number(measured.error, 1)}")
+        content = (
+            f'<div class="ex-line"><span class="ex-large">{volume_text(newest)}</span>{error}</div>'
+            + caption(f"{cubic_cm} cm³ ({text} l) {where}{of_tool}")
+        )
     look = "" if feed.is_current else "is-outdated"
-    return f'<div class="{look}">{_volume(newest, frame)}</div>'
+    return f'<div class="{look}">{content}</div>'
 
 
 def drawing_words(frame: Frame, feed: Feed[WorkspaceRequest, WorkspaceDrawing]) -> str:
@@ -143,30 +156,6 @@ def volume_text(drawing: MeasuredVolume | None) -> str:
     return f"{format_number(drawing.measured.volume, 6, size=size)} units³"
 
 
-def _volume(newest: MeasuredVolume, frame: Frame) -> str:
-    measured, design = newest.measured, newest.request.design
-    if measured.volume <= 0.0:
-        causes = ", ".join(measured.empty_because)
-        return alert("The workspace is empty", f"Emptied by: {causes}.")
-    where = f"within the limits, in the {orientation_word(frame)} orientation"
-    if frame.state.view.at == "tool":
-        where += ", of the tool"
-    return (
-        f'<div class="ex-line"><span class="ex-large">{volume_text(newest)}</span>'
-        f"{dim(f'± {format_number(measured.error, 1)}')}</div>"
-        + caption(f"{_litres(measured.volume, design)} {where}")
-    )
-
-
-def _litres(volume: float, design: Design) -> str:
-    litres = (0.01 * design.unit_mm) ** 3
-    size = design.reach**3
-    one, other = (
-        format_number(factor * volume, 4, size=factor * size) for factor in (1e3 * litres, litres)
-    )
-    return f"{one} cm³ ({other} l)"
-
-
 def workspace_details(frame: Frame, feed: Feed[WorkspaceRequest, WorkspaceDrawing]) -> str:
     """Return the numbers of the drawn workspace as HTML."""
     drawing = feed.drawing
@@ -198,59 +187,37 @@ def workspace_details(frame: Frame, feed: Feed[WorkspaceRequest, WorkspaceDrawin
 
 def _numbers(drawing: WorkspaceDrawing, state: State) -> str:
     """Return the table of nodes, extent and volumes."""
-    rows: list[tuple[str, str, str]] = []
     nodes, part, request = drawing.nodes, drawing.part, drawing.request
+    suffix = turned_suffix(request.design, request.rotation)
+    rows: list[str] = []
+
+    def add(name: str, value: str, hint: str) -> None:
+        rows.append(row(dim(name + suffix), value, hint=hint))
+
     if nodes is not None:
-        count, volume = format_number(nodes.count), nodes.volume
+        count, volume, which = format_number(nodes.count), nodes.volume, "Node"
         hint = "The paper's measure: grid nodes within the limits"
         volume_hint = "Nodes times step³; it overstates the volume"
-        names = "Nodes", "Node volume"
         if part is not None and part.node_count is not None:
             count = f"{format_number(part.node_count)} of {count}"
-            volume = part.node_count * nodes.step**3
+            volume, which = part.node_count * nodes.step**3, "Accessible node"
             hint = "Nodes that collision-free steps of the grid lead to, of all within the limits"
             volume_hint = "Accessible nodes times step³, the paper's measure"
-            names = "Accessible nodes", "Accessible node volume"
         elif part is not None and part.pairs:
             hint += "; too many to check each step between them"
-        rows += [
-            (names[0], count, hint),
-            (names[1], format_number(volume, 6), volume_hint),
-            ("Node step", format_number(nodes.step, 4), "Step of the grid, in design units"),
-        ]
+        add(f"{which}s", count, hint)
+        add(f"{which} volume", format_number(volume, 6), volume_hint)
+        add("Node step", format_number(nodes.step, 4), "Step of the grid, in design units")
     if drawing.extent is not None:
-        size = drawing.request.design.reach
+        size = request.design.reach
         ends = np.array(drawing.extent) + state.offset(request.rotation)
         name = "Extent" if state.view.at == "b4" else "Extent of the tool"
         for axis, low, high in zip("xyz", *ends.tolist(), strict=True):
             text = f"{format_number(low, size=size)} … {format_number(high, size=size)}"
-            rows.append((f"{name} {axis}", text, "Extent of the workspace, in design units"))
+            add(f"{name} {axis}", text, "Extent of the workspace, in design units")
     if drawing.hull_volume is not None:
-        rows.append(
-            ("Hull volume", format_number(drawing.hull_volume, 6), "Volume of the convex hull")
-        )
-    volume = drawing.volume if part is None else part.volume
-    if volume > 0.0:
-        rows.append(
-            (
-                "Mesh",
-                deviation_text(drawing.mesh_volume / volume - 1.0),
-                "Volume of the drawn solid, against the exact one",
-            )
-        )
-    suffix = turned_suffix(request.design, request.rotation)
-    return table(row(dim(name + suffix), value, hint=hint) for name, value, hint in rows)
-
-
-def deviation_text(deviation: float) -> str:
-    """Return a bound of a relative deviation in words, such as "off by less than 0.01 %"."""
-    percent = 100.0 * abs(deviation)
-    bound = next((bound for bound in DEVIATIONS if percent < bound), None)
-    return (
-        f"off by {format_number(percent, 2)} %"
-        if bound is None
-        else f"off by less than {format_number(bound)} %"
-    )
+        add("Hull volume", format_number(drawing.hull_volume, 6), "Volume of the convex hull")
+    return table(rows)
 
 
 def _pairs(part: Part, design: Design, *, is_coloured: bool) -> str:
@@ -273,7 +240,9 @@ def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None
         words, unit, factor = MEASURE_WORDS[measure]
         name = f"{words.capitalize()} ({unit})"
         colours = SHARE_COLOURS if measure == "share" else STEP_COLOURS
-        levels = _levels(measure, drawing)
+        levels: tuple[float, ...] = SHARES if measure == "share" else ()
+        if measure != "share" and drawing is not None and drawing.request.colour == measure:
+            levels = drawing.levels[:0:-1]
         texts = ("0", *(format_number(factor * level, 3) for level in levels), "∞")
         # The ends of bands, and the infinity of singular planes.
         edges = [(100.0 * k / len(colours), text) for k, text in enumerate(texts)]
@@ -305,22 +274,8 @@ def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None
     )
 
 
-def _levels(measure: Measure, drawing: WorkspaceDrawing | None) -> tuple[float, ...]:
-    """Return the ends of the bands of a measure, ascending; () if none are known yet."""
-    if measure == "share":
-        return SHARES
-    if drawing is None or drawing.request.colour != measure:
-        return ()
-    return drawing.levels[:0:-1]
-
-
-def missing_input(measure: Measure, buttons: Iterable[str]) -> str:
-    """Return a hint on the missing input that makes a measure zero.
-
-    Args:
-        measure: The measure, of which `explorer.workspace.position_bands.is_unstated` is true.
-        buttons: Buttons of the colourings that need no limit, HTML.
-    """
+def missing_input(measure: Measure) -> str:
+    """Return a hint on the missing input that makes a measure zero over the whole workspace."""
     match measure:
         case "error":
             words = "The actuators of the design have no errors: state them in the tab Machine."
@@ -330,6 +285,6 @@ def missing_input(measure: Measure, buttons: Iterable[str]) -> str:
                 "struts in the tab Machine."
             )
         case _:
-            others = " or the ".join(buttons)
-            words = f"The design has no limits of forces: colour by the {others} instead."
+            force, bending = MEASURE_WORDS["force"][0], MEASURE_WORDS["bending"][0]
+            words = f"The design has no limits of forces: colour by the {force} or the {bending}."
     return note(words)
