@@ -77,10 +77,6 @@ class Panels:
         of(self.work).float(x=0, y=-1, width=ANY_WIDTH, height=DRAWER_HEIGHT)
         of(self.work).minimize()
 
-    def narrow(self, client: viser.ClientHandle) -> None:
-        """Put the left panel above the right one in a browser whose window is narrow."""
-        dock_above_in(client, self.build, self.analyse)
-
 
 class Layout:
     """Lays out the panels, and adapts the page to each new browser.
@@ -116,7 +112,7 @@ class Layout:
 
     def _make_room(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
         if self._panels is not None and is_narrow(facts):
-            self._panels.narrow(client)
+            dock_above_in(client, self._panels.build, self._panels.analyse)
 
     def _connected(self, client: viser.ClientHandle) -> None:
         ask_browser(client, lambda facts: self._answered(client, facts))

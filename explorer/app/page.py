@@ -63,8 +63,6 @@ MOST_PENDING = 10
 PANELS_SECONDS = 0.004
 # Seconds without a frame after which cameras follow what was drawn.
 FOLLOW_SECONDS = 0.35
-# Seconds to send a frame to one browser, and number of browsers that need no rest.
-REST_SECONDS, FEW_BROWSERS, LONGEST_REST_SECONDS = 0.002, 4, 0.04
 # Properties that decide whether a control can be used.
 USABILITY = ("disabled", "visible")
 
@@ -257,10 +255,6 @@ class Page:
     def _draw(self, frame: Frame) -> None:
         if not self._is_complete:
             return
-        self._draw_all(frame)
-        self._rest()
-
-    def _draw_all(self, frame: Frame) -> None:
         is_drawn, began = frame.state is self._frame.state, time.time()
         self._frame = frame
         if self.autosaver is not None:
@@ -335,12 +329,6 @@ class Page:
             updates.extend(self._panels[0].updates(frame))
             self._panels.rotate(-1)
         return updates
-
-    def _rest(self) -> None:
-        """Leave the processor time for sending a frame to many browsers."""
-        many = len(self._server.get_clients()) - FEW_BROWSERS
-        if many > 0:
-            time.sleep(min(REST_SECONDS * many, LONGEST_REST_SECONDS))
 
     def _placed(self) -> Placed:
         floors = (each.floor(self.services) for each in self._features if each.floor is not None)

@@ -16,7 +16,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.machine.feature import MachinePanel
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.pose_panel import MovePanel
-from explorer.app.inputs.limits import limit_span, pushed
+from explorer.app.inputs.limits import limit_span, push_other_end
 from explorer.app.inputs.ranges import (
     coordinate_span,
     joint_span,
@@ -98,7 +98,7 @@ def test_end_that_passes_the_other_pushes_it_along(
 ) -> None:
     before = (place[0], place[0] + place[1])
     after = (before[0], value) if is_high else (value, before[1])
-    low, high = pushed(before, after)
+    low, high = push_other_end(before, after)
     assert low <= high
     assert (high if is_high else low) == value
     if after[0] <= after[1]:

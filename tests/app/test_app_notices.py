@@ -17,7 +17,7 @@ from client import Client, client_of, press_update, presses_in, wait_for
 from desk import Desk
 from services import StubWorker
 
-from explorer.app.browser.browser_facts import BrowserFacts, decode_facts
+from explorer.app.browser.browser_facts import BrowserFacts
 from explorer.app.browser.downloads import Downloads
 from explorer.app.features.designs.feature import UNSAVED
 from explorer.app.features.help.tour import STEPS, Tour
@@ -197,23 +197,6 @@ def test_preferences_in_a_folder_that_takes_no_file_are_refused_in_a_line(tmp_pa
         file.choose(dark=True)
     assert "\n" not in str(refusal.value)
     assert file.chosen.dark is True
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "{}",
-        '{"width": -1, "height": 5, "dark": false}',
-        '{"width": 1, "height": 5, "dark": 1}',
-        '{"width": 1, "height": 5, "dark": true, "more": 1}',
-        "[" * 100_000,
-    ],
-)
-def test_facts_are_read_unless_no_browser_sends_them(text: str) -> None:
-    assert decode_facts(text) is None
-    sent = '{"width": 1024, "height": 768.5, "dark": true}'
-    assert decode_facts(sent) == BrowserFacts(1024, 768.5, True)
 
 
 @pytest.mark.parametrize(

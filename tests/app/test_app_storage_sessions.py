@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from functools import partial
@@ -24,7 +23,7 @@ from explorer.app.session.session import REDO, UNDO, Session
 from explorer.app.state.actions import SetName, SetPosition
 from explorer.app.state.state import Run, State, opened
 from explorer.app.storage.autosaver import Autosaver
-from explorer.app.storage.folder import SCRATCH_SECONDS, data_folder
+from explorer.app.storage.folder import data_folder
 from explorer.app.storage.session_file import (
     MOST_BYTES,
     MOST_ORPHANS,
@@ -294,17 +293,13 @@ def test_only_the_newest_sessions_are_kept_and_those_of_running_explorers(tmp_pa
     assert resume(tmp_path) == -2
 
 
-def test_scratch_files_are_removed_unless_they_are_new_and_other_paths_ignored(
+def test_paths_that_are_no_sessions_are_ignored(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
     folder = tmp_path / "sessions"
     leave_session(folder, 2)
-    writing, dead = folder / ".one.json.0123.part", folder / ".two.json.0123.part"
-    for each in (writing, dead):
-        each.write_bytes(b"part")
-    before = time.time() - 2.0 * SCRATCH_SECONDS
-    os.utime(dead, (before, before))
+    (folder / ".one.json.0123.part").write_bytes(b"part")
     # Folders, links and pipes named like sessions are ignored.
     (folder / "folder.json").mkdir()
     (folder / "gone.json").symlink_to(folder / "nowhere")
@@ -313,8 +308,6 @@ def test_scratch_files_are_removed_unless_they_are_new_and_other_paths_ignored(
     data = open_user_data(resume=True)
     data.store.close()
     assert (number_of(data.history), data.messages) == (2, ())
-    assert writing.exists()
-    assert not dead.exists()
 
 
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
@@ -360,33 +353,6 @@ def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     assert "another version" in message
     assert message.endswith("; it is left as it is")
     assert other.read_bytes() == before
-    store.close()
-
-
-def test_session_is_only_read_where_nothing_can_be_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(*_: object, **__: object) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    for number in (1, 2):
-        path = leave_session(tmp_path, number)
-    path.write_bytes(b"damaged")
-    before = contents(tmp_path)
-    with monkeypatch.context() as patch:
-        patch.setattr("explorer.app.storage.folder.FileLock.acquire", refuse)
-        patch.setattr(Path, "replace", refuse)
-        store = SessionFile(tmp_path)
-        resumed = store.resume()
-        assert number_of(resumed.history) == 1
-        assert any("Permission denied" in message for message in resumed.messages)
-        assert any(message.endswith("left as it is") for message in resumed.messages)
-        with pytest.raises(StorageError, match="Permission denied"):
-            store.save(numbered(3))
-        assert contents(tmp_path) == before
-    # Once it can be written, the session is saved in a file of its own.
-    store.save(numbered(3))
-    assert {*contents(tmp_path)} > {*before}
     store.close()
 
 

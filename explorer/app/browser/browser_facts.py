@@ -8,7 +8,7 @@ the press during which it arrives.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, TypeVar
+from typing import TypeVar
 
 import msgspec
 import viser
@@ -18,11 +18,10 @@ from explorer.app.look import read_script
 from explorer.app.session.clock import moment_of
 from explorer.app.state.presses import Presses
 
-Pixels = Annotated[float, msgspec.Meta(ge=0, le=100_000)]
 Described = TypeVar("Described")
 
 
-class BrowserFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class BrowserFacts(msgspec.Struct, frozen=True):
     """What a browser reports about itself.
 
     Attributes:
@@ -30,8 +29,8 @@ class BrowserFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         dark: Whether its user prefers dark pages.
     """
 
-    width: Pixels
-    height: Pixels
+    width: float
+    height: float
     dark: bool
 
 
@@ -51,7 +50,7 @@ def ask_browser(client: viser.ClientHandle, answered: Callable[[BrowserFacts], N
     @field.on_update
     async def _(event: viser.GuiEvent[viser.GuiTextHandle]) -> None:
         field.remove()
-        facts = decode_facts(event.target.value)
+        facts = decode_text(event.target.value, _DECODER)
         if facts is not None:
             answered(facts)
 
@@ -64,11 +63,6 @@ def decode_text(text: str, decoder: msgspec.json.Decoder[Described]) -> Describe
         return decoder.decode(text)
     except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError):
         return None
-
-
-def decode_facts(answer: str) -> BrowserFacts | None:
-    """Return the facts in an answer of a browser; None if it is not valid."""
-    return decode_text(answer, _DECODER)
 
 
 def listen(client: viser.ClientHandle, presses: Presses, at_release: Callable[[], None]) -> None:

@@ -37,6 +37,7 @@ class Control(Generic[Value]):
         bound: Binding of its value.
         disabled: Condition in which it is disabled; None for never.
         visible: Condition in which it is visible; None for always.
+        step: Function that returns the step of its buttons; None for a fixed one, or none.
     """
 
     def __init__(
@@ -47,12 +48,14 @@ class Control(Generic[Value]):
         *,
         disabled: Condition | None = None,
         visible: Condition | None = None,
+        step: Callable[[State], float] | None = None,
     ) -> None:
         self.handle = handle
         self._session = session
         self._bound = bound
         self._disabled = disabled
         self._visible = visible
+        self._step = step
         self._last_value: Value | None = None
         # Whether the last value came from the control itself.
         self._is_set_here = False
@@ -74,7 +77,11 @@ class Control(Generic[Value]):
         return self._bound.write(state, self._last_value)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the control show the frame."""
+        """Yield the updates that make the control show the frame, its step first."""
+        if self._step is not None:
+            step = self._step(frame.state)
+            yield self.handle, "step", step
+            yield self.handle, "precision", decimals(step)
         yield from self._show(frame.state, self._bound.read(frame))
 
     def _show(self, state: State, value: Value) -> Iterator[Update]:
@@ -138,54 +145,23 @@ class Slider(Control[float]):
         yield from self._show(frame.state, value)
 
 
-class Ends(Control[Pair]):
-    """The two thumbs of a range, or its two number fields."""
+class Thumbs(Control[Pair]):
+    """The two thumbs of a range, whose track follows the state."""
 
     def __init__(
         self,
         session: Session,
-        handle: viser.GuiMultiSliderHandle[float] | viser.GuiVector2Handle,
+        handle: viser.GuiMultiSliderHandle[float],
         bound: Bound[Pair],
         span: Callable[[State], Span],
         disabled: Condition | None,
     ) -> None:
         super().__init__(session, cast("Any", handle), bound, disabled=disabled)
-        self._thumbs = None
-        if isinstance(handle, viser.GuiMultiSliderHandle):
-            self._thumbs = Track(handle, span)
-        self._span = span
+        self._track = Track(handle, span)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the thumbs or fields show the frame, their range first."""
+        """Yield the updates that make the thumbs show the frame, their range first."""
         ends = self._bound.read(frame)
-        if self._thumbs is not None:
-            is_own = self._is_own(ends)
-            yield from self._thumbs.updates(self._thumbs.span(frame.state, ends, is_own=is_own))
-        else:
-            step = self._span(frame.state).step
-            yield self.handle, "step", step
-            yield self.handle, "precision", decimals(step)
+        span = self._track.span(frame.state, ends, is_own=self._is_own(ends))
+        yield from self._track.updates(span)
         yield from self._show(frame.state, ends)
-
-
-class Number(Control[float]):
-    """A number field, whose step follows the state."""
-
-    def __init__(
-        self,
-        session: Session,
-        handle: viser.GuiNumberHandle[float],
-        bound: Bound[float],
-        step: Callable[[State], float],
-        visible: Condition | None,
-    ) -> None:
-        super().__init__(session, handle, bound, visible=visible)
-        self._number = handle
-        self._step = step
-
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the field show the frame, its step first."""
-        step = self._step(frame.state)
-        yield self._number, "step", step
-        yield self._number, "precision", decimals(step)
-        yield from super().updates(frame)

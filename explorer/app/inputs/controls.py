@@ -8,7 +8,7 @@ from typing import Any, Literal
 import viser
 
 from explorer.app.inputs.bindings import Bound, Source, Value, bound_to
-from explorer.app.inputs.control import Condition, Control, Ends, Number, Slider
+from explorer.app.inputs.control import Condition, Control, Slider, Thumbs
 from explorer.app.inputs.tracks import Intervals, Span
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
@@ -115,9 +115,8 @@ class Controls:
         thumbs = self._gui.add_multi_slider(label, 0.0, 1.0, 0.01, (0.0, 1.0), marks=(), hint=hint)
         # The stylesheet puts the fields into the row of the thumbs, and a script names them.
         fields = self._gui.add_vector2(f"{label} ends", (0.0, 1.0), step=0.01, hint=hint)
-        self._controls += [
-            Ends(self._session, handle, at, span, disabled) for handle in (thumbs, fields)
-        ]
+        self._controls.append(Thumbs(self._session, thumbs, at, span, disabled))
+        self._bind(fields, at, disabled=disabled, step=lambda state: span(state).step)
 
     def number(
         self,
@@ -144,7 +143,7 @@ class Controls:
         bound = bound_to(at, label)
         if callable(step):
             handle = self._gui.add_number(label, least, min=least, hint=hint)
-            self._controls.append(Number(self._session, handle, bound, step, visible))
+            self._bind(handle, bound, visible=visible, step=step)
         else:
             handle = self._gui.add_number(label, least, min=least, step=step, hint=hint)
             if small:
@@ -242,10 +241,12 @@ class Controls:
         *,
         disabled: Condition | None = None,
         visible: Condition | None = None,
+        step: Callable[[State], float] | None = None,
     ) -> None:
         """Bind an input that has no range to the state."""
-        control = Control(self._session, handle, bound, disabled=disabled, visible=visible)
-        self._controls.append(control)
+        self._controls.append(
+            Control(self._session, handle, bound, disabled=disabled, visible=visible, step=step)
+        )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make every control show the frame."""

@@ -55,7 +55,7 @@ def bound_entry(limit: Limit, entry: Entry) -> Bound[Any]:
             is_free = limit.switch is None and entry.free is not None and new >= entry.free
             return Set(path, None if is_free else new, entry.label)
         before = _shown(state, limit, entry)
-        low, high = pushed(before, new)
+        low, high = push_other_end(before, new)
         if entry.axis is not None:
             lows, highs = map(list, value)
             lows[entry.axis], highs[entry.axis] = low, high
@@ -66,7 +66,7 @@ def bound_entry(limit: Limit, entry: Entry) -> Bound[Any]:
     return Bound(lambda frame: _shown(frame.state, limit, entry), write)
 
 
-def pushed(before: Pair, after: Pair) -> Pair:
+def push_other_end(before: Pair, after: Pair) -> Pair:
     """Return the ends of a range after a change of one of them, which pushes the other along."""
     low, high = after
     if low <= high:

@@ -56,11 +56,7 @@ def _position_spans(design: Design, at: Point) -> tuple[Span, ...]:
 
 def length_span(state: State) -> Span:
     """Return the range of a length, such as a margin."""
-    return _length_span(state.base.reach)
-
-
-@functools.lru_cache(64)
-def _length_span(reach: float) -> Span:
+    reach = state.base.reach
     return Span(0.0, round_up(BEYOND * reach), fine_step(reach, 2e3))
 
 
@@ -72,19 +68,15 @@ def radius_span(state: State) -> Span:
 
 def coordinate_span(state: State) -> Span:
     """Return the range of a coordinate, or of a displacement."""
-    return _coordinate_span(state.base.reach)
+    reach = state.base.reach
+    edge = round_up(BEYOND * reach)
+    return Span(-edge, edge, fine_step(reach, 2e3))
 
 
 def platform_span(state: State) -> Span:
     """Return the range of a coordinate of a point of the platform, such as that of the tool."""
     reach = state.base.reach
     edge = round_up(0.5 * reach)
-    return Span(-edge, edge, fine_step(reach, 2e3))
-
-
-@functools.lru_cache(64)
-def _coordinate_span(reach: float) -> Span:
-    edge = round_up(BEYOND * reach)
     return Span(-edge, edge, fine_step(reach, 2e3))
 
 

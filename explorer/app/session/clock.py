@@ -30,7 +30,7 @@ class Timer:
         arguments: Its arguments.
     """
 
-    def __init__(self, seconds: float, call: Callable[..., None], arguments: tuple[object, ...]):
+    def __init__(self, seconds: float, call: Callable[..., None], *arguments: object) -> None:
         self._call, self._arguments = call, arguments
         self._due = now() + seconds
         self._is_waiting = True
@@ -75,9 +75,8 @@ class Timer:
         _condition.notify_all()
 
 
-def start_timer(seconds: float, call: Callable[..., None], *arguments: object) -> Timer:
-    """Call a function after a pause, unless the program ends before; return the timer."""
-    return Timer(seconds, call, arguments)
+start_timer = Timer
+"""Call a function after a pause, unless the program ends before; return the timer."""
 
 
 def now() -> float:

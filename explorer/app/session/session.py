@@ -129,8 +129,7 @@ class Session:
 
     def travel_to(self, key: object, number: int, *, stamp: float | None, who: Who) -> None:
         """Queue a move to the step with a number, in place of one with the same key."""
-        move = HistoryMove(lambda history: history.move_to(number))
-        self.post(key, move, stamp=stamp, who=who)
+        self.post(key, HistoryMove(lambda each: each.move_to(number)), stamp=stamp, who=who)
 
     def settled(self) -> State:
         """Return the state once all changes are made that were posted before.

@@ -28,7 +28,7 @@ from explorer.app.state.view import DrawnAs
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, VARIABLES, Design
 from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
-from explorer.mechanism.kinematics import discriminants, forward
+from explorer.mechanism.kinematics import ForwardKinematics, discriminants, forward
 from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.number_text import format_number
@@ -86,16 +86,11 @@ class SetJoint(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state; where the lengths cannot close, with the last pose."""
-        values = list(state.joints)
-        values[self.joint] = self.value
-        solution = forward(state.design, values)
-        joints = _as_joints(values)
+        joints = with_value(state.joints, str(self.joint), self.value)
+        solution = forward(state.design, joints)
         if not solution.feasible:
             return replace(state, joints=joints, unclosed=_unclosed(state.design, joints, self))
-        pose = Pose.of(solution.position[state.mode], solution.rotation[state.mode])
-        return replace(
-            state, pose=pose, yaw_pitch_roll=angles_of(pose), joints=joints, unclosed=None
-        )
+        return _assemble(replace(state, joints=joints), solution, state.mode)
 
     def describe(self, before: State, after: State) -> str:
         """Return which joint has which value."""
@@ -131,11 +126,10 @@ class SetPosition(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        position = list(state.pose.position)
         # The other coordinates are kept to the last bit.
-        position[self.axis] = self.value - float(state.offset(state.pose.rotation)[self.axis])
-        x, y, z = position
-        return moved(state, Pose((x, y, z), state.pose.quaternion), state.yaw_pitch_roll)
+        value = self.value - float(state.offset(state.pose.rotation)[self.axis])
+        position = with_value(state.pose.position, str(self.axis), value)
+        return moved(state, Pose(position, state.pose.quaternion), state.yaw_pitch_roll)
 
     def describe(self, before: State, after: State) -> str:
         """Return which coordinate has which value."""
@@ -155,11 +149,9 @@ class SetAngle(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        angles = list(state.yaw_pitch_roll)
-        angles[self.axis] = self.value
-        yaw, pitch, roll = angles
+        angles = with_value(state.yaw_pitch_roll, str(self.axis), self.value)
         orientation = Pose.of_yaw_pitch_roll(state.pose.position, angles)
-        return moved(state, state.pose_at(state.position, orientation), (yaw, pitch, roll))
+        return moved(state, state.pose_at(state.position, orientation), angles)
 
     def words(self) -> str:
         """Return what the action does."""
@@ -208,15 +200,7 @@ class SetMode(Action):
         """Return the next state."""
         joints = joints_of(state.design, state.pose)
         solution = forward(state.design, joints)
-        pose = Pose.of(solution.position[self.mode], solution.rotation[self.mode])
-        return replace(
-            state,
-            pose=pose,
-            yaw_pitch_roll=angles_of(pose),
-            joints=joints,
-            mode=self.mode,
-            unclosed=None,
-        )
+        return _assemble(replace(state, joints=joints), solution, self.mode)
 
     def words(self) -> str:
         """Return what the action does."""
@@ -249,10 +233,7 @@ class SetVariable(Action):
                 f"{self.name} = {format_number(self.value, 6)} cannot be assembled while the legs "
                 f"are held; it stays {format_number(present, 6)}. Hold the pose to go further."
             )
-        pose = Pose.of(solution.position[state.mode], solution.rotation[state.mode])
-        return replace(
-            state, design=design, pose=pose, yaw_pitch_roll=angles_of(pose), unclosed=None
-        )
+        return _assemble(replace(state, design=design), solution, state.mode)
 
     def words(self) -> str:
         """Return what the action does."""
@@ -353,6 +334,12 @@ def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> Sta
     )
 
 
+def _assemble(state: State, solution: ForwardKinematics, mode: int) -> State:
+    """Return the state in one of the eight poses that its joints have."""
+    pose = Pose.of(solution.position[mode], solution.rotation[mode])
+    return replace(state, pose=pose, yaw_pitch_roll=angles_of(pose), mode=mode, unclosed=None)
+
+
 def check_free(state: State) -> None:
     """Check that the design may be changed.
 
@@ -374,8 +361,3 @@ def _unclosed(design: Design, joints: Joints, cause: SetJoint) -> Unclosed:
         nearest=nearest_feasible(design, values, cause.joint, intervals),
         failing=failing,
     )
-
-
-def _as_joints(values: list[float]) -> Joints:
-    l1, d1, d2, d3, d4, l4 = values
-    return (l1, d1, d2, d3, d4, l4)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.measures.snapshot import evaluate
 from explorer.measures.verdict import Verdict, verdict
@@ -86,9 +87,7 @@ def _level(found: Verdict | None) -> float:
 
 def _verdict(state: State, joint: int, value: float) -> Verdict | None:
     """Return the verdict on the pose; None where the joints do not close."""
-    trial = np.array(state.joints)
-    trial[joint] = value
-    solution = forward(state.design, trial)
+    solution = forward(state.design, with_value(state.joints, str(joint), value))
     if not solution.feasible:
         return None
     pose = Pose.of(solution.position[state.mode], solution.rotation[state.mode])

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from explorer.app.state.action import Action
 from explorer.app.state.actions import FULL_TURN, moved
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import Folds, GivenFolds, State
 from explorer.errors import InputError
 from explorer.mechanism.folds import FOLDS, pose_of_folds, to_folds
@@ -45,10 +46,7 @@ class SetFold(Action):
         if index > 0 and not least <= value <= HALF_TURN:
             low, high, given = (format_number(each, 6) for each in (least, HALF_TURN, value))
             raise InputError(f"{FOLDS[index]} must be {low}° to {high}°; got {given}°")
-        values = list(folds_of(state))
-        values[index] = value
-        r, beta, epsilon, phi1, phi2, phi3 = values
-        folds = (r, beta, epsilon, phi1, phi2, phi3)
+        folds = with_value(folds_of(state), str(index), value)
         pose = pose_of_folds(folds)
         mode = state.mode
         if index >= FIRST_FOLD and abs(value) not in {0.0, HALF_TURN}:

@@ -1,10 +1,8 @@
-"""The user's data folder, its locks, and the scratch files left in it."""
+"""The user's data folder and its locks."""
 
 from __future__ import annotations
 
-import contextlib
 import os
-import time
 import unicodedata
 from pathlib import Path
 
@@ -18,9 +16,6 @@ NAME = "flagged-explorer"
 
 OVERRIDE = "EXPLORER_DATA"
 """The environment variable that names another folder."""
-
-# Seconds after which a scratch file belongs to a writer that was killed.
-SCRATCH_SECONDS = 60.0
 
 
 def data_folder() -> Path:
@@ -53,14 +48,6 @@ def make_data_folder(folder: Path) -> Path:
     except StorageError as error:
         raise StorageError(f"{error}; or name another folder in {OVERRIDE}") from None
     return folder
-
-
-def remove_scratch(folder: Path) -> None:
-    """Remove the scratch files of writers that were killed."""
-    for path in folder.glob(".*.part"):
-        with contextlib.suppress(OSError):
-            if time.time() - path.stat().st_mtime > SCRATCH_SECONDS:
-                path.unlink()
 
 
 def try_lock(path: Path) -> FileLock | None:

@@ -81,7 +81,6 @@ class SessionFile:
 
         Its file becomes that of this explorer; without one, the first `save` makes one.
         Damaged files are renamed and never removed, those of other versions left alone.
-        Where nothing can be written, the session is only read.
         """
         messages: list[str] = []
         with self._writing:
@@ -120,20 +119,15 @@ class SessionFile:
         lock = None
         try:
             lock = try_lock(_lock_of(path))
-            if lock is None:
-                return None
-        except StorageError as error:
-            messages.append(str(error))
-        try:
-            history = decode_session(read_at_most(path, LARGEST_FILE), repr(str(path)))
+            if lock is not None:
+                history = decode_session(read_at_most(path, LARGEST_FILE), repr(str(path)))
+                self.path, self._lock = path, lock
+                return history
         except StorageError as error:
             messages.append(_set_aside(path, error))
             if lock is not None:
                 lock.release()
-            return None
-        if lock is not None:
-            self.path, self._lock = path, lock
-        return history
+        return None
 
 
 class DamagedError(StorageError):

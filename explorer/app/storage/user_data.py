@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 
 from explorer.app.session.history import History
-from explorer.app.storage.folder import data_folder, make_data_folder, remove_scratch
+from explorer.app.storage.folder import make_data_folder
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.errors import StorageError
@@ -48,8 +48,6 @@ def open_user_data(*, resume: bool) -> UserData:
         resume: Whether to go on with the newest session.
     """
     library, store = Library(), SessionFile()
-    for folder in (data_folder(), library.folder, store.folder):
-        remove_scratch(folder)
     if not resume:
         return UserData(library, store)
     resumed = store.resume()

@@ -2,8 +2,8 @@
 
 viser's HTML reports no clicks. A script of the page sends each press on an element with
 `data-press` to one hidden text control; of an element with `data-hover` it sends, as a press of
-that name, that the pointer rests on it or has left it. It is decoded strictly here; presses on
-names that are not registered are dropped.
+that name, that the pointer rests on it or has left it. Presses on names that are not registered are
+dropped.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import contextlib
 from collections.abc import Callable, Container, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from html import escape
-from typing import Annotated
 
 import msgspec
 import viser
@@ -24,10 +23,6 @@ from explorer.app.widgets.commands import Key
 from explorer.app.widgets.markup import meter
 from explorer.app.widgets.palette import Command
 from explorer.measures.blocks.source import Source
-
-LONGEST_VALUE = 4000
-# JSON escapes make a value longer.
-LONGEST_TEXT = 4 * LONGEST_VALUE
 
 Does = Callable[[str, viser.ClientHandle], None]
 """Handles a press with the value of its button, for the client that pressed."""
@@ -42,9 +37,9 @@ class _Press(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         count: Another number for each press, so that the text differs.
     """
 
-    name: Annotated[str, msgspec.Meta(max_length=100)]
-    value: Annotated[str, msgspec.Meta(max_length=LONGEST_VALUE)]
-    count: Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+    name: str
+    value: str
+    count: int
 
 
 _DECODER = msgspec.json.Decoder(_Press)
@@ -120,7 +115,7 @@ class Buttons:
 
     def receive(self, text: str, client: viser.ClientHandle) -> None:
         """Queue a press that a page sent; drop a text that describes none."""
-        press = _decode_press(text)
+        press = decode_text(text, _DECODER)
         if press is not None:
             # A page that is being closed takes no more presses.
             with contextlib.suppress(RuntimeError):
@@ -142,11 +137,6 @@ def _raise_failure(handled: Future[None]) -> None:
     """Raise the exception of handling a press, so that it is logged with its trace."""
     if not handled.cancelled():
         handled.result()
-
-
-def _decode_press(text: str) -> _Press | None:
-    """Return the press that a text describes; None if the script did not write the text."""
-    return decode_text(text, _DECODER) if len(text) <= LONGEST_TEXT else None
 
 
 def press_button(
