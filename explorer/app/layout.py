@@ -12,7 +12,7 @@ from explorer.app.browser.viser_gaps import dock_above_in, panel_in, run_script
 from explorer.app.features.feature import Feature, Place, Services, Side, Tab
 from explorer.app.look import read_script
 from explorer.app.scene.camera import Cameras
-from explorer.app.session.clock import start_timer
+from explorer.app.session.clock import Timer
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.theme import Theme
@@ -120,7 +120,7 @@ class Layout:
     def _answered(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
         self._make_room(client, facts)
         self._theme.follow_browser(dark=facts.dark)
-        start_timer(SETTLE_SECONDS, self._place_camera, client, 0)
+        Timer(SETTLE_SECONDS, self._place_camera, client, 0)
 
     def _place_camera(self, client: viser.ClientHandle, attempt: int) -> None:
         """Put the camera of a new browser where it belongs, again and again until it is there.
@@ -134,7 +134,7 @@ class Layout:
         self._cameras.look_again(client)
         if attempt + 1 < MOST_ATTEMPTS:
             pause = min((1.0 + attempt) * SETTLE_SECONDS, LONGEST_PAUSE_SECONDS)
-            start_timer(pause, self._place_camera, client, attempt + 1)
+            Timer(pause, self._place_camera, client, attempt + 1)
 
 
 def is_narrow(facts: BrowserFacts) -> bool:

@@ -59,8 +59,9 @@ NOTICE_SECONDS = 6.0
 NOTICE_COLOUR = "orange"
 # Largest number of notices that wait for a browser; the newest are kept.
 MOST_PENDING = 10
-# Seconds that the panels of a frame may take while another frame waits.
-PANELS_SECONDS = 0.004
+# Seconds that the panels of a frame may take during a drag and while another frame waits, and
+# seconds without a change after which a drag counts as paused and all is drawn.
+PANELS_SECONDS, DRAG_PAUSE = 0.003, 0.1
 # Seconds without a frame after which cameras follow what was drawn.
 FOLLOW_SECONDS = 0.35
 # Properties that decide whether a control can be used.
@@ -97,14 +98,11 @@ class Page:
         # Notices without a browser, kept for the next one; the lock guards them.
         self._pending: list[tuple[str, str]] = []
         self._pending_lock = threading.Lock()
-        self._redraw_timer: clock.Timer | None = None
-        # Looks after the cameras once nothing has been drawn for a while, or at a release.
-        self._camera_timer: clock.Timer | None = None
         self._follows_at_release = False
+        # When the state that is drawn was new.
+        self._changed = 0.0
         # Whether `settle` is under way: then nothing waits for a pause of the user.
         self._is_settling = False
-        # Held while a timer is started, so that it is known before it is over.
-        self._timer_lock = threading.Lock()
         # Other threads may ask for a frame before the last panel is there.
         self._is_complete = False
         self._frame = Frame(state)
@@ -113,6 +111,11 @@ class Page:
         self.session = Session(
             state, self._draw, self._complain, self._report, history, press_at=presses.at
         )
+        self._drag_pause = clock.Pause(DRAG_PAUSE, self.session.redraw)
+        self._quiet_pause = clock.Pause(QUIET_SECONDS, self.session.redraw)
+        # Looks after the cameras once nothing has been drawn for a while, or at a release.
+        self._camera_pause = clock.Pause(FOLLOW_SECONDS, self._follow)
+        self._pauses = self._drag_pause, self._quiet_pause, self._camera_pause
         self.worker = Worker(self._announce, preload=TASKS)
         gui = server.gui
         gui.set_panel_label(TITLE)
@@ -187,9 +190,8 @@ class Page:
 
     def stop(self) -> None:
         """End the session, the features and the worker."""
-        for timer in (self._redraw_timer, self._camera_timer):
-            if timer is not None:
-                timer.cancel()
+        for pause in self._pauses:
+            pause.cancel()
         self.buttons.stop()
         self.session.stop()
         self.services.stop()
@@ -218,9 +220,8 @@ class Page:
         self._is_settling = True
         try:
             while self.wait_until_drawn(deadline - time.monotonic()):
-                for timer in (self._redraw_timer, self._camera_timer):
-                    if timer is not None:
-                        timer.finish()
+                for pause in self._pauses:
+                    pause.finish()
                 if not clock.wait_until_quiet(deadline - time.monotonic()):
                     return False
                 # What happened after a pause may have changed more.
@@ -256,7 +257,16 @@ class Page:
         if not self._is_complete:
             return
         is_drawn, began = frame.state is self._frame.state, time.time()
-        self._frame = frame
+        is_dragged, now = self._is_held(), time.monotonic()
+        if is_drawn and is_dragged and now < self._changed + DRAG_PAUSE:
+            # What was computed for a state that is drawn already waits for the next change.
+            self._drag_pause.begin()
+            return
+        if is_drawn:
+            # What follows from the state is known already.
+            frame = self._frame
+        else:
+            self._frame, self._changed = frame, now
         if self.autosaver is not None:
             self.autosaver.follow(frame.state, self.session.history)
         # Feeds come first, so that a drawing counts as outdated until the new one arrives.
@@ -264,16 +274,13 @@ class Page:
             feed.follow(frame)
         # The scene is updated before the panels, whose numbers nobody reads during a drag.
         placed = self._placed()
-        drawn: list[Update] = []
-        for part in self._scene:
-            # What was computed for a state that is drawn already does not hold up a newer one.
-            if is_drawn and self.session.has_changes:
-                return
-            drawn.extend(part.updates(placed))
+        drawn = [update for part in self._scene for update in part.updates(placed)]
         self._assigner.assign(drawn, since=began)
         for runner in self._runners:
             runner.follow(frame)
-        changed = self._assigner.assign(self._panel_updates(frame), since=began)
+        changed = self._assigner.assign(
+            self._panel_updates(frame, is_dragged=is_dragged and not is_drawn), since=began
+        )
         # A command is enabled as its control is, so that it is updated after the controls.
         controls = any(name in USABILITY for _, name, _ in changed)
         self._assigner.assign(self.palette.updates(controls=controls))
@@ -281,30 +288,22 @@ class Page:
             if feature.passing is not None:
                 self.palette.offer(feature.name, feature.passing(self.services))
         if self._assigner.settle(has_paused=self._is_settling):
-            self._schedule_redraw()
-        self._follow_soon()
-
-    def _schedule_redraw(self) -> None:
-        """Schedule one more frame for when no control is moved, unless one is scheduled."""
-        with self._timer_lock:
-            if self._redraw_timer is None:
-                self._redraw_timer = clock.start_timer(QUIET_SECONDS, self._redraw)
+            self._quiet_pause.begin()
+        self._camera_pause.begin()
 
     def _follow(self) -> None:
         """Have the cameras follow what was drawn, once a user holds nothing and nothing changes."""
-        clients, now = self._server.get_clients(), clock.moment_of(time.time())
         # A release that comes meanwhile calls this again.
         self._follows_at_release = True
-        if any(self._presses.at(number, now) is not None for number in clients):
+        if self._is_held():
             return
         self._follows_at_release = False
-        self.services.cameras.follow(clients.values())
+        self.services.cameras.follow(self._server.get_clients().values())
 
-    def _follow_soon(self) -> None:
-        with self._timer_lock:
-            timer = self._camera_timer
-            if timer is None or not timer.postpone(FOLLOW_SECONDS):
-                self._camera_timer = clock.start_timer(FOLLOW_SECONDS, self._follow)
+    def _is_held(self) -> bool:
+        """Whether a user holds a control, as during a drag."""
+        clients, now = self._server.get_clients(), clock.moment_of(time.time())
+        return any(self._presses.at(number, now) is not None for number in clients)
 
     def _forget(self, who: int) -> None:
         self._presses.forget(who)
@@ -312,19 +311,19 @@ class Page:
 
     def _follow_after_release(self) -> None:
         if self._follows_at_release:
-            self._follow_soon()
+            self._camera_pause.begin()
 
-    def _redraw(self) -> None:
-        with self._timer_lock:
-            self._redraw_timer = None
-        self.session.redraw()
+    def _panel_updates(self, frame: Frame, *, is_dragged: bool) -> list[Update]:
+        """Return the updates of all panels for a frame; of a few in turn while there is no time.
 
-    def _panel_updates(self, frame: Frame) -> list[Update]:
-        """Return the updates of all panels for a frame, or of a few in turn if another waits."""
+        That is so during a drag, whose next change must not wait, until it pauses.
+        """
         began = time.monotonic()
         updates: list[Update] = []
         for _ in range(len(self._panels)):
-            if self.session.has_changes and time.monotonic() - began > PANELS_SECONDS:
+            is_hurried = is_dragged or self.session.has_changes
+            if is_hurried and time.monotonic() - began > PANELS_SECONDS:
+                self._drag_pause.begin()
                 break
             updates.extend(self._panels[0].updates(frame))
             self._panels.rotate(-1)

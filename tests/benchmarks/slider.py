@@ -15,9 +15,11 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from typing import Any
 
+import viser
 from machines import PRESS
 from socket_tab import SocketTab
 
@@ -202,12 +204,18 @@ def run() -> Iterator[Row]:
         yield Row(f"  {kind}", "broken: its events make no frames")
 
 
+def _press(page: Any, client: viser.ClientHandle) -> None:
+    """Note that the user of a tab holds the mouse down, as its browser would report."""
+    page._presses.record(client.client_id, 1, time.time())
+
+
 def measure() -> dict[str, list[Stopwatch]]:
     """Return the stopwatch of every round, by kind."""
     watches: dict[str, list[Stopwatch]] = {kind.name: [] for kind in KINDS}
     context = multiprocessing.get_context("spawn")
     with ready_page() as running, ProcessPoolExecutor(1, mp_context=context) as tabs:
         session = running.page.session
+        running.viser.on_client_connect(partial(_press, running.page))
         # The kinds take turns, so that no disturbance falls on one alone.
         for events in (WARM_UP_EVENTS, *[EVENTS] * ROUNDS):
             for kind in KINDS:

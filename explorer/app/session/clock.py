@@ -75,8 +75,36 @@ class Timer:
         _condition.notify_all()
 
 
-start_timer = Timer
-"""Call a function after a pause, unless the program ends before; return the timer."""
+class Pause:
+    """A call after a pause, which may be begun anew before it is over.
+
+    Args:
+        seconds: The pause.
+        call: Function to call.
+    """
+
+    def __init__(self, seconds: float, call: Callable[[], None]) -> None:
+        self._seconds, self._call = seconds, call
+        self._timer: Timer | None = None
+        self._lock = threading.Lock()
+
+    def begin(self) -> None:
+        """Begin the pause, anew if it is not over."""
+        with self._lock:
+            if self._timer is None or not self._timer.postpone(self._seconds):
+                self._timer = Timer(self._seconds, self._call)
+
+    def finish(self) -> None:
+        """End the pause at once, if there is one."""
+        with self._lock:
+            if self._timer is not None:
+                self._timer.finish()
+
+    def cancel(self) -> None:
+        """Call nothing, unless the pause is over."""
+        with self._lock:
+            if self._timer is not None:
+                self._timer.cancel()
 
 
 def now() -> float:

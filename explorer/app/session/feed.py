@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from explorer.app.session.clock import Timer, now, start_timer
+from explorer.app.session.clock import Timer, now
 from explorer.app.session.jobs import LONG_SECONDS, Worker
 from explorer.app.session.session import Session
 from explorer.app.session.worker import CANCELLED, Channel
@@ -188,7 +188,7 @@ class Feed(Generic[Request, Drawing]):
         if self.stage is not None:
             self._redraw()
         elif is_first:
-            self._stage_timer = start_timer(LONG_SECONDS, self._show_stage, count)
+            self._stage_timer = Timer(LONG_SECONDS, self._show_stage, count)
 
     def _show_stage(self, count: int) -> None:
         # The stage of a drawing that is done by then is not shown.

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import IO, Any, cast
 
-from explorer.app.session.clock import Timer, start_timer
+from explorer.app.session.clock import Timer
 from explorer.app.session.latest import LatestWins
 from explorer.app.session.log import log_error
 from explorer.app.session.worker import (
@@ -139,7 +139,7 @@ class Worker:
             write_frame(cast("IO[bytes]", self._process.stdin), Cancel(number, after))
         patience = self._cancelled.get(number)
         if patience is not None and self._deadline is None:
-            self._deadline = start_timer(patience, self._kill, number)
+            self._deadline = Timer(patience, self._kill, number)
 
     def _is_current(self, number: int) -> bool:
         return self._current is not None and self._current.order.number == number

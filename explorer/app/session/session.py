@@ -27,7 +27,8 @@ SETTLED_SECONDS = 10.0
 # Key of requests to draw the present state again.
 REDRAW = "redraw"
 
-Change = Callable[[State], Action]
+Change = Callable[[State], Action | None]
+"""Function from the present state to an action; None for none."""
 Who = int | None
 """Id of a client; None for all clients, or for none in particular."""
 
@@ -118,7 +119,7 @@ class Session:
     def do(self, action: Action | Change, *, who: Who = None) -> None:
         """Queue an action, or the function that makes it, which no other may replace."""
 
-        def change(state: State) -> Action:
+        def change(state: State) -> Action | None:
             return action if isinstance(action, Action) else action(state)
 
         self.post(object(), change, who=who)
@@ -138,11 +139,7 @@ class Session:
         """
         made = threading.Event()
 
-        def mark(_: State) -> Action:
-            made.set()
-            return _Nothing()
-
-        self.post(object(), mark)
+        self.post(object(), lambda _: made.set())
         made.wait(SETTLED_SECONDS)
         return self._state
 
@@ -166,7 +163,7 @@ class Session:
 
     def redraw(self) -> None:
         """Draw the present state again."""
-        self.post(REDRAW, lambda _: _Nothing())
+        self.post(REDRAW, lambda _: None)
 
     def stop(self) -> None:
         """End the session's thread."""
@@ -190,12 +187,9 @@ class Session:
             self._state, self._history = restore(history, self._state)
             return
         press = None if self._press_at is None else self._press_at(item.who, item.stamp)
-        event = UserAction(item.change(self._state), item.key, item.stamp, press)
+        action = item.change(self._state)
+        if action is None:
+            return
+        event = UserAction(action, item.key, item.stamp, press)
         self._state = event.apply(self._state)
         self._history = self._history.record(event, self._state)
-
-
-@dataclass(frozen=True)
-class _Nothing(Action):
-    def apply(self, state: State) -> State:
-        return state

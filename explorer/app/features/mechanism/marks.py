@@ -13,7 +13,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.incidences import approaches
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import add_label
-from explorer.app.session.clock import Timer, now, start_timer
+from explorer.app.session.clock import Timer, now
 from explorer.app.state.actions import SetPose
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
@@ -111,7 +111,7 @@ class DragHandle(ScenePart):
         if wanted == present or now() - self._moved_at > PAUSE:
             return wanted
         if self._timer is None:
-            self._timer = start_timer(PAUSE, self._look_again)
+            self._timer = Timer(PAUSE, self._look_again)
         return present
 
     def _look_again(self) -> None:

@@ -14,7 +14,7 @@ from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH, add_label, add_lines, add_translucent, sphere
-from explorer.app.session.clock import now, start_timer
+from explorer.app.session.clock import Timer, now
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
@@ -277,7 +277,7 @@ class FreeMotion(ScenePart):
         """Draw a swing again and again until it is over, or another one has begun."""
         self._session.redraw()
         if swing is self._swing and not swing.is_over:
-            start_timer(FRAME_SECONDS, self._draw_on, swing)
+            Timer(FRAME_SECONDS, self._draw_on, swing)
 
 
 def show_button(incidence: int) -> str:
