@@ -20,7 +20,7 @@ from explorer.app.security.access import EVERYWHERE, Access, is_loopback
 from explorer.app.security.guard import Guard
 from explorer.app.session.gestures import check_drawable
 from explorer.app.session.log import start_log
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.app.state.view import View
 from explorer.app.storage.folder import data_folder
 from explorer.app.storage.study_folders import STUDIES_FOLDER, StudyFolders
@@ -99,7 +99,7 @@ def start(
         ServerError: the address or the port cannot be had, or the token or a name cannot be used.
     """
     history = None if user_data is None else user_data.history
-    state = opened(design, pose, view) if history is None else history.step.state
+    state = open_state(design, pose, view) if history is None else history.step.state
     check_drawable(state)
     access = Access.to(host, token, allow_hosts)
     guard = Guard(access)
@@ -107,7 +107,7 @@ def start(
     server = start_viser(host, port, guard.guarded)
     if port not in (0, server.get_port()):
         stop_viser(server)
-        raise _taken(port)
+        raise _port_error(port)
     protect(server)
     page = Page(
         server,
@@ -241,9 +241,9 @@ def _check_free(host: str, port: int) -> None:
             raise ServerError(f"port {port} needs privileges; take one above 1023") from None
         except OSError as error:
             if is_loopback(host) or "in use" in str(error):
-                raise _taken(port) from None
+                raise _port_error(port) from None
             raise ServerError(f"cannot listen on {host!r}: {error.strerror}") from None
 
 
-def _taken(port: int) -> ServerError:
+def _port_error(port: int) -> ServerError:
     return ServerError(f"port {port} is taken; choose another with --port, or any free one with 0")

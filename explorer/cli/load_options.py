@@ -54,11 +54,11 @@ def held_by(
     """
     from explorer.workspace.carried_region import carried_region
 
-    check_limited(design)
+    check_has_limits(design)
     return carried_region(design, rotation, load, tolerance=tolerance)
 
 
-def check_limited(design: Design) -> None:
+def check_has_limits(design: Design) -> None:
     """Check that a part of a design has a limit."""
     if not has_limits(design):
         raise InputError(

@@ -118,7 +118,7 @@ def table(rows: Sequence[Sequence[str]], align: str) -> str:
     )
 
 
-def indented(text: str) -> list[str]:
+def indent(text: str) -> list[str]:
     """Return the lines of a text, indented by two spaces."""
     return [f"  {line}" for line in text.splitlines()]
 

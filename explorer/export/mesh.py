@@ -148,7 +148,7 @@ def _ply(solid: Solid, design: Design, name: str) -> bytes:
         *comments("comment name", json_line(name)[1:-1]),
         "comment unit millimetre",
         *(
-            f"comment colour {_spaced(colour_of(limit))} {ascii_name(limit)}"
+            f"comment colour {_join_numbers(colour_of(limit))} {ascii_name(limit)}"
             for limit in solid.limits
         ),
         *comments("comment design", design_json(design)),
@@ -173,13 +173,13 @@ def _obj(solid: Solid, design: Design, name: str) -> bytes:
         "# unit millimetre",
         *comments("# design", design_json(design)),
         f"o {_word(name)}",
-        *(f"v {_spaced(point)}" for point in _millimetres(solid, design).tolist()),
+        *(f"v {_join_numbers(point)}" for point in _millimetres(solid, design).tolist()),
     ]
     for index, limit in enumerate(solid.limits):
         faces = solid.faces[solid.limit_of_face == index] + 1
         if len(faces):
             lines.append(f"g {_word(limit)}")
-            lines.extend(f"f {_spaced(face)}" for face in faces.tolist())
+            lines.extend(f"f {_join_numbers(face)}" for face in faces.tolist())
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
@@ -211,7 +211,7 @@ def _word(name: str) -> str:
     return re.sub(r"[ #\\]", "_", ascii_name(name))
 
 
-def _spaced(values: Iterable[float]) -> str:
+def _join_numbers(values: Iterable[float]) -> str:
     """Return numbers with all their digits, separated by spaces."""
     return " ".join(map(repr, values))
 

@@ -246,7 +246,7 @@ class _Primitives:
             # The planes of a wedge meet in a line along x through the apex.
             sides = [
                 self._half_space(side, float(side @ apex))
-                for side in (_turned(axis, sign * (angle + 0.5 * math.pi)) for sign in (1, -1))
+                for side in (_turn(axis, sign * (angle + 0.5 * math.pi)) for sign in (1, -1))
             ]
             if outside:
                 yield sides[0] ^ sides[1], False
@@ -263,7 +263,7 @@ class _Primitives:
         return primitive("Cone", frame, 0.0, height * math.tan(angle), height)
 
 
-def _turned(vector: FloatArray, angle: float) -> FloatArray:
+def _turn(vector: FloatArray, angle: float) -> FloatArray:
     """Return a vector of the yz-plane rotated about x."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([0.0, c * vector[1] - s * vector[2], s * vector[1] + c * vector[2]])

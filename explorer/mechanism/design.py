@@ -37,7 +37,7 @@ from explorer.numerics.checks import (
     number,
     numbers,
     one_of,
-    ordered,
+    ordered_pair,
     positive,
     two,
 )
@@ -155,7 +155,7 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                     )
             _set(self, name, (low, high))
         if self.guide is not None:
-            low, high = ordered("limits.guide", *two("limits.guide", self.guide))
+            low, high = ordered_pair("limits.guide", *two("limits.guide", self.guide))
             _set(self, "guide", (low, high))
         _set(self, "gap", not_negative("limits.gap", self.gap))
         order = one_of("limits.carriage_order", self.carriage_order, get_args(CarriageOrder))
@@ -163,7 +163,7 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.box is not None:
             lows, highs = two("limits.box", self.box)
             pairs = [
-                ordered(f"limits.box {axis}", low, high)
+                ordered_pair(f"limits.box {axis}", low, high)
                 for axis, low, high in zip(
                     "xyz",
                     numbers("limits.box lows", lows, 3),

@@ -73,7 +73,7 @@ def positive(name: str, value: object, most: float = MOST) -> float:
     return checked
 
 
-def ordered(name: str, low: object, high: object) -> tuple[float, float]:
+def ordered_pair(name: str, low: object, high: object) -> tuple[float, float]:
     """Return both values as floats, the first not above the second."""
     first, second = number(f"{name} low", low), number(f"{name} high", high)
     if first > second:

@@ -14,7 +14,7 @@ Watch: TypeAlias = Callable[[str, float], None]
 are done, at least 0 and below 1, and ends the computation by raising an exception."""
 
 
-def unwatched(words: str, share: float) -> None:
+def ignore_stage(words: str, share: float) -> None:
     """Ignore the stage; the default callback."""
 
 

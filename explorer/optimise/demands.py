@@ -8,7 +8,7 @@ import msgspec
 
 from explorer.errors import InputError
 from explorer.mechanism.pose import Triple
-from explorer.numerics.checks import not_negative, numbers, ordered, positive, two
+from explorer.numerics.checks import not_negative, numbers, ordered_pair, positive, two
 
 Box = tuple[Triple, Triple]
 
@@ -75,7 +75,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         if self.required_box is not None:
             lows, highs = two("the required box", self.required_box)
             pairs = [
-                ordered(f"the required box {axis}", low, high)
+                ordered_pair(f"the required box {axis}", low, high)
                 for axis, low, high in zip(
                     "xyz",
                     numbers("the required box's lows", lows, 3),

@@ -161,7 +161,7 @@ def plan_path(
     for name, snapshot in named_ends.items():
         _check_within(name, snapshot, ends[0].signs)
         if demanded_load is not None:
-            _check_held(name, snapshot.pose, demanded_load)
+            _check_load(name, snapshot.pose, demanded_load)
     _check_same_order(*ends)
     # Compiling takes seconds, once on a machine; they do not count as search.
     for kernel in (divide_line, valid_move_rows, valid_rows, write_poses):
@@ -310,7 +310,7 @@ def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) ->
         raise EndError("outside limits", f"the {name} is outside the limits: {'; '.join(broken)}")
 
 
-def _check_held(name: str, pose: Pose, load: DemandedLoad) -> None:
+def _check_load(name: str, pose: Pose, load: DemandedLoad) -> None:
     shares = load.shares(pose.position, pose.rotation)
     part, share = int(shares.argmax()), float(shares.max())
     if share > 1.0 + ROUNDING:

@@ -171,7 +171,7 @@ def worst_errors(configuration: Configuration, errors: ArrayLike) -> ToolError:
     Raises:
         InputError: An error is negative or not finite, or batch axes do not broadcast.
     """
-    e = _checked(errors)
+    e = _check_bounds(errors)
     if e.shape[-1:] != (6,):
         raise InputError(f"give the errors of six actuators; got the shape {e.shape}")
     c = configuration.spread(e)
@@ -373,7 +373,7 @@ def largest_error(by_source: FloatArray, bounds: ArrayLike) -> LargestError:
     Raises:
         InputError: A bound is negative or not finite.
     """
-    limits = _checked(bounds)
+    limits = _check_bounds(bounds)
     halves = _halves(by_source, limits)
     signs = np.empty((*halves.shape[:-2], halves.shape[-1]))
     count = math.prod(signs.shape[:-1])
@@ -397,7 +397,7 @@ def errors_alone(by_source: FloatArray, bounds: ArrayLike) -> ToolError:
     Raises:
         InputError: A bound is negative or not finite.
     """
-    limits = _checked(bounds)
+    limits = _check_bounds(bounds)
     halves = _halves(by_source, limits)
     sizes = np.sqrt(np.einsum("...ij,...ij->...j", halves, halves))
     # A source without an error moves nothing, also in a singular pose.
@@ -417,7 +417,7 @@ def rms_of_sources(by_source: FloatArray, bounds: ArrayLike) -> ToolError:
     Raises:
         InputError: A bound is negative or not finite.
     """
-    halves = _halves(by_source, UNIFORM * _checked(bounds))
+    halves = _halves(by_source, UNIFORM * _check_bounds(bounds))
     size = np.sqrt(np.einsum("...ij,...ij->...", halves, halves))
     size = np.where(np.isfinite(size), size, np.inf)
     return ToolError(size[..., 0], size[..., 1])
@@ -431,7 +431,7 @@ def _halves(by_source: FloatArray, bounds: FloatArray) -> FloatArray:
     return moved.reshape(*moved.shape[:-2], 2, 3, moved.shape[-1])
 
 
-def _checked(bounds: ArrayLike) -> FloatArray:
+def _check_bounds(bounds: ArrayLike) -> FloatArray:
     limits = np.asarray(bounds, dtype=np.float64)
     if not (np.isfinite(limits) & (limits >= 0.0)).all():
         text = np.array2string(limits, threshold=12).replace("\n", "")

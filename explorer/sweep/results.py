@@ -46,7 +46,7 @@ def front(columns: Mapping[str, Any], objectives: Sequence[Objective]) -> BoolAr
     cost = costs(columns, objectives)
     rows = np.flatnonzero(_is_done(columns) & np.isfinite(cost).all(axis=1))
     is_best = np.zeros(len(cost), dtype=np.bool_)
-    is_best[rows[undominated(cost[rows])]] = True
+    is_best[rows[undominated_rows(cost[rows])]] = True
     return is_best
 
 
@@ -59,7 +59,7 @@ def _is_done(columns: Mapping[str, Any]) -> BoolArray:
     return np.asarray(columns["status"], dtype=object) == "done"
 
 
-def undominated(cost: FloatArray) -> IntArray:
+def undominated_rows(cost: FloatArray) -> IntArray:
     """Return the rows of costs (n, m) that no other row dominates, ascending.
 
     A row dominates another if it is no larger anywhere and smaller somewhere.
@@ -206,7 +206,7 @@ def summarise(folder: str | Path) -> Summary:
             of_best = {
                 goal.measure: [row[goal.measure] for row in best] for goal in study.objectives
             }
-            best = [best[k] for k in undominated(costs(of_best, study.objectives)).tolist()]
+            best = [best[k] for k in undominated_rows(costs(of_best, study.objectives)).tolist()]
     if study is None:
         raise _no_results(folder, damaged)
     for first in study.objectives[:1]:

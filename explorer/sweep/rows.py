@@ -84,7 +84,7 @@ def evaluate(study: bytes, start: int, stop: int) -> Rows:
         start: Index of the first design.
         stop: Index after the last one.
     """
-    decoded = _decoded(study)
+    decoded = _decode_study(study)
     indices = range(start, stop)
     values = samples(decoded, indices)
     rows = [
@@ -263,7 +263,7 @@ def load_kernels(study: Study) -> None:
 
 
 @functools.lru_cache(4)
-def _decoded(study: bytes) -> Study:
+def _decode_study(study: bytes) -> Study:
     decoded = decode_study(study, "the study")
     load_kernels(decoded)
     # Compiled kernels repay their second within a few designs, and the last digits must

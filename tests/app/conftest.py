@@ -13,7 +13,7 @@ from explorer.app.browser.viser_server import start_viser, stop_viser
 from explorer.app.features.feature import Services
 from explorer.app.server import Running, start
 from explorer.app.session.jobs import Worker
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.buttons import Buttons
@@ -36,7 +36,7 @@ def buttons(server: viser.ViserServer) -> Generator[Buttons]:
 
 @pytest.fixture
 def desk() -> Generator[Desk]:
-    made = Desk(opened(PRESETS["paper-optimal"]))
+    made = Desk(open_state(PRESETS["paper-optimal"]))
     yield made
     made.session.stop()
 

@@ -17,7 +17,7 @@ import viser
 from explorer.app.session.session import Session, Who
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons
 from explorer.mechanism.design_file import PRESETS
@@ -107,7 +107,7 @@ def random_states(count: int, seed: int = 3) -> list[State]:
         Pose.of_yaw_pitch_roll(rng.uniform(-8.0, 15.0, 3), rng.uniform(-80.0, 80.0, 3))
         for _ in range(count)
     )
-    return [opened(PRESETS["paper-optimal"], pose) for pose in poses]
+    return [open_state(PRESETS["paper-optimal"], pose) for pose in poses]
 
 
 def thick(state: State, *radii: float) -> State:

@@ -38,7 +38,7 @@ from explorer.app.state.compared import Look
 from explorer.app.state.folds import SetFold
 from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
 from explorer.app.state.parts import value_at, with_value
-from explorer.app.state.state import Run, State, opened
+from explorer.app.state.state import Run, State, open_state
 from explorer.app.state.studies import Brush, Studies
 from explorer.app.state.view import PrecisionView, PrototypeView, SingularView, View, WorkspaceView
 from explorer.errors import ExplorerError
@@ -216,7 +216,7 @@ def samples(most: int = 30) -> st.SearchStrategy[list[Sample]]:
 
 def states_of(actions: list[Sample]) -> list[State]:
     """Return the states from the paper's optimum on, one after each action that is possible."""
-    states = [opened(OPTIMAL)]
+    states = [open_state(OPTIMAL)]
     for number, (make, index, share) in enumerate(actions):
         with contextlib.suppress(ExplorerError):
             action = make(states[-1], index, share)
@@ -253,9 +253,9 @@ def iterates_of(state: State, count: int) -> tuple[Iterate, ...]:
 def rich_state() -> State:
     """Return a state in which every saved value differs from that of a new state."""
     limits = _limits(2, 1 / 3)
-    home = opened(OPTIMAL).pose
+    home = open_state(OPTIMAL).pose
     beyond = Pose((11.1, *home.position[1:]), home.quaternion)
-    state = opened(msgspec.structs.replace(OPTIMAL, name="é «one»", limits=limits, home=home))
+    state = open_state(msgspec.structs.replace(OPTIMAL, name="é «one»", limits=limits, home=home))
     request = vars(varied(OptimisationRequest())) | {
         "volume": 1e4 / 3,
         "free": (VARIABLES[4], YAW, PLACE),

@@ -41,9 +41,9 @@ from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Open, Set, SetVariable
-from explorer.app.state.compared import Look, unnamed
+from explorer.app.state.compared import Look, without_name
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
@@ -78,7 +78,7 @@ def measured(design: Design) -> Measurements:
 
 
 def compared(*pinned: Design, look: Look | None = None, live: Design = OPTIMAL) -> State:
-    state = opened(live)
+    state = open_state(live)
     for design in pinned:
         state = Pin(design).apply(state)
     return Set("compared.look", look or Look()).apply(state)
@@ -110,7 +110,7 @@ def cells(html: str) -> dict[str, list[str]]:
 def test_actions_in_any_order_pin_at_most_three_designs_and_none_twice(
     actions: list[tuple[str, int]],
 ) -> None:
-    state = opened(OPTIMAL)
+    state = open_state(OPTIMAL)
     for kind, index in actions:
         before, pinned = state, state.compared.pinned
         if kind == "live":
@@ -296,11 +296,11 @@ def follow(feeds: list[CompareFeed], state: State) -> None:
 def test_change_of_the_live_design_requests_its_drawing_alone(
     feeds: list[CompareFeed], worker: StubWorker
 ) -> None:
-    follow(feeds, opened(OPTIMAL))
+    follow(feeds, open_state(OPTIMAL))
     assert worker.orders == []
     state = compared(INITIAL, variant(2), look=Look(overlay=True))
     follow(feeds, state)
-    designs = [unnamed(each) for each in (OPTIMAL, INITIAL, variant(2))]
+    designs = [without_name(each) for each in (OPTIMAL, INITIAL, variant(2))]
     assert [order.request.design for order in worker.orders] == designs
     assert len({order.key for order in worker.orders}) == 3
     worker.work()
@@ -312,7 +312,7 @@ def test_change_of_the_live_design_requests_its_drawing_alone(
     ]
     follow(feeds, SetVariable("b2", 2.3).apply(state))
     (order,) = worker.orders[3:]
-    assert order.request.design == unnamed(OPTIMAL.with_variable("b2", 2.3))
+    assert order.request.design == without_name(OPTIMAL.with_variable("b2", 2.3))
     # Until it comes the last one is shown, and said to be old.
     assert drawing_in(LIVE, feeds[LIVE]) is not None
     assert not feeds[LIVE].is_current

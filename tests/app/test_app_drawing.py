@@ -38,7 +38,7 @@ from explorer.app.scene.camera import (
 from explorer.app.scene.placing import Placed, around
 from explorer.app.scene.shapes import cylinder, plate, sphere, turned_to
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.app.widgets import charts
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
@@ -115,7 +115,7 @@ def test_luminance_grows_on_either_side_towards_the_warning_length() -> None:
 def test_view_holds_the_whole_mechanism_and_little_more(
     design: Design, view: ViewName, aspect: float
 ) -> None:
-    points = around(np.array(list(Placed(Frame(opened(design))).points.values())))
+    points = around(np.array(list(Placed(Frame(open_state(design))).points.values())))
     eye, target = framing(points, view, aspect)
     distance = float(np.linalg.norm(target - eye))
     forward = (target - eye) / distance
@@ -134,7 +134,7 @@ def test_view_holds_the_whole_mechanism_and_little_more(
 @given(st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
 def test_squares_of_the_ground_have_the_size_of_their_label(factor: float, unit_mm: float) -> None:
     design = scaled_design(PRESETS["paper-optimal"], factor)
-    placed = Placed(Frame(opened(msgspec.structs.replace(design, unit_mm=unit_mm))))
+    placed = Placed(Frame(open_state(msgspec.structs.replace(design, unit_mm=unit_mm))))
     assert float(f"{placed.square_mm:.6e}"[0]) in (1.0, 2.0, 5.0)
     assert f"{placed.square_mm:.6e}"[1:8] == ".000000"
     # Along the base's axis lie as many squares as a2 is millimetres away.
@@ -176,7 +176,7 @@ def test_small_share_is_not_shown_as_zero() -> None:
     assert format_fitted(1.651e-9, 1.0, 5) == "1.65 × 10⁻⁹"
     assert format_fitted(0.0, 1.0, 5) == "0.0000"
     thin = msgspec.structs.replace(OPTIMAL, b3=OPTIMAL.b2 + 1e-6)
-    text = re.sub(r"<[^>]+>", " ", measures_table(Frame(opened(thin))))
+    text = re.sub(r"<[^>]+>", " ", measures_table(Frame(open_state(thin))))
     # Below a millionth, as its power of ten says.
     assert re.search(r"1/cond J\s+[1-9]\S* × 10⁻[⁷⁸⁹]", text)
 

@@ -32,7 +32,7 @@ from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Open, Set, SetMode, SetPose
 from explorer.app.state.folds import SetFold, folds_of
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
@@ -42,7 +42,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import SINGULAR, Rgb, proximity_colour
 
 OPTIMAL = PRESETS["paper-optimal"]
-HOME = opened(OPTIMAL)
+HOME = open_state(OPTIMAL)
 R = FOLDS.index("r")
 STATES = [SetMode(mode).apply(state) for state in random_states(3) for mode in range(8)]
 # Indices of the margins that each coordinate changes.

@@ -46,7 +46,7 @@ from explorer.app.scene.placing import SCENE_REACH, Placed
 from explorer.app.scene.shapes import linear_colour
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.state.view import ForcesView, PrecisionView
 from explorer.app.widgets.blocks import render, share_colour
 from explorer.app.widgets.buttons import Buttons
@@ -77,7 +77,7 @@ LIMITED = msgspec.structs.replace(
 
 def loaded_state(design: Design = LIMITED, **forces: Any) -> State:
     """Return a design at home, with forces shown."""
-    state = opened(design)
+    state = open_state(design)
     return Set("view", replace(state.view, forces=ForcesView(shown=True, **forces))).apply(state)
 
 
@@ -234,7 +234,7 @@ def test_forces_are_drawn_in_the_colour_of_their_share(services: Services) -> No
 
 def test_scene_without_forces_draws_nothing(services: Services) -> None:
     scene, handle = services.get(ForcesScene), services.get(LoadHandle)
-    hidden = Placed(Frame(opened(LIMITED)))
+    hidden = Placed(Frame(open_state(LIMITED)))
     nodes = by_name(scene.updates(hidden)) | by_name(handle.updates(hidden))
     assert not any(values["visible"] for values in nodes.values() if "visible" in values)
     assert not len(scene.corners(hidden))
@@ -306,7 +306,7 @@ SINGULAR_POSE = Pose((3.0, 4.0, 5.0), (1.0, 0.0, 0.0, 0.0))
 
 def state_with(design: Design = TYPICAL_DESIGN, **precision: Any) -> State:
     """Return a design at home under a force, with what is drawn of its precision."""
-    state = opened(design)
+    state = open_state(design)
     forces = ForcesView(force=(3.0, -4.0, -10.0), moment=(0.05, 0.0, -0.02))
     view = replace(state.view, forces=forces, precision=PrecisionView(**precision))
     return Set("view", view).apply(state)

@@ -43,7 +43,7 @@ from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import linear_colour, plate
 from explorer.app.state.actions import Open, SetJoint, SetPose
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.mechanism.pose import Pose
@@ -58,7 +58,7 @@ Drawn = dict[str, dict[str, Any]]
 @functools.cache
 def approaching(incidence: int) -> list[State]:
     """Return states from the home pose on to the nearest pose with an incidence."""
-    start = opened(OPTIMAL)
+    start = open_state(OPTIMAL)
     goal = GoToSingularity(incidence).apply(start).pose
     a, b = np.array(start.pose.quaternion), np.array(goal.quaternion)
     b *= math.copysign(1.0, float(a @ b))
@@ -74,7 +74,7 @@ def approaching(incidence: int) -> list[State]:
 @functools.cache
 def scenes() -> list[Placed]:
     """Return scenes of random poses, on the way to each incidence, and of every stratum."""
-    singular = (GoToStratum(w).apply(opened(OPTIMAL)) for w in STRATA if w != GENERIC)
+    singular = (GoToStratum(w).apply(open_state(OPTIMAL)) for w in STRATA if w != GENERIC)
     near = itertools.chain.from_iterable(map(approaching, (1, 2, 3)))
     return [Placed(Frame(state)) for state in (*random_states(12, seed=5), *near, *singular)]
 
@@ -180,7 +180,7 @@ def test_gap_fades_in_on_approach_with_margin_and_length_until_the_contact(
         else:
             assert 0.0 < presence <= 1.0
     assert draw(gaps, at)[f"/gaps/label/{incidence}"]["text"] == f"δ{incidence} = 0"
-    assert not any(node["visible"] for node in draw(gaps, opened(OPTIMAL)).values())
+    assert not any(node["visible"] for node in draw(gaps, open_state(OPTIMAL)).values())
 
 
 # Parallel lines, far feet, and designs of any size
@@ -190,7 +190,7 @@ def test_gap_fades_in_on_approach_with_margin_and_length_until_the_contact(
 def test_parallel_lines_are_told_and_nothing_is_drawn_far_away(
     services: Services, gaps: Gaps, angle: float
 ) -> None:
-    state = opened(OPTIMAL, Pose((3.0, 4.0, 5.0), (1.0, 0.0, 0.0, 0.5 * angle)))
+    state = open_state(OPTIMAL, Pose((3.0, 4.0, 5.0), (1.0, 0.0, 0.0, 0.5 * angle)))
     placed = Placed(Frame(state))
     longest = (2.0 * FARTHEST + 1.0) * placed.reach
     nodes = draw(gaps, state)
@@ -232,7 +232,7 @@ def test_designs_of_any_size_are_drawn_alike(factor: float) -> None:
 
 
 def test_camera_follows_near_gaps_and_not_the_pointer(services: Services, desk: Desk) -> None:
-    gaps, home = services.get(Gaps), opened(OPTIMAL)
+    gaps, home = services.get(Gaps), open_state(OPTIMAL)
     desk.press(services.buttons, "margins.hover", "1")
     assert len(gaps.corners(Placed(Frame(home)))) == 0
     near = Placed(Frame(approaching(2)[-2]))
@@ -314,7 +314,7 @@ def test_switch_of_a_tetrahedron_hides_its_edges_name_faces_and_gap(
 def test_tetrahedron_that_fails_is_outlined_even_if_it_is_switched_off(
     tetrahedra: Tetrahedra,
 ) -> None:
-    state = SetJoint(0, 1000.0).apply(opened(OPTIMAL))
+    state = SetJoint(0, 1000.0).apply(open_state(OPTIMAL))
     assert state.unclosed is not None
     nodes = draw(tetrahedra, viewed(state, tetrahedra=(False, False, False)))
     outlined = {i for i in range(3) if nodes[f"/tetrahedra/{i + 1}/edges"]["visible"]}
@@ -327,7 +327,7 @@ def test_tetrahedron_that_fails_is_outlined_even_if_it_is_switched_off(
 def test_gizmo_is_small_and_faint_where_it_would_hide_a_gap(services: Services) -> None:
     handle = services.get(DragHandle)
     # At the last pose b4 is on the base plane.
-    for state, look in ((opened(OPTIMAL), CLEAR_HANDLE), (approaching(3)[-1], FAINT_HANDLE)):
+    for state, look in ((open_state(OPTIMAL), CLEAR_HANDLE), (approaching(3)[-1], FAINT_HANDLE)):
         values = by_name(handle.updates(Placed(Frame(state))))["/handle"]
         assert (values["scale"], values["opacity"]) == look
     # a1 on the platform plane is far from b4.
@@ -364,7 +364,7 @@ def area(points: FloatArray) -> float:
 
 @pytest.mark.parametrize("pose", POSES)
 def test_shadow_of_plates_is_their_projection(pose: Pose | None) -> None:
-    scene = Placed(Frame(opened(OPTIMAL, pose)))
+    scene = Placed(Frame(open_state(OPTIMAL, pose)))
     base, platform, *_ = shadow_outlines(scene, GROUND)
     corners = np.array([scene.points[name][:2] for name in ("a1", "a2", "a3")])
     solid, _ = plate(corners, BASE_RADIUS, GROUND, PLATE_TOP)

@@ -41,7 +41,7 @@ from explorer.app.state.actions import (
 from explorer.app.state.frame import Frame
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.presses import Press, Presses
-from explorer.app.state.state import Hold, State, opened
+from explorer.app.state.state import Hold, State, open_state
 from explorer.errors import ExplorerError, InputError
 from explorer.legs.moves import move_clearance
 from explorer.mechanism.design import JOINTS, VARIABLES, Limits
@@ -75,7 +75,7 @@ class Recorder:
     """A state and its history, changed by actions; each of a control of its own by default."""
 
     def __init__(self, state: State | None = None) -> None:
-        self.state = opened(OPTIMAL) if state is None else state
+        self.state = open_state(OPTIMAL) if state is None else state
         self.history = start_history(self.state)
         self.time = 0.0
 
@@ -199,11 +199,11 @@ def test_playing_path_belongs_to_the_step_that_began_it(recorder: Recorder) -> N
     assert journey.at == pytest.approx(1.5)
     assert not journey.is_playing
     recorder.move(-1)
-    assert settle(recorder.state) == settle(opened(OPTIMAL))
+    assert settle(recorder.state) == settle(open_state(OPTIMAL))
 
 
 def test_search_is_one_step_and_no_step_is_undone_meanwhile() -> None:
-    recorder = Recorder(opened(OTHER))
+    recorder = Recorder(open_state(OTHER))
     recorder.do(StartRun())
     assert recorder.words == []
     with pytest.raises(InputError, match="cancel that first"):
@@ -235,7 +235,7 @@ def test_unclosed_length_is_undone_with_its_message(recorder: Recorder) -> None:
     recorder.do(SetJoint(0, 1000.0))
     assert recorder.state.unclosed is not None
     recorder.move(-1)
-    assert (recorder.state.unclosed, recorder.state.joints) == (None, opened(OPTIMAL).joints)
+    assert (recorder.state.unclosed, recorder.state.joints) == (None, open_state(OPTIMAL).joints)
 
 
 def test_session_undoes_and_redoes_exactly(desk: Desk) -> None:
@@ -266,7 +266,7 @@ CHANGES: list[Action] = [SetPosition(0, 9.0), SetVariable("a3x", 18.0), SetJoint
 @few
 @given(st.lists(st.sampled_from([*VIEWS, *CHANGES, "undo", "redo"]), max_size=20))
 def test_what_is_shown_is_no_step_and_undo_leaves_it(done: list[Action | str]) -> None:
-    recorder, alone = Recorder(opened(OPTIMAL)), Recorder(opened(OPTIMAL))
+    recorder, alone = Recorder(open_state(OPTIMAL)), Recorder(open_state(OPTIMAL))
     view = recorder.state.view
     for each in done:
         if isinstance(each, Action):
@@ -301,7 +301,7 @@ def test_every_action_has_words() -> None:
 @pytest.fixture
 def moved() -> State:
     """The optimum after a move along x from its home pose, at the time 100."""
-    return UserAction(SetPosition(0, 14.0), "x", 100.0).apply(opened(OPTIMAL))
+    return UserAction(SetPosition(0, 14.0), "x", 100.0).apply(open_state(OPTIMAL))
 
 
 def start_of(state: State) -> Pose:
@@ -310,7 +310,7 @@ def start_of(state: State) -> Pose:
 
 
 def test_drag_of_many_events_is_one_move_from_where_it_began() -> None:
-    state = start = opened(OPTIMAL)
+    state = start = open_state(OPTIMAL)
     assert start.gesture is None
     assert Frame(start).last_move is None
     for i in range(30):
@@ -354,7 +354,7 @@ def test_change_of_design_or_mode_ends_the_move(moved: State, action: Action, ho
 
 def test_action_that_moves_nothing_leaves_the_last_move(moved: State) -> None:
     thick = Set("design.limits", Limits(leg_radii=(0.5, 0.5, 0.5, 0.5)))
-    for action in (thick, Set("design.unit_mm", 3.0), Set("view", opened(OTHER).view)):
+    for action in (thick, Set("design.unit_mm", 3.0), Set("view", open_state(OTHER).view)):
         assert UserAction(action, "other", 100.1).apply(moved).gesture == moved.gesture
 
 

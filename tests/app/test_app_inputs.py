@@ -29,7 +29,7 @@ from explorer.app.session.field_words import FIELD_WORDS, message_of
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetJoint, SetPosition
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.errors import DesignError
 from explorer.mechanism.design import JOINTS, VARIABLES, Design, Limits
 from explorer.mechanism.design_file import PRESETS, decode_design
@@ -43,7 +43,7 @@ def test_ranges_are_round_and_hold_the_design_whatever_its_size(size: float) -> 
     design = Design(
         a3=(size, 0.4 * size), b1=(0.4 * size, -0.1 * size), b2=0.3 * size, b3=0.1 * size
     )
-    state = opened(design)
+    state = open_state(design)
     spans = {
         **{name: joint_span(state, i) for i, name in enumerate(JOINTS)},
         **{name: position_span(state, i) for i, name in enumerate("xyz")},

@@ -48,7 +48,7 @@ from explorer.app.scene.placing import Placed
 from explorer.app.session.gestures import UserAction
 from explorer.app.state.actions import Set, SetPose, SetPosition
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.colours import SWEPT, TUBE
 from explorer.errors import InputError
@@ -75,7 +75,7 @@ OPTIMAL = PRESETS["paper-optimal"]
 RADIUS = 0.2
 Followed = TypeVar("Followed", bound=Feed)
 # Rows of the rotation at home.
-LEVEL = regions.rows_of(opened(OPTIMAL).pose.rotation)
+LEVEL = regions.rows_of(open_state(OPTIMAL).pose.rotation)
 
 
 def rows_of(html: str) -> list[list[str]]:
@@ -101,7 +101,7 @@ def with_limits(state: State, **limits: Any) -> State:
 
 def beyond_its_limits() -> State:
     """Return the optimum with a leg 4 that is too short for its home."""
-    return with_limits(opened(OPTIMAL), l4=(0.0, 12.5))
+    return with_limits(open_state(OPTIMAL), l4=(0.0, 12.5))
 
 
 def follow(
@@ -143,7 +143,7 @@ def clearance_at(state: State, points: FloatArray) -> FloatArray:
 
 untyped_trimesh: Any = trimesh
 # Forces and moments of no load.
-THICK = show(thick(opened(OPTIMAL), RADIUS))
+THICK = show(thick(open_state(OPTIMAL), RADIUS))
 
 
 # The accessible workspace
@@ -269,16 +269,16 @@ def test_failure_of_an_older_request_is_no_problem() -> None:
 
 
 def test_curve_is_requested_once_for_all_radii() -> None:
-    feed, worker = follow(opened(OPTIMAL), RADIUS_FEED)
-    state = show_curve(opened(OPTIMAL))
+    feed, worker = follow(open_state(OPTIMAL), RADIUS_FEED)
+    state = show_curve(open_state(OPTIMAL))
     narrow = with_limits(state, margin=1.0)
     for each, orders in (
-        (opened(OPTIMAL), 0),
+        (open_state(OPTIMAL), 0),
         (state, 1),
         (thick(state, 0.3), 1),
         (SetPosition(0, 11.0).apply(state), 1),
         (narrow, 2),
-        (opened(OPTIMAL), 2),
+        (open_state(OPTIMAL), 2),
     ):
         feed.follow(Frame(each))
         assert len(worker.orders) == orders
@@ -402,7 +402,7 @@ def words_of(state: State) -> str:
 
 @given(st.lists(st.floats(1.0, 1e3), min_size=2, max_size=30), st.none() | st.floats(0.0, 2.0))
 def test_chart_shows_any_curve_and_marks_on_it(values: list[float], radius: float | None) -> None:
-    whole = curve_of(opened(OPTIMAL))
+    whole = curve_of(open_state(OPTIMAL))
     drawn = replace(
         whole,
         radii=np.append(np.linspace(0.0, 0.5, len(values)), 0.5),
@@ -427,7 +427,7 @@ def test_chart_shows_any_curve_and_marks_on_it(values: list[float], radius: floa
 
 
 def test_words_of_the_curve_show_its_radii_shares_and_first_contacts() -> None:
-    expected, html = curve_of(opened(OPTIMAL)), words_of(thick(opened(OPTIMAL), RADIUS))
+    expected, html = curve_of(open_state(OPTIMAL)), words_of(thick(open_state(OPTIMAL), RADIUS))
     rows = rows_of(html)
     assert [row[0] for row in rows] == ["present radius", "99 % accessible up to", "no loss up to"]
     assert number(rows[0][1]) == RADIUS
@@ -444,14 +444,14 @@ def test_words_of_the_curve_show_its_radii_shares_and_first_contacts() -> None:
 
 def test_chart_appears_once_its_curve_is_computed(services: Services, worker: StubWorker) -> None:
     panel, feed = LegsPanel(services), services.get(RADIUS_FEED)
-    state = show_curve(opened(OPTIMAL))
+    state = show_curve(open_state(OPTIMAL))
 
     def chart(state: State) -> dict[str, Any]:
         feed.follow(Frame(state))
         updates = list(panel.updates(Frame(state)))
         return {name: v for h, name, v in updates if isinstance(h, viser.GuiUplotHandle)}
 
-    assert chart(opened(OPTIMAL)) == chart(state) == {"visible": False}
+    assert chart(open_state(OPTIMAL)) == chart(state) == {"visible": False}
     assert "Computing" in radius_words(Frame(state), feed)
     answer(worker)
     drawn = chart(state)
@@ -521,16 +521,16 @@ def test_table_shows_the_clearance_of_each_pair() -> None:
 
 def test_legs_that_share_a_joint_are_called_joined() -> None:
     index = PAIRS.index((2, 4))
-    html = render(pose_clearances(Frame(opened(JOINED)).snapshot))
+    html = render(pose_clearances(Frame(open_state(JOINED)).snapshot))
     assert rows_of(html)[index] == ["2–4", "joined", ""]
-    state = swept(opened(JOINED))
+    state = swept(open_state(JOINED))
     assert rows_of(move_table(Frame(state)))[index] == ["2–4", "", "joined", ""]
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3, 0.4])
 def test_last_move_is_judged_by_both_tests(radius: float) -> None:
-    state = thick(swept(opened(OPTIMAL)), radius)
-    home = opened(OPTIMAL).pose
+    state = thick(swept(open_state(OPTIMAL)), radius)
+    home = open_state(OPTIMAL).pose
     exact = move_clearance(state.design, home, END)
     overlaps = step_overlaps(
         OPTIMAL, home.position, home.rotation, END.position, END.rotation
@@ -606,7 +606,7 @@ def test_legs_with_radii_are_drawn_as_capsules(services: Services) -> None:
 
 
 def test_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
-    state, home = swept(opened(OPTIMAL)), opened(OPTIMAL).pose
+    state, home = swept(open_state(OPTIMAL)), open_state(OPTIMAL).pose
     placed = Placed(Frame(state))
     drawn = by_name(SweptTetrahedra(services).updates(placed))
     assert all(each["visible"] is True for each in drawn.values())
@@ -627,12 +627,12 @@ def test_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
 @pytest.mark.parametrize(
     "state",
     [
-        opened(OPTIMAL),
+        open_state(OPTIMAL),
         # Shown, but there is no move.
-        viewed(opened(OPTIMAL), swept=True),
-        viewed(opened(OPTIMAL), clearance=True, drawn_as="6-4 twin"),
-        viewed(thick(swept(opened(OPTIMAL)), 0.3), drawn_as="6-4 twin"),
-        viewed(thick(swept(opened(OPTIMAL)), 0.3), swept=False, legs=False),
+        viewed(open_state(OPTIMAL), swept=True),
+        viewed(open_state(OPTIMAL), clearance=True, drawn_as="6-4 twin"),
+        viewed(thick(swept(open_state(OPTIMAL)), 0.3), drawn_as="6-4 twin"),
+        viewed(thick(swept(open_state(OPTIMAL)), 0.3), swept=False, legs=False),
     ],
 )
 def test_clearances_capsules_and_tetrahedra_are_hidden_where_they_are_not_wanted(
@@ -664,7 +664,7 @@ def test_each_radius_has_a_slider_that_sets_it_alone_and_refuses_what_cannot_be(
     assert desk.complaints == []
     before = desk.state
     sums = [expected[i - 1] + expected[j - 1] for i, j in PAIRS]
-    np.testing.assert_allclose(clearances(before), clearances(opened(OPTIMAL)) - sums)
+    np.testing.assert_allclose(clearances(before), clearances(open_state(OPTIMAL)) - sums)
     # What no slider offers may still be typed, or sent by anyone.
     for radius in (-0.5, float("nan")):
         desk.use(sliders["leg 3"], radius)

@@ -11,7 +11,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.listed import FEATURES
 from explorer.app.scene.placing import Placed
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.mechanism.design_file import PRESETS
 
 DESIGN = PRESETS["paper-optimal"]
@@ -30,7 +30,7 @@ def test_line_of_the_scene_has_the_kind_of_colours_that_it_gets_later(
             return handle
 
     server.scene.__class__ = Recorder
-    placed = Placed(Frame(opened(DESIGN)))
+    placed = Placed(Frame(open_state(DESIGN)))
     parts = [part(services) for feature in FEATURES for part in feature.scene]
     updates = [update for part in parts for update in part.updates(placed)]
     given = {id(h): np.shape(np.asarray(v)) for h, name, v in updates if name == "colors"}

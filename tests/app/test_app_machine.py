@@ -23,7 +23,7 @@ from explorer.app.scene.placing import HALF_JOINT, Placed
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.app.state.view import PrototypeView
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
@@ -278,7 +278,7 @@ def test_impossible_value_gets_one_line_and_changes_nothing(
 def test_tool_angles_are_kept_as_set_and_turn_as_the_pose_does(
     turns: list[tuple[int, float]],
 ) -> None:
-    state, angles = opened(OPTIMAL), [0.0, 0.0, 0.0]
+    state, angles = open_state(OPTIMAL), [0.0, 0.0, 0.0]
     for axis, angle in turns:
         state = SetToolAngle(axis, angle).apply(state)
         angles[axis] = angle
@@ -294,7 +294,7 @@ def test_tool_angles_of_a_design_that_is_opened_are_its_own(desk: Desk) -> None:
     desk.session.do(SetToolAngle(1, 120.0))
     assert desk.state.tool_angles == (30.0, 120.0, 0.0)
     # The same orientation with a pitch within 90°.
-    reopened = opened(desk.state.design)
+    reopened = open_state(desk.state.design)
     assert reopened.tool_angles == pytest.approx((-150.0, 60.0, 180.0))
     # Angles of another orientation do not count.
     other = replace(reopened, set_tool_angles=(1.0, 2.0, 3.0))
@@ -354,7 +354,7 @@ def test_panel_tells_the_machine_the_weight_and_the_moment(hand: Hand, desk: Des
 
 
 def placed(design: Design, pose: Pose | None = None, **view: Any) -> Placed:
-    return Placed(Frame(viewed(opened(design, pose), **view)))
+    return Placed(Frame(viewed(open_state(design, pose), **view)))
 
 
 def visible(nodes: dict[str, dict[str, Any]]) -> set[str]:

@@ -24,7 +24,7 @@ from explorer.app.features.help.tour import STEPS, Tour
 from explorer.app.layout import is_narrow
 from explorer.app.server import Running, start
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import PREFERENCES, PreferenceFile, Preferences, UserData
@@ -141,7 +141,7 @@ def test_only_a_file_of_the_same_name_and_browser_without_a_notice_is_replaced(
 
 @pytest.mark.parametrize("design", PRESETS.values(), ids=str)
 def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(design: Design) -> None:
-    state = start = opened(design)
+    state = start = open_state(design)
     tour = Tour(0, Frame(state))
     assert tour.step_by(-1, Frame(state)).at == 0
     for index, step in enumerate(STEPS):

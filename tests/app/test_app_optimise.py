@@ -70,7 +70,7 @@ from explorer.app.state.actions import (
 )
 from explorer.app.state.frame import Frame
 from explorer.app.state.optimisation import PLACE, OptimisationRequest, killed_result, result_of
-from explorer.app.state.state import Run, State, opened
+from explorer.app.state.state import Run, State, open_state
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.measures.size import corners_of
@@ -102,7 +102,7 @@ ENDLESS = OptimisationRequest(objective="smallest-reach", volume=7053.0, starts=
 
 def own_state() -> State:
     """Return the paper's start in a pose of its own, held by its legs."""
-    turned = SetAngle(1, 3.0).apply(SetPosition(0, 4.5).apply(opened(paper_start())))
+    turned = SetAngle(1, 3.0).apply(SetPosition(0, 4.5).apply(open_state(paper_start())))
     return replace(turned, hold="legs")
 
 
@@ -135,7 +135,7 @@ def best_of(run: Run) -> Iterate:
 
 def mechanism_of(state: State) -> State:
     """Return all of a state that belongs to the mechanism."""
-    fresh = opened(OPTIMAL)
+    fresh = open_state(OPTIMAL)
     return replace(
         state, view=fresh.view, hold=fresh.hold, optimisation=fresh.optimisation, gesture=None
     )
@@ -177,7 +177,7 @@ class Bench(Desk):
         self.reports: list[str] = []
         self.states: list[State] = []
         self.markup: list[object] = []
-        super().__init__(opened(OPTIMAL))
+        super().__init__(open_state(OPTIMAL))
         self.services = services_for(
             server, self.session, buttons=Buttons(server), tell=self.reports.append
         )
@@ -294,7 +294,7 @@ def test_killed_process_leaves_the_design_and_the_panel_says_so(bench: Bench) ->
     os.kill(process, signal.SIGKILL)
     run = bench.wait_for_end()
     state = bench.state
-    assert mechanism_of(state) == mechanism_of(opened(paper_start()))
+    assert mechanism_of(state) == mechanism_of(open_state(paper_start()))
     assert run.verdict is not None
     assert run.verdict.status == "failed"
     assert "died" in result_words(state)
@@ -398,7 +398,7 @@ def test_platform_moves_freely_during_a_run_and_iterates_keep_its_position() -> 
     assert after.pose.position[0] == 6.0
     assert after.pose.quaternion == last.design.home_pose.quaternion
     assert after.pose.quaternion != run.own.design.home_pose.quaternion
-    assert after.joints == opened(last.design, after.pose).joints
+    assert after.joints == open_state(last.design, after.pose).joints
     # Iterates of another run change nothing.
     assert Advance(run.number + 1, (last,)).apply(moved) == moved
 
@@ -437,7 +437,7 @@ def test_only_free_variables_change_and_those_of_margins_influence_them() -> Non
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_suggested_values_suit_the_design(name: str) -> None:
-    state = opened(PRESETS[name])
+    state = open_state(PRESETS[name])
     design, home = state.design, state.design.home_pose
     volume = workspace_volume(design).volume
     assert 1.05 * volume < requested_volume(state) < 2.3 * volume
@@ -458,7 +458,7 @@ def test_suggested_values_suit_the_design(name: str) -> None:
 def test_default_demands_can_be_kept_by_every_preset(name: str, objective: Any) -> None:
     machine = {key: getattr(MACHINE, key) for key in ("payload", "actuators", "struts")}
     design = msgspec.structs.replace(PRESETS[name], **machine)
-    state = ask(OptimisationRequest(objective=objective), opened(design))
+    state = ask(OptimisationRequest(objective=objective), open_state(design))
     assert find_refusals(state) == ()
     assert liftable_limits(state) == ()
     assert StartRun().apply(state).optimisation.is_on
@@ -480,7 +480,7 @@ def test_default_demands_can_be_kept_by_every_preset(name: str, objective: Any) 
 def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
     design: Design, request_: OptimisationRequest, limit: str, title: str
 ) -> None:
-    before = ask(request_, opened(design))
+    before = ask(request_, open_state(design))
     assert liftable_limits(before) == (limit,)
     assert filled_buttons(before) == [LIFT]
     assert buttons_of(before)[START] == "disabled"
@@ -492,7 +492,7 @@ def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
 
 
 def test_paper_box_allows_the_search_and_keeps_the_home() -> None:
-    before = ask(SMALL, opened(INITIAL))
+    before = ask(SMALL, open_state(INITIAL))
     after = TakePaperBox().apply(before)
     assert find_refusals(before) != ()
     assert find_refusals(after) == ()
@@ -500,7 +500,7 @@ def test_paper_box_allows_the_search_and_keeps_the_home() -> None:
 
 
 def test_tilt_is_demanded_over_the_required_box() -> None:
-    state = SetRequest("optimisation.request.tilt", 20.0).apply(opened(OPTIMAL))
+    state = SetRequest("optimisation.request.tilt", 20.0).apply(open_state(OPTIMAL))
     problem = problem_of(state)
     assert problem.demands.tilt == 20.0
     assert problem.demands.required_box == requested_box(state)

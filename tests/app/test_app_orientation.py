@@ -46,7 +46,7 @@ from explorer.app.features.workspace.slice_map import AXES
 from explorer.app.features.workspace.tasks import draw_workspace
 from explorer.app.state.actions import Set, SetAngle, SetPosition
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.state.view import WorkspaceView
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
@@ -80,7 +80,7 @@ def tilts() -> Generator[TiltsDrawing]:
         patch.setattr(work, "NODES", 8)
         services, worker = services_and_worker()
         feed = services.get(TILTS_FEED)
-        feed.follow(Frame(show(opened(OPTIMAL), tilts=True)))
+        feed.follow(Frame(show(open_state(OPTIMAL), tilts=True)))
         worker.work()
         assert feed.drawing is not None
         yield feed.drawing
@@ -98,7 +98,7 @@ def services_and_worker() -> tuple[Services, StubWorker]:
 
 
 def test_angles_that_are_set_are_those_of_the_pose() -> None:
-    state = opened(OPTIMAL)
+    state = open_state(OPTIMAL)
     for axis, value in ((1, 25.0), (0, -140.0), (2, -50.0)):
         state = SetTiltTorsion(axis, value).apply(state)
         assert tilt_torsion_of(state.pose.rotation)[axis] == pytest.approx(value, abs=1e-9)
@@ -149,7 +149,7 @@ def test_map_without_any_tilt_is_drawn_too() -> None:
 
 def test_position_feed_computes_share_and_torsions() -> None:
     services, worker = services_and_worker()
-    state = opened(OPTIMAL)
+    state = open_state(OPTIMAL)
     for kind in ORIENTATION.later_feeds:
         services.get(kind).follow(Frame(state))
     worker.work()
@@ -162,7 +162,7 @@ def test_position_feed_computes_share_and_torsions() -> None:
 
 
 def test_tilts_over_positions_are_the_greatest_of_each(tilts: TiltsDrawing) -> None:
-    torsion = round(opened(OPTIMAL).tilt_torsion.torsion, work.DIGITS)
+    torsion = round(open_state(OPTIMAL).tilt_torsion.torsion, work.DIGITS)
     for index in np.random.default_rng(0).integers(len(tilts.tilts), size=20):
         expected = greatest_tilt(OPTIMAL, tilts.positions[index], torsion).tilt
         assert tilts.tilts[index] == pytest.approx(expected, abs=1e-6)
@@ -180,7 +180,7 @@ def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
     ):
         services, worker = services_and_worker()
         feed = services.get(RANGE_FEED)
-        feed.follow(Frame(show(opened(OPTIMAL), over=over, range=15.0)))
+        feed.follow(Frame(show(open_state(OPTIMAL), over=over, range=15.0)))
         worker.work()
         assert feed.drawing is not None
         volumes[over] = feed.drawing.solid.volume
@@ -210,7 +210,7 @@ def test_range_turns_the_tilted_orientations_either_way() -> None:
 )
 def test_range_or_turn_beyond_half_a_turn_is_refused(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        show(opened(OPTIMAL), **changes)
+        show(open_state(OPTIMAL), **changes)
 
 
 def test_strip_of_torsions_has_the_tilts_and_a_mark_at_the_torsion(
@@ -243,7 +243,7 @@ def test_tilt_at_any_torsion_is_between_those_of_its_neighbours(by_torsion: Tilt
 
 
 def test_angles_stay_as_they_were_set_at_tilts_that_do_not_determine_them() -> None:
-    state = opened(OPTIMAL)
+    state = open_state(OPTIMAL)
     for axis, value in ((0, 60.0), (1, 20.0), (2, -50.0)):
         state = SetTiltTorsion(axis, value).apply(state)
     for tilt in (0.0, 180.0):
@@ -260,7 +260,7 @@ def test_angles_stay_as_they_were_set_at_tilts_that_do_not_determine_them() -> N
 
 def test_panel_marks_values_of_an_older_position_as_outdated_and_shows_a_failure() -> None:
     services, worker = services_and_worker()
-    state, feed = opened(OPTIMAL), services.get(POSITION_FEED)
+    state, feed = open_state(OPTIMAL), services.get(POSITION_FEED)
 
     def text_at(state: State) -> str:
         here = state.tilt_torsion
@@ -286,7 +286,7 @@ def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side(
 ) -> None:
     assert nodes_beside_cut(tilts, WorkspaceView()).all()
     view = WorkspaceView(solid=True, cut=AXES[axis], level=6.0, flipped=flipped)
-    request = workspace_request(Frame(Set("view.workspace", view).apply(opened(OPTIMAL))))
+    request = workspace_request(Frame(Set("view.workspace", view).apply(open_state(OPTIMAL))))
     assert request is not None
     surface = draw_workspace(request).surface
     ends = [shell.vertices[:, axis] for shell in surface.shells if len(shell.vertices)]

@@ -59,7 +59,7 @@ from explorer.app.state.actions import Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import value_at
 from explorer.app.state.paths import STRAIGHT_SECONDS, End, Journey
-from explorer.app.state.state import State, angles_of, joints_of, opened
+from explorer.app.state.state import State, angles_of, joints_of, open_state
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.charts import ORANGE
 from explorer.app.widgets.pieces import widgets
@@ -87,7 +87,7 @@ class Bench(Desk):
     def __init__(self) -> None:
         self.reports: list[str] = []
         self.times: list[float] = []
-        super().__init__(opened(OPTIMAL))
+        super().__init__(open_state(OPTIMAL))
         self.runner = PathRunner(services_for(session=self.session, tell=self.reports.append))
 
     def draw(self, frame: Frame) -> None:
@@ -116,7 +116,7 @@ def with_ends(state: State, start: End = None, goal: End = None) -> State:
 
 
 def start_between(first: int, last: int, pose: Pose = TILTED) -> State:
-    return Go().apply(with_ends(opened(OPTIMAL, pose), first, last))
+    return Go().apply(with_ends(open_state(OPTIMAL, pose), first, last))
 
 
 def journey_of(state: State) -> Journey:
@@ -125,7 +125,7 @@ def journey_of(state: State) -> Journey:
 
 
 def to_plan(goal: Pose = GOAL) -> State:
-    state = with_ends(opened(OPTIMAL), None, goal)
+    state = with_ends(open_state(OPTIMAL), None, goal)
     return Set("paths.kind", "planned").apply(state)
 
 
@@ -159,7 +159,7 @@ def test_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
     ("start", "goal"), [(None, GOAL), (TILTED, GOAL), (GOAL, 5), (2, GOAL), (None, None), (None, 6)]
 )
 def test_straight_path_leads_between_any_two_ends(start: End, goal: End) -> None:
-    before = with_ends(opened(OPTIMAL, TILTED), start, goal)
+    before = with_ends(open_state(OPTIMAL, TILTED), start, goal)
     expected = ends_of(before)
     state = Go().apply(before)
     journey = journey_of(state)
@@ -172,7 +172,7 @@ def test_straight_path_leads_between_any_two_ends(start: End, goal: End) -> None
 
 
 def test_goal_is_the_neighbouring_mode_until_one_is_chosen_and_stays_once_it_is_gone_to() -> None:
-    state = opened(OPTIMAL)
+    state = open_state(OPTIMAL)
     assert (state.mode, goal_of(state)) == (1, 5)
     end = SetPathTime(STRAIGHT_SECONDS).apply(Go().apply(state))
     assert (end.mode, end.paths.goal, goal_of(end)) == (5, 5, 5)
@@ -182,7 +182,7 @@ def test_goal_is_the_neighbouring_mode_until_one_is_chosen_and_stays_once_it_is_
     ("start", "goal"), [(None, TILTED), (GOAL, GOAL), (3, 3), (None, 1), (1, TILTED)]
 )
 def test_path_from_a_pose_to_itself_is_refused(start: End, goal: End) -> None:
-    state = with_ends(opened(OPTIMAL, TILTED), start, goal)
+    state = with_ends(open_state(OPTIMAL, TILTED), start, goal)
     for kind in ("straight", "planned"):
         with pytest.raises(InputError, match="are the same pose: choose another goal"):
             Go().apply(Set("paths.kind", kind).apply(state))
@@ -197,7 +197,7 @@ def test_modes_on_the_way_are_those_of_the_legs_at_the_ends() -> None:
     elsewhere = Go().apply(SetPosition(0, 9.0).apply(state))
     assert journey_of(elsewhere).poses[0] != journey_of(state).poses[0]
     # A path whose ends have other leg lengths gives its own place no other legs.
-    free = SetPathTime(4.0).apply(Go().apply(with_ends(opened(OPTIMAL, TILTED), None, GOAL)))
+    free = SetPathTime(4.0).apply(Go().apply(with_ends(open_state(OPTIMAL, TILTED), None, GOAL)))
     modes = forward(OPTIMAL, joints_of(OPTIMAL, free.pose))
     assert ends_of(with_ends(free, None, 6))[1].position == pytest.approx(modes.position[6])
 
@@ -290,7 +290,7 @@ def test_flat_ends_are_lines_with_a_name_even_without_a_path(
     services: Services, quantity: Quantity, flat: tuple[float, ...]
 ) -> None:
     plot = IncidencePlot(services.gui, quantity)
-    updates: Any = plot.updates(Frame(opened(OPTIMAL)))
+    updates: Any = plot.updates(Frame(open_state(OPTIMAL)))
     chart, scales = {name: (handle, value) for handle, name, value in updates}["scales"]
     levels, (low, high) = chart.axes[-1], scales["y"]["range"]
     assert levels["splits"] == flat
@@ -311,7 +311,7 @@ def test_path_and_its_crossings_are_drawn(services: Services) -> None:
     balls: Any = drawn["/path/crossings", "batched_positions"]
     expected = scale * np.array([c.pose.position for c in crossings])
     np.testing.assert_allclose(balls[: len(crossings)], expected, atol=1e-4)
-    hidden = [v for _, n, v in scene.updates(Placed(Frame(opened(OPTIMAL)))) if n == "visible"]
+    hidden = [v for _, n, v in scene.updates(Placed(Frame(open_state(OPTIMAL)))) if n == "visible"]
     assert hidden == [False, False]
 
 
@@ -327,7 +327,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     assert state.paths.problem is None
     journey = journey_of(state)
     assert journey.kind == "planned"
-    assert (journey.poses[0], journey.poses[-1]) == (opened(OPTIMAL).pose, GOAL)
+    assert (journey.poses[0], journey.poses[-1]) == (open_state(OPTIMAL).pose, GOAL)
     # It is played at once, as a straight one.
     assert bench.wait(lambda state: journey_of(state).at > 0.0).pose != GOAL
     assert not journey.margins.crossings
@@ -341,7 +341,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     assert process not in (None, os.getpid())
     # A plan that would never be ready.
     os.kill(process, signal.SIGSTOP)
-    bench.do(SetPose(opened(OPTIMAL).pose), Go())
+    bench.do(SetPose(open_state(OPTIMAL).pose), Go())
     assert "Planning, for 2 s at most" in str(plan_words(bench.wait(lambda s: s.paths.is_planning)))
     bench.do(CancelPlan())
     bench.wait_for_plan(2)
@@ -357,7 +357,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
 
 def test_plan_that_comes_late_or_for_another_design_is_not_taken() -> None:
     state = Go().apply(to_plan())
-    journey = Journey("planned", "", OPTIMAL, (opened(OPTIMAL).pose, GOAL))
+    journey = Journey("planned", "", OPTIMAL, (open_state(OPTIMAL).pose, GOAL))
     for late in (CancelPlan().apply(state), Go().apply(state)):
         assert TakePlan(1, journey, None).apply(late) == late
     assert TakePlan(1, journey, None).apply(state).pose == journey.poses[0]
@@ -458,7 +458,7 @@ def test_end_is_the_present_pose_a_mode_or_six_numbers(
 def test_mode_at_a_singular_pose_is_refused_in_words_or_a_pose_with_the_same_legs() -> None:
     flat = Pose.of_yaw_pitch_roll((10.0, 5.0, 0.0), (-73.1, 12.0, 9.0))
     for mode in range(8):
-        state = with_ends(opened(OPTIMAL, flat), None, mode)
+        state = with_ends(open_state(OPTIMAL, flat), None, mode)
         if forward(OPTIMAL, joints_of(OPTIMAL, flat)).feasible:
             goal = ends_of(state)[1]
             expected = pytest.approx(joints_of(OPTIMAL, flat), abs=1e-6)
@@ -488,7 +488,7 @@ DOWN = (0.0, 0.0, -40.0)
 
 def straight(*more: Action, force: Triple = DOWN) -> State:
     """Return a state with the straight path between the ends."""
-    state = opened(PRESS, START)
+    state = open_state(PRESS, START)
     for action in (
         Set("view.forces.force", force),
         Set("paths.goal", FAR),

@@ -34,7 +34,7 @@ from explorer.app.features.prototype.work import (
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Open, SetPose, SetPosition, SetVariable, draw_as
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.state.view import PrototypeView
 from explorer.app.widgets.assigning import Assigner
 from explorer.errors import InputError
@@ -70,7 +70,7 @@ def parts() -> Parts:
 
 def with_prototype(state: State | None = None, **changes: Any) -> State:
     """Return the state with the prototype drawn."""
-    begin = opened(OPTIMAL) if state is None else state
+    begin = open_state(OPTIMAL) if state is None else state
     return viewed(begin, drawn_as="prototype", prototype=PrototypeView(**changes))
 
 
@@ -225,7 +225,7 @@ def test_parts_are_made_again_when_the_design_changes_and_not_else(
     feed: PartsFeed, worker: StubWorker
 ) -> None:
     orders = worker.orders
-    feed.follow(Frame(opened(OPTIMAL)))
+    feed.follow(Frame(open_state(OPTIMAL)))
     assert orders == []
     for state in (
         with_prototype(),
@@ -259,7 +259,7 @@ def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed
     assert "carriages 2 and 3" in trouble
     # In this home pose no unit helps, so that none is offered.
     home = Pose.of_yaw_pitch_roll((10, 5, 9), (90, 0, 0))
-    turned = Frame(with_prototype(opened(msgspec.structs.replace(OPTIMAL, home=home))))
+    turned = Frame(with_prototype(open_state(msgspec.structs.replace(OPTIMAL, home=home))))
     feed.follow(turned)
     assert drawn_parts(feed) is None
     assert FIT not in (trouble_of(turned, feed) or "")
@@ -347,7 +347,7 @@ def test_files_of_the_assembly_are_those_of_the_library(monkeypatch: pytest.Monk
     assert export_assembly(OPTIMAL, "glb") == expected
     for file_format in ("glb", "step"):
         with pytest.raises(InputError, match="too tight"):
-            export_assembly(thick(opened(OPTIMAL), 0.4).design, file_format)
+            export_assembly(thick(open_state(OPTIMAL), 0.4).design, file_format)
     assert {file_format for file_format, _ in ASSEMBLIES.values()} == {*FORMATS, "step"}
     write = Mock(return_value=b"ISO-10303-21")
     monkeypatch.setattr("explorer.export.step.assembly_step", write)

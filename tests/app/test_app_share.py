@@ -28,7 +28,7 @@ from explorer.app.features.sharing.view_picture import (
 )
 from explorer.app.server import Running
 from explorer.app.state.actions import Set
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.app.state.view import View
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
@@ -133,7 +133,7 @@ def test_scene_page_drops_parts_with_what_they_belong_to() -> None:
 
 def test_caption_of_a_scene_page_has_names_as_text() -> None:
     design = msgspec.structs.replace(OPTIMAL, name="<script>alert(1)</script>")
-    caption = caption_of(opened(design), DATE)
+    caption = caption_of(open_state(design), DATE)
     assert "<script" not in caption
     assert "&lt;script&gt;" in caption
     assert "b4 at (10.000, 5.000, 9.000)" in caption

@@ -56,7 +56,7 @@ from explorer.app.session import clock
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetMode, SetPosition
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.state.view import SingularView
 from explorer.app.widgets.blocks import render
 from explorer.errors import InputError
@@ -76,7 +76,7 @@ BATCHED = ("batched_positions", "batched_scales")
 
 def singular_states() -> list[State]:
     """Return the home pose brought to each singular stratum."""
-    return [GoToStratum(w).apply(opened(OPTIMAL)) for w in STRATA if w != GENERIC]
+    return [GoToStratum(w).apply(open_state(OPTIMAL)) for w in STRATA if w != GENERIC]
 
 
 def viewed(state: State, **changes: Any) -> State:
@@ -109,7 +109,7 @@ def test_stratum_is_reached_by_the_shortest_way(stratum: tuple[int, ...]) -> Non
 
 @pytest.mark.parametrize("lower", [(2, 4, 3, 1), (1, 2, 3, 4)])
 def test_stratum_without_a_nearest_pose_is_refused(lower: tuple[int, ...]) -> None:
-    state = GoToStratum(lower).apply(opened(OPTIMAL))
+    state = GoToStratum(lower).apply(open_state(OPTIMAL))
     for goal, words in (
         (GENERIC, "arbitrarily close to every pose"),
         (lower, rf"lies in {re.escape(stratum_name(lower))} already"),
@@ -244,7 +244,7 @@ def test_singular_pose_is_named_and_drawn_without_infinite_numbers(
 def test_singular_pose_says_about_which_line_locked_actuators_let_the_platform_turn(
     incidence: int, line: str, through: str
 ) -> None:
-    assert not list(freedoms(Frame(opened(OPTIMAL)).snapshot))
+    assert not list(freedoms(Frame(open_state(OPTIMAL)).snapshot))
     frame = Frame(GoToSingularity(incidence).apply(random_states(1)[0]))
     words = plain(render(freedoms(frame.snapshot), {f"show {incidence}": show_button(incidence)}))
     place, rotation = np.array(frame.state.pose.position), frame.state.pose.rotation
@@ -261,7 +261,7 @@ def test_singular_pose_says_about_which_line_locked_actuators_let_the_platform_t
 
 
 def test_pose_within_the_limits_looks_safe_unless_it_is_singular() -> None:
-    regular = opened(OPTIMAL)
+    regular = open_state(OPTIMAL)
     singular = GoToSingularity(2).apply(regular)
     for state, kept, here in (
         (regular, "kept", "Within all limits"),
@@ -361,7 +361,7 @@ def rows_of_modes(frame: Frame) -> list[list[str]]:
 
 
 def test_table_has_the_eight_modes_with_b4_and_the_limits_that_each_breaks() -> None:
-    frame = Frame(opened(OPTIMAL))
+    frame = Frame(open_state(OPTIMAL))
     rows = rows_of_modes(frame)
     assert [row[0] for row in rows] == [str(mode) for mode in range(8)]
     for mode, row in enumerate(rows):
@@ -382,7 +382,7 @@ def test_table_has_the_eight_modes_with_b4_and_the_limits_that_each_breaks() -> 
 
 @given(all_cases())
 def test_table_of_any_pose_has_eight_rows_or_says_that_they_do_not_close(case: Case) -> None:
-    frame = Frame(opened(case.design, Pose.of(case.position, case.rotation)))
+    frame = Frame(open_state(case.design, Pose.of(case.position, case.rotation)))
     rows = rows_of_modes(frame)
     assert len(rows) == 8
     for row in rows:

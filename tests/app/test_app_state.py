@@ -31,7 +31,7 @@ from explorer.app.state.actions import (
     UseNearest,
 )
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, joints_of, mode_at, opened
+from explorer.app.state.state import State, joints_of, mode_at, open_state
 from explorer.errors import DesignError, ExplorerError, InputError
 from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
@@ -49,7 +49,7 @@ def closes(state: State) -> bool:
 
 @pytest.fixture
 def state() -> State:
-    return opened(OPTIMAL)
+    return open_state(OPTIMAL)
 
 
 @pytest.mark.parametrize("joint", range(6))
@@ -131,7 +131,7 @@ def test_joints_may_pass_through_what_cannot_close(state: State) -> None:
 def test_pose_controls_take_their_values_exactly_and_the_legs_follow(
     axis: int, length: float, angle_axis: int, angle: float
 ) -> None:
-    moved = SetAngle(angle_axis, angle).apply(SetPosition(axis, length).apply(opened(OPTIMAL)))
+    moved = SetAngle(angle_axis, angle).apply(SetPosition(axis, length).apply(open_state(OPTIMAL)))
     assert moved.pose.position[axis] == length
     assert moved.yaw_pitch_roll[angle_axis] == angle
     assert closes(moved)
@@ -145,7 +145,7 @@ def test_angles_stay_as_given_at_gimbal_lock(state: State) -> None:
 
 @given(st.lists(st.sampled_from(range(8)), min_size=1, max_size=12))
 def test_modes_are_poses_of_the_same_joints(modes: list[int]) -> None:
-    state = start = opened(OPTIMAL)
+    state = start = open_state(OPTIMAL)
     for mode in modes:
         state = SetMode(mode).apply(state)
         assert state.mode == mode == mode_at(state.pose, 0)
@@ -230,7 +230,7 @@ MAKERS: tuple[Callable[[int, float, float], Action], ...] = (
 def test_state_after_any_actions_does_not_contradict_itself(
     steps: list[tuple[Callable[[int, float, float], Action], int, float]],
 ) -> None:
-    state = opened(OPTIMAL)
+    state = open_state(OPTIMAL)
     for make, index, share in steps:
         with contextlib.suppress(ExplorerError):
             state = make(index, share, 45.0 * share - 10.0).apply(state)
@@ -252,7 +252,7 @@ def stuck_states(design: Design, seed: int) -> list[State]:
     rng = np.random.default_rng(seed)
     place = rng.uniform(-0.6, 0.6, 3) * design.reach
     pose = Pose.of_yaw_pitch_roll(place.tolist(), rng.uniform(-80.0, 80.0, 3).tolist())
-    state, found = opened(design, pose), list[State]()
+    state, found = open_state(design, pose), list[State]()
     for joint, name in enumerate(JOINTS):
         for low, high in Frame(state).snapshot.intervals[joint]:
             for value in (low - 0.1 * design.reach, high + 0.1 * design.reach):
@@ -295,7 +295,7 @@ class Watched:
         self._gate = threading.Event()
         self._gate.set()
         self.session = Session(
-            opened(PRESETS["paper-optimal"]),
+            open_state(PRESETS["paper-optimal"]),
             self._draw,
             lambda message, who: self.complaints.append((message, who)),
             self.faults.append,

@@ -21,7 +21,7 @@ from explorer.app.features.optimise.actions import StartRun
 from explorer.app.session.history import History, Step, start_history
 from explorer.app.session.session import REDO, UNDO, Session
 from explorer.app.state.actions import SetName, SetPosition
-from explorer.app.state.state import Run, State, opened
+from explorer.app.state.state import Run, State, open_state
 from explorer.app.storage.autosaver import Autosaver
 from explorer.app.storage.folder import data_folder
 from explorer.app.storage.session_file import (
@@ -39,7 +39,7 @@ from explorer.app.storage.user_data import open_user_data
 from explorer.errors import StorageError
 
 DATA = Path(__file__).parents[1] / "data"
-RICH, OPENED = rich_state(), opened(OPTIMAL)
+RICH, OPENED = rich_state(), open_state(OPTIMAL)
 WHOLE = encode_session(History((Step(7, "Open", OPENED), Step(8, "All", RICH)), 1))
 
 
@@ -87,7 +87,7 @@ def leaves(value: Any, path: str = "") -> dict[str, Any]:
 
 
 def test_rich_state_differs_from_a_new_one_in_every_saved_value() -> None:
-    new, rich = leaves(opened(OPTIMAL)), leaves(RICH)
+    new, rich = leaves(open_state(OPTIMAL)), leaves(RICH)
     transient = {"taken", "gesture", "paths.request", "paths.planning", "paths.problem"}
     same = {path[1:] for path, value in new.items() if rich.get(path, ...) == value}
     assert same == transient
@@ -115,7 +115,7 @@ def test_session_after_any_actions_is_read_back_to_the_last_bit(actions: list[Sa
 def test_long_and_large_histories_lose_steps_far_from_the_present_one(
     words: str, least: int, most: int
 ) -> None:
-    history = history_of(moves(opened(OPTIMAL), 3 * MOST_STEPS), words)
+    history = history_of(moves(open_state(OPTIMAL), 3 * MOST_STEPS), words)
     data = encode_session(history)
     read = decode_session(data, "file")
     assert least <= len(read.steps) <= most
@@ -125,7 +125,7 @@ def test_long_and_large_histories_lose_steps_far_from_the_present_one(
 
 
 def test_infinite_number_is_refused_when_the_session_is_written() -> None:
-    state = replace(opened(OPTIMAL), yaw_pitch_roll=(float("inf"), 0.0, 0.0))
+    state = replace(open_state(OPTIMAL), yaw_pitch_roll=(float("inf"), 0.0, 0.0))
     with pytest.raises(StorageError, match="no file can"):
         encode_session(start_history(state))
 

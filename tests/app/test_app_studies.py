@@ -36,7 +36,7 @@ from explorer.app.features.studies.work import StudyRunner
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.app.state.studies import (
     Brush,
     Studies,
@@ -100,7 +100,7 @@ def test_row_is_within_brushes_if_each_of_them_has_it_in_some_range(
 def test_axis_has_the_ranges_that_it_was_given_last(
     strokes: list[tuple[str, tuple[tuple[float, float], ...]]],
 ) -> None:
-    state = OpenStudy("some").apply(opened(OPTIMAL))
+    state = OpenStudy("some").apply(open_state(OPTIMAL))
     for axis, each in strokes:
         state = BrushAxes((Brush(axis, each),)).apply(state)
     last = dict(strokes)
@@ -112,7 +112,7 @@ def test_axis_has_the_ranges_that_it_was_given_last(
 
 
 def test_box_brushes_both_its_axes_and_frees_them_again() -> None:
-    state = BrushAxes((Brush("b2", ((0.0, 1.0),)),)).apply(opened(OPTIMAL))
+    state = BrushAxes((Brush("b2", ((0.0, 1.0),)),)).apply(open_state(OPTIMAL))
     box = Brush("volume", ((1.0, 2.0),)), Brush("reach", ((3.0, 4.0),))
     boxed = BrushAxes(box).apply(state).studies
     ranges = [boxed.ranges_of(axis) for axis in ("volume", "reach", "b2")]
@@ -129,11 +129,11 @@ def test_ranges_without_a_finite_interval_are_refused(
     wrong: tuple[tuple[float, float], ...],
 ) -> None:
     with pytest.raises(InputError):
-        BrushAxes((Brush("volume", wrong),)).apply(opened(OPTIMAL))
+        BrushAxes((Brush("volume", wrong),)).apply(open_state(OPTIMAL))
 
 
 def test_study_that_is_opened_has_no_brushes_unless_it_was_open() -> None:
-    state = OpenStudy("one").apply(opened(OPTIMAL))
+    state = OpenStudy("one").apply(open_state(OPTIMAL))
     state = BrushAxes((Brush("volume", ((1.0, 2.0),)),)).apply(state)
     state = Set("studies.plan", QUICK).apply(state)
     assert OpenStudy("one").apply(state) is state
@@ -329,7 +329,7 @@ def feed(home: Path) -> Generator[StudyFeed]:
 
 
 def draw_study(feed: StudyFeed, studies: Studies) -> StudyDrawing:
-    feed.follow(Frame(replace(opened(OPTIMAL), studies=studies)))
+    feed.follow(Frame(replace(open_state(OPTIMAL), studies=studies)))
     assert feed.wait_until_idle(PATIENCE)
     assert feed.problem is None
     assert feed.drawing is not None
@@ -439,16 +439,16 @@ def test_plots_are_not_drawn_again_for_a_live_design_and_a_lost_study_is_reporte
 ) -> None:
     studies = Studies(name="some")
     drawing = draw_study(feed, studies)
-    state = replace(opened(OPTIMAL), studies=studies)
+    state = replace(open_state(OPTIMAL), studies=studies)
     feed.follow(Frame(SetVariable("b3", 5.0).apply(state)))
     feed.follow(Frame(Set("studies.plan", QUICK).apply(state)))
     assert feed.wait_until_idle(PATIENCE)
     assert feed.drawing is drawing
-    feed.follow(Frame(replace(opened(OPTIMAL), studies=Studies(name="gone"))))
+    feed.follow(Frame(replace(open_state(OPTIMAL), studies=Studies(name="gone"))))
     assert feed.wait_until_idle(PATIENCE)
     assert feed.problem == "there is no study 'gone'; there are some"
     assert feed.drawing is None
-    feed.follow(Frame(opened(OPTIMAL)))
+    feed.follow(Frame(open_state(OPTIMAL)))
     assert feed.problem is None
 
 

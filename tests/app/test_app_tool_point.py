@@ -56,7 +56,7 @@ from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetAngle, SetMode, SetPose, SetPosition
 from explorer.app.state.compared import Look
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, angles_of, opened
+from explorer.app.state.state import State, angles_of, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.pieces import widgets
@@ -83,7 +83,7 @@ def state_at(
     at: Point = "tool", tool: Triple = TOOL, pose: Pose | None = TILTED, **view: Any
 ) -> State:
     """Return the paper's optimum with a tool, and the point that is shown."""
-    state = opened(with_tool(OPTIMAL, tool), pose)
+    state = open_state(with_tool(OPTIMAL, tool), pose)
     return Set("view", replace(state.view, at=at, **view)).apply(state)
 
 
@@ -98,7 +98,7 @@ def states(draw: st.DrawFn) -> tuple[State, float]:
     """Draw a state with a tool that is set, and the largest length of the computation."""
     case: Case = draw(all_cases())
     x, y, z = (case.design.reach * draw(st.floats(-2.0, 2.0)) for _ in range(3))
-    state = opened(with_tool(case.design, (x, y, z)), case.pose)
+    state = open_state(with_tool(case.design, (x, y, z)), case.pose)
     return Set("view.at", "tool").apply(state), max(case.size, abs(x), abs(y), abs(z))
 
 

@@ -20,7 +20,7 @@ from explorer.app.features.singularity.strata import distances_of, neighbours
 from explorer.app.features.singularity.work import STRATA_FEED, GoToSingularity
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.measures.snapshot import evaluate
 from explorer.measures.verdict import DISTANCE_SHARE, TITLES, verdict, warnings
 from explorer.mechanism.design import Design
@@ -39,7 +39,7 @@ def test_verdict_seven_degrees_from_an_incidence_is_near_and_so_is_its_margin() 
     # Where the lines nearly meet every margin is long.
     home = OPTIMAL.home_pose
     turn = rotation_from_yaw_pitch_roll((66.0, 0.0, 0.0))
-    frame = Frame(opened(OPTIMAL, Pose.of(home.position, home.rotation @ turn)))
+    frame = Frame(open_state(OPTIMAL, Pose.of(home.position, home.rotation @ turn)))
     assert np.abs(frame.snapshot.margins).min() > frame.state.warn_below
     text = summary(frame)
     assert "Near a singularity" in text
@@ -54,7 +54,7 @@ def test_verdict_seven_degrees_from_an_incidence_is_near_and_so_is_its_margin() 
 
 @pytest.mark.parametrize("incidence", [1, 2, 3])
 def test_nearest_singular_pose_is_the_boundary_of_two_modes(incidence: int) -> None:
-    frame = Frame(GoToSingularity(incidence).apply(opened(OPTIMAL)))
+    frame = Frame(GoToSingularity(incidence).apply(open_state(OPTIMAL)))
     found = frame.verdict
     assert (found.kind, found.incidences, found.distance) == ("singular", (incidence,), 0.0)
     assert found.levels[incidence - 1] == 0.0
@@ -131,7 +131,9 @@ def test_verdict_within_the_warning_distance_or_angle_of_an_incidence_is_never_c
 ) -> None:
     rng, warn = np.random.default_rng(incidence), warnings(design.reach)
     for _ in range(8):
-        singular = GoToSingularity(incidence).apply(opened(design, random_pose(design, rng))).pose
+        singular = (
+            GoToSingularity(incidence).apply(open_state(design, random_pose(design, rng))).pose
+        )
         share = float(rng.uniform(0.0, 0.999))
         # It is moved, and turned about b4 or a1.
         way, axis = (each / np.linalg.norm(each) for each in rng.normal(size=(2, 3)))
@@ -149,14 +151,14 @@ def test_verdict_within_the_warning_distance_or_angle_of_an_incidence_is_never_c
 
 @pytest.mark.parametrize("design", PRESETS.values(), ids=lambda design: design.name)
 def test_verdict_at_home_is_clear(design: Design) -> None:
-    home = Frame(opened(design)).verdict
+    home = Frame(open_state(design)).verdict
     assert home.kind == "clear"
     assert home.brief(10.0).startswith(f"{home.distance * 10.0:.3g} mm to δ")
 
 
 def test_verdict_on_a_nearly_degenerate_design_names_the_conditioning_and_its_margin() -> None:
     design = OPTIMAL.with_variable("b3", OPTIMAL.b2 + 0.02)
-    pose = opened(OPTIMAL).pose
+    pose = open_state(OPTIMAL).pose
     snapshot = evaluate(design, pose)
     found = verdict(snapshot)
     assert snapshot.inverse_condition < 1e-3
@@ -187,7 +189,7 @@ def test_verdict_names_a_measure_that_is_below_its_warning_value() -> None:
 
 
 def test_verdict_scales_with_the_warning_length() -> None:
-    state = opened(OPTIMAL)
+    state = open_state(OPTIMAL)
     wide = replace(state, view=replace(state.view, warn_below=30.0))
     assert Frame(state).verdict.title == TITLES["clear"]
     assert Frame(wide).verdict.title == TITLES["near"]
@@ -198,7 +200,7 @@ def test_verdict_scales_with_the_warning_length() -> None:
 
 @given(all_cases())
 def test_modes_that_meet_in_a_pose_differ_in_the_signs_that_vanish(case: Case) -> None:
-    frame = Frame(opened(case.design, Pose.of(case.position, case.rotation)))
+    frame = Frame(open_state(case.design, Pose.of(case.position, case.rotation)))
     snapshot = frame.snapshot
     vanishing = incidences(snapshot.stratum)
     modes = snapshot.bordering_modes
@@ -215,7 +217,7 @@ def test_modes_that_meet_in_a_pose_differ_in_the_signs_that_vanish(case: Case) -
 
 
 def test_distances_of_deeper_strata_are_shown_at_a_singular_pose_without_the_diagram() -> None:
-    singular = GoToSingularity(2).apply(opened(OPTIMAL))
+    singular = GoToSingularity(2).apply(open_state(OPTIMAL))
     frame = Frame(Set("view.singular.strata", value=False).apply(singular))
     worker = StubWorker(at_once=True)
     feed = STRATA_FEED(services_for(worker=worker))
@@ -224,5 +226,5 @@ def test_distances_of_deeper_strata_are_shown_at_a_singular_pose_without_the_dia
     assert set(COVERED[OF_INCIDENCES[1]]) <= set(distances)
     assert "…" not in neighbours(frame, distances)
     # Nothing is computed where nothing of it is shown.
-    feed.follow(Frame(Set("view.singular.strata", value=False).apply(opened(OPTIMAL))))
+    feed.follow(Frame(Set("view.singular.strata", value=False).apply(open_state(OPTIMAL))))
     assert feed.request is None

@@ -37,7 +37,7 @@ from explorer.app.features.workspace.words import drawing_words, volume_headline
 from explorer.app.scene.bands import AT_LIMIT, PLAIN
 from explorer.app.state.actions import Open, Set, SetAngle, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.state.view import ForcesView
 from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration
@@ -73,7 +73,7 @@ def with_workspace(state: State, **changes: Any) -> State:
 
 
 def test_volume_is_known_while_the_solid_is_not_shown() -> None:
-    services, first = services_for(), opened(OPTIMAL)
+    services, first = services_for(), open_state(OPTIMAL)
     feed = services.get(volume_feed)
     assert volume_text(feed.drawing) == "–"
     assert "computing" in volume_headline(Frame(first), feed)
@@ -94,7 +94,7 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
 
 
 def test_volume_is_that_of_the_orientation_that_is_chosen() -> None:
-    services, state = services_for(), SetAngle(1, 20.0).apply(opened(OPTIMAL))
+    services, state = services_for(), SetAngle(1, 20.0).apply(open_state(OPTIMAL))
     for orientation, words in (("pose", "present"), ("home", "home")):
         chosen = with_workspace(state, orientation=orientation)
         follow(services, chosen)
@@ -105,7 +105,7 @@ def test_volume_is_that_of_the_orientation_that_is_chosen() -> None:
 
 
 def test_volume_is_requested_before_the_drawing_and_once_only() -> None:
-    services, state = services_for(), with_workspace(opened(OPTIMAL), solid=True)
+    services, state = services_for(), with_workspace(open_state(OPTIMAL), solid=True)
     # Neither another position nor another colour changes it.
     for other in (state, SetPosition(2, 8.0).apply(state), with_workspace(state, colour="margin")):
         worker = follow(services, other)
@@ -115,7 +115,7 @@ def test_volume_is_requested_before_the_drawing_and_once_only() -> None:
 
 def test_empty_workspace_names_what_empties_it_instead_of_a_volume() -> None:
     limits = msgspec.structs.replace(OPTIMAL.limits, l1=(0.0, 1.0), box=((10.0,) * 3, (11.0,) * 3))
-    services, state = services_for(), Set("design.limits", limits).apply(opened(OPTIMAL))
+    services, state = services_for(), Set("design.limits", limits).apply(open_state(OPTIMAL))
     follow(services, state)
     words = volume_headline(Frame(state), services.get(volume_feed))
     assert "The workspace is empty" in words
@@ -188,7 +188,7 @@ def test_cut_shows_the_solid_and_goes_through_its_middle_on_every_axis(
 
 
 def test_slider_of_the_cut_spans_the_extent_and_follows_the_design(services: Services) -> None:
-    state = with_workspace(opened(OPTIMAL), solid=True, cut="y")
+    state = with_workspace(open_state(OPTIMAL), solid=True, cut="y")
     for changed in (state, SetVariable("a3x", 14.0).apply(state)):
         follow(services, changed)
         extent = drawing_of(changed).extent
@@ -239,7 +239,7 @@ def facts_of(picture: str) -> dict[str, Any]:
 @pytest.mark.parametrize(("axis", "angles"), [*zip(AXES, ORIENTATIONS, strict=True)])
 def test_map_has_its_place_for_the_page(axis: Axis, angles: tuple[float, float, float]) -> None:
     pose = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), angles)
-    state = with_workspace(opened(OPTIMAL, pose), solid=True, cut=axis)
+    state = with_workspace(open_state(OPTIMAL, pose), solid=True, cut=axis)
     drawing = drawing_of(state)
     assert drawing.slice_map is not None
     picture = map_picture(drawing.slice_map, pose.position, OPTIMAL.reach)
@@ -258,7 +258,7 @@ def test_map_has_its_place_for_the_page(axis: Axis, angles: tuple[float, float, 
 
 @pytest.mark.parametrize("axis", AXES)
 def test_map_has_the_exact_outline_of_the_slice(axis: Axis) -> None:
-    drawing = drawing_of(with_workspace(opened(OPTIMAL), solid=True, cut=axis))
+    drawing = drawing_of(with_workspace(open_state(OPTIMAL), solid=True, cut=axis))
     drawn = drawing.slice_map
     assert drawn is not None
     rotation = np.array(drawing.request.rotation)
@@ -279,7 +279,7 @@ def test_map_has_the_exact_outline_of_the_slice(axis: Axis) -> None:
 
 
 def test_b4_is_a_cross_where_it_is_and_faint_beside_the_slice() -> None:
-    state = opened(OPTIMAL)
+    state = open_state(OPTIMAL)
     drawn = drawing_of(with_workspace(state, solid=True, cut="y")).slice_map
     assert drawn is not None
     for y, look in ((drawn.level, "ex-here"), (drawn.level + 1.0, "ex-here is-off")):
@@ -345,9 +345,9 @@ LOAD = (3.0, 0.0, -40.0, 0.0, 20.0, 0.0)
 
 def load_state(design: Design = LOADED, forces: ForcesView = FORCES, **changes: Any) -> State:
     """Return a design under the forces, with its workspace shown."""
-    view = opened(design).view
+    view = open_state(design).view
     workspace = replace(view.workspace, solid=True, **changes)
-    return Set("view", replace(view, forces=forces, workspace=workspace)).apply(opened(design))
+    return Set("view", replace(view, forces=forces, workspace=workspace)).apply(open_state(design))
 
 
 def shares_at(design: Design, points: FloatArray, rotation: FloatArray) -> FloatArray:
@@ -480,7 +480,7 @@ def test_map_words_tell_the_measure_at_a_position(colour: str, reading: str) -> 
 
 
 def test_map_is_read_to_the_browser_that_asks(services: Services) -> None:
-    state = with_workspace(opened(OPTIMAL), solid=True, cut="y")
+    state = with_workspace(open_state(OPTIMAL), solid=True, cut="y")
     follow(services, state)
     panel, asking = WorkspacePanel(services), ScriptedBrowser()
     client: Any = asking

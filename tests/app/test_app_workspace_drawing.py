@@ -33,7 +33,7 @@ from explorer.app.session.jobs import Worker
 from explorer.app.session.worker import CancelledError, Channel
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.state.view import WorkspaceView
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
@@ -83,12 +83,12 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
 ) -> None:
     redraws = threading.Semaphore(0)
     feed = workspace_feed(services_for(worker=worker, redraw=redraws.release))
-    feed.follow(Frame(opened(OPTIMAL)))
+    feed.follow(Frame(open_state(OPTIMAL)))
     assert worker.wait_until_idle(PATIENCE)
     # A hidden drawing is not requested.
     assert worker.process_id is None
     assert feed.drawing is None
-    state = with_solid(opened(OPTIMAL))
+    state = with_solid(open_state(OPTIMAL))
     for i in range(25):
         state = SetVariable("a3x", 18.0 + 0.05 * i).apply(state)
         feed.follow(Frame(state))
@@ -106,7 +106,7 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     assert worker.wait_until_idle(PATIENCE)
     assert feed.drawing is not None
     assert surface_of(feed) is feed.drawing.surface
-    feed.follow(Frame(opened(OPTIMAL)))
+    feed.follow(Frame(open_state(OPTIMAL)))
     assert surface_of(feed) is None
 
 
@@ -263,7 +263,7 @@ def test_grid_too_fine_for_live_nodes_leaves_the_rest_of_the_drawing() -> None:
 def test_cancelled_drawing_leaves_none_of_an_older_design() -> None:
     worker = StubWorker()
     feed = workspace_feed(services_for(worker=worker))
-    state = viewed(opened(THICK), workspace=WorkspaceView(solid=True))
+    state = viewed(open_state(THICK), workspace=WorkspaceView(solid=True))
     feed.follow(Frame(state))
     drawing = draw_workspace(worker.orders[0].request)
     worker.orders[0].done(drawing)
@@ -289,7 +289,7 @@ def test_drawing_shows_its_stage_and_is_cancelled_and_requested_again(
         while not condition():
             assert redraws.acquire(timeout=PATIENCE)
 
-    state = Set("design.limits", THICK.limits).apply(opened(OPTIMAL))
+    state = Set("design.limits", THICK.limits).apply(open_state(OPTIMAL))
     state = viewed(state, workspace=WorkspaceView(solid=True, region="accessible"))
     frame = Frame(state)
     try:

@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from tab import TRACK, Tab
 
 from explorer.app.screenshot import SCENE_CANVAS
-from explorer.app.state.state import joints_of, opened
+from explorer.app.state.state import joints_of, open_state
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
 
@@ -38,11 +38,11 @@ def test_design_is_opened_changed_by_a_variable_and_reset_in_its_pose(tab: Tab) 
     expect(card).to_have_count(0)
     tab.choose("Preset", "paper-initial")
     tab.wait_for(lambda: tab.state.design == INITIAL, "the preset")
-    assert tab.state.pose == opened(INITIAL).pose
+    assert tab.state.pose == open_state(INITIAL).pose
     assert_variables_shown(tab)
     tab.choose("Preset", "paper-optimal")
     tab.wait_for(lambda: tab.state.design == OPTIMAL, "the other preset")
-    assert tab.state.pose == opened(OPTIMAL).pose
+    assert tab.state.pose == open_state(OPTIMAL).pose
     # The pose is held, and the legs change.
     before = tab.state
     goal = tab.drag("b1x", 0.6)
@@ -71,7 +71,7 @@ def test_design_is_opened_changed_by_a_variable_and_reset_in_its_pose(tab: Tab) 
     tab.turn_to("Design")
     tab.push("Reset")
     tab.wait_for(lambda: tab.state.design == OPTIMAL, "the design as it was opened")
-    assert tab.state.pose == opened(OPTIMAL).pose
+    assert tab.state.pose == open_state(OPTIMAL).pose
     assert_variables_shown(tab)
 
 

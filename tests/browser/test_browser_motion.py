@@ -14,7 +14,7 @@ from explorer.app.features.view.ground import ground_of, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Set, SetPose
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
+from explorer.app.state.state import open_state
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.mechanism.pose import Pose
@@ -88,7 +88,7 @@ def test_fast_motion_is_drawn_in_one_pose_in_each_frame(tab: Tab) -> None:
         assert tab.running.page.session.wait_until_idle()
         tab.settle()
     frames: list[Drawn] = tab.page.evaluate("window.explorer.stopWatching()")
-    scenes = [Placed(Frame(opened(DESIGN, pose))) for pose in poses]
+    scenes = [Placed(Frame(open_state(DESIGN, pose))) for pose in poses]
     places = np.array([scene.points["b4"] for scene in scenes])
     seen: set[int] = set()
     for frame in frames:

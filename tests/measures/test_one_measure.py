@@ -16,7 +16,7 @@ from explorer.app.features.optimise.words import measure_rows
 from explorer.app.features.optimise.work import compare
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.words import chips
-from explorer.app.state.compared import unnamed
+from explorer.app.state.compared import without_name
 from explorer.app.state.studies import StudyPlan, label_of, study_around, title_of
 from explorer.cli.commands.optimise import measure_rows as measure_rows_of_command
 from explorer.export.report.data import gather_report_data
@@ -56,7 +56,7 @@ def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture
     paper = problem()
     margin = paper.demands.clearance_margin
     both = compare(paper.start, design, margin, (BOX, BOX))
-    compared = draw_compared(ComparedRequest(unnamed(design))).measurements
+    compared = draw_compared(ComparedRequest(without_name(design))).measurements
     assert compared is not None
     studied = measure_design(Case(design), SWIFT).values
     path = folder / "design.json"

@@ -11,8 +11,8 @@ from hypothesis import given, strategies as st
 from explorer.app.features.singularity.panel import distance_table, measures_table, summary
 from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
-from explorer.app.widgets.markup import signed
+from explorer.app.state.state import open_state
+from explorer.app.widgets.markup import format_signed
 from explorer.cli.commands.singularity import Singularity
 from explorer.cli.output import degrees, figures
 from explorer.mechanism.design_file import PRESETS
@@ -36,7 +36,7 @@ def test_number_text_of_zero_has_no_sign(value: float, size: float, digits: int)
     for text in (
         format_fixed(value, digits),
         format_ascii(value, digits, size=size),
-        signed(value, digits),
+        format_signed(value, digits),
         format_number(value, digits, size=size),
         format_fitted(value, size, digits),
         *figures([value, size]),
@@ -74,7 +74,7 @@ def test_page_and_command_at_a_singular_pose_show_no_rounding(
     incidence: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     start = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-40.0, 10.0, 20.0))
-    frame = Frame(GoToSingularity(incidence).apply(opened(PRESETS["paper-optimal"], start)))
+    frame = Frame(GoToSingularity(incidence).apply(open_state(PRESETS["paper-optimal"], start)))
     pose = frame.state.pose
     Singularity(position=pose.position, quaternion=pose.quaternion).run()
     html = (summary(frame), distance_table(frame), measures_table(frame))

@@ -29,7 +29,7 @@ from explorer.app.session import clock
 from explorer.app.session.history import start_history
 from explorer.app.session.session import HistoryMove
 from explorer.app.state.actions import Set
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.app.state.view import View
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
@@ -144,7 +144,7 @@ class Tab:
         self.page.evaluate(CLOSE_NOTICES)
         # A move through the history leaves what is shown as it is.
         session.do(Set("view", View()))
-        session.travel(HistoryMove(lambda _: start_history(opened(PRESETS["paper-optimal"]))))
+        session.travel(HistoryMove(lambda _: start_history(open_state(PRESETS["paper-optimal"]))))
         page.panels.work.minimize()
         # Cameras follow what has changed, and the scene has its size, before this one is put.
         assert page.settle(PATIENCE_SECONDS), "the explorer is never at rest"

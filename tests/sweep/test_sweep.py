@@ -31,7 +31,7 @@ from explorer.mechanism.pose import Pose
 from explorer.singularity.ellipsoids import inverse_condition, jacobian
 from explorer.statics.loaded import LoadedPose
 from explorer.sweep.machine import MACHINE
-from explorer.sweep.results import front, undominated
+from explorer.sweep.results import front, undominated_rows
 from explorer.sweep.rows import Value, check_study, design_of, evaluate
 from explorer.sweep.sampling import samples
 from explorer.sweep.study import (
@@ -580,7 +580,7 @@ def test_undominated_rows_match_the_definition(cost: Any) -> None:
         for row in range(len(cost))
         if not any((other <= cost[row]).all() and (other < cost[row]).any() for other in cost)
     ]
-    assert undominated(cost).tolist() == expected
+    assert undominated_rows(cost).tolist() == expected
 
 
 def test_front_has_only_complete_rows_that_are_done() -> None:

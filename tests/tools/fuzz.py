@@ -23,7 +23,7 @@ import numpy as np
 from explorer.app.session.gestures import UserAction, check_drawable
 from explorer.app.state.actions import Open
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State, opened
+from explorer.app.state.state import State, open_state
 from explorer.errors import ExplorerError
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 from explorer.numerics.compiled import warm
@@ -120,7 +120,7 @@ def attempt(data: bytes) -> State | None:
     try:
         design = decode_design(data, "fuzz")
         assert decode_design(encode_design(design), "again") == design
-        state = opened(design)
+        state = open_state(design)
         check_drawable(state)
         later = UserAction(Open(design), "fuzz", 0.0).apply(state)
         frame = Frame(later)

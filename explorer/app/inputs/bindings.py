@@ -30,7 +30,7 @@ class Bound(Generic[Value]):
     write: Callable[[State, Value], Action]
 
 
-def _unchanged(value: Any) -> Any:
+def _identity(value: Any) -> Any:
     return value
 
 
@@ -47,7 +47,7 @@ class At:
 
     path: str
     default: Callable[[State], Any] | None = None
-    convert: Callable[[Any], Any] = _unchanged
+    convert: Callable[[Any], Any] = _identity
     action: type[Set] = Set
 
     def bound(self, name: str, options: Mapping[str, object] | None = None) -> Bound[Any]:

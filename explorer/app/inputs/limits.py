@@ -54,7 +54,7 @@ def bound_entry(limit: Limit, entry: Entry) -> Bound[Any]:
         if entry.is_number:
             is_free = limit.switch is None and entry.free is not None and new >= entry.free
             return Set(path, None if is_free else new, entry.label)
-        before = _shown(state, limit, entry)
+        before = _visible_value(state, limit, entry)
         low, high = push_other_end(before, new)
         if entry.axis is not None:
             lows, highs = map(list, value)
@@ -63,7 +63,7 @@ def bound_entry(limit: Limit, entry: Entry) -> Bound[Any]:
         # A maximum at the reach stays there while only the minimum is moved.
         return Set(path, (low, None if value[1] is None and high == before[1] else high))
 
-    return Bound(lambda frame: _shown(frame.state, limit, entry), write)
+    return Bound(lambda frame: _visible_value(frame.state, limit, entry), write)
 
 
 def push_other_end(before: Pair, after: Pair) -> Pair:
@@ -78,7 +78,7 @@ def _limits_of(switch: Switch) -> list[Limit]:
     return [limit for limit in LIMITS if limit.switch is switch]
 
 
-def _shown(state: State, limit: Limit, entry: Entry) -> Any:
+def _visible_value(state: State, limit: Limit, entry: Entry) -> Any:
     """Return what a slider shows: a number, or the ends of a range."""
     value = _value(state, limit)
     if entry.is_number:

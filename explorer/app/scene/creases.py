@@ -27,7 +27,7 @@ Drawn: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
 CREASE = math.radians(30.0)
 
 
-def creased(vertices: FloatArray, faces: NDArray[np.int32]) -> Drawn:
+def with_creases(vertices: FloatArray, faces: NDArray[np.int32]) -> Drawn:
     """Return a closed mesh whose faces on either side of a sharp edge share no vertices.
 
     Args:

@@ -286,13 +286,13 @@ def _revolve(*profile: tuple[float, float]) -> Mesh:
 def cylinder() -> Mesh:
     """Return the cylinder of radius one from z = 0 to z = 1, its rim with sharp edges."""
     bottom, top = _revolve((0.0, 0.0), (1.0, 0.0)), _revolve((1.0, 1.0), (0.0, 1.0))
-    return joined(bottom, _revolve((1.0, 0.0), (1.0, 1.0)), top)
+    return join_meshes(bottom, _revolve((1.0, 0.0), (1.0, 1.0)), top)
 
 
 @functools.cache
 def cone() -> Mesh:
     """Return the cone of radius one from z = 0 to z = 1."""
-    return joined(_revolve((0.0, 0.0), (1.0, 0.0)), _revolve((1.0, 0.0), (0.0, 1.0)))
+    return join_meshes(_revolve((0.0, 0.0), (1.0, 0.0)), _revolve((1.0, 0.0), (0.0, 1.0)))
 
 
 @functools.cache
@@ -309,7 +309,7 @@ def torus(radius: float, tube: float) -> Mesh:
     return _revolve(*((radius + tube * math.cos(v), tube * math.sin(v)) for v in angles))
 
 
-def joined(*meshes: Mesh) -> Mesh:
+def join_meshes(*meshes: Mesh) -> Mesh:
     """Return several meshes as one."""
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
     vertices = np.concatenate([vertices for vertices, _ in meshes])

@@ -12,7 +12,7 @@ from explorer.app.session.jobs import LONG_SECONDS, Worker
 from explorer.app.session.session import Session
 from explorer.app.session.worker import CANCELLED, Channel
 from explorer.app.state.frame import Frame
-from explorer.numerics.search import Watch, unwatched
+from explorer.numerics.search import Watch, ignore_stage
 
 # Seconds after which a drawing that the user cancelled ends with its process.
 CANCEL_SECONDS = 2.0
@@ -29,7 +29,7 @@ class Stage:
 def watch_of(channel: Channel | None) -> Watch:
     """Return a watch that sends each stage to the parent and ends the task when it cancels."""
     if channel is None:
-        return unwatched
+        return ignore_stage
 
     def watch(words: str, share: float) -> None:
         channel.raise_if_cancelled()

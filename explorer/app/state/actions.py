@@ -13,16 +13,16 @@ import numpy as np
 
 from explorer.app.state.action import Action, value_text
 from explorer.app.state.clear_length import clear_length
-from explorer.app.state.parts import kept_on_open, with_value
+from explorer.app.state.parts import parts_kept_on_open, with_value
 from explorer.app.state.state import (
     Joints,
     State,
-    Taken,
+    Substituted,
     Unclosed,
     angles_of,
     joints_of,
     mode_at,
-    opened,
+    open_state,
 )
 from explorer.app.state.view import DrawnAs
 from explorer.errors import InputError
@@ -52,7 +52,7 @@ class Open(Action):
             InputError: the design is being optimised.
         """
         check_free(state)
-        return replace(opened(self.design), **kept_on_open(state))
+        return replace(open_state(self.design), **parts_kept_on_open(state))
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class GoHome(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        return moved(state, opened(state.design).pose)
+        return move_to(state, open_state(state.design).pose)
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,9 @@ class SetJoint(Action):
         joints = with_value(state.joints, str(self.joint), self.value)
         solution = forward(state.design, joints)
         if not solution.feasible:
-            return replace(state, joints=joints, unclosed=_unclosed(state.design, joints, self))
+            return replace(
+                state, joints=joints, unclosed=_unclosed_error(state.design, joints, self)
+            )
         return _assemble(replace(state, joints=joints), solution, state.mode)
 
     def describe(self, before: State, after: State) -> str:
@@ -111,10 +113,10 @@ class UseNearest(Action):
             return state
         nearest = clear_length(state)
         if nearest is None:
-            return moved(state, state.pose)
+            return move_to(state, state.pose)
         value, words = nearest
         after = SetJoint(unclosed.joint, value).apply(state)
-        return replace(after, taken=Taken(after.joints, words))
+        return replace(after, taken=Substituted(after.joints, words))
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ class SetPosition(Action):
         # The other coordinates are kept to the last bit.
         value = self.value - float(state.offset(state.pose.rotation)[self.axis])
         position = with_value(state.pose.position, str(self.axis), value)
-        return moved(state, Pose(position, state.pose.quaternion), state.yaw_pitch_roll)
+        return move_to(state, Pose(position, state.pose.quaternion), state.yaw_pitch_roll)
 
     def describe(self, before: State, after: State) -> str:
         """Return which coordinate has which value."""
@@ -151,7 +153,7 @@ class SetAngle(Action):
         """Return the next state."""
         angles = with_value(state.yaw_pitch_roll, str(self.axis), self.value)
         orientation = Pose.of_yaw_pitch_roll(state.pose.position, angles)
-        return moved(state, state.pose_at(state.position, orientation), angles)
+        return move_to(state, state.pose_at(state.position, orientation), angles)
 
     def words(self) -> str:
         """Return what the action does."""
@@ -167,7 +169,7 @@ class SetPose(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        return moved(state, self.pose)
+        return move_to(state, self.pose)
 
     def describe(self, before: State, after: State) -> str:
         """Return where the platform is."""
@@ -187,7 +189,7 @@ class StartThere(Action):
     def apply(self, state: State) -> State:
         """Return the next state."""
         workspace = replace(state.view.workspace, start="pose")
-        return moved(replace(state, view=replace(state.view, workspace=workspace)), self.pose)
+        return move_to(replace(state, view=replace(state.view, workspace=workspace)), self.pose)
 
 
 @dataclass(frozen=True)
@@ -225,7 +227,7 @@ class SetVariable(Action):
         check_free(state)
         design = state.design.with_variable(self.name, self.value)
         if state.hold == "pose":
-            return moved(replace(state, design=design), state.pose, state.yaw_pitch_roll)
+            return move_to(replace(state, design=design), state.pose, state.yaw_pitch_roll)
         solution = forward(design, state.joints)
         if not solution.feasible:
             present = state.design.variables[VARIABLES.index(self.name)]
@@ -322,7 +324,7 @@ def draw_as(form: DrawnAs) -> Set:
     return Set("view.drawn_as", form, "Drawn as", form)
 
 
-def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> State:
+def move_to(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> State:
     """Return the state in another pose, with the joints and the mode of that pose."""
     return replace(
         state,
@@ -350,7 +352,7 @@ def check_free(state: State) -> None:
         raise InputError("the design is being optimised: wait until that is done, or cancel it")
 
 
-def _unclosed(design: Design, joints: Joints, cause: SetJoint) -> Unclosed:
+def _unclosed_error(design: Design, joints: Joints, cause: SetJoint) -> Unclosed:
     values = np.array(joints)
     squares = discriminants(design, values)
     failing = tuple(int(i) for i in np.flatnonzero(squares < 0.0))

@@ -54,11 +54,13 @@ class Compared:
 
     def slot_of(self, design: Design) -> int | None:
         """Return the index of the place of a design under any name; None if it is not pinned."""
-        plain = unnamed(design)
-        slots = (i for i, pinned in enumerate(self.pinned) if pinned and unnamed(pinned) == plain)
+        plain = without_name(design)
+        slots = (
+            i for i, pinned in enumerate(self.pinned) if pinned and without_name(pinned) == plain
+        )
         return next(slots, None)
 
 
-def unnamed(design: Design) -> Design:
+def without_name(design: Design) -> Design:
     """Return a design without its name, on which nothing else depends."""
     return msgspec.structs.replace(design, name="")

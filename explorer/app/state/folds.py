@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, replace
 
 from explorer.app.state.action import Action
-from explorer.app.state.actions import FULL_TURN, moved
+from explorer.app.state.actions import FULL_TURN, move_to
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import Folds, GivenFolds, State
 from explorer.errors import InputError
@@ -52,7 +52,7 @@ class SetFold(Action):
         if index >= FIRST_FOLD and abs(value) not in {0.0, HALF_TURN}:
             bit = int(MODE_BITS[index - FIRST_FOLD])
             mode = mode | bit if value > 0.0 else mode & ~bit
-        return replace(moved(state, pose), mode=mode, set_folds=GivenFolds(folds, pose))
+        return replace(move_to(state, pose), mode=mode, set_folds=GivenFolds(folds, pose))
 
     def describe(self, before: State, after: State) -> str:
         """Return which coordinate has which value."""

@@ -18,11 +18,11 @@ TRANSIENT: Mapping[str, Any] = {"is_saved": False}
 """Metadata of a field that no file holds: it describes work under way, or is computed again."""
 
 
-def _unchanged(value: Any) -> Any:
+def _identity(value: Any) -> Any:
     return value
 
 
-STAYS: Mapping[str, Any] = {"on_open": _unchanged}
+STAYS: Mapping[str, Any] = {"on_open": _identity}
 """Metadata of a field that keeps its value when another design is opened.
 
 Another function as `on_open` takes the value and returns what stays of it.
@@ -34,7 +34,7 @@ def saved_fields(kind: Any) -> tuple[Field[Any], ...]:
     return tuple(field for field in fields(kind) if field.metadata.get("is_saved", True))
 
 
-def kept_on_open(state: Any) -> dict[str, Any]:
+def parts_kept_on_open(state: Any) -> dict[str, Any]:
     """Return what stays of a state when another design is opened, by field."""
     return {
         field.name: field.metadata["on_open"](getattr(state, field.name))

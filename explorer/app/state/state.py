@@ -84,7 +84,7 @@ class Unclosed:
 
 
 @dataclass(frozen=True)
-class Taken:
+class Substituted:
     """A length that was taken in the place of the one asked for.
 
     Attributes:
@@ -250,7 +250,7 @@ class State:
     hold: Hold = field(default="pose", metadata=STAYS)
     unclosed: Unclosed | None = None
     view: View = field(default_factory=View, metadata=STAYS)
-    taken: Taken | None = field(default=None, compare=False, metadata=TRANSIENT)
+    taken: Substituted | None = field(default=None, compare=False, metadata=TRANSIENT)
     gesture: Gesture | None = field(default=None, metadata=TRANSIENT)
     paths: Paths = field(default_factory=Paths)
     optimisation: Optimisation = field(
@@ -346,7 +346,7 @@ class State:
         return WARN_SHARE * self.design.reach if given is None else given
 
 
-def opened(design: Design, pose: Pose | None = None, view: View | None = None) -> State:
+def open_state(design: Design, pose: Pose | None = None, view: View | None = None) -> State:
     """Return the state in which a design opens: in its home pose unless another is given."""
     at = design.home_pose if pose is None else pose
     return State(

@@ -179,10 +179,10 @@ class Library:
         for entry in entries:
             if entry.name in (name, _tidy(name)):
                 return entry
-        names = [_quoted(each.name) for each in entries if each.design is not None]
+        names = [_quote(each.name) for each in entries if each.design is not None]
         known = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
         raise InputError(
-            f"no design is called {_quoted(name)}; "
+            f"no design is called {_quote(name)}; "
             + (f"there are {known}" if names else "none has been saved yet")
         )
 
@@ -211,7 +211,7 @@ def _with_name(design: Design, name: str) -> Design:
     tidy = _tidy(name)
     if not tidy or len(tidy) > LONGEST_NAME or not tidy.isprintable():
         raise InputError(
-            f"a name is one printable line of 1 to {LONGEST_NAME} characters; got {_quoted(name)}"
+            f"a name is one printable line of 1 to {LONGEST_NAME} characters; got {_quote(name)}"
         )
     return msgspec.structs.replace(design, name=tidy)
 
@@ -252,5 +252,5 @@ def _read(path: Path) -> Entry:
     return Entry(name, path.name, design)
 
 
-def _quoted(name: str) -> str:
+def _quote(name: str) -> str:
     return repr(name if len(name) <= 40 else f"{name[:39]}…")

@@ -24,7 +24,7 @@ from explorer.app.widgets.markup import meter
 from explorer.app.widgets.palette import Command
 from explorer.measures.blocks.source import Source
 
-Does = Callable[[str, viser.ClientHandle], None]
+PressHandler = Callable[[str, viser.ClientHandle], None]
 """Handles a press with the value of its button, for the client that pressed."""
 
 
@@ -53,7 +53,7 @@ class Buttons:
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self._registered: dict[str, tuple[Does, Container[str] | None]] = {}
+        self._registered: dict[str, tuple[PressHandler, Container[str] | None]] = {}
         self._commands: list[Command] = []
         # Handles presses one after the other, in their order.
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="buttons")
@@ -72,7 +72,7 @@ class Buttons:
         """The commands that press a button, for the palette."""
         return tuple(self._commands)
 
-    def on(self, name: str, does: Does, *, values: Container[str] | None = None) -> None:
+    def on(self, name: str, does: PressHandler, *, values: Container[str] | None = None) -> None:
         """Register the function that handles presses on the buttons with a name.
 
         Args:

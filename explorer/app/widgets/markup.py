@@ -152,6 +152,6 @@ def sentence(message: str) -> str:
     return f"{message[:1].upper()}{message[1:]}{'' if message.endswith('.') else '.'}"
 
 
-def signed(value: float, digits: int = 3) -> str:
+def format_signed(value: float, digits: int = 3) -> str:
     """Return a number with a fixed number of decimals, see `format_decimals`."""
     return format_decimals(value, digits)

@@ -22,7 +22,7 @@ from explorer.cli.output import (
     attributes,
     finite,
     heading,
-    indented,
+    indent,
     limits_json,
     limits_lines,
     pose_table,
@@ -119,7 +119,7 @@ def move_lines(move: MoveClearance, start: Snapshot, end: Snapshot) -> Iterator[
     design = start.design
     yield heading(design)
     for name, pose in (("from", move.start), ("to", move.end)):
-        yield from (name, *indented(pose_table(design, pose, move.tool)))
+        yield from (name, *indent(pose_table(design, pose, move.tool)))
     yield radii_line(design)
     yield from (*lines(move_clearances(move, design)), "")
     yield from limits_lines(start, "the start is ")

@@ -11,7 +11,7 @@ import numpy as np
 import tyro
 
 from explorer.cli import output
-from explorer.cli.load_options import check_limited
+from explorer.cli.load_options import check_has_limits
 from explorer.cli.options import (
     DesignOptions,
     EndOptions,
@@ -133,7 +133,7 @@ class Path(JsonOptions, RadiiOptions, EndOptions, PointOptions, DesignOptions):
             )
         goal = _pose("--to", start, *ends, tool)
         if self.load is not None:
-            check_limited(design)
+            check_has_limits(design)
         if self.out is not None:
             check_writable(self.out)
         try:
@@ -213,7 +213,7 @@ def _as_lines(
     plural = "" if path.checked == 1 else "s"
     yield output.heading(design)
     for name, pose in (("from", path.poses[0]), ("to", path.poses[-1])):
-        yield from (name, *output.indented(output.pose_table(design, pose, path.tool)))
+        yield from (name, *output.indent(output.pose_table(design, pose, path.tool)))
     rows = [
         ("moves", f"{len(path.poses) - 1}, each proved to keep limits and clearances"),
         ("length", f"{output.figure(path.length)} (root mean square of b1 to b4)"),

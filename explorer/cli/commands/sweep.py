@@ -182,7 +182,7 @@ def progress_json(progress: Progress) -> dict[str, object]:
         "done": progress.done,
         "computed": progress.done - progress.kept,
         "complete": progress.is_complete,
-        "counts": _ordered(progress.counts),
+        "counts": _sort_counts(progress.counts),
         "seconds": progress.seconds,
     }
 
@@ -206,7 +206,7 @@ def summary_json(summary: Summary, folder: Path) -> dict[str, object]:
         "total": summary.study.count,
         "rows": summary.count,
         "complete": summary.count == summary.study.count,
-        "counts": _ordered(summary.counts),
+        "counts": _sort_counts(summary.counts),
         "incomparable": summary.incomparable,
         "damaged_parts": summary.damaged,
         "stray_files": summary.strays,
@@ -242,10 +242,10 @@ def summary_lines(summary: Summary) -> Iterator[str]:
 
 
 def _count_lines(counts: Mapping[str, int]) -> list[str]:
-    return [f"  {status}: {count}" for status, count in _ordered(counts).items()]
+    return [f"  {status}: {count}" for status, count in _sort_counts(counts).items()]
 
 
-def _ordered(counts: Mapping[str, int]) -> dict[str, int]:
+def _sort_counts(counts: Mapping[str, int]) -> dict[str, int]:
     """Return counts of statuses, most frequent first."""
     return dict(sorted(counts.items(), key=lambda count: (-count[1], count[0])))
 

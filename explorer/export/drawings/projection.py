@@ -122,20 +122,20 @@ def labels(
         width = LETTER * len(name) + 4.0
 
         def cost(offset: Offset, point: FloatArray = point, width: float = width) -> float:
-            x0, y0, x1, y1 = box = _placed(point, offset, width)
+            x0, y0, x1, y1 = box = _place_box(point, offset, width)
             inside = ((covered > (x0, y0)) & (covered < (x1, y1))).all(axis=1)
             outside = max(0.0, within[0] - x0, x1 - within[2], within[1] - y0, y1 - within[3])
             overlap = sum(_overlap(box, other) for other in taken)
             return overlap + 4.0 * float(inside.sum()) + 50.0 * outside + 0.4 * offset[0]
 
         best = min(itertools.product(_DISTANCES, _DIRECTIONS), key=cost)
-        box = _placed(point, best, width)
+        box = _place_box(point, best, width)
         taken.append(box)
         texts.append(drawing_text(name, 0.5 * (box[0] + box[2]), box[3] - 2.5, class_="label"))
     return texts
 
 
-def _placed(point: FloatArray, offset: Offset, width: float) -> Box:
+def _place_box(point: FloatArray, offset: Offset, width: float) -> Box:
     distance, angle = offset
     x, y = point.tolist()
     off_x = math.cos(angle) * (distance + 0.5 * width - 4.0)

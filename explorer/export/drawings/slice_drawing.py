@@ -40,7 +40,7 @@ def slices_through(slices: Slices, position: Sequence[float], name: str = "slice
         level = float(position[AXES.index(axis)])
         width, tall = (float(scale * spans[k]) for k in (first, second))
         x, y = left + LEFT, TOP + tall
-        maps.append(_placed(slices, axis, level, x, y, scale, f"{name}-{axis}"))
+        maps.append(_place(slices, axis, level, x, y, scale, f"{name}-{axis}"))
         for k, low, across in ((first, x, y), (second, y, x)):
             ends = float(slices.lows[k]), float(slices.highs[k])
             maps.append(ruler(AXES[k], ends, low, scale, across=across, up=k == second))
@@ -67,7 +67,7 @@ def slice_strip(
     for index in range(many):
         level = float(slices.lows[cut] + spans[cut] * (index + 0.5) / many)
         left = (index + 0.5) * WIDTH / many - 0.5 * scale * float(spans[first])
-        maps.append(_placed(slices, axis, level, left, TOP + tall, scale, f"strip-{index}"))
+        maps.append(_place(slices, axis, level, left, TOP + tall, scale, f"strip-{index}"))
         middle = (index + 0.5) * WIDTH / many
         title = f"{axis} = {format_number(level, 4)}"
         maps.append(drawing_text(title, middle, 16.0, class_="title"))
@@ -102,7 +102,7 @@ def legend(slices: Slices, unit_mm: float) -> Element:
     return svg_drawing(24.0 + 14.0 * len(rows), "The colours of the maps", *pieces)
 
 
-def _placed(
+def _place(
     slices: Slices, axis: str, level: float, x: float, y: float, scale: float, name: str
 ) -> Element:
     """Return a map with its lows at (x, y) on paper, at a scale in points per design unit."""

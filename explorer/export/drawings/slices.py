@@ -218,7 +218,7 @@ class Slices:
             for sign, gradient in zip(signs, gradients, strict=True):
                 beyond = float(gradient[AXES.index(axis)]) * level
                 least = margin - sign * beyond
-                polygon = _clipped(polygon, sign * (polygon @ gradient[in_plane(axis)]) - least)
+                polygon = _clip(polygon, sign * (polygon @ gradient[in_plane(axis)]) - least)
                 if not len(polygon):
                     break
             else:
@@ -283,7 +283,7 @@ def _middle(edge: Edge) -> FloatArray:
     return centre + np.array([c * x - s * y, s * x + c * y])
 
 
-def _clipped(polygon: FloatArray, values: FloatArray) -> FloatArray:
+def _clip(polygon: FloatArray, values: FloatArray) -> FloatArray:
     """Return the part of a convex polygon (n, 2) where a linear value is not negative."""
     corners: list[FloatArray] = []
     for k in range(len(polygon)):

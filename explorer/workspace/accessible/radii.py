@@ -20,7 +20,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.numerics.search import Stages, Watch, unwatched
+from explorer.numerics.search import Stages, Watch, ignore_stage
 from explorer.workspace.accessible.nodes import Survey, check_start, make_cell_grid, survey
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.slices.volume import home_rotation, workspace_volume
@@ -88,7 +88,7 @@ def radius_curve(
     *,
     start: ArrayLike | None = None,
     cells: int = DEFAULT_CELLS,
-    watch: Watch = unwatched,
+    watch: Watch = ignore_stage,
 ) -> RadiusCurve:
     """Compute the accessible volume against one radius of all legs.
 

@@ -20,7 +20,7 @@ from explorer.legs.clearance import PAIRS, radii_of_pairs
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.numerics.search import Stages, Watch, unwatched
+from explorer.numerics.search import Stages, Watch, ignore_stage
 from explorer.workspace.accessible.collision_surface import nearest_pair, project_onto_collisions
 from explorer.workspace.accessible.nodes import (
     ALL_PAIRS,
@@ -120,7 +120,7 @@ def accessible_workspace(
     node_step: float | None = None,
     most_nodes: int | None = None,
     tolerance: float | None = None,
-    watch: Watch = unwatched,
+    watch: Watch = ignore_stage,
 ) -> AccessibleWorkspace:
     """Compute the accessible workspace at one orientation.
 

@@ -98,7 +98,7 @@ def arm_of(row: FloatArray, leg: int, tool: FloatArray) -> Vector:
 
 
 @helper
-def turned(turn: FloatArray, i: int, k: int, arm: Vector) -> float:
+def turn_direction(turn: FloatArray, i: int, k: int, arm: Vector) -> float:
     """Return a coefficient of a coordinate of a vector of the platform that turns."""
     return arm[0] * turn[i, 0, k] + arm[1] * turn[i, 1, k] + arm[2] * turn[i, 2, k]
 
@@ -112,7 +112,7 @@ def write_leg(search: TurnSearch, leg: int) -> None:
     arm = arm_of(search.row, leg, search.tool)
     for i in range(3):
         for k in range(3):
-            value = turned(search.turn, i, k, arm)
+            value = turn_direction(search.turn, i, k, arm)
             if k != 1:
                 value += search.p[i]
                 if leg == 3 and i < 2:

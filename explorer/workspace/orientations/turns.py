@@ -62,7 +62,7 @@ from explorer.workspace.orientations.turn_polynomials import (
     arm_of,
     nearer_end,
     nearer_linear_end,
-    turned,
+    turn_direction,
     write_leg,
     write_tilt,
 )
@@ -92,9 +92,9 @@ def nearer_end_of_length(
             q = (p[0] - row[A3], p[1] - row[A3 + 1], p[2])
         a = b = c = 0.0
         for i in range(3):
-            a += q[i] * turned(turn, i, 0, arm)
-            b += q[i] * turned(turn, i, 1, arm)
-            c += q[i] * turned(turn, i, 2, arm)
+            a += q[i] * turn_direction(turn, i, 0, arm)
+            b += q[i] * turn_direction(turn, i, 1, arm)
+            c += q[i] * turn_direction(turn, i, 2, arm)
         square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2]
         offset = limit - (square + arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2])
         return nearer_linear_end(
@@ -110,7 +110,7 @@ def nearer_end_of_length(
     for i in range(1, 3):
         leg_row = search.scratch[LEG_ROW + i]
         for k in range(3):
-            leg_row[k] = turned(turn, i, k, arm) + (0.0 if k == 1 else p[i])
+            leg_row[k] = turn_direction(turn, i, k, arm) + (0.0 if k == 1 else p[i])
         add_product(leg_row, leg_row, 2, polynomial)
     for k in range(5):
         polynomial[k] *= -sign / BINOMIALS_4[k]
@@ -128,7 +128,7 @@ def margin_at(search: TurnSearch, index: int, k: int) -> float:
     if index == 1:
         across = tool[1] * turn[0, 2, k] - tool[2] * turn[0, 1, k]
         return turn[1, 0, k] * p[2] - turn[2, 0, k] * p[1] - across
-    return constant * p[2] - turned(turn, 2, k, (tool[0], tool[1], tool[2]))
+    return constant * p[2] - turn_direction(turn, 2, k, (tool[0], tool[1], tool[2]))
 
 
 @helper
@@ -146,9 +146,9 @@ def coefficients_of(search: TurnSearch, kind: int) -> Vector:
         i, leg = (kind - X, 3) if kind <= Z else (0, kind - D1 + 1)
         arm = arm_of(row, leg, search.tool)
         return (
-            p[i] + turned(turn, i, 0, arm),
-            turned(turn, i, 1, arm),
-            p[i] + turned(turn, i, 2, arm),
+            p[i] + turn_direction(turn, i, 0, arm),
+            turn_direction(turn, i, 1, arm),
+            p[i] + turn_direction(turn, i, 2, arm),
         )
     apart = row[B3] - row[B2]
     # The distance of the carriages cannot vanish before it is too small.

@@ -18,7 +18,7 @@ from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.session.session import Change
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Open
-from explorer.app.state.compared import SLOTS, unnamed
+from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
@@ -294,7 +294,7 @@ def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:
             class_name="ex-chip ex-cut ex-pin",
         )
         for name, design in choices.items()
-        if compared.slot_of(design) is None and unnamed(design) != unnamed(state.design)
+        if compared.slot_of(design) is None and without_name(design) != without_name(state.design)
     )
     return live + "".join(others)
 

@@ -17,7 +17,7 @@ from explorer.app.features.workspace.regions import Rows, rows_of
 from explorer.app.scene.bands import Shell
 from explorer.app.scene.placing import outline
 from explorer.app.session.feed import Feed
-from explorer.app.state.compared import SLOTS, unnamed
+from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import measures_in
@@ -136,14 +136,14 @@ def _request_for(column: int, frame: Frame) -> ComparedRequest | None:
     if compared.is_empty or design is None:
         return None
     if not compared.look.overlay:
-        return ComparedRequest(unnamed(design))
+        return ComparedRequest(without_name(design))
     tolerance = state.view.workspace.tolerance
     if tolerance is not None:
         # The tolerance in millimetres is that of the live design.
         tolerance /= unit_ratio(design, state.design)
     is_turned = column == LIVE and compared.look.at_pose
     rotation = rows_of(frame.snapshot.rotation) if is_turned else None
-    return ComparedRequest(unnamed(design), drawn=True, rotation=rotation, tolerance=tolerance)
+    return ComparedRequest(without_name(design), drawn=True, rotation=rotation, tolerance=tolerance)
 
 
 def drawing_in(column: int, feed: CompareFeed) -> ComparedDrawing | None:

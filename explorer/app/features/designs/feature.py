@@ -17,7 +17,7 @@ from explorer.app.state.actions import Open, SetName
 from explorer.app.state.frame import Frame
 from explorer.app.storage.library import Entry
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Does, open_button, press_button
+from explorer.app.widgets.buttons import PressHandler, open_button, press_button
 from explorer.app.widgets.markup import box, note
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, PRESETS
@@ -172,7 +172,7 @@ class DesignsPanel:
         self.asked = name if name not in PRESETS else None
         self._session.redraw()
 
-    def _for_row(self, action: Callable[[Entry, Who], None]) -> Does:
+    def _for_row(self, action: Callable[[Entry, Who], None]) -> PressHandler:
         def press(name: str, client: viser.ClientHandle) -> None:
             row = next((row for row in self.rows if row.name == name), None)
             if row is not None:

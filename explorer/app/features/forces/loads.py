@@ -69,7 +69,7 @@ class SetForce(Action):
         return f"Force {numbers} N"
 
 
-def rounded(force: FloatArray, size: float) -> Triple:
+def round_force(force: FloatArray, size: float) -> Triple:
     """Return a force with the decimals that a thousandth of a size has.
 
     Args:

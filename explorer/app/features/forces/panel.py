@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.loads import Loads, SetForce, nearest_feed, rounded
+from explorer.app.features.forces.loads import Loads, SetForce, nearest_feed, round_force
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.actions import SetPose
@@ -158,7 +158,7 @@ class ForcesPanel:
         size = math.hypot(*frame.state.view.forces.force)
         direction = without_force(self._loads.of(frame)).worst_force(size).direction
         if size > 0.0 and np.isfinite(direction).all():
-            force = rounded(size * direction, size)
+            force = round_force(size * direction, size)
             action = SetForce(force, title="Force in its worst direction")
             self._session.do(action, who=client.client_id)
 

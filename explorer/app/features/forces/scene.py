@@ -14,7 +14,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.loads import Loads, SetForce, fitting_scale, rounded
+from explorer.app.features.forces.loads import Loads, SetForce, fitting_scale, round_force
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import (
     NO_MESH,
@@ -160,7 +160,7 @@ class ForcesScene(ScenePart):
             words = _newtons(drop_rounding(force, size), 3) + (
                 f" ± {_newtons(more, 2)}" if more else ""
             )
-            yield label, "text", f"{joint} {words}{_told(shares[index])}"
+            yield label, "text", f"{joint} {words}{_share_suffix(shares[index])}"
             yield label, "position", tuple(places[index].tolist())
 
     def corners(self, placed: Placed) -> FloatArray:
@@ -224,7 +224,7 @@ class ForcesScene(ScenePart):
         yield self._ordinates[index], "colors", of_one_colour(colour, ORDINATES + 1)
         label = self._labels[f"strut {leg}"]
         words = f"strut {leg} {format_number(moment * 1e-3 * design.unit_mm, 3)} N m"
-        yield label, "text", words + _told(share)
+        yield label, "text", words + _share_suffix(share)
         yield label, "position", tuple(top.tolist())
 
 
@@ -248,7 +248,7 @@ class LoadHandle(ScenePart):
         tool = scene_scale(state) * np.array(position_of(state.design, state.pose, "tool"))
         scale = state.view.forces.scale
         per_length = scale / (scene_scale(state) * state.design.reach)
-        return rounded(per_length * (np.asarray(self.handle.position) - tool), scale)
+        return round_force(per_length * (np.asarray(self.handle.position) - tool), scale)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that keep the gizmo at the tip of the arrow."""
@@ -316,7 +316,7 @@ def scale_of(placed: Placed) -> float:
     return fitting_scale(state.design.payload.weight_n, state.view.forces.scale)
 
 
-def _told(share: float | None) -> str:
+def _share_suffix(share: float | None) -> str:
     """Return a share of a limit beside a force, "" without a limit."""
     return "" if share is None else f" · {Share(share).text()}"
 

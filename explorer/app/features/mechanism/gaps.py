@@ -31,7 +31,7 @@ from explorer.app.scene.shapes import (
     add_lines,
     add_translucent,
     dashes,
-    joined,
+    join_meshes,
     linear_colour,
     of_one_colour,
     sphere,
@@ -246,4 +246,4 @@ def gap_text(placed: Placed, index: int, approach: Approach) -> str:
 def _contact_mark() -> Mesh:
     """Return a ring about the z-axis with a ball in its middle."""
     vertices, faces = sphere()
-    return joined((CONTACT_RADIUS * vertices, faces), torus(RING_RADIUS, RING_TUBE))
+    return join_meshes((CONTACT_RADIUS * vertices, faces), torus(RING_RADIUS, RING_TUBE))

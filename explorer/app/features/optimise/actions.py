@@ -14,9 +14,9 @@ import msgspec
 
 from explorer.app.features.optimise.work import find_refusals, problem_of
 from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, Set, check_free, moved
+from explorer.app.state.actions import Open, Set, check_free, move_to
 from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
-from explorer.app.state.parts import kept_on_open, with_value
+from explorer.app.state.parts import parts_kept_on_open, with_value
 from explorer.app.state.state import Optimisation, Run, State
 from explorer.app.storage.library import LONGEST_NAME
 from explorer.errors import InputError, NoAnswerError
@@ -236,13 +236,13 @@ def _with_run(state: State, change: Callable[[Run], Run]) -> State:
 
 def _restore_own(state: State, own: State) -> State:
     """Return the user's own state with the present view."""
-    return replace(own, **kept_on_open(state) | {"optimisation": state.optimisation})
+    return replace(own, **parts_kept_on_open(state) | {"optimisation": state.optimisation})
 
 
 def _with_design(state: State, design: Design) -> State:
     """Return the state with a design of a run, in the orientation of its home pose."""
     pose = Pose(state.pose.position, design.home_pose.quaternion)
-    return moved(replace(state, design=design), pose)
+    return move_to(replace(state, design=design), pose)
 
 
 def _rename(design: Design) -> Design:

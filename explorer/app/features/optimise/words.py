@@ -33,10 +33,10 @@ from explorer.app.widgets.markup import (
     box,
     caption,
     dim,
+    format_signed,
     meter,
     row,
     sentence,
-    signed,
     status,
     table,
 )
@@ -357,7 +357,7 @@ def _value(line: Row, value: float | None, digits: int) -> str:
         return "none"
     if math.isinf(value):
         return "infinite"
-    return line.names[round(value) - 1] if line.names else signed(value, digits)
+    return line.names[round(value) - 1] if line.names else format_signed(value, digits)
 
 
 def _pair(legs: tuple[int, int] | None) -> str:

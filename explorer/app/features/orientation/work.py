@@ -13,7 +13,7 @@ from explorer.app.features.workspace.tasks import LIVE_TOLERANCE
 from explorer.app.session.feed import Feed, feed_of, watch_of
 from explorer.app.session.worker import Channel
 from explorer.app.state.action import Action
-from explorer.app.state.actions import moved
+from explorer.app.state.actions import move_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.mechanism.configuration import tool_offset
@@ -77,7 +77,7 @@ def _tilt_to(state: State, angles: TiltTorsion) -> State:
     """Return the state with azimuth, tilt and torsion in degrees, which it keeps as they are."""
     orientation = pose_of_tilt_torsion(state.pose.position, angles)
     pose = state.pose_at(state.position, orientation)
-    return replace(moved(state, pose), set_tilt_torsion=angles)
+    return replace(move_to(state, pose), set_tilt_torsion=angles)
 
 
 NODES = 20

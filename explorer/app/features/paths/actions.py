@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from explorer.app.state.action import Action
-from explorer.app.state.actions import moved
+from explorer.app.state.actions import move_to
 from explorer.app.state.paths import End, Journey, Paths
 from explorer.app.state.state import Joints, State, joints_of
 from explorer.errors import InputError
@@ -54,7 +54,7 @@ class Go(Action):
         path = Journey(
             "straight", title, state.design, (start, goal), is_playing=True, tool=state.tool
         )
-        after = moved(_with(state, goal=chosen, problem=None, planning=None, journey=path), start)
+        after = move_to(_with(state, goal=chosen, problem=None, planning=None, journey=path), start)
         mode = state.paths.start
         return replace(after, mode=mode) if isinstance(mode, int) else after
 
@@ -207,7 +207,7 @@ class TakePlan(Action):
         after = _with(state, planning=None, problem=problem, journey=self.journey)
         if after.journey is None:
             return after
-        return moved(after, after.journey.pose)
+        return move_to(after, after.journey.pose)
 
 
 def _journey(state: State) -> Journey:
@@ -219,7 +219,7 @@ def _journey(state: State) -> Journey:
 
 def _go_along(state: State, journey: Journey) -> State:
     """Return the state at the present place of a path."""
-    return moved(_with(state, journey=journey), journey.pose)
+    return move_to(_with(state, journey=journey), journey.pose)
 
 
 def _with(state: State, **changes: object) -> State:

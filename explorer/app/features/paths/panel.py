@@ -42,7 +42,7 @@ from explorer.app.state.state import State, angles_of
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chip, Chips, choose
-from explorer.app.widgets.markup import alert, beside, box, dim, note, sentence, signed
+from explorer.app.widgets.markup import alert, beside, box, dim, format_signed, note, sentence
 from explorer.errors import InputError
 from explorer.export.tables import trajectory_csv
 from explorer.mechanism.configuration import position_of
@@ -232,8 +232,8 @@ def end_numbers(state: State, end: EndName) -> str:
     except InputError as error:
         return f'<div class="ex-note ex-close">{escape(sentence(str(error)))}</div>'
     there = position_of(state.design, pose, state.view.at)
-    position = ", ".join(signed(coordinate, 2) for coordinate in there)
-    angles = ", ".join(f"{signed(angle, 1)}°" for angle in angles_of(pose))
+    position = ", ".join(format_signed(coordinate, 2) for coordinate in there)
+    angles = ", ".join(f"{format_signed(angle, 1)}°" for angle in angles_of(pose))
     hint = f"x, y, z of {state.point} in design units; yaw, pitch, roll"
     return note(f'<span title="{hint}">{position} · {angles}</span>')
 

@@ -90,7 +90,7 @@ class PrecisionPanel:
             "Precision › Assume typical values",
             TYPICAL_HINT,
             TYPICAL,
-            is_ready=lambda: bool(_assumed(services.session.state.design)),
+            is_ready=lambda: bool(_assumed_values(services.session.state.design)),
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -112,12 +112,12 @@ class PrecisionPanel:
         return load_source("accuracy", loaded, density)
 
     def _assume(self, _: str, client: viser.ClientHandle) -> None:
-        if _assumed(self._session.state.design):
+        if _assumed_values(self._session.state.design):
             self._session.do(AssumeTypical(), who=client.client_id)
 
 
 @lru_cache(maxsize=1)
-def _assumed(design: Design) -> tuple[str, ...]:
+def _assumed_values(design: Design) -> tuple[str, ...]:
     """Return what typical values the design would get; it stays while the mechanism moves."""
     return typical_machine(design)[1]
 
@@ -127,7 +127,7 @@ def _offer(precision: ToolPrecision) -> str:
     design = precision.loaded.design
     if precision.has_errors and is_elastic(design):
         return ""
-    assumed = _assumed(design)
+    assumed = _assumed_values(design)
     if not assumed:
         return ""
     words = dim(f"State them in the tab Machine, or assume typical values: {'; '.join(assumed)}.")

@@ -13,7 +13,7 @@ from typing import TypeAlias
 import msgspec
 import numpy as np
 
-from explorer.app.scene.creases import Drawn, creased
+from explorer.app.scene.creases import Drawn, with_creases
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.frame import Frame
 from explorer.errors import ExplorerError
@@ -132,7 +132,7 @@ def parts_drawing(request: PartsRequest) -> Parts | ExplorerError:
         prototype = make_prototype(request.design)
     except ExplorerError as error:
         return error
-    meshes = tuple(creased(part.vertices, part.faces) for part in prototype.parts)
+    meshes = tuple(with_creases(part.vertices, part.faces) for part in prototype.parts)
     return Parts(prototype, meshes, parts_list(prototype))
 
 

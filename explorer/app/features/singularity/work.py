@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.action import Action
-from explorer.app.state.actions import moved
+from explorer.app.state.actions import move_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.errors import InputError
@@ -49,7 +49,7 @@ class GoToStratum(Action):
                 f"the pose lies in {stratum_name(here)}, which {stratum_name(goal)} borders on, "
                 "so none of its poses is the nearest; move a margin off zero"
             )
-        return moved(state, nearest.pose)
+        return move_to(state, nearest.pose)
 
     def words(self) -> str:
         """Return what the action does."""
@@ -75,7 +75,7 @@ class GoToSingularity(Action):
         if nearest.distance == 0.0:
             index = nearest.incidence
             raise InputError(f"the pose has δ{index} = 0 already: {INCIDENCES[index - 1]}")
-        return moved(state, nearest.pose)
+        return move_to(state, nearest.pose)
 
     def words(self) -> str:
         """Return what the action does."""

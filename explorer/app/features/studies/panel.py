@@ -42,7 +42,7 @@ from explorer.app.state.studies import (
     label_of,
 )
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Buttons, Does
+from explorer.app.widgets.buttons import Buttons, PressHandler
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import alert, beside
 from explorer.errors import ExplorerError
@@ -296,7 +296,7 @@ class StudiesPanel:
         self.chips = gui.add_html("")
 
     def _add_buttons(self, buttons: Buttons) -> None:
-        handlers: dict[str, tuple[Does, Callable[[], bool]]] = {
+        handlers: dict[str, tuple[PressHandler, Callable[[], bool]]] = {
             "start": (self._start, lambda: self.runner.run is None),
             "cancel": (lambda _, __: self.runner.cancel(), lambda: self.runner.run is not None),
             "continue": (self._go_on, self._can_go_on),
@@ -361,7 +361,7 @@ class StudiesPanel:
     def _clear(self, _: str, client: viser.ClientHandle) -> None:
         self._session.do(free_axes, who=client.client_id)
 
-    def _switch(self, turn: Callable[[StudyPlan, str], StudyPlan]) -> Does:
+    def _switch(self, turn: Callable[[StudyPlan, str], StudyPlan]) -> PressHandler:
         def press(name: str, client: viser.ClientHandle) -> None:
             self._session.do(
                 lambda state: Set(

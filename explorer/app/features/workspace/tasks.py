@@ -31,7 +31,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.search import unwatched
+from explorer.numerics.search import ignore_stage
 from explorer.statics.reactions import has_limits
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.faces.faces import Faces, workspace_faces
@@ -260,7 +260,7 @@ def export_mesh(
     if region == "limits":
         solid = workspace_solid(design, np.array(selection.rotation), tolerance)
     else:
-        found = find_part(selection, tolerance, unwatched)
+        found = find_part(selection, tolerance, ignore_stage)
         if isinstance(found, Trouble):
             cause = "nothing holds the load: " if region == "held" else ""
             raise InputError(cause + found.reason)
