@@ -14,16 +14,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
 from explorer.measures.size import corners_of
 from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from explorer.app.widgets.assigning import Update
 
 # Approximate reach of a design in scene units.
 SCENE_REACH = 10.0
