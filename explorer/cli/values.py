@@ -11,7 +11,7 @@ import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
 from explorer.cli.parsing import UsageError
-from explorer.numerics.checks import LEAST, size_problem
+from explorer.numerics.checks import LEAST, MOST, size_problem
 
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six", 7: "seven"}
 
@@ -175,14 +175,19 @@ def finite_number(option: str) -> PrimitiveConstructorSpec[Any]:
     return _parser("NUMBER", read)
 
 
-def positive(option: str) -> PrimitiveConstructorSpec[Any]:
-    """Return the parser of an option with one finite number above zero."""
+def positive(option: str, power: int = 1) -> PrimitiveConstructorSpec[Any]:
+    """Return the parser of an option with one finite number above zero.
+
+    Args:
+        option: The option.
+        power: Exponent of length in its unit; 3 for a volume.
+    """
 
     def read(words: list[str]) -> float:
         value = _number(option, words[0])
         if not value > 0.0:
             raise UsageError(f"{option} must be a positive number; got {words[0]}")
-        if problem := size_problem(value, LEAST):
+        if problem := size_problem(value, LEAST**power, MOST**power):
             raise UsageError(f"{option} {problem}")
         return value
 

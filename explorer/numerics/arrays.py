@@ -47,7 +47,8 @@ def finite_array(
             f"{name} must have the shape {_shape_text(shape)}, leading batch axes allowed; "
             f"got {array.shape}"
         )
-    allowed = np.isfinite(array) & (np.abs(array) <= most)
+    # A number that is none is not allowed either.
+    allowed = np.isfinite(array) if math.isinf(most) else np.abs(array) <= most
     if not allowed.all():
         odd = float(array[~allowed].flat[0])
         if not math.isfinite(odd):

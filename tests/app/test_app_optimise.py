@@ -547,7 +547,7 @@ def test_required_box_is_drawn_where_it_is() -> None:
     assert np.sort(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)) == pytest.approx(
         np.sort(np.repeat(sides, 4))
     )
-    shifted = replace(iterates_of(state, 1)[0], values=(0.5, -0.25, 1.0))
+    shifted = msgspec.structs.replace(iterates_of(state, 1)[0], values=(0.5, -0.25, 1.0))
     assert np.array(visible_box(end(state, (shifted,)))) == pytest.approx(
         np.array(box) + shifted.values
     )

@@ -313,7 +313,7 @@ def test_optimise_writes_each_file_that_it_can(
         ("accuracy", "--position", "3", "4", "0"),
         ("budget", "--position", "3", "4", "0"),
         ("budget", "--over", "box"),
-        ("budget", "--typical", "--keep-actuators", "--wanted", "1e-9"),
+        ("budget", "--typical", "--keep-actuators", "--wanted", "1e-6"),
         ("path", "--to", "12", "8", "-7"),
         ("forward", "--joints", "1", "2", "3", "4", "5", "600"),
         ("optimise", "--design", "paper-initial", "--target-volume", "20000"),

@@ -278,7 +278,7 @@ FOLDS = ["--folds", "14", "45", "98", "-140", "-120", "60"]
         ("workspace", ".", ["--format", "stl"], "it is a folder"),
         ("workspace", "/dev/null", ["--format", "stl"], "no plain file"),
         ("workspace", "file.stl", ["--tolerance", "0"], "--tolerance must be a positive number"),
-        ("workspace", "file.stl", ["--tolerance", "1e-9"], "at most 2,000,000 are made"),
+        ("workspace", "file.stl", ["--tolerance", "1e-6"], "at most 2,000,000 are made"),
         ("workspace", "file.stl", ["--design", "no-such"], "no preset and no file"),
         ("simulation", "model.urdf", [], "no simulation format 'urdf'; there is mjcf"),
         ("simulation", "model.xml", ["--quaternion", "1", "0", "0", "0"], "--quaternion is not"),

@@ -51,7 +51,7 @@ def message_of(data: bytes | dict[str, Any], source: str = "some.json") -> str:
         ({"a3": [8, 0]}, "a3y = 0"),
         ({"b3": 2}, "b3 - b2 = 0"),
         ({"a3": [8, 1e-13]}, "degenerate"),
-        ({"a3": [0, 1e-7], "b1": [0, 1e-7], "b2": 0, "b3": 1e-7}, "at least 1e-06 in size"),
+        ({"a3": [0, 1e-8], "b1": [0, 1e-8], "b2": 0, "b3": 1e-8}, "at least 1e-07 in size"),
         ({"a3": [0, 1.1e6]}, "a3 must not exceed 1e+06 in size; got 1.1e+06: change the unit"),
         *(({"a3": value}, "a3") for value in ([8], [8, 5, 0], 8)),
         *(({"b2": value}, "b2") for value in ("2", True, None, [2])),

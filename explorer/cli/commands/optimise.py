@@ -69,7 +69,7 @@ class Optimise(JsonOptions, DesignOptions):
     required box the worst margin, the largest share of a limit of forces, the worst error, or the
     largest deflection under the load."""
 
-    target_volume: Annotated[float | None, positive("--target-volume"), OPTIONAL] = None
+    target_volume: Annotated[float | None, positive("--target-volume", power=3), OPTIONAL] = None
     """Volume to match, or least volume; for the shortest leg by default that of the design."""
 
     target_reach: Annotated[float | None, positive("--target-reach"), OPTIONAL] = None

@@ -161,8 +161,9 @@ def workspace_nodes(
 
 def node_step_of(design: Design, step: float | None = None) -> float:
     """Return the step of the paper's grid, a positive one: given, the design's, or reach / 15."""
-    width = step if step is not None else design.node_step or design.reach / STEPS_IN_REACH
-    return positive("the node step", width)
+    if step is None:
+        return design.node_step or design.reach / STEPS_IN_REACH
+    return positive("the node step", step)
 
 
 def node_range(region: Region, step: float) -> tuple[FloatArray, FloatArray]:
