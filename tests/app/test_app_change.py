@@ -13,7 +13,7 @@ from desk import Desk
 from services import StubWorker, services_for
 
 from explorer.app.features.history.change import OVER, ChangeCard, ChangeScene, DesignChange
-from explorer.app.features.workspace.feeds import volume_feed
+from explorer.app.features.workspace.feeds import VOLUME_FEED
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import REDO, UNDO
 from explorer.app.state.action import Action
@@ -35,7 +35,7 @@ class Watcher:
         self.desk = desk
         worker = StubWorker(at_once=True)
         services = services_for(server, desk.session, worker, buttons=buttons)
-        self._volumes = services.get(volume_feed)
+        self._volumes = services.get(VOLUME_FEED)
         self.change = services.get(DesignChange)
         self.card = ChangeCard(services)
         self.scene = ChangeScene(services)

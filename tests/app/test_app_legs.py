@@ -31,7 +31,7 @@ from explorer.app.features.legs.work import RADIUS_FEED
 from explorer.app.features.mechanism.bodies import Legs
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.workspace import regions
-from explorer.app.features.workspace.feeds import workspace_feed
+from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.features.workspace.panel import WorkspacePanel
 from explorer.app.features.workspace.slice_map import SliceMap
 from explorer.app.features.workspace.tasks import (
@@ -129,7 +129,7 @@ def answer(worker: StubWorker) -> None:
 
 
 def drawing_of(state: State) -> WorkspaceDrawing:
-    drawing = follow(state, workspace_feed)[0].drawing
+    drawing = follow(state, WORKSPACE_FEED)[0].drawing
     assert drawing is not None
     return drawing
 
@@ -250,13 +250,13 @@ def test_move_requests_a_drawing_only_if_paths_start_at_the_pose(
     services = services_for()
     state = show(THICK, start=start, region=region)
     for each in (state, SetPosition(2, 8.0).apply(state)):
-        services.get(workspace_feed).follow(Frame(each))
+        services.get(WORKSPACE_FEED).follow(Frame(each))
     assert isinstance(services.worker, StubWorker)
     assert len(services.worker.orders) == orders
 
 
 def test_failure_of_an_older_request_is_no_problem() -> None:
-    feed, worker = follow(THICK, workspace_feed)
+    feed, worker = follow(THICK, WORKSPACE_FEED)
     feed.follow(Frame(show(THICK, colour="margin")))
     first, second = worker.orders
     first.failed("too late")
@@ -287,7 +287,7 @@ def test_curve_is_requested_once_for_all_radii() -> None:
 
 def summary(state: State) -> str:
     """Return all that the panel says of the drawing of a state."""
-    frame, feed = Frame(state), follow(state, workspace_feed)[0]
+    frame, feed = Frame(state), follow(state, WORKSPACE_FEED)[0]
     return drawing_words(frame, feed) + workspace_details(frame, feed)
 
 
@@ -334,7 +334,7 @@ def test_button_of_a_home_in_trouble_goes_to_the_nearest_start(
     panel, before = WorkspacePanel(services), show(beyond_its_limits())
     desk.session.do(Set("design", before.design))
     desk.session.do(Set("view", before.view))
-    feed, worker = follow(before, workspace_feed, services)
+    feed, worker = follow(before, WORKSPACE_FEED, services)
     updates = list(panel.updates(Frame(before)))
     assert any("Nothing is accessible from the home position" in str(v) for *_, v in updates)
     (button,) = (

@@ -521,7 +521,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
     PathRunner(services_for()).follow(Frame(state))
     assert worker.orders[-1].request.tool == state.tool == PRESS.tool.position
     poses = plan(worker.orders[-1].request).poses
-    own = weights_of_parts(WeightsRequest(PRESS, 3000.0)).weights
+    own = weights_of_parts(WeightsRequest(PRESS, 3000.0))
     weights = replace(own, on_platform=(*own.on_platform, PRESS.payload))
     along = path_loads(PRESS, poses, load_of(state), tool=state.tool, weights=weights)
     assert 0.5 < along.share <= 1.0 + 1e-4

@@ -39,7 +39,7 @@ from explorer.app.features.singularity.panel import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene
 from explorer.app.features.workspace.feature import send_workspace
 from explorer.app.features.workspace.feeds import (
-    workspace_feed,
+    WORKSPACE_FEED,
     workspace_pose,
     workspace_request,
     workspace_start,
@@ -339,7 +339,7 @@ def draw_workspace_of(
     services: Services, state: State
 ) -> tuple[dict[str, dict[str, Any]], WorkspaceDrawing]:
     """Return the nodes of the workspace of a state, and its drawing."""
-    drawing = draw(services, workspace_feed, state)
+    drawing = draw(services, WORKSPACE_FEED, state)
     return by_name(WorkspaceScene(services).updates(Placed(Frame(state)))), drawing
 
 
@@ -372,7 +372,7 @@ def test_drawn_solid_and_hull_are_those_of_b4_moved_by_the_arm(
     ends = np.array([corners.min(axis=0), corners.max(axis=0)])
     box = WorkspaceScene(services).corners(Placed(Frame(state))) / scene_scale(state)
     np.testing.assert_allclose([box.min(axis=0), box.max(axis=0)], ends, atol=0.05)
-    rows = rows_of(workspace_details(Frame(state), services.get(workspace_feed)))
+    rows = rows_of(workspace_details(Frame(state), services.get(WORKSPACE_FEED)))
     extents = [row[1] for row in rows if row[0].startswith("Extent of the tool")]
     numbers = [[number(end) for end in text.split(" … ")] for text in extents]
     np.testing.assert_allclose(numbers, ends.T, atol=0.05)

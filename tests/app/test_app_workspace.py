@@ -24,8 +24,8 @@ from workspace_feeds import drawing_of, follow
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feature import FORMATS, send_workspace
 from explorer.app.features.workspace.feeds import (
-    volume_feed,
-    workspace_feed,
+    VOLUME_FEED,
+    WORKSPACE_FEED,
     workspace_request,
     workspace_rotation,
 )
@@ -74,7 +74,7 @@ def with_workspace(state: State, **changes: Any) -> State:
 
 def test_volume_is_known_while_the_solid_is_not_shown() -> None:
     services, first = services_for(), open_state(OPTIMAL)
-    feed = services.get(volume_feed)
+    feed = services.get(VOLUME_FEED)
     assert volume_text(feed.drawing) == "–"
     assert "computing" in volume_headline(Frame(first), feed)
     for state in (first, SetVariable("a3x", 17.0).apply(first)):
@@ -82,7 +82,7 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
         assert not feed.is_current
         follow(services, state)
         expected = workspace_volume(state.design, state.pose.rotation)
-        assert services.get(workspace_feed).drawing is None
+        assert services.get(WORKSPACE_FEED).drawing is None
         assert feed.is_current
         assert volume_text(feed.drawing) == f"{format_number(expected.volume, 6)} units³"
         words = volume_headline(Frame(state), feed)
@@ -98,7 +98,7 @@ def test_volume_is_that_of_the_orientation_that_is_chosen() -> None:
     for orientation, words in (("pose", "present"), ("home", "home")):
         chosen = with_workspace(state, orientation=orientation)
         follow(services, chosen)
-        feed = services.get(volume_feed)
+        feed = services.get(VOLUME_FEED)
         expected = workspace_volume(OPTIMAL, workspace_rotation(Frame(chosen))).volume
         assert volume_text(feed.drawing) == f"{format_number(expected, 6)} units³"
         assert f"in the {words} orientation" in volume_headline(Frame(chosen), feed)
@@ -117,7 +117,7 @@ def test_empty_workspace_names_what_empties_it_instead_of_a_volume() -> None:
     limits = msgspec.structs.replace(OPTIMAL.limits, l1=(0.0, 1.0), box=((10.0,) * 3, (11.0,) * 3))
     services, state = services_for(), Set("design.limits", limits).apply(open_state(OPTIMAL))
     follow(services, state)
-    words = volume_headline(Frame(state), services.get(volume_feed))
+    words = volume_headline(Frame(state), services.get(VOLUME_FEED))
     assert "The workspace is empty" in words
     assert "l1 maximum" in words
     assert drawing_of(with_workspace(state, solid=True, cut="x")).slice_map is None
@@ -492,7 +492,7 @@ def test_map_is_read_to_the_browser_that_asks(services: Services) -> None:
     for text in ("[12.5,5]", "[NaN,1,2]", place):
         services.buttons.press("workspace.read", text, client)
     (script,) = asking.scripts
-    drawing = services.get(workspace_feed).drawing
+    drawing = services.get(WORKSPACE_FEED).drawing
     assert drawing is not None
     assert drawing.slice_map is not None
     words = drawing.slice_map.words_at((12.5, 5.0, 7.25))
@@ -561,7 +561,7 @@ def feed() -> Any:
     """The feed after it has drawn the part that holds the load."""
     services = services_for()
     follow(services, load_state(region="held"))
-    return services.get(workspace_feed)
+    return services.get(WORKSPACE_FEED)
 
 
 @pytest.fixture(scope="module")
@@ -595,7 +595,7 @@ def test_load_that_nothing_holds_names_the_part(services: Services) -> None:
     weak = msgspec.structs.replace(LOADED, actuators=Actuators(push_n=(2, 2, 2, 2, 2, 2)))
     state = load_state(weak, region="held")
     follow(services, state)
-    drawing = services.get(workspace_feed).drawing
+    drawing = services.get(WORKSPACE_FEED).drawing
     assert drawing is not None
     assert drawing.trouble is not None
     assert re.search(r"payload; actuator \w+ is at its limit there", drawing.trouble.reason)

@@ -17,7 +17,7 @@ from desk import viewed
 from services import StubWorker, services_for
 
 from explorer.app.features.legs.work import RadiusRequest, draw_radius_curve
-from explorer.app.features.workspace.feeds import surface_of, workspace_feed
+from explorer.app.features.workspace.feeds import WORKSPACE_FEED, surface_of
 from explorer.app.features.workspace.regions import MOST_LIVE_NODES
 from explorer.app.features.workspace.tasks import (
     WorkspaceRequest,
@@ -82,7 +82,7 @@ def test_drawing_follows_the_newest_design_and_its_surface_comes_before_its_numb
     worker: Worker,
 ) -> None:
     redraws = threading.Semaphore(0)
-    feed = workspace_feed(services_for(worker=worker, redraw=redraws.release))
+    feed = WORKSPACE_FEED(services_for(worker=worker, redraw=redraws.release))
     feed.follow(Frame(open_state(OPTIMAL)))
     assert worker.wait_until_idle(PATIENCE)
     # A hidden drawing is not requested.
@@ -262,7 +262,7 @@ def test_grid_too_fine_for_live_nodes_leaves_the_rest_of_the_drawing() -> None:
 
 def test_cancelled_drawing_leaves_none_of_an_older_design() -> None:
     worker = StubWorker()
-    feed = workspace_feed(services_for(worker=worker))
+    feed = WORKSPACE_FEED(services_for(worker=worker))
     state = viewed(open_state(THICK), workspace=WorkspaceView(solid=True))
     feed.follow(Frame(state))
     drawing = draw_workspace(worker.orders[0].request)
@@ -283,7 +283,7 @@ def test_drawing_shows_its_stage_and_is_cancelled_and_requested_again(
 ) -> None:
     monkeypatch.setattr(session_feed, "LONG_SECONDS", 0.0)
     worker, redraws = Worker(lambda _: None), threading.Semaphore(0)
-    feed = workspace_feed(services_for(worker=worker, redraw=redraws.release))
+    feed = WORKSPACE_FEED(services_for(worker=worker, redraw=redraws.release))
 
     def wait_for(condition: Callable[[], object]) -> None:
         while not condition():

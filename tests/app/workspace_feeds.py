@@ -9,7 +9,7 @@ from services import StubWorker, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feature import WORKSPACE
-from explorer.app.features.workspace.feeds import workspace_feed
+from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
@@ -44,6 +44,6 @@ def drawing_of(state: State) -> WorkspaceDrawing:
     """Return the drawing of the workspace of a state."""
     services = services_for()
     follow(services, state)
-    drawing = services.get(workspace_feed).drawing
+    drawing = services.get(WORKSPACE_FEED).drawing
     assert drawing is not None
     return drawing

@@ -12,7 +12,7 @@ from playwright.sync_api import expect
 from tab import Tab
 
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
-from explorer.app.features.workspace.feeds import workspace_feed
+from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
 from explorer.app.state.actions import Set
 from explorer.numerics.number_text import format_number
@@ -68,7 +68,7 @@ def test_accessible_solid_replaces_the_other_while_the_page_stays_alive(tab: Tab
         tab.wait_until_shown(JOINT_LABELS["l4"], tab.state.joints[5])
         assert tab.state.pose != before.pose
         assert red_pixels(tab) < MANY
-        assert not page.services.get(workspace_feed).is_current
+        assert not page.services.get(WORKSPACE_FEED).is_current
         tab.push("Home pose")
         tab.wait_for(lambda: tab.state.pose == before.pose, "the home pose")
     finally:
@@ -77,7 +77,7 @@ def test_accessible_solid_replaces_the_other_while_the_page_stays_alive(tab: Tab
     accessible.wait_for()
     wait_until_drawn(tab)
     expect(tab.page.get_by_text("computing …")).to_be_hidden()
-    drawing = page.services.get(workspace_feed).drawing
+    drawing = page.services.get(WORKSPACE_FEED).drawing
     assert drawing is not None
     assert drawing.part is not None
     expect(accessible).to_contain_text(f"{format_number(drawing.part.volume, 6)} units³")

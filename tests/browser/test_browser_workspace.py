@@ -11,7 +11,7 @@ from machines import FULL, six
 from playwright.sync_api import Locator, expect
 from tab import Tab
 
-from explorer.app.features.workspace.feeds import workspace_feed
+from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Open, Set, SetAngle
 from explorer.mechanism.design_file import PRESETS
@@ -127,7 +127,7 @@ def test_map_of_each_measure_is_read_and_the_reading_stays_while_it_is_drawn_aga
     assert number(found[3]) == pytest.approx(moved, rel=5e-3)
     words = r"largest share of a limit ([\d.,]+) % \(([\w ]+)\)"
     at, found = read("share", words, Open(FULL))
-    drawing = tab.running.page.services.get(workspace_feed).drawing
+    drawing = tab.running.page.services.get(WORKSPACE_FEED).drawing
     assert drawing is not None
     assert drawing.request.load is not None
     case = load_case(FULL, rotation, np.array(drawing.request.load))

@@ -121,8 +121,7 @@ class Loads:
 
     def precision(self, frame: Frame) -> ToolPrecision:
         """Return the precision of the tool in the pose of a frame under its load."""
-        drawing = self.weights.drawing
-        state, weights = frame.state, None if drawing is None else drawing.weights
+        state, weights = frame.state, self.weights.drawing
         if self._last is None or self._last[0] is not state or self._last[1] is not weights:
             weighs_payload = state.view.forces.weighed != "none"
             loaded = LoadedPose(state.design, state.pose, load_of(state), weights, weighs_payload)

@@ -24,21 +24,8 @@ class WeightsRequest:
     density: float
 
 
-@dataclass(frozen=True)
-class WeightsDrawing:
-    """The weights of platform and legs, without the payload.
-
-    Attributes:
-        request: The request.
-        weights: Weights of the prototype's parts.
-    """
-
-    request: WeightsRequest
-    weights: Weights
-
-
-def weights_of_parts(request: WeightsRequest) -> WeightsDrawing:
-    """Return the weights of the prototype's parts.
+def weights_of_parts(request: WeightsRequest) -> Weights:
+    """Return the weights of the prototype's parts, without the payload.
 
     Raises:
         ExplorerError: the design has no prototype.
@@ -47,7 +34,7 @@ def weights_of_parts(request: WeightsRequest) -> WeightsDrawing:
     from explorer.prototype.weights import machine_weights
 
     masses = make_prototype(request.design).masses(request.density)
-    return WeightsDrawing(request, machine_weights(request.design, masses, payload=False))
+    return machine_weights(request.design, masses, payload=False)
 
 
 @dataclass(frozen=True)
@@ -55,14 +42,12 @@ class NearestDrawing:
     """The nearest position that holds a load.
 
     Attributes:
-        request: The pose that does not hold it.
         pose: The pose there; None if none was found.
     """
 
-    request: LoadedPose
     pose: Pose | None
 
 
 def nearest_position(request: LoadedPose) -> NearestDrawing:
     """Return the nearest position that holds the load of a pose."""
-    return NearestDrawing(request, nearest_carrying_pose(request))
+    return NearestDrawing(nearest_carrying_pose(request))

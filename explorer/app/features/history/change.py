@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.feeds import volume_feed, volume_request
+from explorer.app.features.workspace.feeds import VOLUME_FEED, volume_request
 from explorer.app.features.workspace.regions import Selection
 from explorer.app.features.workspace.tasks import (
     MeasuredVolume,
@@ -42,7 +42,7 @@ class DesignChange:
     def __init__(self, services: Services) -> None:
         self.before: Frame | None = None
         self._session = services.session
-        self._now = services.get(volume_feed)
+        self._now = services.get(VOLUME_FEED)
         # Another page of the same state may not have measured the design before the change.
         self._then = Feed[Selection, MeasuredVolume](
             services.worker,

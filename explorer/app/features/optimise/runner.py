@@ -13,7 +13,7 @@ import time
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import Advance, Compare, EndRun
 from explorer.app.features.optimise.work import compare, optimise
-from explorer.app.features.workspace.feeds import workspace_feed
+from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.session.jobs import Worker
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
@@ -41,7 +41,7 @@ class Optimiser(Runner):
         self.worker = Worker(services.tell, preload=[optimise.__module__], died=DIED)
         self._session = services.session
         # The page shows all of the last iterate once these are settled.
-        self._drawings = services.get(workspace_feed)
+        self._drawings = services.get(WORKSPACE_FEED)
         services.at_end(self.stop)
         self._stopped = threading.Event()
         # Iterates and end that are not shown yet; the worker's thread writes them too.

@@ -41,7 +41,7 @@ def plan(request: PlanRequest) -> PlannedPath:
     if load is not None:
         own = None
         if request.weighed == "payload and legs":
-            own = weights_of_parts(WeightsRequest(design, request.density)).weights
+            own = weights_of_parts(WeightsRequest(design, request.density))
         weights = LoadedPose(design, start, load, own, request.weighed != "none").weights
     return plan_path(
         design,

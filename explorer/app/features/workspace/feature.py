@@ -10,12 +10,12 @@ import viser
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
 from explorer.app.features.forces.loads import load_of
 from explorer.app.features.workspace.feeds import (
+    VOLUME_FEED,
+    WORKSPACE_FEED,
     loaded_design,
     orientation_word,
     tolerance_of,
     turned_suffix,
-    volume_feed,
-    workspace_feed,
     workspace_rows,
     workspace_start,
 )
@@ -88,7 +88,7 @@ class VolumeFigure:
     """The volume of the workspace within the limits, dim while a newer one is computed."""
 
     def __init__(self, services: Services) -> None:
-        self._feed = services.get(volume_feed)
+        self._feed = services.get(VOLUME_FEED)
 
     def __call__(self, frame: Frame) -> str:
         """Return the figure for a frame, as HTML."""
@@ -123,7 +123,7 @@ WORKSPACE = Feature(
         ),
     ),
     scene=(WorkspaceScene,),
-    feeds=(volume_feed, workspace_feed),
+    feeds=(VOLUME_FEED, WORKSPACE_FEED),
     tasks=(measure_volume, draw_workspace),
     lists=("Region", "Orientation", "Colour by"),
 )

@@ -9,12 +9,10 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import load_of
 from explorer.app.features.workspace.regions import Rows, Selection, rows_of
 from explorer.app.features.workspace.tasks import (
     LIVE_TOLERANCE,
-    MeasuredVolume,
     WorkspaceDrawing,
     WorkspaceRequest,
     WorkspaceSurface,
@@ -22,7 +20,7 @@ from explorer.app.features.workspace.tasks import (
     measure_volume,
 )
 from explorer.app.scene.bands import Measure
-from explorer.app.session.feed import Feed
+from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design
@@ -98,24 +96,17 @@ def drawn_measure(state: State) -> Measure:
     return "plain" if colour != "plain" and is_unstated(state.design, colour) else colour
 
 
-def volume_feed(services: Services) -> Feed[Selection, MeasuredVolume]:
-    """Return the feed of the volume within the limits, whether or not the solid is drawn.
-
-    It takes a tenth of the time of a drawing, and is followed before `workspace_feed`, so that it
-    never waits for the drawing of the same state.
-    """
-    return Feed(services.worker, measure_volume, volume_request, services.session.redraw)
-
-
 def volume_request(frame: Frame) -> Selection:
     """Return the request for the volume of a frame's design."""
     return Selection(frame.state.design, workspace_rows(frame))
 
 
-def workspace_feed(services: Services) -> Feed[WorkspaceRequest, WorkspaceDrawing]:
-    """Return the feed of the drawn workspace, whose surface arrives before the numbers."""
-    redraw = services.session.redraw
-    return Feed(services.worker, draw_workspace, workspace_request, redraw, has_stages=True)
+VOLUME_FEED = feed_of(measure_volume, volume_request)
+"""The feed of the volume within the limits, whether or not the solid is drawn.
+
+It takes a tenth of the time of a drawing, and is followed before `WORKSPACE_FEED`, so that it
+never waits for the drawing of the same state.
+"""
 
 
 def surface_of(feed: Feed[WorkspaceRequest, WorkspaceDrawing]) -> WorkspaceSurface | None:
@@ -153,3 +144,7 @@ def workspace_request(frame: Frame) -> WorkspaceRequest | None:
         warn_below=frame.state.warn_below if coloured else 1.0,
         load=load_of(frame.state) if is_loaded else None,
     )
+
+
+WORKSPACE_FEED = feed_of(draw_workspace, workspace_request, has_stages=True)
+"""The feed of the drawn workspace, whose surface arrives before the numbers."""

@@ -14,10 +14,10 @@ from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import run_script, run_script_in
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feeds import (
+    VOLUME_FEED,
+    WORKSPACE_FEED,
     drawn_measure,
     tolerance_of,
-    volume_feed,
-    workspace_feed,
     workspace_pose,
 )
 from explorer.app.features.workspace.regions import Region
@@ -93,7 +93,7 @@ class WorkspacePanel:
         gui, session, buttons = services.gui, services.session, services.buttons
         self._controls = controls = Controls(gui, session)
         self._session = session
-        self._feed, self._volumes = services.get(workspace_feed), services.get(volume_feed)
+        self._feed, self._volumes = services.get(WORKSPACE_FEED), services.get(VOLUME_FEED)
         self._nearest_start: Pose | None = None
         # The drawing whose solid is cut, and its map where the page shows it.
         self._drawing: WorkspaceDrawing | None = None

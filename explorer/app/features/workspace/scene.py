@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feeds import (
+    WORKSPACE_FEED,
     surface_of,
-    workspace_feed,
     workspace_position,
     workspace_rotation,
 )
@@ -62,7 +62,7 @@ class WorkspaceScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
-        self._feed = services.get(workspace_feed)
+        self._feed = services.get(WORKSPACE_FEED)
         # Collisions are added first and so drawn first: surfaces before them let them through.
         colours = (COLLIDING, AT_LIMIT, PLAIN, *band_colours(), *SHARE_COLOURS, *STEP_COLOURS)
         self._colours: tuple[Rgb, ...] = tuple(dict.fromkeys(colours))
