@@ -1,6 +1,6 @@
 """The public names, and the module from which each is loaded on first use.
 
-Every other name is imported from its room: `from explorer.statics.accuracy import rms_error`.
+Every other name is imported from its room: `from explorer.statics.accuracy import rms_of_sources`.
 """
 
 from .app.notebook import show as show

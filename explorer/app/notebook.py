@@ -56,8 +56,8 @@ class Shown:
         """The design on the page; assigning a design, a preset or a file opens it in its home pose.
 
         Raises:
-            DesignError: no such preset or file, or a file that holds no design.
-            InputError: the explorer is stopped, or the design is being optimised.
+            DesignError: No such preset or file, or a file that holds no design.
+            InputError: The explorer is stopped, or the design is being optimised.
         """
         self._check_running()
         return self._running.page.session.state.design
@@ -71,7 +71,7 @@ class Shown:
         """The pose on the page; assigning one moves the platform there.
 
         Raises:
-            InputError: the explorer is stopped.
+            InputError: The explorer is stopped.
         """
         self._check_running()
         return self._running.page.session.state.pose
@@ -147,9 +147,9 @@ def show(
         port: Port to listen on; any free one if 0.
 
     Raises:
-        InputError: a height that is too small, or a design or pose that cannot be drawn.
-        DesignError: no such preset or file, or a file that holds no design.
-        ServerError: the port is not available.
+        InputError: A height that is too small, or a design or pose that cannot be drawn.
+        DesignError: No such preset or file, or a file that holds no design.
+        ServerError: The port is not available.
     """
     if height < LEAST_HEIGHT:
         raise InputError(f"the height must be {LEAST_HEIGHT} pixels at least; got {height}")
@@ -161,8 +161,8 @@ def _as_design(given: object) -> Design:
     """Return a design from itself, the name of a preset or a file.
 
     Raises:
-        InputError: the value is none of these.
-        DesignError: no such preset or file, or a file that holds no design.
+        InputError: The value is none of these.
+        DesignError: No such preset or file, or a file that holds no design.
     """
     if isinstance(given, str):
         return load_design(given)

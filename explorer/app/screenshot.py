@@ -113,8 +113,8 @@ def take(
 
     Raises:
         MissingExtraError: Playwright or a Chromium is missing.
-        PictureError: the browser did not start or did not draw in time.
-        StorageError: the file cannot be written.
+        PictureError: The browser did not start or did not draw in time.
+        StorageError: The file cannot be written.
     """
     # The server starts while the browser does.
     with ThreadPoolExecutor(1) as executor:
@@ -144,7 +144,7 @@ def picture(
     A tab of the panels may be chosen by its name.
 
     Raises:
-        PictureError: the browser did not draw in time.
+        PictureError: The browser did not draw in time.
     """
     running = _start(design, pose, panels=panels)
     try:
@@ -206,7 +206,7 @@ def open_page(
         hold: Whether the tab draws only frames that it is told to draw.
 
     Raises:
-        PictureError: it does not connect in time.
+        PictureError: It does not connect in time.
     """
     known = set(running.viser.get_clients())
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
@@ -234,7 +234,7 @@ def settle(page: Page, client: ClientHandle) -> None:
     """Wait until a tab has drawn all that was sent to it, with its panels laid out.
 
     Raises:
-        PictureError: it does not draw in time.
+        PictureError: It does not draw in time.
     """
     from explorer.app.browser.viser_gaps import mark_broadcasts, run_script_in
 
@@ -269,7 +269,7 @@ def stable_picture(page: Page) -> bytes:
     """Return a PNG of a page that has settled, once what fades in or glides has arrived.
 
     Raises:
-        PictureError: it keeps changing.
+        PictureError: It keeps changing.
     """
     _await_rest(page, IS_STILL)
     page.evaluate(AWAIT_FRAMES, 2)

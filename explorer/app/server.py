@@ -95,8 +95,8 @@ def start(
         studies: Where design studies lie; None to offer none.
 
     Raises:
-        InputError: the design or the pose is too large to be drawn.
-        ServerError: the address or the port cannot be had, or the token or a name cannot be used.
+        InputError: The design or the pose is too large to be drawn.
+        ServerError: The address or the port cannot be had, or the token or a name cannot be used.
     """
     history = None if user_data is None else user_data.history
     state = open_state(design, pose, view) if history is None else history.step.state
@@ -145,7 +145,7 @@ def serve(
         studies: Folders of results that the page offers beside those of the user's data.
 
     Raises:
-        ServerError: the address or the port cannot be had, or the token or a name cannot be used.
+        ServerError: The address or the port cannot be had, or the token or a name cannot be used.
     """
     start_log(data_folder())
     user_data = open_user_data(resume=design is None)

@@ -147,7 +147,7 @@ def check_size(points: FloatArray) -> float:
     """Return the largest magnitude of a coordinate of points (n, 3), in millimetres.
 
     Raises:
-        InputError: lib3mf does not accept the coordinate.
+        InputError: Lib3mf does not accept the coordinate.
     """
     largest = float(np.abs(points).max())
     if largest > LARGEST:

@@ -212,7 +212,7 @@ def tetrahedra_overlap(p: ArrayLike, q: ArrayLike) -> BoolArray:
         q: Vertices, shape (..., 4, 3), in the same unit; batch axes are broadcast.
 
     Raises:
-        InputError: p or q does not consist of finite numbers, or has another shape.
+        InputError: P or q does not consist of finite numbers, or has another shape.
     """
     a, b = finite_array("p", p, (4, 3)), finite_array("q", q, (4, 3))
     batch = batch_shape((a, 2), (b, 2))

@@ -46,7 +46,7 @@ NO_LENGTH = 1e-12
 class MoveClearances(NamedTuple):
     """The least clearances of all pairs of legs over moves, in the order of `PAIRS`.
 
-    A pair that shares a joint has the clearance inf, as in `explorer.LegClearances`.
+    A pair that shares a joint has the clearance inf, as in `explorer.legs.clearance.LegClearances`.
 
     Attributes:
         bound: Lower bound of the clearance over the move, to rounding, shape (..., 6).
@@ -213,7 +213,7 @@ def move_clearances(
             for b4.
 
     Raises:
-        InputError: a pose or the tool is not finite, not a rotation, or the tolerance is too small.
+        InputError: A pose or the tool is not finite, not a rotation, or the tolerance is too small.
     """
     arrays = (start_position, start_rotation, end_position, end_rotation)
     moves = _Moves.of(design, *arrays, tool=tool)
@@ -348,7 +348,7 @@ class _Moves:
         """Return the tolerance of each move, shape (n,).
 
         Raises:
-            InputError: the requested tolerance is too small.
+            InputError: The requested tolerance is too small.
         """
         size = np.maximum(design.reach, self.travel)
         if requested is None:

@@ -50,7 +50,7 @@ def measure_design(case: Case, names: Iterable[str]) -> Measurements:
         names: Out of `CATALOGUE`; measures are left out whose needs the case does not have.
 
     Raises:
-        ExplorerError: a mesh that is needed cannot be made.
+        ExplorerError: A mesh that is needed cannot be made.
     """
     values: dict[str, float | None] = {}
     infinite: list[str] = []

@@ -267,7 +267,7 @@ class Snapshot(Configuration):
     @cached_property
     def clearances(self) -> LegClearances:
         """The clearances of the six pairs of legs."""
-        return leg_clearances(Configuration(self.design, self.position, self.rotation))
+        return leg_clearances(self)
 
     @cached_property
     def nearest_distances(self) -> tuple[float, float, float]:
@@ -282,7 +282,7 @@ class Snapshot(Configuration):
 
     @cached_property
     def _nearest_poses(self) -> NearestPoses:
-        return nearest_singular_poses(Configuration(self.design, self.position, self.rotation))
+        return nearest_singular_poses(self)
 
     @cached_property
     def modes(self) -> ForwardKinematics:

@@ -255,9 +255,7 @@ def possible_ranges(design: Design) -> PossibleRanges:
         )
         for b, apart in ((b2, _to_b1(design, design.b2)), (b3, _to_b1(design, design.b3)))
     ]
-    from_a3 = math.hypot(
-        *(max(abs(e - a) for e in ends) for ends, a in ((x, a3x), (y, a3y))), farthest[2]
-    )
+    from_a3 = math.hypot(_farthest(x, a3x), _farthest(y, a3y), farthest[2])
     joints = (
         (l1[0], min(l1[1], from_a1 + b1)),
         carriages[0],

@@ -81,7 +81,7 @@ def make_problem(
         bounds: Variables with other bounds than the default ones.
 
     Raises:
-        InputError: see `Problem`.
+        InputError: See `Problem`.
     """
     given = {variable.name: variable for variable in bounds}
     names = [*VARIABLES, *free, *(name for name in given if name not in VARIABLES)]
@@ -119,7 +119,7 @@ def default_variable(start: Design, name: str) -> Variable:
     """Return a variable with bounds that leave room around a start.
 
     Raises:
-        InputError: no such variable.
+        InputError: No such variable.
     """
     size = max(map(abs, start.variables))
     value = start_value(start, name)

@@ -104,8 +104,8 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         demands: Demands.
 
     Raises:
-        StartError: a start that its limits, or what it lacks, keep from a search.
-        InputError: bounds that cross or leave the start out, numbers that are not finite or
+        StartError: A start that its limits, or what it lacks, keep from a search.
+        InputError: Bounds that cross or leave the start out, numbers that are not finite or
             out of range, or an objective that nothing free has an influence on.
     """
 
@@ -152,7 +152,7 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         """Return the design with these values of the variables.
 
         Raises:
-            DesignError: the values make a degenerate design.
+            DesignError: The values make a degenerate design.
         """
         design = varied(self.start, dict(zip(self.names, values, strict=True)))
         return with_strokes(design, self.demands.stroke_ratio)
@@ -162,7 +162,7 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         """The demanded volume, in cubed design units.
 
         Raises:
-            InputError: no volume is demanded.
+            InputError: No volume is demanded.
         """
         if self.demands.volume is None:
             raise InputError("this problem demands no volume")
@@ -172,7 +172,7 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         """Return the required box where these values of the variables shift it to.
 
         Raises:
-            InputError: no box is required.
+            InputError: No box is required.
         """
         if self.demands.required_box is None:
             raise InputError("this problem requires no box within the workspace")
@@ -190,7 +190,7 @@ def varied(design: Design, values: Mapping[str, float]) -> Design:
         values: Values by name, of `VARIABLES`, `YAW` and `REACH`; other names change nothing.
 
     Raises:
-        DesignError: the values make a degenerate design.
+        DesignError: The values make a degenerate design.
     """
     own = zip(VARIABLES, design.variables, strict=True)
     changed = design.with_variables([values.get(name, value) for name, value in own])
@@ -245,7 +245,7 @@ def start_value(start: Design, name: str) -> float:
     """Return the value of a variable in a design.
 
     Raises:
-        InputError: no such variable.
+        InputError: No such variable.
     """
     if name in VARIABLES:
         return start.variables[VARIABLES.index(name)]

@@ -91,7 +91,7 @@ def decode_record(data: bytes, source: str) -> Record:
         source: Name of the text in an error message.
 
     Raises:
-        InputError: not JSON, of another schema, with unknown fields, fields given twice or
+        InputError: Not JSON, of another schema, with unknown fields, fields given twice or
             unusable values.
     """
     return decode_strictly(data, Record, source)
@@ -101,8 +101,8 @@ def load_record(path: Path) -> Record:
     """Return the record in a file.
 
     Raises:
-        InputError: the file holds no record.
-        StorageError: the file cannot be read.
+        InputError: The file holds no record.
+        StorageError: The file cannot be read.
     """
     return decode_record(read_at_most(path, LARGEST_FILE), str(path))
 

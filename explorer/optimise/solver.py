@@ -41,7 +41,7 @@ def optimise_design(
         stop: Called before each evaluation, some milliseconds apart; True ends the search.
 
     Raises:
-        InputError: no start, or no iterations.
+        InputError: No start, or no iterations.
     """
     check_starts(starts)
     if iterations < 1:

@@ -136,16 +136,16 @@ def plan_path(
         load: (F; M) at the tool point of the design, shape (6,), in N and N × unit, that every
             pose has to hold within the limits of actuators, struts and guide, besides the weights
             and the payload's force of any direction. Samples of every move hold it, and poses
-            between them to two hundredths of the limits; see `explorer.path_loads`. None to demand
+            between them to two hundredths of the limits; see `explorer.paths.loads`. None to demand
             no load.
         weights: All masses for the load, the payload's included; None for the payload alone.
 
     Raises:
-        EndError: the start or the goal is singular, outside the limits or does not hold the load.
+        EndError: The start or the goal is singular, outside the limits or does not hold the load.
         InputError: `seconds` is not a positive number, or the tool or the load is not three or six
             finite numbers.
-        NoPathError: there is no path, or the search ended without one.
-        MissingExtraError: the straight line in the folds is not valid, and OMPL is not installed.
+        NoPathError: There is no path, or the search ended without one.
+        MissingExtraError: The straight line in the folds is not valid, and OMPL is not installed.
     """
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InputError(f"planning needs a time above zero, in seconds; got {seconds:g}")

@@ -78,7 +78,7 @@ def trajectory(
             for b4.
 
     Raises:
-        InputError: there are too few poses, too few or too many samples, the speed is not
+        InputError: There are too few poses, too few or too many samples, the speed is not
             positive, or the tool is not finite.
     """
     if len(poses) < 2:

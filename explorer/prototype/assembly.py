@@ -81,8 +81,8 @@ def make_prototype(design: Design) -> Prototype:
     """Return the parts of a design, sized from it, its legs' radii and its unit.
 
     Raises:
-        InputError: the design is too tight for the parts; the message says what would fit.
-        ExplorerError: a body cannot be made.
+        InputError: The design is too tight for the parts; the message says what would fit.
+        ExplorerError: A body cannot be made.
     """
     from explorer.prototype.shapes import make_parts
 

@@ -119,7 +119,7 @@ class Chains:
             rotation: Rotation from platform to base, shape (..., 3, 3).
 
         Raises:
-            InputError: a pose that is not finite or not a rotation.
+            InputError: A pose that is not finite or not a rotation.
         """
         b = Configuration(self.design, position, rotation).points
         ends = np.stack([b.b1, b.b2, b.b3, b.b4 - b.a3], axis=-2)

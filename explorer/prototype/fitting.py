@@ -106,9 +106,9 @@ def sizes_of(design: Design) -> Sizes:
     Legs without a radius in the design get the largest that fits, up to a share of the reach.
 
     Raises:
-        TooTightError: the design is too tight for its parts; the message names the parts, their
+        TooTightError: The design is too tight for its parts; the message names the parts, their
             distance and what would fit.
-        InputError: the home pose breaks the limits of a leg.
+        InputError: The home pose breaks the limits of a leg.
     """
     design = msgspec.structs.replace(design, home=design.home_pose)
     share = 1.0 if all(design.limits.leg_radii) else _fitting_factors(design, 1.0)[0]

@@ -166,7 +166,7 @@ def singularities_of(
 def nearest_singular_poses(configuration: Configuration) -> NearestPoses:
     """Return the nearest singular poses of a batch of poses."""
     platform, batch = PlatformPoints.of(configuration.design), configuration.batch
-    # In units of the platform's own length no product of lengths can over- or underflow.
+    # The kernel's tolerances are those of a platform whose own length is one.
     unit = platform.length
     p_rows, r_rows = configuration.positions / unit, configuration.rotations
     count = len(p_rows)

@@ -82,7 +82,6 @@ def _ranks_of_pose(
     """Return r_ij of poses by (i - 1, j - 1), from distances and angles."""
     u, n = r[..., 0], r[..., 2]
     across = np.hypot(p[..., 1], p[..., 2])
-    # Squares would underflow or overflow in some units.
     distance = np.hypot(p[..., 0], across)
     near = TOLERANCE * (distance if length is None else length)
 

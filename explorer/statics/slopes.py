@@ -264,5 +264,5 @@ def _weight_and_turn(design: Design, rotation: FloatArray) -> tuple[FloatArray, 
     # A turn about z turns the arm of the weight with the platform, not the weight.
     arm = rotation @ (np.array(design.payload.centre) - design.tool.position)
     turned = np.zeros(6)
-    turned[3:] = np.cross(np.cross([0.0, 0.0, 1.0], arm), wrench[:3])
+    turned[3:] = np.cross(np.cross(VERTICAL, arm), wrench[:3])
     return wrench, turned

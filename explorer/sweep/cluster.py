@@ -40,7 +40,7 @@ class DaskWorkers(Workers):
         patience: Seconds to wait for the scheduler; `PATIENCE` if None.
 
     Raises:
-        InputError: there is no scheduler at that address.
+        InputError: There is no scheduler at that address.
         MissingExtraError: Dask is not installed.
     """
 

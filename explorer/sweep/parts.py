@@ -97,7 +97,7 @@ def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -
         pieces: Rows of the chunk, in order and without gaps.
 
     Raises:
-        StorageError: the part cannot be written; a part that was there is unchanged.
+        StorageError: The part cannot be written; a part that was there is unchanged.
     """
     arrow = pyarrow()
     fields: list[Any] = []
@@ -127,7 +127,7 @@ def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, A
         columns: Columns to read; None for all.
 
     Raises:
-        BadPartError: the file is damaged or cut off, or no part of a study.
+        BadPartError: The file is damaged or cut off, or no part of a study.
     """
     arrow = pyarrow()
     try:
@@ -161,7 +161,7 @@ def sound_parts(
         study: Study of all parts; that of the first one if None.
 
     Raises:
-        InputError: a part is of another study.
+        InputError: A part is of another study.
     """
     known_hash = None if study is None else study_hash(study)
     for chunk, path in _numbered(folder):
@@ -197,7 +197,7 @@ def pyarrow() -> Any:
     """Return the library that reads and writes Parquet, with its module `parquet`.
 
     Raises:
-        MissingExtraError: it is not installed.
+        MissingExtraError: It is not installed.
     """
     try:
         importlib.import_module("pyarrow.parquet")
@@ -228,8 +228,8 @@ def claim(folder: Path, study: Study) -> Generator[None]:
     """Make a folder if needed, and lock it for a study within a `with` block.
 
     Raises:
-        InputError: the folder belongs to another study, or is in use.
-        StorageError: the folder cannot be made or read.
+        InputError: The folder belongs to another study, or is in use.
+        StorageError: The folder cannot be made or read.
     """
     make_folder(folder)
     # A folder of other files is left alone: not even a lock goes into it.

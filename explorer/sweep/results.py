@@ -110,7 +110,7 @@ class Results:
             row: Row from 0; where parts are missing it is not the design's index.
 
         Raises:
-            InputError: there is no such row.
+            InputError: There is no such row.
         """
         if not 0 <= row < self.count:
             raise InputError(f"the row must lie within 0 to {self.count - 1}; got {row}")
@@ -153,7 +153,7 @@ def design_at(folder: str | Path, index: int) -> Design:
     """Return the design with an index, reading no parts after its own.
 
     Raises:
-        InputError: the folder holds no results, or not yet those of this design.
+        InputError: The folder holds no results, or not yet those of this design.
     """
     study, damaged = None, list[Path]()
     for study, _, table in sound_parts(Path(folder), damaged):
@@ -172,8 +172,8 @@ def load_results(folder: str | Path) -> Results:
     """Return the rows of a results folder, as far as they have been computed.
 
     Raises:
-        InputError: the folder holds no results, or those of several studies.
-        MissingExtraError: pyarrow is not installed.
+        InputError: The folder holds no results, or those of several studies.
+        MissingExtraError: Pyarrow is not installed.
     """
     damaged: list[Path] = []
     parts = list(sound_parts(Path(folder), damaged))
@@ -191,7 +191,7 @@ def summarise(folder: str | Path) -> Summary:
     """Return a summary of a results folder, in memory that does not grow with its parts.
 
     Raises:
-        InputError: the folder holds no results, or those of several studies.
+        InputError: The folder holds no results, or those of several studies.
     """
     damaged: list[Path] = []
     counts: Counter[str] = Counter()

@@ -142,7 +142,7 @@ def problem_of(study: Study, sample: Mapping[str, float]) -> Problem:
     """Return the problem that is solved from a sample.
 
     Raises:
-        InputError: the sample makes no design, or one that the problem does not allow.
+        InputError: The sample makes no design, or one that the problem does not allow.
     """
     if study.polish is None:
         raise InputError("this study polishes nothing")

@@ -98,11 +98,11 @@ def run_study(
         stop: Called some times a second; True ends the run and drops unfinished chunks.
 
     Raises:
-        InputError: no design of the study can be made, or the folder belongs to another
+        InputError: No design of the study can be made, or the folder belongs to another
             study or is in use.
-        StorageError: the folder cannot be written.
-        MissingExtraError: pyarrow is not installed.
-        RunError: the workers are gone, or have other versions of the libraries.
+        StorageError: The folder cannot be written.
+        MissingExtraError: Pyarrow is not installed.
+        RunError: The workers are gone, or have other versions of the libraries.
     """
     pyarrow()
     check_study(study)

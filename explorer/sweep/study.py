@@ -74,7 +74,7 @@ class Sampling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         seed: Seed of the scrambling or the hypercube; a grid has none.
 
     Raises:
-        InputError: no designs, too many, or a seed out of range.
+        InputError: No designs, too many, or a seed out of range.
     """
 
     method: Method = "sobol"
@@ -110,7 +110,7 @@ class Polish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         iterations: Most steps of each search.
 
     Raises:
-        InputError: an unknown objective or variable, an empty range, no iterations.
+        InputError: An unknown objective or variable, an empty range, no iterations.
     """
 
     objective: ObjectiveName
@@ -139,7 +139,7 @@ class Objective(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         sense: "min" or "max".
 
     Raises:
-        InputError: another sense.
+        InputError: Another sense.
     """
 
     measure: str
@@ -169,7 +169,7 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         chunk: Number of designs of one task and one part of the results.
 
     Raises:
-        InputError: something is unknown, empty, named twice or out of range.
+        InputError: Something is unknown, empty, named twice or out of range.
     """
 
     schema: Literal[1] = 1
@@ -304,7 +304,7 @@ def decode_study(data: bytes, source: str) -> Study:
         source: Name of the text in an error message.
 
     Raises:
-        InputError: not JSON, of another schema, with unknown fields, fields given twice or
+        InputError: Not JSON, of another schema, with unknown fields, fields given twice or
             unusable values.
     """
     if len(data) > LARGEST_FILE:
@@ -323,8 +323,8 @@ def load_study(path: str | Path) -> Study:
     """Return the study in a file, or a packaged one by its name.
 
     Raises:
-        InputError: the file holds no study.
-        StorageError: the file cannot be read.
+        InputError: The file holds no study.
+        StorageError: The file cannot be read.
     """
     known = STUDIES.get(str(path))
     if known is not None:

@@ -79,7 +79,7 @@ class LocalWorkers(Workers):
         size: Number of processes; one for each core that this process may use if None.
 
     Raises:
-        InputError: fewer than one process, or more than `MOST_WORKERS`.
+        InputError: Fewer than one process, or more than `MOST_WORKERS`.
     """
 
     def __init__(self, size: int | None = None) -> None:

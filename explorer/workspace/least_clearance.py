@@ -94,7 +94,7 @@ def least_clearances(
         before_each: Function that is called before each batch of cells; it may raise.
 
     Raises:
-        InputError: not a rotation.
+        InputError: Not a rotation.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     resolution = tolerance or DEFAULT_TOLERANCE * design.reach

@@ -2,7 +2,7 @@
 
 The nodes are the centres of the cells of a box about the constant-orientation workspace, so
 that none lies on its surface. A least value at the nodes is an upper bound of the least value
-in the workspace; `explorer.least_clearances` certifies a lower bound too.
+in the workspace; `explorer.workspace.least_clearance` certifies a lower bound too.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def node_measures(
             nearer to a singularity legs may have to meet.
 
     Raises:
-        InputError: not a rotation, or too few or too many nodes.
+        InputError: Not a rotation, or too few or too many nodes.
     """
     if not FEWEST_NODES <= nodes <= MOST_NODES:
         raise InputError(

@@ -27,11 +27,11 @@ from explorer.app.features.forces.loads import (
     Loads,
     SetForce,
     fitting_scale,
-    load_of,
     nearest_feed,
 )
 from explorer.app.features.forces.panel import GO, WORST, ForcesPanel
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle, load_tip, tool_point
+from explorer.app.features.forces.tasks import load_of
 from explorer.app.features.precision.budget import (
     BUDGET_FEED,
     SET,

@@ -35,7 +35,7 @@ from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.features.workspace.panel import WorkspacePanel
 from explorer.app.features.workspace.slice_map import SliceMap
 from explorer.app.features.workspace.tasks import (
-    REACHED_TOLERANCE,
+    PART_TOLERANCE,
     STEP,
     WorkspaceDrawing,
     export_mesh,
@@ -151,7 +151,7 @@ THICK = show(thick(open_state(OPTIMAL), RADIUS))
 
 def test_drawing_has_the_numbers_of_the_library() -> None:
     drawing = drawing_of(THICK)
-    expected = accessible_workspace(THICK.design, tolerance=REACHED_TOLERANCE * OPTIMAL.reach)
+    expected = accessible_workspace(THICK.design, tolerance=PART_TOLERANCE * OPTIMAL.reach)
     assert drawing.part is not None
     assert drawing.trouble is None
     assert drawing.volume == expected.volume
@@ -174,7 +174,7 @@ def test_faces_where_legs_begin_to_collide_have_a_colour_of_their_own() -> None:
     plain = shells[PLAIN].vertices[shells[PLAIN].faces].mean(axis=1)
     limits = constraints(THICK.design, THICK.pose.rotation)
     on_limits = np.abs(slacks(limits, plain)).min(axis=-1)
-    assert float(on_limits.max()) < 2.0 * REACHED_TOLERANCE * OPTIMAL.reach
+    assert float(on_limits.max()) < 2.0 * PART_TOLERANCE * OPTIMAL.reach
     whole = drawing_of(show(THICK, region="limits"))
     assert [shell.colour for shell in whole.surface.shells] == [PLAIN]
 
@@ -362,7 +362,7 @@ def test_button_of_a_home_in_trouble_goes_to_the_nearest_start(
 @pytest.mark.parametrize("what", ["workspace", "hull"])
 def test_exported_mesh_has_the_volume_of_the_drawing(what: str) -> None:
     drawing = drawing_of(show(THICK, hull=True))
-    tolerance = REACHED_TOLERANCE * OPTIMAL.reach
+    tolerance = PART_TOLERANCE * OPTIMAL.reach
     data = export_mesh(regions.Selection(THICK.design, LEVEL, "accessible"), tolerance, what, "stl")
     mesh = untyped_trimesh.load_mesh(io.BytesIO(data), file_type="stl")
     expected = drawing.mesh_volume if what == "workspace" else drawing.hull_volume

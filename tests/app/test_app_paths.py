@@ -18,8 +18,7 @@ from desk import Desk
 from services import StubDownloads, StubWorker, services_for
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.loads import load_of
-from explorer.app.features.forces.tasks import WeightsRequest, weights_of_parts
+from explorer.app.features.forces.tasks import WeightsRequest, load_of, weights_of_parts
 from explorer.app.features.paths import runner
 from explorer.app.features.paths.actions import (
     Advance,

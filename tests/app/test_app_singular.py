@@ -22,7 +22,7 @@ from explorer.app.features.mechanism.modes import (
     Ghosts,
     ModesPanel,
     ghost_points,
-    hovered_mode,
+    mode_hover,
     modes_table,
 )
 from explorer.app.features.singularity.panel import (
@@ -442,7 +442,7 @@ def test_pointer_on_a_row_shows_one_ghost_with_its_number_and_leaves_no_step(
 def test_pointer_is_on_a_mode_or_on_none_and_leaves_with_its_browser(
     services: Services, desk: Desk
 ) -> None:
-    hovered = services.get(hovered_mode)
+    hovered = services.get(mode_hover)
     for text, row in (("9", None), ("-1", None), ("x", None), ("2", 2)):
         desk.press(services.buttons, "modes.hover", text)
         assert hovered.row == row

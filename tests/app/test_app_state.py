@@ -378,7 +378,7 @@ def test_settled_state_has_all_that_was_posted_before(watched: Watched) -> None:
     with watched.busy():
         for x in (3.0, 4.0):
             watched.session.post("x", lambda _, x=x: SetPosition(0, x))
-        reader = threading.Thread(target=lambda: settled.append(watched.session.settled()))
+        reader = threading.Thread(target=lambda: settled.append(watched.session.latest_state()))
         reader.start()
     reader.join()
     assert settled[0].pose.position[0] == 4.0

@@ -12,7 +12,7 @@ from playwright.sync_api import Locator, expect
 from tab import SIZE, TRACK, Tab
 
 from explorer.app.features.mechanism.marks import ARROW_LENGTH
-from explorer.app.features.mechanism.modes import hovered_mode
+from explorer.app.features.mechanism.modes import mode_hover
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import SetPosition
@@ -87,7 +87,7 @@ def test_mechanism_follows_fields_sliders_and_the_home_button(tab: Tab) -> None:
 
 
 def test_row_of_a_mode_shows_its_ghost_while_it_is_pointed_at_and_is_chosen(tab: Tab) -> None:
-    session, hovered = tab.running.page.session, tab.running.page.services.get(hovered_mode)
+    session, hovered = tab.running.page.session, tab.running.page.services.get(mode_hover)
     before, number = tab.state, session.history.step.number
     tab.settle()
     row_of_mode(tab, 6).scroll_into_view_if_needed()

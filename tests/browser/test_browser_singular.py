@@ -6,7 +6,7 @@ import numpy as np
 from playwright.sync_api import expect
 from tab import SIZE, Tab
 
-from explorer.app.features.mechanism.incidences import hovered_margin
+from explorer.app.features.mechanism.incidences import margin_hover
 from explorer.app.features.mechanism.marks import (
     ARROW_LENGTH,
     CLEAR_HANDLE,
@@ -43,7 +43,7 @@ def test_stratum_is_entered_from_the_diagram_and_shows_its_motions(tab: Tab) -> 
 
 def test_margin_that_is_pointed_at_fills_its_tetrahedron(tab: Tab) -> None:
     before, number = tab.state, tab.running.page.session.history.step.number
-    hovered = tab.running.page.services.get(hovered_margin)
+    hovered = tab.running.page.services.get(margin_hover)
     assert not is_visible(tab, "/tetrahedra/faces")
     for row in (3, 1):
         words = tab.page.locator(".ex-margin-row").nth(row - 1).get_by_text(INCIDENCES[row - 1])

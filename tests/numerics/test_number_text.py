@@ -12,7 +12,6 @@ from explorer.app.features.singularity.panel import distance_table, measures_tab
 from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
-from explorer.app.widgets.markup import format_signed
 from explorer.cli.commands.singularity import Singularity
 from explorer.cli.output import degrees, figures
 from explorer.mechanism.design_file import PRESETS
@@ -36,7 +35,7 @@ def test_number_text_of_zero_has_no_sign(value: float, size: float, digits: int)
     for text in (
         format_fixed(value, digits),
         format_ascii(value, digits, size=size),
-        format_signed(value, digits),
+        format_decimals(value, digits),
         format_number(value, digits, size=size),
         format_fitted(value, size, digits),
         *figures([value, size]),

@@ -52,7 +52,7 @@ def headless_browser(
 
     Raises:
         MissingExtraError: Playwright or a Chromium is missing.
-        PictureError: the browser did not start, or failed at what it was then told to do.
+        PictureError: The browser did not start, or failed at what it was then told to do.
     """
     try:
         from playwright.sync_api import Error, sync_playwright

@@ -42,7 +42,7 @@ def start_viser(
             None everybody gets in.
 
     Raises:
-        ServerError: this viser does not serve in the way that is guarded.
+        ServerError: This viser does not serve in the way that is guarded.
     """
     # A tab may close while a message is on its way to it; that needs no warning.
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection")

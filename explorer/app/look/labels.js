@@ -51,7 +51,7 @@ window.explorer.labels ??= (() => {
   const theme = () =>
     THEMES[document.documentElement.dataset.mantineColorScheme === "dark" ? "dark" : "light"];
   const css = (rgb) => `rgb(${rgb.map(Math.round).join(" ")})`;
-  // The colour of a label, see labels.py; a little darker or lighter than in the scene, to be read.
+  // The colour of a label, see `add_label` of scene/shapes.py; a little darker or lighter than in the scene, to be read.
   const colourOf = ({ font_scene_height: code }, { text, towards }) =>
     code >= 1 ? [16, 8, 0].map((bits) => 0.75 * ((code >> bits) & 255) + 0.25 * towards) : text;
 

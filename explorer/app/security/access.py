@@ -86,7 +86,7 @@ class Access:
             lower case, with a port or for any port.
 
     Raises:
-        ServerError: a host beyond loopback or a proxy without a token, or an invalid token or name.
+        ServerError: A host beyond loopback or a proxy without a token, or an invalid token or name.
     """
 
     host: str
@@ -112,7 +112,7 @@ class Access:
         """Return the rule for a host, with a new random token where one is needed and not given.
 
         Raises:
-            ServerError: the token or a name cannot be used.
+            ServerError: The token or a name cannot be used.
         """
         if token is None and (names or not is_loopback(host)):
             token = secrets.token_urlsafe(TOKEN_BYTES)

@@ -59,7 +59,7 @@ class UserAction:
         """Return the next state, with the gesture that led to its pose.
 
         Raises:
-            ExplorerError: the change is not possible, or its result cannot be drawn.
+            ExplorerError: The change is not possible, or its result cannot be drawn.
         """
         after = self.action.apply(state)
         check_drawable(after)
@@ -83,7 +83,7 @@ def check_drawable(state: State) -> None:
     """Check that every length of a state can be drawn at the scale that it was opened in.
 
     Raises:
-        InputError: a design variable, a coordinate, a joint, the guide or a radius is too long.
+        InputError: A design variable, a coordinate, a joint, the guide or a radius is too long.
     """
     reach = state.base.reach
     for names, values in (

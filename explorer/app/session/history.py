@@ -95,7 +95,7 @@ class History:
         """Return the history moved by a number of steps; a negative number undoes.
 
         Raises:
-            InputError: there are not that many steps.
+            InputError: There are not that many steps.
         """
         at = self.at + steps
         if not 0 <= at < len(self.steps):
@@ -106,7 +106,7 @@ class History:
         """Return the history at the step with a number.
 
         Raises:
-            InputError: there is no such step, or it was dropped.
+            InputError: There is no such step, or it was dropped.
         """
         first = self.steps[0].number
         if not first <= number <= self.steps[-1].number:
@@ -138,7 +138,7 @@ def restore(history: History, present: State) -> tuple[State, History]:
     The view, but for its point, and the counts of requests are those of the present state.
 
     Raises:
-        InputError: a design is being optimised.
+        InputError: A design is being optimised.
     """
     if present.optimisation.is_on:
         raise InputError(

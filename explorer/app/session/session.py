@@ -132,7 +132,7 @@ class Session:
         """Queue a move to the step with a number, in place of one with the same key."""
         self.post(key, HistoryMove(lambda each: each.move_to(number)), stamp=stamp, who=who)
 
-    def settled(self) -> State:
+    def latest_state(self) -> State:
         """Return the state once all changes are made that were posted before.
 
         A press that reads the state needs this, since it may follow a typed value at once.

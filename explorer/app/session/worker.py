@@ -101,7 +101,7 @@ def read_frame(stream: IO[bytes]) -> Any:
     """Read one object.
 
     Raises:
-        EOFError: the other process has ended.
+        EOFError: The other process has ended.
     """
     return pickle.load(stream)  # noqa: S301 - from our own process, over a pipe of our own
 

@@ -32,7 +32,7 @@ class Action(ABC):
         """Return the next state.
 
         Raises:
-            ExplorerError: the change is not possible; the state stays as it was.
+            ExplorerError: The change is not possible; the state stays as it was.
         """
         ...
 

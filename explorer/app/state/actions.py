@@ -49,7 +49,7 @@ class Open(Action):
         """Return the next state.
 
         Raises:
-            InputError: the design is being optimised.
+            InputError: The design is being optimised.
         """
         check_free(state)
         return replace(open_state(self.design), **parts_kept_on_open(state))
@@ -220,8 +220,8 @@ class SetVariable(Action):
         """Return the next state.
 
         Raises:
-            DesignError: the design would be degenerate.
-            InputError: the legs are held and cannot close in the new design, or the
+            DesignError: The design would be degenerate.
+            InputError: The legs are held and cannot close in the new design, or the
                 design is being optimised.
         """
         check_free(state)
@@ -254,8 +254,8 @@ class SetName(Action):
         """Return the next state.
 
         Raises:
-            DesignError: the name is not one printable line.
-            InputError: the name is empty, or the design is being optimised.
+            DesignError: The name is not one printable line.
+            InputError: The name is empty, or the design is being optimised.
         """
         check_free(state)
         name = self.name.strip()
@@ -301,7 +301,7 @@ class Set(Action):
         """Return the next state.
 
         Raises:
-            InputError: the state refuses the value, or it belongs to a design that is being
+            InputError: The state refuses the value, or it belongs to a design that is being
                 optimised.
         """
         if self.at.startswith("design."):
@@ -346,7 +346,7 @@ def check_free(state: State) -> None:
     """Check that the design may be changed.
 
     Raises:
-        InputError: the design is being optimised.
+        InputError: The design is being optimised.
     """
     if state.optimisation.is_on:
         raise InputError("the design is being optimised: wait until that is done, or cancel it")

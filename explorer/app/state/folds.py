@@ -39,7 +39,7 @@ class SetFold(Action):
         """Return the next state.
 
         Raises:
-            InputError: the coordinate is beyond its range.
+            InputError: The coordinate is beyond its range.
         """
         index, value = self.index, self.value
         least = -HALF_TURN if index >= FIRST_FOLD else 0.0

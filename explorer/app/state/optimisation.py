@@ -43,7 +43,7 @@ class OptimisationRequest:
         tilt: Tilt in every azimuth that the required box must allow, in degrees; 0 for no demand.
 
     Raises:
-        InputError: a volume or reach that is not positive, a clearance below zero, too few or too
+        InputError: A volume or reach that is not positive, a clearance below zero, too few or too
             many starts, or an unknown name in `free`.
     """
 

@@ -50,7 +50,7 @@ def value_at(whole: object, path: str) -> Any:
     """Return the value at a path: names of fields and indices of tuples, joined by dots.
 
     Raises:
-        AttributeError: the path names a field that is not there.
+        AttributeError: The path names a field that is not there.
     """
     value: Any = whole
     for name in path.split("."):
@@ -62,7 +62,7 @@ def with_value(whole: Whole, path: str, value: object) -> Whole:
     """Return a frozen value with another value at a path; the rest of it stays.
 
     Raises:
-        InputError: a part refuses the value.
+        InputError: A part refuses the value.
     """
     name, _, rest = path.partition(".")
     new: Any = with_value(value_at(whole, name), rest, value) if rest else value

@@ -57,7 +57,7 @@ class Journey:
         tool: The tool point in the platform frame, if its moves are straight; None for those of b4.
 
     Raises:
-        InputError: fewer than two corners.
+        InputError: Fewer than two corners.
     """
 
     kind: PathKind
@@ -114,7 +114,7 @@ class Paths:
         journey: The present path; None if there is none.
 
     Raises:
-        InputError: a time for planning that is not above zero.
+        InputError: A time for planning that is not above zero.
     """
 
     start: End = None

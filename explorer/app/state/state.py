@@ -142,7 +142,7 @@ class Run:
         accepted: Whether the result was accepted.
 
     Raises:
-        InputError: a run within the state before it, or one that has ended without a verdict.
+        InputError: A run within the state before it, or one that has ended without a verdict.
     """
 
     number: Count
@@ -323,7 +323,7 @@ class State:
         """Return the pose with the orientation of a pose, and that point at a position.
 
         Raises:
-            InputError: the position is not finite, or too far away.
+            InputError: The position is not finite, or too far away.
         """
         return pose_with(self.design, self.view.at, position, orientation)
 

@@ -168,7 +168,7 @@ def range_around(design: Design, name: str, percent: float) -> Range:
     that is larger; for the yaw, of a right angle. A radius stays at zero or above.
 
     Raises:
-        InputError: no such variable, or a part of the machine that the design does not have.
+        InputError: No such variable, or a part of the machine that the design does not have.
     """
     share = percent / 100.0
     if name == YAW:
@@ -203,7 +203,7 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> Study:
         name: Name of the study.
 
     Raises:
-        InputError: no variable or no measure, or a number that is out of its range.
+        InputError: No variable or no measure, or a number that is out of its range.
     """
     if not FEWEST <= plan.count <= MOST:
         raise InputError(

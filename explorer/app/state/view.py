@@ -63,7 +63,7 @@ class OrientationView:
         turn: Largest change of torsion either way in that range, in degrees.
 
     Raises:
-        InputError: a tilt that is not above 0 and up to 180, or a turn that is not 0 to 180.
+        InputError: A tilt that is not above 0 and up to 180, or a turn that is not 0 to 180.
     """
 
     tilts: bool = False
@@ -89,7 +89,7 @@ class PrototypeView:
         density: Density of all parts, in kg/m³.
 
     Raises:
-        InputError: a share beyond 0 to 1, or a density that is not positive.
+        InputError: A share beyond 0 to 1, or a density that is not positive.
     """
 
     exploded: float = 0.0
@@ -116,7 +116,7 @@ class ForcesView:
         scale: Force whose arrow is as long as the reach, in N.
 
     Raises:
-        InputError: a number that is not finite or exceeds 1e6, or a scale that is not positive.
+        InputError: A number that is not finite or exceeds 1e6, or a scale that is not positive.
     """
 
     shown: bool = False
@@ -147,7 +147,7 @@ class PrecisionView:
         keep_actuators: Whether the errors of the actuators stay as they are.
 
     Raises:
-        InputError: a magnification or a wanted precision that is not positive.
+        InputError: A magnification or a wanted precision that is not positive.
     """
 
     ellipsoid: bool = False
@@ -221,7 +221,7 @@ class View:
         precision: How errors and the deflection are shown, and what is wanted of the tolerances.
 
     Raises:
-        InputError: the warning length is not positive.
+        InputError: The warning length is not positive.
     """
 
     at: Point = "b4"

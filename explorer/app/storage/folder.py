@@ -41,7 +41,7 @@ def make_data_folder(folder: Path) -> Path:
     """Make a folder of the user's data unless it exists; return it.
 
     Raises:
-        StorageError: it cannot be made.
+        StorageError: It cannot be made.
     """
     try:
         make_folder(folder)
@@ -54,7 +54,7 @@ def try_lock(path: Path) -> FileLock | None:
     """Lock a file until the lock is released or this process ends; None if it is locked already.
 
     Raises:
-        StorageError: it can be neither opened nor made.
+        StorageError: It can be neither opened nor made.
     """
     lock = FileLock(path, thread_local=False)
     try:

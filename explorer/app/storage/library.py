@@ -85,7 +85,7 @@ class Library:
         """Return the design with a name.
 
         Raises:
-            InputError: there is no such design, or its file cannot be used.
+            InputError: There is no such design, or its file cannot be used.
         """
         entry = self._entry(name)
         if entry.design is None:
@@ -100,8 +100,8 @@ class Library:
             design: The design; another one that has the name goes to the trash.
 
         Raises:
-            InputError: a name that cannot be used.
-            StorageError: it cannot be written.
+            InputError: A name that cannot be used.
+            StorageError: It cannot be written.
         """
         named = _with_name(design, name)
         entry = self._designs().get(named.name)
@@ -115,8 +115,8 @@ class Library:
         """Give a design of the library another name.
 
         Raises:
-            InputError: there is no such design, or the new name cannot be used or is taken.
-            StorageError: it cannot be written.
+            InputError: There is no such design, or the new name cannot be used or is taken.
+            StorageError: It cannot be written.
         """
         entry = self._entry(name)
         renamed = _with_name(self.open(name), new)
@@ -132,8 +132,8 @@ class Library:
         """Move a design, or an unusable file by the file's name, to the trash.
 
         Raises:
-            InputError: there is no such design.
-            StorageError: it cannot be moved.
+            InputError: There is no such design.
+            StorageError: It cannot be moved.
         """
         file = self._entry(name).file
         make_folder(self._trash)
@@ -150,8 +150,8 @@ class Library:
         """Bring back what was deleted or replaced last, as a copy if its name is taken.
 
         Raises:
-            InputError: the trash is empty, or another file lies in its place.
-            StorageError: it cannot be moved.
+            InputError: The trash is empty, or another file lies in its place.
+            StorageError: It cannot be moved.
         """
         path = next(iter(_newest_first(self._trash)), None)
         if path is None:

@@ -45,7 +45,7 @@ class Packer:
         """Add a state; return its index in the list.
 
         Raises:
-            StorageError: a number in it is not finite, which JSON cannot hold.
+            StorageError: A number in it is not finite, which JSON cannot hold.
         """
         return self._pack(state)[REFERENCE]
 
@@ -74,9 +74,9 @@ def unpack(objects: list[dict[str, Any]], numbers: list[int]) -> list[State]:
     """Return the states with these indices in a list of objects; what follows is computed again.
 
     Raises:
-        InputError: a reference to an object that does not come before, or values that no state has.
+        InputError: A reference to an object that does not come before, or values that no state has.
         msgspec.ValidationError: a value has the wrong type, or is missing.
-        IndexError: there is no object with one of the indices.
+        IndexError: There is no object with one of the indices.
     """
     resolved: list[Any] = []
 

@@ -98,7 +98,7 @@ class SessionFile:
         file holds the session that was saved before.
 
         Raises:
-            StorageError: it cannot be written now; a later call may succeed.
+            StorageError: It cannot be written now; a later call may succeed.
         """
         with self._writing:
             if self.path is None:
@@ -162,7 +162,7 @@ def encode_session(history: History) -> bytes:
     It holds the steps nearest to the present one, as many as a file may have.
 
     Raises:
-        StorageError: a number in it is not finite.
+        StorageError: A number in it is not finite.
     """
     most = MOST_STEPS
     while True:
@@ -180,8 +180,8 @@ def decode_session(data: bytes, source: str) -> History:
     """Return the history in the file of a session.
 
     Raises:
-        StorageError: another version of the explorer wrote it.
-        DamagedError: it is damaged, not the file of a session, or holds a state that no page
+        StorageError: Another version of the explorer wrote it.
+        DamagedError: It is damaged, not the file of a session, or holds a state that no page
             shows.
     """
     header, _, body = data.partition(b"\n")

@@ -51,7 +51,7 @@ class StudyFolders:
         """Return the folder of a study.
 
         Raises:
-            InputError: there is none of that name.
+            InputError: There is none of that name.
         """
         folders = self.by_name()
         if name not in folders:
@@ -63,7 +63,7 @@ class StudyFolders:
         """Return a folder that does not exist yet, for a new study with this name.
 
         Raises:
-            StorageError: the folder of studies cannot be made.
+            StorageError: The folder of studies cannot be made.
         """
         slug, home = plain_words(name, _LONGEST) or "study", make_data_folder(self.home)
         taken = {path.stem for path in home.iterdir()}
@@ -75,7 +75,7 @@ def check_given(folders: Sequence[Path]) -> None:
     """Check that the folders named on the command line hold studies.
 
     Raises:
-        InputError: one holds none.
+        InputError: One holds none.
     """
     for folder in folders:
         if not _is_study(folder.absolute()):
@@ -89,7 +89,7 @@ def keep_study(folder: Path, study: Study) -> None:
     """Write the file of a study beside the folder for its results.
 
     Raises:
-        StorageError: it cannot be written.
+        StorageError: It cannot be written.
     """
     write_whole(_file_beside(folder), encode_study(study))
 
@@ -98,9 +98,9 @@ def study_in(folder: Path) -> Study:
     """Return the study of a folder of results, even before there are any.
 
     Raises:
-        InputError: it holds none.
-        StorageError: it cannot be read.
-        MissingExtraError: pyarrow is not installed.
+        InputError: It holds none.
+        StorageError: It cannot be read.
+        MissingExtraError: Pyarrow is not installed.
     """
     for path in part_paths(folder):
         try:

@@ -82,7 +82,7 @@ class PreferenceFile:
         """Set the preferences that are given; those that are None stay.
 
         Raises:
-            StorageError: the file cannot be written; the choice holds until this process ends.
+            StorageError: The file cannot be written; the choice holds until this process ends.
         """
         with self._lock:
             # Another explorer may have written the file meanwhile.

@@ -81,7 +81,7 @@ class Buttons:
             values: The values that a press may have; any if None.
 
         Raises:
-            ValueError: the name is registered.
+            ValueError: The name is registered.
         """
         if name in self._registered:
             raise ValueError(f"two buttons are called {name!r}")

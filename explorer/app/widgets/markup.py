@@ -7,7 +7,6 @@ from html import escape
 from typing import Literal
 
 from explorer.measures.blocks.block import Look
-from explorer.numerics.number_text import format_decimals
 from explorer.singularity.colours import MARGIN_COLOURS, Rgb, css, margin_text
 
 
@@ -150,8 +149,3 @@ def _message(role: str, look: str, title: str, body: str) -> str:
 def sentence(message: str) -> str:
     """Return a message with a capital and a full stop."""
     return f"{message[:1].upper()}{message[1:]}{'' if message.endswith('.') else '.'}"
-
-
-def format_signed(value: float, digits: int = 3) -> str:
-    """Return a number with a fixed number of decimals, see `format_decimals`."""
-    return format_decimals(value, digits)

@@ -91,7 +91,7 @@ class Palette:
         """Add a command that stays.
 
         Raises:
-            ValueError: another command has this name.
+            ValueError: Another command has this name.
         """
         if any(command.label == known.label for known, _ in self._registered):
             raise ValueError(f"two commands are called {command.label!r}")

@@ -137,7 +137,7 @@ class Model:
         """Return the evaluation at scaled variables; the last one is remembered.
 
         Raises:
-            DesignError: a degenerate design.
+            DesignError: A degenerate design.
         """
         if self._last is None or not np.array_equal(self._last.u, u):
             self.evaluations += 1

@@ -100,7 +100,7 @@ def radius_curve(
         watch: Called before each stage.
 
     Raises:
-        InputError: not a rotation, the start breaks a limit, or legs cross there.
+        InputError: Not a rotation, the start breaks a limit, or legs cross there.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     p = np.array(design.home_pose.position) if start is None else np.array(start, dtype=float)

@@ -129,7 +129,7 @@ def accessible_workspace(
         rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
         start: Position from which moves start, shape (3,); that of the home pose if None.
         nodes: Number of nodes of the grid on each axis of the workspace's extent.
-        node_step: Step of the paper's grid of nodes, as in `explorer.workspace_nodes`.
+        node_step: Step of the paper's grid of nodes, as in `workspace_nodes`.
         most_nodes: Largest number of nodes of the paper's grid to count; the counts of a
             finer grid are None. If this is None, too fine a grid is refused.
         tolerance: Tolerance of the solid where limits bound it, as in
@@ -137,7 +137,7 @@ def accessible_workspace(
         watch: Called before each stage.
 
     Raises:
-        InputError: not a rotation, the start collides or breaks a limit, or a number is out
+        InputError: Not a rotation, the start collides or breaks a limit, or a number is out
             of range. An empty workspace has no start to check.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)

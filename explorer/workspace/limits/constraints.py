@@ -179,7 +179,7 @@ def constraints(
     A sign triple may be demanded instead of the home's, even if no margin is demanded.
 
     Raises:
-        InputError: not a rotation.
+        InputError: Not a rotation.
     """
     r = checked_rotation(rotation)
     return tuple(
@@ -195,7 +195,7 @@ def constraints_over(
     The point is in the platform frame, shape (3,), in design units; None for b4.
 
     Raises:
-        InputError: not rotations, or not a point.
+        InputError: Not rotations, or not a point.
     """
     matrices = checked_rotation(rotations)
     if matrices.ndim != 3 or not len(matrices):

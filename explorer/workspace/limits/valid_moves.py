@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.mechanism.configuration import one_tool
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins_of
 from explorer.mechanism.pose import checked_rotation
@@ -86,7 +87,7 @@ def moves_are_valid(
         tool: Point that moves straight in the platform frame, shape (3,); None for b4.
 
     Raises:
-        InputError: a pose that is not finite or not a rotation, or not a point.
+        InputError: A pose that is not finite or not a rotation, or not a point.
     """
     p, q = (
         position_array(name, value)
@@ -101,7 +102,7 @@ def moves_are_valid(
     valid = np.empty(len(start), dtype=np.bool_)
     rules = rules or Rules.of(design)
     most = DEFAULT_TOLERANCE * design.reach if tolerance is None else tolerance
-    point = np.zeros(3) if tool is None else for_kernel(position_array("tool", tool))
+    point = for_kernel(one_tool(tool))
     move = start, turn, end, last_turn
     valid_move_rows(20 * len(start), rules.row, rules.demands, *move, point, most, valid)
     return valid.reshape(batch)

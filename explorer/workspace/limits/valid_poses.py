@@ -102,7 +102,7 @@ def poses_are_valid(
         rules: Rules of the design, if they have been computed before.
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: A pose that is not finite or not a rotation.
     """
     p, r = position_array("position", position), checked_rotation(rotation)
     batch = batch_shape((p, 1), (r, 2))

@@ -33,7 +33,7 @@ def yaw_pitch_roll_range(
         counts: Numbers of values on the ranges, ends included; a single one is the middle.
 
     Raises:
-        InputError: not three of each, a reversed range, or no usable number of orientations.
+        InputError: Not three of each, a reversed range, or no usable number of orientations.
     """
     low, high = finite_array("lows", lows, (3,)), finite_array("highs", highs, (3,))
     if low.ndim != 1 or high.ndim != 1 or len(counts) != 3:
@@ -61,7 +61,7 @@ def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> Fl
         count: Number of orientations.
 
     Raises:
-        InputError: not a rotation, a half-angle out of its range, or no usable count.
+        InputError: Not a rotation, a half-angle out of its range, or no usable count.
     """
     untilted = checked_rotation(rotation)
     if not 0.0 <= half_angle <= 180.0:

@@ -98,7 +98,7 @@ def orientation_capability(
             design units; None for b4.
 
     Raises:
-        InputError: not a position, not a tool point, not rotations, or no usable count.
+        InputError: Not a position, not a tool point, not rotations, or no usable count.
     """
     array = np.asarray(orientations)
     if array.ndim == 0:

@@ -128,7 +128,7 @@ def greatest_tilt(
             design units; None for b4.
 
     Raises:
-        InputError: not a position, not a tool point, or a torsion that is not finite.
+        InputError: Not a position, not a tool point, or a torsion that is not finite.
     """
     p, sigma = one_position(position), checked_torsion(design, torsion)
     sigmas = np.array([sigma])
@@ -159,7 +159,7 @@ def greatest_tilts(
         tool: As in `greatest_tilt`.
 
     Raises:
-        InputError: as there, or positions and torsions that do not broadcast.
+        InputError: As there, or positions and torsions that do not broadcast.
     """
     p = position_array("position", position)
     sigma = np.asarray(checked_torsion(design, None))

@@ -111,7 +111,7 @@ def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) 
     if edges cannot be distinguished in double precision. The level is the coordinate on the axis.
 
     Raises:
-        InputError: no such axis, or not a rotation.
+        InputError: No such axis, or not a rotation.
     """
     if axis not in AXES or len(axis) != 1:
         raise InputError(f"a slice is cut across x, y or z; got {axis!r}")

@@ -101,7 +101,7 @@ def workspace_volume(
         explain: Whether to find the limits that empty an empty workspace, which takes longer.
 
     Raises:
-        InputError: not a rotation.
+        InputError: Not a rotation.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     limits = constraints(design, r)
@@ -130,7 +130,7 @@ def workspace_nodes(
     The rotation is that of the home pose if None, and the step that of `node_step_of`.
 
     Raises:
-        InputError: not a rotation, a step that is not positive, or a grid of too many nodes.
+        InputError: Not a rotation, a step that is not positive, or a grid of too many nodes.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     width = node_step_of(design, step)

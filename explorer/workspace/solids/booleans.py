@@ -50,7 +50,7 @@ def mesh_of(body: Manifold) -> tuple[FloatArray, NDArray[np.int32], NDArray[np.u
     """Return the vertices, faces and ids of the faces of a body.
 
     Raises:
-        ExplorerError: a boolean failed.
+        ExplorerError: A boolean failed.
     """
     from manifold3d import Error
 
@@ -110,7 +110,7 @@ def carved_solid(
     """Return a workspace less what surfaces remove: the part with a seed (3,), or all parts.
 
     Raises:
-        ExplorerError: a boolean fails.
+        ExplorerError: A boolean fails.
     """
     from manifold3d import Manifold
 

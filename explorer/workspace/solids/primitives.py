@@ -118,7 +118,7 @@ def frame_of(
     of the reach or of the largest extent, whichever is smaller.
 
     Raises:
-        InputError: the tolerance is not positive.
+        InputError: The tolerance is not positive.
     """
     if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
         raise InputError(f"the tolerance must be positive; got {tolerance:g}")

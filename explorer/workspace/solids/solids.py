@@ -77,8 +77,8 @@ def workspace_solid(
         signs: Sign triple to demand instead of the home's, even if no margin is demanded.
 
     Raises:
-        InputError: not a rotation, or a tolerance that is not positive or too small.
-        ExplorerError: a boolean fails.
+        InputError: Not a rotation, or a tolerance that is not positive or too small.
+        ExplorerError: A boolean fails.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     limits = constraints(design, r, signs)
@@ -101,8 +101,8 @@ def inclusive_solid(
     `workspace_solid`.
 
     Raises:
-        InputError: not rotations, not a point, or no usable tolerance.
-        ExplorerError: a boolean fails.
+        InputError: Not rotations, not a point, or no usable tolerance.
+        ExplorerError: A boolean fails.
     """
     families = constraints_over(design, rotations, tool)
     frame = frame_of(families, design.reach, tolerance)

@@ -47,7 +47,7 @@ class Pin(Action):
         """Return the next state.
 
         Raises:
-            InputError: the design is pinned already, or no place is free.
+            InputError: The design is pinned already, or no place is free.
         """
         pinned, name = state.compared.pinned, self.design.name
         slot = state.compared.slot_of(self.design)

@@ -11,7 +11,7 @@ from explorer.app.features.compare.work import LIVE, CompareFeed, drawing_in
 from explorer.app.state.compared import SLOTS
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.colours import COMPARED, Rgb
+from explorer.app.widgets.colours import COMPARED
 from explorer.app.widgets.markup import swatch
 from explorer.measures.catalogue import CATALOGUE, Measure, measures_in
 from explorer.measures.measurements import Measurements
@@ -23,7 +23,7 @@ from explorer.numerics.number_text import (
     format_decimals,
     format_number,
 )
-from explorer.singularity.colours import css
+from explorer.singularity.colours import Rgb, css
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9

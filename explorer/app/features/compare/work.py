@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from explorer.app.features.workspace.regions import Rows, rows_of
+from explorer.app.features.workspace.tasks import LIVE_TOLERANCE
 from explorer.app.scene.bands import Shell
 from explorer.app.scene.placing import outline
 from explorer.app.session.feed import Feed
@@ -40,8 +41,6 @@ LIVE = 0
 
 # Number of cached measurements and solids: of the compared designs, and of the last changes.
 CACHED = 8
-# Chord tolerance of a mesh without one of its own, as a share of the reach.
-MESH_TOLERANCE = 0.004
 NO_COLOUR: Rgb = (0, 0, 0)
 
 
@@ -113,7 +112,7 @@ def _measure(design: Design) -> Measurements:
 @lru_cache(maxsize=CACHED)
 def _solid(design: Design, rotation: Rows | None, tolerance: float | None) -> Solid:
     r = design.home_pose.rotation if rotation is None else np.array(rotation)
-    return workspace_solid(design, r, tolerance or MESH_TOLERANCE * design.reach)
+    return workspace_solid(design, r, tolerance or LIVE_TOLERANCE * design.reach)
 
 
 CompareFeed: TypeAlias = Feed[ComparedRequest, ComparedDrawing]

@@ -90,8 +90,8 @@ class DesignsPanel:
             disabled=lambda state: state.optimisation.is_on,
         )
         actions: dict[str, Callable[[Who], None]] = {
-            "Save": lambda who: saved.save(session.settled().design, who),
-            "Save a copy": lambda who: saved.save_copy(session.settled().design, who),
+            "Save": lambda who: saved.save(session.latest_state().design, who),
+            "Save a copy": lambda who: saved.save_copy(session.latest_state().design, who),
             "Rename": self._rename,
             "Download": partial(send_design, services),
         }
@@ -150,7 +150,7 @@ class DesignsPanel:
             yield self.restore, "label", f"Bring back {deleted}"
 
     def _rename(self, who: Who) -> None:
-        state = self._session.settled()
+        state = self._session.latest_state()
         self._saved.rename(state.base.name, state.design.name, who)
 
     def _open(self, row: Entry, who: Who) -> None:

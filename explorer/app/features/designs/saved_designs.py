@@ -27,7 +27,7 @@ MOST_COMMANDS = 200
 
 def send_design(services: Services, who: Who) -> None:
     """Send the live design to one browser, as a design file."""
-    design = services.session.settled().design
+    design = services.session.latest_state().design
     services.downloads.send(who, f"{design.name}.json", encode_design(design))
 
 

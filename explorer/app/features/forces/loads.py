@@ -12,6 +12,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.tasks import (
     NearestDrawing,
     WeightsRequest,
+    load_of,
     nearest_position,
     weights_of_parts,
 )
@@ -20,7 +21,6 @@ from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
@@ -54,7 +54,7 @@ class SetForce(Action):
         """Return the next state.
 
         Raises:
-            InputError: a force that is not finite.
+            InputError: A force that is not finite.
         """
         forces = replace(state.view.forces, force=self.force)
         if not self.keeps_scale:
@@ -138,11 +138,3 @@ def nearest_feed(services: Services) -> Feed[LoadedPose, NearestDrawing]:
         return loaded if has_limits(loaded.design) and loaded.share > 1.0 else None
 
     return Feed(services.worker, nearest_position, request_of, services.session.redraw)
-
-
-def load_of(state: State) -> Six:
-    """Return the load at the tool as (F; M), base axes, in N and N × unit."""
-    forces, units = state.view.forces, 1e3 / state.design.unit_mm
-    fx, fy, fz = forces.force
-    mx, my, mz = (units * each for each in forces.moment)
-    return fx, fy, fz, mx, my, mz

@@ -143,7 +143,7 @@ class ForcesPanel:
             yield nearest_held(loaded, feed.drawing.pose, frame.state.tool)
 
     def _source(self) -> Source:
-        state = self._session.settled()
+        state = self._session.latest_state()
         loaded = self._loads.of(Frame(state))
         density = None if loaded.own is None else state.view.prototype.density
         return load_source("forces", loaded, density)
@@ -154,7 +154,7 @@ class ForcesPanel:
             self._session.do(SetPose(drawing.pose), who=client.client_id)
 
     def _turn(self, _: str, client: viser.ClientHandle) -> None:
-        frame = Frame(self._session.settled())
+        frame = Frame(self._session.latest_state())
         size = math.hypot(*frame.state.view.forces.force)
         direction = without_force(self._loads.of(frame)).worst_force(size).direction
         if size > 0.0 and np.isfinite(direction).all():

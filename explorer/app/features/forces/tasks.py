@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from explorer.app.state.state import State
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.weights import Weights
@@ -28,7 +30,7 @@ def weights_of_parts(request: WeightsRequest) -> Weights:
     """Return the weights of the prototype's parts, without the payload.
 
     Raises:
-        ExplorerError: the design has no prototype.
+        ExplorerError: The design has no prototype.
     """
     from explorer.prototype.assembly import make_prototype
     from explorer.prototype.weights import machine_weights
@@ -51,3 +53,11 @@ class NearestDrawing:
 def nearest_position(request: LoadedPose) -> NearestDrawing:
     """Return the nearest position that holds the load of a pose."""
     return NearestDrawing(nearest_carrying_pose(request))
+
+
+def load_of(state: State) -> Six:
+    """Return the load at the tool as (F; M), base axes, in N and N × unit."""
+    forces, units = state.view.forces, 1e3 / state.design.unit_mm
+    fx, fy, fz = forces.force
+    mx, my, mz = (units * each for each in forces.moment)
+    return fx, fy, fz, mx, my, mz

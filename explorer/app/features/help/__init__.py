@@ -1,1 +1,1 @@
-"""The toolbar, the list of keys, the manual and the tour."""
+"""The buttons of help in the bar, the list of keys, the manual and the tour."""

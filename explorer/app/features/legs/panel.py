@@ -25,7 +25,6 @@ from explorer.app.widgets.charts import (
     dots,
     line,
 )
-from explorer.app.widgets.colours import Rgb
 from explorer.app.widgets.markup import alert, box, dim, row, sentence, swatch, table
 from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.legs.clearance import PAIRS
@@ -35,6 +34,7 @@ from explorer.measures.blocks.source import Source, pose_source
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.singularity.colours import Rgb
 from explorer.workspace.accessible.radii import RadiusCurve
 
 # Share of the volume without radii; the largest radius that keeps it is marked.
@@ -52,7 +52,7 @@ class LegsPanel:
         self._pose = gui.add_html("")
 
         def source() -> Source:
-            state = services.session.settled()
+            state = services.session.latest_state()
             return pose_source("interference", state.design, state.pose)
 
         self._copy = CopyButton(services.buttons, "Legs", source)

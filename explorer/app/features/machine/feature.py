@@ -72,7 +72,7 @@ class SetToolAngle(Action):
         """Return the next state, which keeps the angles as they are.
 
         Raises:
-            InputError: the angle is not finite, or the design is being optimised.
+            InputError: The angle is not finite, or the design is being optimised.
         """
         check_free(state)
         angles = list(state.tool_angles)

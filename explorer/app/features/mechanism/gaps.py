@@ -19,7 +19,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.incidences import (
     Approach,
     approaches,
-    hovered_margin,
+    margin_hover,
 )
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import (
@@ -99,7 +99,7 @@ class Tetrahedra(ScenePart):
     """
 
     def __init__(self, services: Services) -> None:
-        scene, self._hovered = services.scene, services.get(hovered_margin)
+        scene, self._hovered = services.scene, services.get(margin_hover)
         flat = np.zeros((4, 3)), TETRAHEDRON_FACES
         self._faces = add_translucent(scene, "/tetrahedra/faces", flat, OPACITY, is_flat=True)
         self._edges = [
@@ -152,7 +152,7 @@ class Gaps(ScenePart):
     """The gaps that are near, each with its ends and its label, and the contacts."""
 
     def __init__(self, services: Services) -> None:
-        scene, self._hovered = services.scene, services.get(hovered_margin)
+        scene, self._hovered = services.scene, services.get(margin_hover)
         self._dashes = add_lines(scene, "/gaps/dashes", 3 * DASHES, None, THICK)
         self._feet = Balls(scene, "/gaps/feet", [WARNED] * len(FEET))
         self._contacts = Instances(

@@ -121,8 +121,8 @@ class Approach:
         return self.has_gap and (self.is_filled or self.level < 1.0)
 
 
-def hovered_margin(services: Services) -> HoveredRow:
-    """Return the margin, 1 to 3, on whose row a pointer rests; the scene shows its incidence."""
+def margin_hover(services: Services) -> HoveredRow:
+    """Make the record of the margin, 1 to 3, on whose row a pointer rests."""
     return HoveredRow(services, HOVER, range(1, 4))
 
 
@@ -226,7 +226,7 @@ class Flags(ScenePart):
     """The base's flag and the platform's."""
 
     def __init__(self, services: Services) -> None:
-        scene, self._hovered = services.scene, services.get(hovered_margin)
+        scene, self._hovered = services.scene, services.get(margin_hover)
         self._base = Flag(scene, "/base", deltas=(0, 1, 2))
         self._platform = Flag(scene, "/platform", deltas=(2, 1, 0))
 

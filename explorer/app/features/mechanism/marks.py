@@ -77,7 +77,7 @@ class DragHandle(ScenePart):
         """Return the pose of the platform where the gizmo is.
 
         Raises:
-            InputError: the gizmo is where no platform can be.
+            InputError: The gizmo is where no platform can be.
         """
         x, y, z = (np.asarray(self.handle.position) / scene_scale(state)).tolist()
         w, i, j, k = np.asarray(self.handle.wxyz, dtype=np.float64).tolist()

@@ -37,8 +37,8 @@ GHOSTS_LABEL = "Other modes as ghosts"
 SHORT = {"gap |d1 − d3|": "gap", "carriage order": "order"}
 
 
-def hovered_mode(services: Services) -> HoveredRow:
-    """Return the mode on whose row a pointer rests, which the scene shows as a ghost."""
+def mode_hover(services: Services) -> HoveredRow:
+    """Make the record of the mode on whose row a pointer rests; the scene shows its ghost."""
     return HoveredRow(services, HOVER, range(len(MODES)))
 
 
@@ -47,7 +47,7 @@ class ModesPanel:
 
     def __init__(self, services: Services) -> None:
         self._session, buttons = services.session, services.buttons
-        services.get(hovered_mode)
+        services.get(mode_hover)
         self._table = services.gui.add_html("")
         buttons.on(GO, self._go, values=VALUES)
         ghosts = Chip(
@@ -160,7 +160,7 @@ class Ghosts(ScenePart):
     """
 
     def __init__(self, services: Services) -> None:
-        scene, self._hovered = services.scene, services.get(hovered_mode)
+        scene, self._hovered = services.scene, services.get(mode_hover)
         # Instanced meshes cannot change their shape, and these follow the design.
         self._plates = [
             add_translucent(scene, f"/ghosts/platform/{i}", NO_MESH, 0.35, colour=GHOST)

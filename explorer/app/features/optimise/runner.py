@@ -125,12 +125,12 @@ class Optimiser(Runner):
     def _post(self) -> None:
         self._session.post(self, self._advance)
 
-    def _advance(self, state: State) -> Action:
+    def _advance(self, state: State) -> Action | None:
         """Return the action that shows the next iterates, or the end once all are shown."""
         run = state.optimisation.run
         with self._lock:
             if run is None or run.number != self._number or run.phase == "ended":
-                return Advance(0, ())
+                return None
             self._advanced = time.monotonic()
             count = len(self._waiting)
             is_hasty = self._is_cancelled or isinstance(self._ending, str)

@@ -33,7 +33,6 @@ from explorer.app.widgets.markup import (
     box,
     caption,
     dim,
-    format_signed,
     meter,
     row,
     sentence,
@@ -357,7 +356,7 @@ def _value(line: Row, value: float | None, digits: int) -> str:
         return "none"
     if math.isinf(value):
         return "infinite"
-    return line.names[round(value) - 1] if line.names else format_signed(value, digits)
+    return line.names[round(value) - 1] if line.names else format_decimals(value, digits)
 
 
 def _pair(legs: tuple[int, int] | None) -> str:

@@ -66,7 +66,7 @@ def problem_of(state: State) -> Problem:
     """Return the problem of the present design.
 
     Raises:
-        ExplorerError: the values make no problem.
+        ExplorerError: The values make no problem.
     """
     return _problem(state.design, state.base, state.optimisation.request)
 

@@ -24,9 +24,9 @@ from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH, add_translucent
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import Rgb
 from explorer.measures.size import corners_of
 from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.singularity.colours import Rgb
 
 COLOURS: dict[str, Rgb] = {"inclusive": (96, 140, 196), "total": (30, 150, 135)}
 OPACITY = 0.22

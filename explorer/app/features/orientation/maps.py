@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explorer.app.features.orientation.work import TiltsDrawing
-from explorer.app.widgets.colours import Rgb
 from explorer.app.widgets.markup import caption, dim, reading, row, swatch, table, ticks
 from explorer.mechanism.tilt_torsion import TiltTorsion
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.colours import MARGIN_COLOURS, css
+from explorer.singularity.colours import MARGIN_COLOURS, Rgb, css
 from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap
 from explorer.workspace.orientations.torsions import TiltByTorsion
 

@@ -30,7 +30,7 @@ class Go(Action):
         """Return the next state: at the start of the path and playing, or planning it.
 
         Raises:
-            InputError: both ends are the same pose, or an end is a mode that the present leg
+            InputError: Both ends are the same pose, or an end is a mode that the present leg
                 lengths do not have.
         """
         start, goal = ends_of(state)
@@ -79,7 +79,7 @@ def pose_of_end(state: State, end: End) -> Pose:
     """Return the pose of an end: itself, a mode of the present leg lengths, or the present pose.
 
     Raises:
-        InputError: the present leg lengths do not close in other modes, to rounding.
+        InputError: The present leg lengths do not close in other modes, to rounding.
     """
     if end is None:
         return state.pose

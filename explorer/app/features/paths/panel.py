@@ -42,13 +42,13 @@ from explorer.app.state.state import State, angles_of
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chip, Chips, choose
-from explorer.app.widgets.markup import alert, beside, box, dim, format_signed, note, sentence
+from explorer.app.widgets.markup import alert, beside, box, dim, note, sentence
 from explorer.errors import InputError
 from explorer.export.tables import trajectory_csv
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.margins import margins, mode_name, mode_of
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.number_text import format_number, snap_to_decimals
+from explorer.numerics.number_text import format_decimals, format_number, snap_to_decimals
 
 EndName = Literal["start", "goal"]
 ENDS: tuple[EndName, ...] = ("start", "goal")
@@ -232,8 +232,8 @@ def end_numbers(state: State, end: EndName) -> str:
     except InputError as error:
         return f'<div class="ex-note ex-close">{escape(sentence(str(error)))}</div>'
     there = position_of(state.design, pose, state.view.at)
-    position = ", ".join(format_signed(coordinate, 2) for coordinate in there)
-    angles = ", ".join(f"{format_signed(angle, 1)}°" for angle in angles_of(pose))
+    position = ", ".join(format_decimals(coordinate, 2) for coordinate in there)
+    angles = ", ".join(f"{format_decimals(angle, 1)}°" for angle in angles_of(pose))
     hint = f"x, y, z of {state.point} in design units; yaw, pitch, roll"
     return note(f'<span title="{hint}">{position} · {angles}</span>')
 

@@ -29,7 +29,7 @@ from explorer.app.widgets.charts import (
     level_axis,
     line,
 )
-from explorer.app.widgets.markup import format_signed, margin_name, note, swatch
+from explorer.app.widgets.markup import margin_name, note, swatch
 from explorer.measures.blocks.block import MOST_SHARE, Share
 from explorer.mechanism.folds import to_folds
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, margins
@@ -283,7 +283,7 @@ def legend(pose: Pose, quantity: Quantity) -> str:
     parts = (
         f'<span class="ex-whole" title="{escape(incidence)}">{swatch(colour, look)}'
         f"{margin_name(index, quantity.name)} "
-        f"<b>{format_signed(value, quantity.decimals)}{quantity.unit}</b></span>"
+        f"<b>{format_decimals(value, quantity.decimals)}{quantity.unit}</b></span>"
         for index, colour, look, incidence, value in zip(
             (1, 2, 3), MARGIN_COLOURS, STROKES, INCIDENCES, values, strict=True
         )

@@ -6,7 +6,7 @@ import threading
 import time
 
 from explorer.app.features.feature import Runner, Services
-from explorer.app.features.forces.loads import load_of
+from explorer.app.features.forces.tasks import load_of
 from explorer.app.features.paths.actions import Advance, TakePlan
 from explorer.app.features.paths.work import PlanRequest, plan
 from explorer.app.session.jobs import Worker

@@ -66,7 +66,7 @@ class SetTolerances(Action):
         """Return the next state.
 
         Raises:
-            InputError: the design is being optimised.
+            InputError: The design is being optimised.
         """
         check_free(state)
         design = with_tolerances(state.design, np.array(self.tolerances))
@@ -103,7 +103,7 @@ class ToleranceFile:
 
     def send(self, who: Who) -> None:
         """Send the table of the budget, whether it is shown or not."""
-        state = self._session.settled()
+        state = self._session.latest_state()
         name = f"{state.design.name}-tolerances.csv"
         self._downloads.compute(who, name, budget_table, (budget_request(state),))
 

@@ -48,7 +48,7 @@ class AssumeTypical(Action):
         """Return the next state.
 
         Raises:
-            InputError: the design is being optimised.
+            InputError: The design is being optimised.
         """
         check_free(state)
         return with_value(state, "design", typical_machine(state.design)[0])
@@ -106,7 +106,7 @@ class PrecisionPanel:
         yield from self._budget.updates(frame)
 
     def _source(self) -> Source:
-        state = self._session.settled()
+        state = self._session.latest_state()
         loaded = self._loads.of(Frame(state))
         density = None if loaded.own is None else state.view.prototype.density
         return load_source("accuracy", loaded, density)

@@ -54,7 +54,7 @@ def budget_of(request: BudgetRequest) -> BudgetDrawing:
     """Return a budget.
 
     Raises:
-        ExplorerError: errors are infinite at the positions, no position is within the limits, or
+        ExplorerError: Errors are infinite at the positions, no position is within the limits, or
             the errors of the actuators alone exceed what is wanted.
     """
     design, tool = request.design, request.design.tool.position
@@ -75,6 +75,6 @@ def budget_table(request: BudgetRequest) -> bytes:
     """Return the tolerances of a budget as CSV.
 
     Raises:
-        ExplorerError: as for `budget_of`.
+        ExplorerError: As for `budget_of`.
     """
     return tolerance_csv(budget_of(request).costs).encode()

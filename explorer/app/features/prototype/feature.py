@@ -28,7 +28,7 @@ ASSEMBLIES = {
 
 def _assembly_sender(services: Services) -> Callable[[str, Who], None]:
     def send(name: str, who: Who) -> None:
-        design = services.session.settled().design
+        design = services.session.latest_state().design
         file_format, end = ASSEMBLIES[name]
         file = f"{design.name}-{end}"
         services.downloads.compute(who, file, export_assembly, (design, file_format))
@@ -38,7 +38,7 @@ def _assembly_sender(services: Services) -> Callable[[str, Who], None]:
 
 def _simulation_sender(services: Services) -> Callable[[str, Who], None]:
     def send(_: str, who: Who) -> None:
-        state = services.session.settled()
+        state = services.session.latest_state()
         file = f"{state.design.name}-simulation.xml"
         arguments = state.design, state.view.prototype.density
         services.downloads.compute(who, file, export_simulation, arguments)

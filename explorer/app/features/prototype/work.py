@@ -155,7 +155,7 @@ def export_assembly(design: Design, file_format: str) -> bytes:
     """Return a file of the prototype, assembled in the home pose, in a format of the page.
 
     Raises:
-        ExplorerError: a design too tight for the parts, or a missing library.
+        ExplorerError: A design too tight for the parts, or a missing library.
     """
     from explorer.export.assembly import assembly_bytes
 
@@ -171,7 +171,7 @@ def export_simulation(design: Design, density: float) -> bytes:
     """Return the model for physics engines as MJCF; `density` of its bodies in kg/m³.
 
     Raises:
-        ExplorerError: a design without a model, such as one with legs of length zero.
+        ExplorerError: A design without a model, such as one with legs of length zero.
     """
     from explorer.export.simulation import simulation_mjcf
 

@@ -64,7 +64,7 @@ def send_scene(services: Services, who: Who) -> None:
     """Send the scene as an HTML file with the present camera of the browser."""
 
     def make(client: viser.ClientHandle) -> File:
-        state, date = services.session.settled(), dt.datetime.now().astimezone().date()
+        state, date = services.session.latest_state(), dt.datetime.now().astimezone().date()
         data = scene_html(services.server, state, FileCamera.of(client), date=date)
         return f"{state.design.name}-scene.html", data
 
@@ -73,7 +73,7 @@ def send_scene(services: Services, who: Who) -> None:
 
 def send_report(services: Services, file_format: ReportFormat, who: Who) -> None:
     """Send the report of the design in its present pose."""
-    state = services.session.settled()
+    state = services.session.latest_state()
     services.downloads.compute(
         who,
         f"{state.design.name}-report.{file_format}",

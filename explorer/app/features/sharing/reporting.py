@@ -35,7 +35,7 @@ def make_report(
 
     Raises:
         MissingExtraError: PDF without Playwright or a Chromium.
-        PictureError: the browser did not start.
+        PictureError: The browser did not start.
     """
     from explorer.export.report.data import gather_report_data
     from explorer.export.report.document import report_html

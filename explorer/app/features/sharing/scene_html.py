@@ -17,9 +17,8 @@ from explorer.app.browser.viser_gaps import SceneMessage, scene_as_html
 from explorer.app.look import read_script
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.markup import format_signed
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import format_decimals, format_number
 
 # Messages outside the tree of the scene that go into the file.
 KEPT = (
@@ -122,9 +121,9 @@ def visible_messages(messages: Iterable[SceneMessage]) -> list[SceneMessage]:
 
 def caption_of(state: State, date: dt.date) -> str:
     """Return design, unit, pose and date of a scene as HTML."""
-    x, y, z = (format_signed(value) for value in state.position)
+    x, y, z = (format_decimals(value, 3) for value in state.position)
     angles = " · ".join(
-        f"{name} {format_signed(value, 2)}°"
+        f"{name} {format_decimals(value, 2)}°"
         for name, value in zip(("yaw", "pitch", "roll"), state.yaw_pitch_roll, strict=True)
     )
     return (

@@ -34,7 +34,7 @@ def check_size(width: float, height: float) -> tuple[int, int]:
     """Return a size as whole pixels.
 
     Raises:
-        InputError: a side that is out of bounds, or no number.
+        InputError: A side that is out of bounds, or no number.
     """
     for name, value in (("width", width), ("height", height)):
         if not (math.isfinite(value) and LEAST <= value <= MOST):
@@ -69,7 +69,7 @@ def view_picture(
         without: Names of nodes of the scene to leave out.
 
     Raises:
-        NoAnswerError: the browser is gone, hidden, or cannot draw that much.
+        NoAnswerError: The browser is gone, hidden, or cannot draw that much.
     """
     # A node of one browser covers the shared one of the same name.
     covers = [client.scene.add_frame(name, show_axes=False) for name in without]
@@ -85,7 +85,7 @@ def _draw(client: viser.ClientHandle, width: int, height: int) -> Pixels:
     """Return the view of a browser, shape (height, width, 4), transparent where it is empty.
 
     Raises:
-        NoAnswerError: it is gone, hidden, or cannot draw that much.
+        NoAnswerError: It is gone, hidden, or cannot draw that much.
     """
     camera = client.camera
     fov, aspect = float(camera.fov), width / height

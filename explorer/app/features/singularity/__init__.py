@@ -1,1 +1,1 @@
-"""Nearest singular poses, uncoupled motions, strata and ellipsoids."""
+"""Nearest singular poses, free motions, strata, ellipsoids and the singularity-free ball."""

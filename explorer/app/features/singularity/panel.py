@@ -10,7 +10,7 @@ from typing import get_args
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.incidences import HOVER, hovered_margin
+from explorer.app.features.mechanism.incidences import HOVER, margin_hover
 from explorer.app.features.singularity.scene import show_button
 from explorer.app.features.singularity.strata import StrataPanel
 from explorer.app.features.singularity.work import GoToSingularity
@@ -65,12 +65,12 @@ class SingularityPanel:
 
     def __init__(self, services: Services) -> None:
         gui, buttons, self._session = services.gui, services.buttons, services.session
-        services.get(hovered_margin)
+        services.get(margin_hover)
         self._controls = controls = Controls(gui, services.session)
         self._summary = gui.add_html("")
 
         def source() -> Source:
-            state = services.session.settled()
+            state = services.session.latest_state()
             return pose_source("singularity", state.design, state.pose)
 
         self._copy = CopyButton(buttons, "Singularity", source)

@@ -29,7 +29,7 @@ class GoToStratum(Action):
         """Return the next state.
 
         Raises:
-            InputError: there is no such stratum, or none of its poses is the nearest: it is the
+            InputError: There is no such stratum, or none of its poses is the nearest: it is the
                 generic one, or the pose lies in it or in its boundary.
         """
         goal = tuple(self.stratum)
@@ -66,7 +66,7 @@ class GoToSingularity(Action):
         """Return the next state.
 
         Raises:
-            InputError: the pose has that incidence already.
+            InputError: The pose has that incidence already.
         """
         poses = nearest_singularities(state.design, state.pose)
         nearest = min(poses, key=lambda pose: pose.distance)

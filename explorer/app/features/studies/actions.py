@@ -45,7 +45,7 @@ class BrushAxes(Action):
         """Return the next state.
 
         Raises:
-            InputError: too many ranges, or one without numbers.
+            InputError: Too many ranges, or one without numbers.
         """
         studies = state.studies
         for brush in self.brushes:
@@ -82,7 +82,7 @@ class PickDesign(Open):
         """Return the next state.
 
         Raises:
-            InputError: the design is being optimised, or another study is open by now.
+            InputError: The design is being optimised, or another study is open by now.
         """
         if state.studies.name != self.study:
             raise InputError(f"the study {self.study!r} is not open any more")

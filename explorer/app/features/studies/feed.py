@@ -101,7 +101,7 @@ class StudyDrawing:
         """Return the row of a design.
 
         Raises:
-            InputError: it has not been computed yet.
+            InputError: It has not been computed yet.
         """
         rows = np.flatnonzero(self.results.columns["index"] == index)
         if not len(rows):
@@ -229,8 +229,8 @@ def results_in(folder: Path) -> Results:
     """Return the rows of a study that have been computed, if any.
 
     Raises:
-        InputError: the folder holds no study, or one of too many designs for the page.
-        MissingExtraError: pyarrow is not installed.
+        InputError: The folder holds no study, or one of too many designs for the page.
+        MissingExtraError: Pyarrow is not installed.
     """
     pyarrow()
     study = study_in(folder)

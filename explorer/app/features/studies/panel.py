@@ -325,7 +325,7 @@ class StudiesPanel:
 
     def _start(self, _: str, client: viser.ClientHandle) -> None:
         self._is_new_asked = False
-        state = self._session.settled()
+        state = self._session.latest_state()
         self.runner.start(state.design, state.studies.plan, client.client_id)
 
     def _go_on(self, _: str, client: viser.ClientHandle) -> None:

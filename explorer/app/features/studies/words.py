@@ -20,11 +20,11 @@ from explorer.app.state.studies import (
     title_of,
 )
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.markup import box, by_theme, dim, format_signed, meter
+from explorer.app.widgets.markup import box, by_theme, dim, meter
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import IntArray
-from explorer.numerics.number_text import decimals_for, format_number
+from explorer.numerics.number_text import decimals_for, format_decimals, format_number
 from explorer.optimise.problem import REACH, YAW
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.study import NAMES, Study
@@ -268,7 +268,7 @@ def _line(drawing: StudyDrawing, row: int, decimals: Mapping[str, int]) -> str:
     columns = drawing.results.columns
     index = int(columns["index"][row])
     cells = "".join(
-        f"<span>{format_signed(float(columns[name][row]), digits)}</span>"
+        f"<span>{format_decimals(float(columns[name][row]), digits)}</span>"
         for name, digits in decimals.items()
     )
     is_picked = index == drawing.request.studies.picked

@@ -67,10 +67,10 @@ def run_in_worker(study: Study, folder: Path, channel: Channel) -> Progress:
         channel: Channel to the parent.
 
     Raises:
-        InputError: the study cannot be run, or the folder is another's or in use.
-        StorageError: the folder cannot be written.
-        MissingExtraError: pyarrow is not installed.
-        RunError: the workers are gone.
+        InputError: The study cannot be run, or the folder is another's or in use.
+        StorageError: The folder cannot be written.
+        MissingExtraError: Pyarrow is not installed.
+        RunError: The workers are gone.
     """
     workers = LocalWorkers(max(1, cores() - 1))
     try:
@@ -84,7 +84,7 @@ def study_runner(services: Services) -> StudyRunner:
     """Return the runner of the studies of a page, and with it their drawings; for `Services.get`.
 
     Raises:
-        RuntimeError: the page offers no studies.
+        RuntimeError: The page offers no studies.
     """
     if services.studies is None:
         raise RuntimeError("a page without folders of studies draws none")

@@ -8,7 +8,7 @@ from typing import Literal
 import viser
 
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
-from explorer.app.features.forces.loads import load_of
+from explorer.app.features.forces.tasks import load_of
 from explorer.app.features.workspace.feeds import (
     VOLUME_FEED,
     WORKSPACE_FEED,
@@ -55,7 +55,7 @@ def send_workspace(
         who: The client.
         at_home: Whether it is that within the limits at the orientation of home instead.
     """
-    state = services.session.settled()
+    state = services.session.latest_state()
     frame, region, start = Frame(state), state.view.workspace.region, None
     if at_home:
         region, rows = "limits", rows_of(state.design.home_pose.rotation)

@@ -9,10 +9,11 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from explorer.app.features.forces.loads import load_of
+from explorer.app.features.forces.tasks import load_of
 from explorer.app.features.workspace.regions import Rows, Selection, rows_of
 from explorer.app.features.workspace.tasks import (
     LIVE_TOLERANCE,
+    PART_TOLERANCE,
     WorkspaceDrawing,
     WorkspaceRequest,
     WorkspaceSurface,
@@ -73,8 +74,10 @@ def workspace_start(frame: Frame) -> Triple | None:
 
 
 def tolerance_of(state: State) -> float:
-    """Return the chord tolerance in design units."""
-    return state.view.workspace.tolerance or LIVE_TOLERANCE * state.base.reach
+    """Return the chord tolerance of what is drawn and written to files, in design units."""
+    view = state.view.workspace
+    share = LIVE_TOLERANCE if view.region == "limits" else PART_TOLERANCE
+    return view.tolerance or share * state.base.reach
 
 
 def loaded_design(state: State) -> Design:
@@ -138,7 +141,7 @@ def workspace_request(frame: Frame) -> WorkspaceRequest | None:
         cut=view.cut,
         level=level if is_cut else None,
         flipped=is_cut and view.flipped,
-        tolerance=view.tolerance,
+        tolerance=tolerance_of(frame.state),
         hull=view.hull,
         # The length changes no drawing that is not coloured by it.
         warn_below=frame.state.warn_below if coloured else 1.0,

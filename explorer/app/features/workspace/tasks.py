@@ -41,10 +41,8 @@ from explorer.workspace.solids.booleans import convex_hull, cut_solid
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import workspace_solid
 
-# Chord tolerance of a live solid, as a share of the reach.
-LIVE_TOLERANCE = 0.004
-# The same for a part of it, whose triangles are those that are drawn.
-REACHED_TOLERANCE = 0.001
+# Chord tolerances of a live solid, and of an accessible or a carried part, over the reach.
+LIVE_TOLERANCE, PART_TOLERANCE = 0.004, 0.001
 # The format with exact faces rather than facets.
 STEP = "step"
 
@@ -62,7 +60,7 @@ def measure_volume(request: Selection) -> MeasuredVolume:
     return MeasuredVolume(request, exact_volume(request.design, request.rotation))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WorkspaceRequest(Selection):
     """Request to draw and measure a workspace; lengths in design units.
 
@@ -71,18 +69,18 @@ class WorkspaceRequest(Selection):
         cut: Axis across which the solid is cut open, or None.
         level: Coordinate of the cut; None, or one beyond the extent, for the middle.
         flipped: Whether the side is kept that faces the isometric camera.
-        tolerance: Chord tolerance; None for a share of the reach.
+        tolerance: Chord tolerance, in design units.
         hull: Whether to make the convex hull.
         warn_below: Length below which margins raise a warning.
     """
 
-    colour: Measure = "plain"
-    cut: Axis | None = None
-    level: float | None = None
-    flipped: bool = False
-    tolerance: float | None = None
-    hull: bool = False
-    warn_below: float = 1.0
+    colour: Measure
+    cut: Axis | None
+    level: float | None
+    flipped: bool
+    tolerance: float
+    hull: bool
+    warn_below: float
 
     @property
     def selection(self) -> Selection:
@@ -155,8 +153,6 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
             as it is known, and may cancel; None for neither.
     """
     design, rotation = request.design, np.array(request.rotation)
-    share = LIVE_TOLERANCE if request.region == "limits" else REACHED_TOLERANCE
-    tolerance = request.tolerance or share * design.reach
     load = (0.0,) * 6 if request.load is None else request.load
     colouring = Colouring(design, rotation, request.colour, request.warn_below, np.array(load))
     holds = request.region == "held"
@@ -175,10 +171,10 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
     if request.region == "limits" and request.cut is None:
         # It is waited for; it needs none of what follows.
         surface = draw(workspace_faces(limits))
-    whole = workspace_solid(design, rotation, tolerance, volume=measured)
+    whole = workspace_solid(design, rotation, request.tolerance, volume=measured)
     solid, part, trouble = whole, None, None
     if request.region != "limits":
-        found = find_part(request.selection, tolerance, watch_of(channel))
+        found = find_part(request.selection, request.tolerance, watch_of(channel))
         if isinstance(found, Trouble):
             trouble = found
         else:
@@ -249,7 +245,7 @@ def export_mesh(
         offset: Vector from b4 to the tool point, of which the positions are; None for b4.
 
     Raises:
-        ExplorerError: an empty workspace, nothing accessible, a load that nothing holds, a missing
+        ExplorerError: An empty workspace, nothing accessible, a load that nothing holds, a missing
             library, or STEP of a solid without exact faces.
     """
     if file_format == STEP:
@@ -276,8 +272,8 @@ def _exact_file(selection: Selection, offset: Triple | None) -> bytes:
     """Return a STEP file of the workspace within the limits.
 
     Raises:
-        InputError: a part of the workspace, which has no exact faces.
-        ExplorerError: as of `explorer.export.step.exact_workspace`.
+        InputError: A part of the workspace, which has no exact faces.
+        ExplorerError: As of `explorer.export.step.exact_workspace`.
     """
     design, region = selection.design, selection.region
     if region != "limits":
