@@ -146,7 +146,7 @@ SIDES: tuple[Side, ...] = get_args(Side)
 
 
 class Bar:
-    """Shows the parts, side by side.
+    """The bar on top of the page, with the parts of the features side by side.
 
     Args:
         services: Services of the page.

@@ -1,4 +1,4 @@
-"""What files of meshes hold: metadata, GLB by trimesh, and 3MF by lib3mf."""
+"""Mesh files with names, colours and metadata: GLB by trimesh, and 3MF by lib3mf."""
 
 from __future__ import annotations
 

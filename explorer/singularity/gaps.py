@@ -1,4 +1,4 @@
-"""What is left to each of the three incidences: gaps between the two flags, and the least turns.
+"""The gaps between the two flags, and the least turns by which the three incidences come about.
 
 A gap is the shortest segment from an element of the base flag to one of the platform flag: from a1
 to the platform plane (δ1), between the lines a1a2 and b2b3 (δ2), and from the base plane to b4

@@ -108,7 +108,7 @@ class Pause:
 
 
 def now() -> float:
-    """Return the time in seconds since some moment, that of the machine but for tests."""
+    """Return the monotonic time in seconds, which tests can shift."""
     return time.monotonic() + _shift()
 
 

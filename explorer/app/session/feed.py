@@ -98,7 +98,7 @@ class Feed(Generic[Request, Drawing]):
 
     @property
     def part(self) -> object:
-        """What has arrived of a drawing newer than the newest; None for nothing, or as there."""
+        """What has arrived of a drawing that is not complete; None if there is no such drawing."""
         return None if self.request is None or self.is_cancelled else self._part
 
     @property

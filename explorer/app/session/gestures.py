@@ -39,7 +39,7 @@ class UserAction:
     press: Press | None = None
 
     def continues(self, source: object, last: float, press: Press | None) -> bool:
-        """Return whether this continues an earlier gesture with the same control.
+        """Whether this continues an earlier gesture with the same control.
 
         All events from press to release are one gesture, and two presses of one browser are two;
         where no press is known, a pause ends a gesture.

@@ -1,4 +1,4 @@
-"""Blocks as HTML, for the panels of the page: strings, since a frame of a drag has many."""
+"""Blocks as HTML for the panels of the page, written as strings for speed."""
 
 from __future__ import annotations
 

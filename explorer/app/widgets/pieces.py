@@ -1,7 +1,7 @@
 """The controls of a page as viser holds them: places, words, options, and a way to use one.
 
 The command palette and the tests read them here, so that neither lags behind the page. Gap: viser
-lists its controls under private names alone, and presses none.
+lists its controls under private names alone, and has no call that presses one.
 """
 
 from __future__ import annotations

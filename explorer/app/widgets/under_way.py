@@ -16,7 +16,7 @@ AnyFeed = Feed[Any, Any]
 
 
 class UnderWay:
-    """Two buttons, each visible while it has an effect.
+    """The buttons that cancel and repeat a computation, each visible while it has an effect.
 
     Args:
         gui: Controls of the page, to which the buttons are added.

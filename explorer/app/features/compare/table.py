@@ -104,7 +104,7 @@ class Column:
         return PERCENT * value if value is not None and measure.unit == "share" else value
 
     def has(self, measure: Measure) -> bool:
-        """Return whether the design has what a measure needs, such as a load."""
+        """Whether the design has what a measure needs, such as a load."""
         return self.measured is not None and measure.name in self.measured.values
 
     def value(self, measure: Measure) -> float | None:

@@ -1,4 +1,4 @@
-"""The user's designs by name: the name in the bar, and a list to save, open, copy and delete."""
+"""The user's designs by name, in a list to save, open, copy and delete; the bar shows the name."""
 
 from __future__ import annotations
 

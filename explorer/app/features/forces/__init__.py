@@ -1,1 +1,1 @@
-"""The load on the platform, and what holds it."""
+"""The load on the platform, and the reactions to it."""

@@ -1,4 +1,4 @@
-"""The load of the page, the action that sets it, and the present pose under it."""
+"""The load of the page: the action that sets it, the pose under it, and the feeds it needs."""
 
 from __future__ import annotations
 

@@ -274,13 +274,13 @@ class LoadHandle(ScenePart):
 
 
 def is_shown(placed: Placed) -> bool:
-    """Return whether forces are drawn: of the mechanism itself, whose parts are in place."""
+    """Whether forces are drawn: of the mechanism itself, whose parts are in place."""
     view = placed.frame.state.view
     return view.forces.shown and not view.is_twin and not placed.is_apart
 
 
 def has_force(placed: Placed) -> bool:
-    """Return whether there is a force at the tool to draw."""
+    """Whether there is a force at the tool to draw."""
     return any(placed.frame.state.view.forces.force)
 
 

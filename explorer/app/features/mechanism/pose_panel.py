@@ -201,7 +201,7 @@ def _choice(
 
 
 def message(state: State) -> str:
-    """Return what there is to say of the lengths, in room that it always has, as HTML."""
+    """Return the message on the lengths of the legs as HTML, in a box of constant height."""
     if state.unclosed is not None:
         text = alert("", str(state.unclosed))
     elif state.remark is not None:

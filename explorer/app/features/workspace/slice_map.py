@@ -1,7 +1,7 @@
 """The map of a slice of the workspace: the report's exact drawing, with axes, and the pose in it.
 
 The worker draws the map itself; the page puts it between axes, marks b4 or the tool point, and
-answers `look/map.js`, which asks what is under the pointer.
+gives the words for what is under the pointer.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def level_within(low: float, high: float, level: float | None) -> float:
 
 
 def keeps_above(axis: Axis, flipped: bool) -> bool:
-    """Return whether a cut keeps what lies above its level.
+    """Whether a cut keeps what lies above its level.
 
     The half that faces the isometric camera is cut away, or kept if the cut is flipped.
     """
