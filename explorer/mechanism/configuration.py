@@ -1,7 +1,7 @@
 """The configuration: a design in one pose or a batch of poses, with a point of the platform.
 
 Statics, clearances and singularities are asked of one. What follows from it is computed on first
-use and kept, so that no two of them compute it twice. The point may be meant by name: b4 or the tool.
+use and kept, so that no two of them compute it twice. Its point may be named: b4 or the tool.
 """
 
 from __future__ import annotations
