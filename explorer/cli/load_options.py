@@ -74,4 +74,5 @@ def check_regular(pose: Pose, values: FloatArray, infinite: str) -> None:
     least = SINGULAR * float(np.linalg.norm(pose.position))
     margin = np.abs(margins(pose.position, pose.rotation))
     zero = [f"δ{k + 1} = 0: {INCIDENCES[k]}" for k in np.flatnonzero(margin <= least)]
-    raise NoAnswerError(f"the pose is singular ({'; '.join(zero)}): {infinite} are infinite")
+    named = "; ".join(zero) or "a margin vanishes to rounding"
+    raise NoAnswerError(f"the pose is singular ({named}): {infinite} are infinite")

@@ -11,7 +11,7 @@ import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
 from explorer.cli.parsing import UsageError
-from explorer.numerics.checks import LEAST, MOST, size_problem
+from explorer.numerics.checks import LEAST, MOST, STIFFEST, size_problem
 
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six", 7: "seven"}
 
@@ -74,7 +74,7 @@ def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstr
                 f"{alternative}; got {len(values)}"
             )
         for name, value in zip(names, values, strict=True):
-            if problem := size_problem(value):
+            if problem := size_problem(value, most=STIFFEST):
                 raise UsageError(f"{option}: {name} {problem}")
         return tuple(values)
 

@@ -31,6 +31,7 @@ from explorer.mechanism.points import Variables, platform_points
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import (
+    LEAST,
     instance,
     not_negative,
     number,
@@ -62,8 +63,6 @@ radians for angles."""
 
 # Share of the design's size up to which a3y, b1y and b3 - b2 are rounding noise.
 DEGENERATE_RATIO = 1e-12
-# Least size of the largest design variable.
-LEAST_SIZE = 1e-7
 
 DOWN: Triple = (0.0, 0.0, -1.0)
 """The default direction of gravity."""
@@ -243,7 +242,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         _set(self, "unit_mm", positive("unit_mm", self.unit_mm))
         if self.node_step is not None:
             _set(self, "node_step", positive("node_step", self.node_step))
-        size = number("the largest design variable", max(map(abs, self.variables)), LEAST_SIZE)
+        size = number("the largest design variable", max(map(abs, self.variables)), LEAST)
         for name, value, zero in (
             ("a3y", self.a3[1], "a1, a2 and a3 lie on one line"),
             ("b1y", self.b1[1], "b1, b2 and b3 lie on one line"),

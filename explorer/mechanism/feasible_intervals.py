@@ -21,11 +21,15 @@ import numpy as np
 
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
 from explorer.mechanism.kinematics import checked_joints, forward
-from explorer.numerics.arrays import FARTHEST, FloatArray
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.checks import MOST
 
 Interval = tuple[float, float]
 
 _IS_LENGTH = tuple(name in LENGTHS for name in JOINTS)
+
+# Largest joint that can have a meaning.
+LARGEST_JOINT = 10.0 * MOST
 
 
 def feasible_intervals(design: Design, joints: FloatArray) -> tuple[tuple[Interval, ...], ...]:
@@ -175,13 +179,13 @@ def _breaks(roots: FloatArray, scale: float, is_length: bool) -> list[float]:
     """Return the ascending values of one joint at which the joints may cease to close.
 
     No joints close beyond the outer ones, since |d1 - d3| is bounded, and with it every length. A
-    value above `FARTHEST` belongs to a vanishing term.
+    value above `LARGEST_JOINT` belongs to a vanishing term.
     """
     values = np.sort(roots)
     if is_length:
         values = np.sqrt(np.append(0.0, values[values > 0.0]))
     values = values * scale
-    return values[np.abs(values) <= FARTHEST].tolist()
+    return values[np.abs(values) <= LARGEST_JOINT].tolist()
 
 
 def _closing_intervals(

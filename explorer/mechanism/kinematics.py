@@ -27,12 +27,12 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, LENGTHS, Design
 from explorer.mechanism.folds import write_rotation
 from explorer.numerics.arrays import (
-    FARTHEST,
     BoolArray,
     FloatArray,
     finite_array,
     for_kernel,
 )
+from explorer.numerics.checks import FARTHEST
 from explorer.numerics.compiled import helper, kernel
 
 # Relative rounding of one operation.

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, position_array
-from explorer.numerics.checks import MOST
+from explorer.numerics.checks import FARTHEST
 from explorer.numerics.compiled import helper, kernel
 
 Triple = tuple[float, float, float]
@@ -36,14 +36,14 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Raises:
         InputError: The position or the quaternion is not of three or four finite numbers, the
-            position exceeds 1e6, or the quaternion is zero.
+            position exceeds 1e100, or the quaternion is zero.
     """
 
     position: Triple
     quaternion: Quadruple
 
     def __post_init__(self) -> None:
-        position = finite_array("position", self.position, (3,), MOST)
+        position = finite_array("position", self.position, (3,), FARTHEST)
         quaternion = finite_array("quaternion", self.quaternion, (4,))
         if position.ndim != 1 or quaternion.ndim != 1:
             raise InputError("a pose has one position and one quaternion, not a batch")
@@ -95,9 +95,11 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
         InputError: A quaternion is not finite, or it is zero.
     """
     array = finite_array("quaternion", quaternion, (4,))
-    if not np.abs(array).max(axis=-1).all():
+    largest = np.abs(array).max(axis=-1, keepdims=True)
+    if not largest.all():
         raise InputError("quaternion must not be all zeros; no rotation is (1, 0, 0, 0)")
-    return Rotation.from_quat(array, scalar_first=True).as_matrix()
+    # Any length will do, also one whose square is no number.
+    return Rotation.from_quat(array / largest, scalar_first=True).as_matrix()
 
 
 def quaternion_from_rotation(rotation: ArrayLike) -> FloatArray:

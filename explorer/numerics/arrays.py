@@ -12,15 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from explorer.errors import InputError
-from explorer.numerics.checks import MOST, size_problem
+from explorer.numerics.checks import FARTHEST, size_problem
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
-
-FARTHEST = 10.0 * MOST
-"""Largest coordinate of a position and largest joint of a pose, in design units: a computation may
-find some beyond those that a user gives."""
 
 
 def finite_array(

@@ -16,8 +16,12 @@ from typing import Any, SupportsIndex, cast
 
 from explorer.errors import DesignError
 
-LEAST, MOST = 1e-6, 1e6
+LEAST, MOST = 1e-7, 1e6
 """Bounds of the size of a number that a user gives, in its unit."""
+
+FARTHEST = 1e100
+"""Largest coordinate of a position and largest joint, of which powers are numbers still: a
+computation, such as that of the nearest singular pose, finds some far beyond what a user gives."""
 
 STIFFEST = 1e12
 """Largest stiffness in N/mm: one rigid actuator among springs is stated by a large number."""
@@ -38,9 +42,9 @@ def size_problem(value: float, least: float = 0.0, most: float = MOST) -> str:
     if not math.isfinite(value):
         return f"must be a finite number; got {value}"
     if abs(value) > most:
-        return f"must not exceed {most:g} in size; got {value:g}: change the unit"
+        return f"must not exceed {most:g} in size; got {value:.12g}"
     if 0.0 < abs(value) < least:
-        return f"must be at least {least:g} in size; got {value:g}: change the unit"
+        return f"must be at least {least:g} in size; got {value:.12g}"
     return ""
 
 
@@ -57,9 +61,9 @@ def number(name: str, value: object, least: float = 0.0, most: float = MOST) -> 
     return checked
 
 
-def not_negative(name: str, value: object) -> float:
-    """Return the value as a float from 0 to `MOST`."""
-    checked = number(name, value)
+def not_negative(name: str, value: object, most: float = MOST) -> float:
+    """Return the value as a float from 0 to `most`."""
+    checked = number(name, value, most=most)
     if checked < 0.0:
         raise DesignError(f"{name} must not be negative; got {checked:g}", name)
     return checked

@@ -15,6 +15,7 @@ from explorer.errors import InputError
 from explorer.measures.size import MARGIN_OF_CLEARANCE, longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
+from explorer.numerics.checks import MOST
 from explorer.optimise.demands import Box, Demands
 from explorer.optimise.problem import (
     DISTANCES,
@@ -124,11 +125,13 @@ def default_variable(start: Design, name: str) -> Variable:
     size = max(map(abs, start.variables))
     value = start_value(start, name)
     if name in ("a3x", "a3y"):
-        return Variable(name, -A3_WITHIN * size, A3_WITHIN * size)
+        within = min(A3_WITHIN * size, MOST)
+        return Variable(name, -within, within)
     if name in VARIABLES:
         return Variable(name, -B_WITHIN * size, B_WITHIN * size)
     if name == REACH:
-        return Variable(name, max(value / A3_WITHIN, longest_minimum(start)), A3_WITHIN * value)
+        low = max(value / A3_WITHIN, longest_minimum(start))
+        return Variable(name, low, min(A3_WITHIN * value, MOST))
     if name in SHIFTS:
         return Variable(name, -size, size)
     # The lines are parallel at multiples of 180°; stay between two of them if the start does.

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError, TooTightError
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.checks import MOST
 from explorer.numerics.number_text import format_number
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, joints_of_leg
 from explorer.prototype.dimensions import FIRST_SWING, SECOND_SWING
@@ -182,14 +183,15 @@ def _refusal(design: Design, worst: tuple[str, float, float]) -> TooTightError:
 def _least_unit(design: Design) -> float | None:
     """Return the least factor on the unit with which everything fits, None if there is none."""
     share: float | None = 1.0
+    largest = min(LARGEST_FACTOR, MOST / design.unit_mm)
     if not all(design.limits.leg_radii):
         # With a huge unit clearances vanish, so open radii are at their largest.
-        share = _fitting_factors(design, LARGEST_FACTOR)[0]
+        share = _fitting_factors(design, largest)[0]
 
     def fits(factor: float) -> bool:
         return share is not None and _sizes(design, factor, share).worst is None
 
-    low, high = 1.0, LARGEST_FACTOR
+    low, high = 1.0, largest
     if not fits(high):
         return None
     while high > 1.001 * low:

@@ -160,7 +160,7 @@ def test_field_with_no_number_or_a_refused_one_gets_back_what_was_there(tab: Tab
         tab.page.keyboard.press("Tab")
         tab.wait_until_shown("x", x)
     tab.type("x", "999999999999\n")
-    notice = tab.page.get_by_text("must not exceed")
+    notice = tab.page.get_by_text("too far to be drawn")
     notice.wait_for()
     tab.wait_until_shown("x", x)
     assert notice.count() == 1

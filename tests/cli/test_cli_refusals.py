@@ -22,7 +22,7 @@ SIX = ["1", "2", "3", "4", "5", "6"]
         (["inverse", "--position", "1", "2"], "three numbers in the order x y z; got 2"),
         (["inverse", "--quaternion", "1"], "four numbers in the order w x y z; got 1"),
         (["inverse", "--yaw-pitch-roll", "1"], "three numbers in the order yaw pitch roll; got 1"),
-        (["singularity", "--position", "1e200", "1", "1"], "must not exceed 1e+06 in size"),
+        (["singularity", "--position", "1e200", "1", "1"], "must not exceed 1e+12 in size"),
         (
             ["forward", "--joints", "-1", *SIX[1:]],
             "explorer: l1 is a length and must not be negative",
