@@ -419,7 +419,7 @@ def test_deflected_shape_is_the_linear_motion_magnified(
 
 
 @pytest.mark.parametrize(
-    "values", [{"times": 0.0}, {"wanted": -1.0}, {"wanted": 1e-7}, {"wanted_turn": math.inf}]
+    "values", [{"times": 0.0}, {"wanted": -1.0}, {"wanted": 1e-8}, {"wanted_turn": math.inf}]
 )
 def test_precision_of_the_view_that_is_not_positive_is_refused(values: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="must be"):
