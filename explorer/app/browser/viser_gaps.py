@@ -16,6 +16,7 @@ from viser._messages import (
     GuiSliderMark,
     GuiUpdateMessage,
     RunJavascriptMessage,
+    SceneNodeUpdateMessage,
     SetCameraFovMessage,
     SetCameraLookAtMessage,
     SetCameraPositionMessage,
@@ -57,11 +58,9 @@ def place(node: viser.SceneNodeHandle, name: str, value: ArrayLike) -> None:
 def assign_properties(node: viser.SceneNodeHandle, values: Mapping[str, object]) -> None:
     """Assign properties of a node of the scene, in one message.
 
-    viser's own assignment resolves the type of each property anew and sends a message for each,
-    which takes longer than all that is computed for it.
+    Gap: viser's own assignment resolves the type of each property anew and sends a message for
+    each, which takes longer than all that is computed for it.
     """
-    from viser import _messages
-
     internals: Any = node
     properties = internals._impl.props
     updates = dict(values)
@@ -71,8 +70,7 @@ def assign_properties(node: viser.SceneNodeHandle, values: Mapping[str, object])
             # A copy, since the message is sent later.
             updates[name] = np.array(value, dtype=dtype)
         setattr(properties, name, updates[name])
-    message = _messages.SceneNodeUpdateMessage(node.name, updates)
-    internals._impl.api._queue_scene_message(message)
+    internals._impl.api._queue_scene_message(SceneNodeUpdateMessage(node.name, updates))
 
 
 def put_camera(

@@ -55,9 +55,9 @@ class Assigner:
             return new
         # A value that a user sets from now on crosses.
         now = time.time()
-        # Nothing is computed in this block, since it holds up every browser.
         # By identity, since viser's handles have no hash.
         properties: dict[int, tuple[viser.SceneNodeHandle, dict[str, object]]] = {}
+        # Nothing is computed in this block, since it holds up every browser.
         with self._server.atomic():
             for handle, name, value in new:
                 if name in PLACE:
