@@ -48,6 +48,9 @@ JOINTS = ("l1", "d1", "d2", "d3", "d4", "l4")
 LENGTHS = ("l1", "d2", "d4", "l4")
 """The joints that are lengths of actuators, hence not negative, in the order of the legs."""
 
+LENGTH_ROWS = [JOINTS.index(name) for name in LENGTHS]
+"""The places of the `LENGTHS` among the `JOINTS`."""
+
 VARIABLES = ("a3x", "a3y", "b1x", "b1y", "b2", "b3")
 """The design variables X in the paper's order."""
 

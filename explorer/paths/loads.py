@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import LENGTH_ROWS, Design
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import (
@@ -39,8 +39,6 @@ from explorer.statics.weights import Weights, design_weights
 TOLERANCE, ROUNDING = 0.02, 1e-9
 # Samples within a move at first, and the most samples of all moves.
 FIRST_SAMPLES, MOST_SAMPLES = 16, 20_000
-# The joints along legs 1 to 4, by `JOINTS`.
-LEGS = [0, 2, 4, 5]
 
 
 @dataclass(frozen=True)
@@ -194,9 +192,9 @@ class DemandedLoad:
             way = half[:, None] * (lengths_of(moves.step[number])[:, None] + lengths_of(swing))
             angle = half[:, None] * lengths_of(turn)[:, None]
             least = lengths - way
-            tilt = np.where(least > 0.0, way / least, np.inf)[:, LEGS]
+            tilt = np.where(least > 0.0, way / least, np.inf)[:, LENGTH_ROWS]
             turns = np.repeat(angle, 6, axis=1)
-            turns[:, LEGS] += tilt
+            turns[:, LENGTH_ROWS] += tilt
             asked = speeds[:, :, :6] * turns[:, None]
             # Loads that keep their direction in the base turn in the axes of the platform.
             sizes = [lengths_of(self.load[:3]), *(body.mass_kg * gravity for body in bodies)]
@@ -205,10 +203,10 @@ class DemandedLoad:
             # The weights of the legs act at their joints, partly across the legs.
             rods, cylinders = np.array(masses.rods), np.array(masses.cylinders)
             leaning = np.abs(cylinders * masses.cylinder_centres - rods * masses.rod_centres)
-            leaning = gravity * leaning / lengths[:, LEGS]
+            leaning = gravity * leaning / lengths[:, LENGTH_ROWS]
             standing = gravity * (rods + cylinders + np.array(masses.carriages))
             tilting = 2.0 * leaning * tilt
-            change += rotate(speeds[:, :, LEGS], tilting + angle * (leaning + standing))
+            change += rotate(speeds[:, :, LENGTH_ROWS], tilting + angle * (leaning + standing))
             sums = asked.sum(axis=2)
             most = sums.max(axis=1, keepdims=True)
             change += sums * change.max(axis=1, keepdims=True) / (1.0 - most)

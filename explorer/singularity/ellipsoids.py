@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration, computed_once
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import LENGTH_ROWS, Design
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import FloatArray, position_array
@@ -56,7 +56,7 @@ def jacobian_of(configuration: Configuration) -> FloatArray:
     """
     points, c = configuration.points, configuration.position + configuration.arm
     out = np.zeros((*configuration.batch, 6, 6))
-    out[..., [0, 2, 4, 5], :3] = configuration.leg_directions
+    out[..., LENGTH_ROWS, :3] = configuration.leg_directions
     out[..., [1, 3], 0] = 1.0
     b1, b2, b3, b4 = points.b1 - c, points.b2 - c, points.b3 - c, points.b4 - c
     arms = np.stack(np.broadcast_arrays(b1, b2, b2, b3, b3, b4), axis=-2)
@@ -80,7 +80,7 @@ def determinant(design: Design, joints: FloatArray, margin: FloatArray) -> Float
         joints: Joints of the pose, shape (..., 6), in design units.
         margin: Margins (δ1, δ2, δ3) of the pose, shape (..., 3), in design units.
     """
-    lengths = joints[..., [0, 2, 4, 5]]
+    lengths = joints[..., LENGTH_ROWS]
     product = np.prod(lengths, axis=-1)
     factor = -design.b1[1] * design.a3[1] * (design.b3 - design.b2) ** 2
     numerator = factor * np.prod(margin, axis=-1)
@@ -101,7 +101,7 @@ def scaled_margins(design: Design, joints: FloatArray, margin: FloatArray) -> Fl
         margin: Margins (δ1, δ2, δ3) of the pose, shape (..., 3), in design units.
     """
     span, reach = design.b3 - design.b2, design.reach
-    l1, d2, d4, l4 = (joints[..., index] for index in (0, 2, 4, 5))
+    l1, d2, d4, l4 = (joints[..., index] for index in LENGTH_ROWS)
     factors = np.array([design.b1[1] / reach, (span / reach) * span, design.a3[1] / reach])
     lengths = np.stack([l1, d2 * d4, l4], axis=-1)
     sizes = np.abs(margin * factors)

@@ -28,7 +28,7 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import LENGTH_ROWS, Design
 from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose
@@ -193,7 +193,7 @@ def _locked_rates(design: Design, pose: Pose) -> FloatArray:
     p, r, reach = np.array(pose.position), pose.rotation, design.reach
     points = Configuration(design, p, r).points
     rows = [jacobian(design, p, r)]
-    lengths = inverse(design, p, r)[[0, 2, 4, 5]]
+    lengths = inverse(design, p, r)[LENGTH_ROWS]
     for end, length in zip((points.b1, points.b2, points.b3, points.b4), lengths, strict=True):
         if length <= ZERO * reach:
             # The columns are those of v + ω × arm.

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import LENGTH_ROWS, Design
 from explorer.numerics.arrays import FloatArray, finite_array, lengths_of
 from explorer.numerics.compiled import helper, kernel
 from explorer.statics.forces import B2, B3, STRUT_ROWS, twists_of_actuators
@@ -295,7 +295,7 @@ def compliance_shares(
     lengths = poses.joints[..., STRUT_ROWS].reshape(-1, 2)
     work = forces**2 * poses.rows(soft)
     bent = (forces[:, [1, 3]] ** 2 * poses.rows(bending) * lengths**3).sum(axis=1)
-    guide, actuators = work[:, [1, 3]].sum(axis=1), work[:, [0, 2, 4, 5]].sum(axis=1)
+    guide, actuators = work[:, [1, 3]].sum(axis=1), work[:, LENGTH_ROWS].sum(axis=1)
     total: FloatArray = guide + actuators + bent
     parts = [
         np.divide(part, total, out=np.full(total.shape, np.nan), where=total > 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.design import JOINTS, LENGTH_ROWS, Design
 from explorer.mechanism.machine import Payload
 from explorer.numerics.arrays import BoolArray, FloatArray, dot
 from explorer.statics.forces import (
@@ -232,7 +232,7 @@ def _spread(c: Configuration, batch: tuple[int, ...]) -> FloatArray:
 
 def _joint_forces(c: Configuration, forces: FloatArray, carried: Carried) -> FloatArray:
     finite = np.where(np.isfinite(forces), forces, 0.0)
-    out = finite[..., [0, 2, 4, 5], None] * c.leg_directions + carried.at_joints
+    out = finite[..., LENGTH_ROWS, None] * c.leg_directions + carried.at_joints
     out[..., 1, 0] += finite[..., 1]
     out[..., 2, 0] += finite[..., 3]
     return np.where(np.isfinite(forces[..., 0, None, None]), out, np.inf)

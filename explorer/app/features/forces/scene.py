@@ -35,7 +35,7 @@ from explorer.app.widgets.colours import GHOST
 from explorer.measures.blocks.block import Share
 from explorer.measures.blocks.forces import shares_of
 from explorer.mechanism.configuration import position_of
-from explorer.mechanism.design import JOINTS
+from explorer.mechanism.design import JOINTS, LENGTH_ROWS
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding, format_number
@@ -146,7 +146,7 @@ class ForcesScene(ScenePart):
         radius = np.full(4, SLEEVE_RADIUS * placed.thickness)
         yield from self._sleeves.between(feet, tips, radius)
         yield from self._sleeves.colour(
-            [linear_colour(share_colour(shares[i])) for i in (0, 2, 4, 5)]
+            [linear_colour(share_colour(shares[i])) for i in LENGTH_ROWS]
         )
         for index, leg in enumerate((2, 3)):
             share = _larger(shares[6 + index], shares[10 + index])
