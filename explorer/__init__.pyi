@@ -22,7 +22,7 @@ from .mechanism.design_file import (
     load_design as load_design,
 )
 from .mechanism.folds import from_folds as from_folds, to_folds as to_folds
-from .mechanism.kinematics import forward as forward, inverse as inverse
+from .mechanism.kinematics import forward as forward, inverse as inverse, jacobian as jacobian
 from .mechanism.machine import (
     Actuators as Actuators,
     Guide as Guide,
@@ -42,7 +42,7 @@ from .optimise.defaults import make_problem as make_problem
 from .optimise.solver import optimise_design as optimise_design
 from .paths.planning import plan_path as plan_path
 from .prototype.assembly import make_prototype as make_prototype
-from .singularity.ellipsoids import jacobian as jacobian, performance as performance
+from .singularity.ellipsoids import performance as performance
 from .singularity.nearest import nearest_singularities as nearest_singularities
 from .singularity.strata import stratum as stratum
 from .statics.accuracy import (

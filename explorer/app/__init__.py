@@ -1,1 +1,1 @@
-"""The page: state and jobs know no browser; scene, panels and server draw them in viser."""
+"""The page: state and session know no browser; scene, panels and server draw them in viser."""

@@ -160,8 +160,7 @@ class Bar:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the bar show the frame."""
-        sides = "".join(f"<div>{self._markup(side, frame)}</div>" for side in SIDES)
-        yield self._html, "content", f'<div class="ex-bar">{sides}</div>'
-
-    def _markup(self, side: Side, frame: Frame) -> str:
-        return "".join(part(frame) for each, part in self._parts if each == side)
+        parts = [(side, part(frame)) for side, part in self._parts]
+        sides = ("".join(html for each, html in parts if each == side) for side in SIDES)
+        bar = "".join(f"<div>{side}</div>" for side in sides)
+        yield self._html, "content", f'<div class="ex-bar">{bar}</div>'

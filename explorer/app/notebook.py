@@ -14,8 +14,7 @@ from types import TracebackType
 from typing import Self
 
 from explorer.app.server import Running, start
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, SetPose
+from explorer.app.state.actions import Action, Open, SetPose
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design
@@ -122,11 +121,6 @@ class Shown:
             f'<iframe src="{escape(self.url)}" title="{escape(repr(self))}" width="100%" '
             f'height="{self._height}" style="{STYLE}"></iframe>'
         )
-
-    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
-        """Return the frame and the words that Jupyter displays."""
-        del include, exclude
-        return {"text/html": self._repr_html_(), "text/plain": repr(self)}
 
 
 def show(

@@ -13,23 +13,38 @@ import viser
 from explorer.app.browser.browser_facts import listen
 from explorer.app.browser.downloads import Downloads
 from explorer.app.browser.viser_gaps import run_script
-from explorer.app.features.feature import Panel, Services
-from explorer.app.features.listed import FEATURES
+from explorer.app.features.compare.feature import COMPARE
+from explorer.app.features.designs.feature import DESIGNS
+from explorer.app.features.feature import Feature, Panel, Services
+from explorer.app.features.forces.feature import FORCES
+from explorer.app.features.help.feature import HELP
+from explorer.app.features.history.feature import HISTORY
+from explorer.app.features.legs.feature import LEGS
+from explorer.app.features.machine.feature import MACHINE
+from explorer.app.features.mechanism.feature import MECHANISM
+from explorer.app.features.optimise.feature import OPTIMISE
+from explorer.app.features.orientation.feature import ORIENTATION
+from explorer.app.features.paths.feature import PATHS
+from explorer.app.features.precision.feature import PRECISION
+from explorer.app.features.prototype.feature import PROTOTYPE
+from explorer.app.features.sharing.feature import SHARING
+from explorer.app.features.singularity.feature import SINGULARITY
+from explorer.app.features.studies.feature import STUDIES
+from explorer.app.features.studies.folders import StudyFolders, study_folders
+from explorer.app.features.view.feature import VIEW
+from explorer.app.features.workspace.feature import WORKSPACE
 from explorer.app.layout import Bar, Layout, Panels
 from explorer.app.look import read_script, read_stylesheet
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
 from explorer.app.session import clock
 from explorer.app.session.history import History
-from explorer.app.session.jobs import Worker
-from explorer.app.session.log import log_error
 from explorer.app.session.session import Session, Who
+from explorer.app.session.worker import Worker, log_error
 from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Presses
 from explorer.app.state.state import State
-from explorer.app.storage.autosaver import Autosaver
-from explorer.app.storage.study_folders import StudyFolders
-from explorer.app.storage.user_data import PreferenceFile, UserData
+from explorer.app.storage.user_data import Autosaver, PreferenceFile, UserData
 from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.markup import sentence
@@ -38,6 +53,11 @@ from explorer.app.widgets.theme import Theme
 from explorer.numerics.arrays import FloatArray
 
 TITLE = "Flagged 4-4 explorer"
+# The features, in the order of their tabs and of their parts of the bar.
+FEATURES: tuple[Feature, ...] = (
+    DESIGNS, MECHANISM, MACHINE, HISTORY, VIEW, SINGULARITY, WORKSPACE, ORIENTATION, LEGS, FORCES,
+    PRECISION, PROTOTYPE, OPTIMISE, STUDIES, COMPARE, PATHS, SHARING, HELP,
+)  # fmt: skip
 # Modules that the worker imports at its start.
 TASKS = tuple({task.__module__: None for feature in FEATURES for task in feature.tasks})
 # Scripts of the whole page.
@@ -74,12 +94,8 @@ class Page:
     Args:
         server: Server that the page is drawn on.
         state: The first state.
-        panels: Whether there is room for panels beside the scene; else the scene is alone.
-        user_data: The user's designs and where the session is saved; None to save nothing.
         history: History that led to the state; None to start one with it.
-        preferences: Where theme and tour are remembered; None to be light and to begin no
-            tour by itself.
-        studies: Where design studies lie; None to offer none.
+        panels, user_data, preferences, studies: As for `explorer.app.server.start`.
     """
 
     def __init__(
@@ -101,8 +117,6 @@ class Page:
         self._follows_at_release = False
         # When the state that is drawn was new.
         self._changed = 0.0
-        # Whether `settle` is under way: then nothing waits for a pause of the user.
-        self._is_settling = False
         # Other threads may ask for a frame before the last panel is there.
         self._is_complete = False
         self._frame = Frame(state)
@@ -115,8 +129,8 @@ class Page:
         self._quiet_pause = clock.Pause(QUIET_SECONDS, self.session.redraw)
         # Looks after the cameras once nothing has been drawn for a while, or at a release.
         self._camera_pause = clock.Pause(FOLLOW_SECONDS, self._follow)
-        self._pauses = self._drag_pause, self._quiet_pause, self._camera_pause
-        self.worker = Worker(self._announce, preload=TASKS)
+        self.pauses = self._drag_pause, self._quiet_pause, self._camera_pause
+        self.worker = Worker(self._tell, preload=TASKS)
         gui = server.gui
         gui.set_panel_label(TITLE)
         self.buttons = Buttons(server)
@@ -140,15 +154,16 @@ class Page:
             self.buttons,
             Downloads(server, self.worker, self._complain),
             self._complain,
-            self._announce,
+            self._tell,
             theme,
             Cameras(server.initial_camera, self.corners),
             user_data,
-            studies,
             preferences,
             self.autosaver,
             lambda: self.palette.commands,
         )
+        if studies is not None:
+            self.services.give(study_folders, studies)
         self.services.at_end(self.services.downloads.stop)
         server.scene.set_up_direction("+z")
         self._features = tuple(each for each in FEATURES if each.is_offered(self.services))
@@ -169,7 +184,7 @@ class Page:
         layout = Layout(server, theme, self.services.cameras, self.panels if panels else None)
         self.palette = self._add_palette(layout)
         for message in () if user_data is None else user_data.messages:
-            self._announce(sentence(message))
+            self._tell(sentence(message))
         server.on_client_connect(self._show_pending)
         server.on_client_connect(self.services.cameras.connected)
         server.on_client_disconnect(self.services.cameras.disconnected)
@@ -190,7 +205,7 @@ class Page:
 
     def stop(self) -> None:
         """End the session, the features and the worker."""
-        for pause in self._pauses:
+        for pause in self.pauses:
             pause.cancel()
         self.buttons.stop()
         self.session.stop()
@@ -210,26 +225,6 @@ class Page:
             idle = idle and self.session.wait_until_idle(deadline - time.monotonic())
             idle = idle and self.worker.wait_until_idle(deadline - time.monotonic())
         return idle and self.session.wait_until_idle(deadline - time.monotonic())
-
-    def settle(self, timeout: float) -> bool:
-        """Wait until all is drawn and no pause is pending; return whether that is so.
-
-        What waits for a pause of the user happens at once.
-        """
-        deadline = time.monotonic() + timeout
-        self._is_settling = True
-        try:
-            while self.wait_until_drawn(deadline - time.monotonic()):
-                for pause in self._pauses:
-                    pause.finish()
-                if not clock.wait_until_quiet(deadline - time.monotonic()):
-                    return False
-                # What happened after a pause may have changed more.
-                if not self.session.has_more and clock.wait_until_quiet(0.0):
-                    return True
-            return False
-        finally:
-            self._is_settling = False
 
     def point_cameras(self, view: ViewName) -> None:
         """Point the camera of every open browser."""
@@ -287,7 +282,7 @@ class Page:
         for feature in self._features:
             if feature.passing is not None:
                 self.palette.offer(feature.name, feature.passing(self.services))
-        if self._assigner.settle(has_paused=self._is_settling):
+        if self._assigner.resend_crossed():
             self._quiet_pause.begin()
         self._camera_pause.begin()
 
@@ -342,14 +337,14 @@ class Page:
     def _complain(self, message: str, who: Who) -> None:
         self._notify(REFUSAL, message, who)
 
-    def _announce(self, message: str) -> None:
+    def _tell(self, message: str) -> None:
         """Notify all browsers of what no request caused."""
         self._notify("Please note", message, None)
 
     def _show_saving(self, message: str) -> None:
         # The bar shows whether saving fails, also to browsers that come later.
         if self._server.get_clients():
-            self._announce(message)
+            self._tell(message)
         self.session.redraw()
 
     def _report(self, error: Exception) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -121,41 +120,14 @@ def take(
         starting = executor.submit(_start, design, pose, panels=panels, handle=handle)
         try:
             with headless_browser() as browser:
-                data = _draw(browser, starting.result(), view=view, size=size, panels=panels)
+                data = draw_page(browser, starting.result(), view=view, size=size, panels=panels)
         finally:
             if starting.exception() is None:
                 starting.result().stop()
     write_whole(out, data)
 
 
-def picture(
-    browser: Browser,
-    design: Design,
-    pose: Pose | None,
-    *,
-    view: ViewName,
-    size: tuple[int, int],
-    panels: bool = False,
-    tab: str | None = None,
-    prepare: Callable[[Running], None] | None = None,
-) -> bytes:
-    """Return a picture as `take` writes it, from a browser that is running already.
-
-    A tab of the panels may be chosen by its name.
-
-    Raises:
-        PictureError: The browser did not draw in time.
-    """
-    running = _start(design, pose, panels=panels)
-    try:
-        return _draw(
-            browser, running, view=view, size=size, panels=panels, tab=tab, prepare=prepare
-        )
-    finally:
-        running.stop()
-
-
-def _start(design: Design, pose: Pose | None, *, panels: bool, handle: bool = True) -> Running:
+def _start(design: Design, pose: Pose | None, *, panels: bool, handle: bool) -> Running:
     # What it imports takes longer than all else that happens before there is a browser.
     from explorer.app.server import start
     from explorer.app.state.view import View
@@ -163,7 +135,7 @@ def _start(design: Design, pose: Pose | None, *, panels: bool, handle: bool = Tr
     return start(design, pose, view=View(handle=handle), port=0, panels=panels)
 
 
-def _draw(
+def draw_page(
     browser: Browser,
     running: Running,
     *,
@@ -171,12 +143,12 @@ def _draw(
     size: tuple[int, int],
     panels: bool,
     tab: str | None = None,
-    prepare: Callable[[Running], None] | None = None,
 ) -> bytes:
-    if prepare is not None:
-        prepare(running)
-        if not running.page.wait_until_drawn(PATIENCE_SECONDS):
-            raise PictureError("the explorer did not finish what it draws in time")
+    """Return a picture of an explorer as `take` writes it, with a tab in front by its title.
+
+    Raises:
+        PictureError: The browser did not draw in time.
+    """
     page, client = open_page(browser, running, size, hold=True)
     try:
         if not panels:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import signal
 import socket
 import sys
@@ -10,29 +11,33 @@ import threading
 import webbrowser
 from collections.abc import Sequence
 from dataclasses import dataclass
+from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
 import viser
 
 from explorer.app.browser.viser_server import protect, start_viser, stop_viser
+from explorer.app.features.studies.folders import STUDIES_FOLDER, StudyFolders
 from explorer.app.page import TITLE, Page
-from explorer.app.security.access import EVERYWHERE, Access, is_loopback
-from explorer.app.security.guard import Guard
-from explorer.app.session.gestures import check_drawable
-from explorer.app.session.log import start_log
+from explorer.app.security import EVERYWHERE, Access, Guard, is_loopback
+from explorer.app.session.history import check_drawable
 from explorer.app.state.state import open_state
 from explorer.app.state.view import View
 from explorer.app.storage.folder import data_folder
-from explorer.app.storage.study_folders import STUDIES_FOLDER, StudyFolders
 from explorer.app.storage.user_data import PreferenceFile, UserData, open_user_data
-from explorer.errors import ExplorerError, ServerError
+from explorer.errors import ExplorerError, ServerError, StorageError
+from explorer.files.writing import make_folder
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.compiled import warm_in_background
 
-# Preset that is opened if there is no session to go on with.
+# Preset that is opened if there is no session to continue.
 FIRST_DESIGN = "paper-optimal"
+LOG = "explorer.log"
+"""Name of the log of unexpected errors in the user's data folder."""
+# Size in bytes at which a new log is begun, and number of older ones that are kept.
+LARGEST_LOG, OLDER_LOGS = 1_000_000, 2
 # Longest delay of an interruption, on systems where it does not end a wait.
 WAKE_SECONDS = 1.0
 
@@ -79,7 +84,7 @@ def start(
     """Start an explorer in this process and return at once.
 
     Args:
-        design: The manipulator to open, unless a session is gone on with.
+        design: The manipulator to open if no session is continued.
         pose: Pose in which to open it; its home pose if None.
         view: What to show; the usual if None.
         host: The address to listen on.
@@ -88,7 +93,7 @@ def start(
             a host that only this machine reaches, without a proxy.
         allow_hosts: Names of hosts by which a proxy passes requests on.
         panels: Whether there are panels beside the scene; else the scene is alone.
-        user_data: The user's designs, where the session is saved and the history to go on with;
+        user_data: The user's designs, where the session is saved and the history to continue;
             None to save nothing.
         preferences: Where theme and tour are remembered; None to be light and to begin no
             tour by itself.
@@ -101,7 +106,7 @@ def start(
     history = None if user_data is None else user_data.history
     state = open_state(design, pose, view) if history is None else history.step.state
     check_drawable(state)
-    access = Access.to(host, token, allow_hosts)
+    access = Access(host, token, allow_hosts)
     guard = Guard(access)
     _check_free(host, port)
     server = start_viser(host, port, guard.guarded)
@@ -135,12 +140,11 @@ def serve(
     """Serve the explorer until it is interrupted, and save the session.
 
     Args:
-        design: The manipulator to open; None to go on with the newest session.
+        design: The manipulator to open; None to continue the newest session.
         host: The address to listen on.
         port: The port to listen on; any free one if 0.
-        token: What has to be known to get in; if None a random one is made, but none for
-            a host that only this machine reaches, without a proxy.
-        allow_hosts: Names of hosts by which a proxy passes requests on.
+        token: As for `start`.
+        allow_hosts: As for `start`.
         open_browser: Whether to show the page in the user's browser.
         studies: Folders of results that the page offers beside those of the user's data.
 
@@ -177,9 +181,31 @@ def serve(
         running.stop()
 
 
+def start_log(folder: Path) -> None:
+    """Write all that is logged in this process into a file of a folder."""
+    # Where the folder cannot be made, the first error to log is reported on standard error.
+    with contextlib.suppress(StorageError):
+        make_folder(folder)
+    log = RotatingFileHandler(
+        folder / LOG, maxBytes=LARGEST_LOG, backupCount=OLDER_LOGS, encoding="utf-8", delay=True
+    )
+    log.setFormatter(logging.Formatter("%(asctime)s %(name)s %(message)s"))
+    logging.getLogger().addHandler(log)
+
+
 def _wait_for_interruption(running: Running, open_browser: bool) -> None:
     """Print the address of the page, start what it needs, and wait for an interruption."""
-    interrupted = _catch_interruption()
+    interrupted = threading.Event()
+
+    def interrupt(*_: object) -> None:
+        # The next Ctrl-C interrupts as usual.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        interrupted.set()
+
+    # Python would raise at any point, and an exception within a finaliser is lost. Where Ctrl-C is
+    # ignored, as in a background job, nothing changes.
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, interrupt)
     sys.stderr.write(f"{TITLE}: {running.url}   (Ctrl-C stops it)\n")
     access = running.access
     if not is_loopback(access.host):
@@ -190,9 +216,8 @@ def _wait_for_interruption(running: Running, open_browser: bool) -> None:
             "Nothing is encrypted.\n"
         )
     for name in access.names:
-        sys.stderr.write(
-            f"Through a proxy: {access.proxy_url(name)}   (http if the proxy does not encrypt)\n"
-        )
+        url = f"https://{name}/?token={access.token}"
+        sys.stderr.write(f"Through a proxy: {url}   (http if the proxy does not encrypt)\n")
     sys.stderr.flush()
     warm_in_background()
     running.page.start_workers()
@@ -201,25 +226,6 @@ def _wait_for_interruption(running: Running, open_browser: bool) -> None:
     # Some systems handle signals only between two waits.
     while not interrupted.wait(WAKE_SECONDS):
         pass
-
-
-def _catch_interruption() -> threading.Event:
-    """Return an event that the first Ctrl-C sets; the next one interrupts as usual.
-
-    Python would raise at any point, and an exception within the garbage collector or a finaliser
-    is lost. Where Ctrl-C is ignored, as in a background job, nothing changes.
-    """
-    interrupted = threading.Event()
-    usual = signal.getsignal(signal.SIGINT)
-    in_main = threading.current_thread() is threading.main_thread()
-    if in_main and usual is signal.default_int_handler:
-
-        def interrupt(*_: object) -> None:
-            signal.signal(signal.SIGINT, usual)
-            interrupted.set()
-
-        signal.signal(signal.SIGINT, interrupt)
-    return interrupted
 
 
 def _check_free(host: str, port: int) -> None:

@@ -1,4 +1,4 @@
-"""The command line: `explorer COMMAND [options]`, one module per command.
+"""The command line: `explorer COMMAND [options]`.
 
 A command is a frozen dataclass with a `run` method; its fields are its options. Only the
 module of the chosen command is imported, so that no command waits for the imports of another.
@@ -37,7 +37,7 @@ COMMANDS: Mapping[str, str] = {
     "report": "Write a report of a design: drawings, slices, tables, and how to reproduce it.",
     "screenshot": "Draw a pose into a PNG file.",
 }
-"""The summary of each command by its name, which is that of its module."""
+"""The summary of each command by its name."""
 
 INTERNAL_ERROR = 70
 INTERRUPTED = 130

@@ -7,14 +7,15 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 import msgspec
 import numpy as np
 import tyro
 
-from explorer.cli.output import write_json, write_lines
-from explorer.cli.values import DESIGN_NAME, OF_DESIGN, OF_HOME, Flag, fold_numbers, hint, numbers
+from explorer.cli import values
+from explorer.cli.output import write_json
+from explorer.cli.streams import write
 from explorer.errors import DesignError, ExplorerError, InputError, StorageError
 from explorer.mechanism.configuration import Point, offset_of, tool_offset, tool_position
 from explorer.mechanism.design import Design
@@ -25,18 +26,29 @@ from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion
 from explorer.numerics.arrays import FloatArray
 
+if TYPE_CHECKING:
+    from explorer.workspace.carried_region import CarriedRegion
+
+_Struct = TypeVar("_Struct", bound=msgspec.Struct)
+
 
 @dataclass(frozen=True, kw_only=True)
 class DesignOptions:
     """The option for the design."""
 
-    design: Annotated[str, tyro.conf.arg(metavar=DESIGN_NAME)] = "paper-optimal"
+    design: Annotated[str, tyro.conf.arg(metavar=values.DESIGN_NAME)] = "paper-optimal"
     """A preset (paper-initial, paper-optimal), a design file (JSON), or the name of a design
     saved on the page."""
 
     def read_design(self) -> Design:
         """Return the design, as `load` does."""
         return load(self.design)
+
+
+def replace_given(struct: _Struct, **changes: object) -> _Struct:
+    """Return a struct with the changes that are not None."""
+    given = {name: value for name, value in changes.items() if value is not None}
+    return msgspec.structs.replace(struct, **given)
 
 
 def load(name: str) -> Design:
@@ -83,26 +95,26 @@ def write_files(files: Mapping[Path, bytes]) -> tuple[list[Path], list[StorageEr
 class JsonOptions:
     """The option for JSON."""
 
-    json: Flag = False
+    json: values.Flag = False
     """Write one JSON object to standard output, and nothing else."""
 
     def write(
         self,
         as_json: Callable[[], Mapping[str, object]],
-        as_lines: Callable[[], Iterable[str]],
+        lines: Iterable[str],
         errors: Sequence[ExplorerError] = (),
     ) -> None:
         """Write the answer to standard output: as JSON with `--json`, otherwise as text.
 
         Args:
             as_json: Returns the answer as plain values.
-            as_lines: Returns the answer as lines of text.
+            lines: Lines of the text; those of a generator are computed only if they are written.
             errors: Errors that keep the answer from being whole.
         """
         if self.json:
             write_json(as_json())
         else:
-            write_lines(*as_lines())
+            write("\n".join(lines) + "\n")
         if errors:
             raise PartialAnswerError("; ".join(map(str, errors)))
 
@@ -111,7 +123,7 @@ class JsonOptions:
 class TypicalOptions:
     """The option for typical values of precision and stiffness."""
 
-    typical: Flag = False
+    typical: values.Flag = False
     """Assume typical errors, stiffness, struts and tolerances where the design states none, and say
     so."""
 
@@ -125,21 +137,18 @@ class RadiiOptions:
     """The option for the radii of the legs."""
 
     radii: Annotated[
-        Quadruple | None, numbers("--radii", "r1 r2 r3 r4", or_one=True), OF_DESIGN
+        Quadruple | None, values.numbers("r1 r2 r3 r4", or_one=True), values.OF_DESIGN
     ] = None
     """Radii of the four legs in design units, or one for all."""
 
     def with_radii(self, design: Design) -> Design:
         """Return the design with the given radii."""
-        if self.radii is None:
-            return design
-        limits = msgspec.structs.replace(design.limits, leg_radii=self.radii)
-        return msgspec.structs.replace(design, limits=limits)
+        return design if self.radii is None else design.with_limits(leg_radii=self.radii)
 
 
 @dataclass(frozen=True, kw_only=True)
-class PointOptions:
-    """The option for the point of the platform that is meant."""
+class PointOptions(DesignOptions):
+    """The options for the design, and for the point of the platform that is meant."""
 
     at: Point = "b4"
     """Point whose positions are meant, and at which loads act and results hold: b4 or the tool of
@@ -155,134 +164,137 @@ class PointOptions:
 
 
 def make_pose(
-    option: str,
+    command: object,
+    prefix: str,
     default: Pose,
-    position: Triple | None,
-    quaternion: Quadruple | None,
-    yaw_pitch_roll: Triple | None,
-    tilt_torsion: Triple | None,
-    folds: Six | None = None,
+    position: values.Numbers | None = None,
     tool: Triple | None = None,
 ) -> Pose:
     """Return the pose that options give, completed from a default pose.
 
     Args:
-        option: Start of the names of the options for orientation and folds, such as ``--to-``.
+        command: Command with the options for orientation and folds.
+        prefix: Start of the names of their fields, such as ``to_``.
         default: Pose that completes what is not given; without a position the tool stays in place.
-        position: Position of b4 or the tool in the base frame, in design units.
-        quaternion: Orientation as (w, x, y, z), of any length but zero.
-        yaw_pitch_roll: Orientation as angles in degrees.
-        tilt_torsion: Orientation as azimuth, tilt and torsion in degrees.
-        folds: The whole pose as r in design units and five angles in degrees.
+        position: Position of b4 or the tool in the base frame, in design units; yaw, pitch and roll
+            in degrees or a quaternion may follow.
         tool: Tool point in the platform frame, in design units; None if positions are those of b4.
     """
-    orientations = {
-        "quaternion": quaternion,
-        "yaw-pitch-roll": yaw_pitch_roll,
-        "tilt-torsion": tilt_torsion,
+    option = f"--{prefix.replace('_', '-')}"
+    # Values of options have the types of the fields below.
+    given: dict[str, Any] = {
+        name: value
+        for name in ("quaternion", "yaw_pitch_roll", "tilt_torsion", "folds")
+        if (value := getattr(command, prefix + name, None)) is not None
     }
-    given = [f"{option}{name}" for name, value in orientations.items() if value is not None]
-    if len(given) > 1:
-        raise InputError(f"give one of {given[0]} and {given[1]}, not both")
-    if folds is not None:
-        if position is not None:
-            given.insert(0, "the position")
+    named = [option + name.replace("_", "-") for name in given]
+    if position is not None and len(position) > 3:
         if given:
-            raise InputError(f"{option}folds is a whole pose; leave {' and '.join(given)} out")
+            raise InputError(f"{option[:-1]} has an orientation already; leave {named[0]} out")
+        given["quaternion" if len(position) > 6 else "yaw_pitch_roll"] = position[3:]
+    folds = given.pop("folds", None)
+    if len(given) > 1:
+        raise InputError(f"give one of {named[0]} and {named[1]}, not both")
+    if folds is not None:
+        others = [*["the position"] * (position is not None), *named[:-1]]
+        if others:
+            raise InputError(f"{option}folds is a whole pose; leave {' and '.join(others)} out")
         return pose_of_folds(folds)
-    at = default.position if position is None else position
-    if tilt_torsion is not None:
-        pose = pose_of_tilt_torsion(at, tilt_torsion)
-    elif yaw_pitch_roll is not None:
-        pose = Pose.of_yaw_pitch_roll(at, yaw_pitch_roll)
+    place: Any = default.position if position is None else position[:3]
+    if "tilt_torsion" in given:
+        pose = pose_of_tilt_torsion(place, given["tilt_torsion"])
+    elif "yaw_pitch_roll" in given:
+        pose = Pose.of_yaw_pitch_roll(place, given["yaw_pitch_roll"])
     else:
-        pose = Pose(at, quaternion or default.quaternion)
+        pose = Pose(place, given.get("quaternion", default.quaternion))
     if tool is None or (position is None and not given):
         return pose
-    here = tool_position(default, tool) if position is None else position
+    here = tool_position(default, tool) if position is None else place
     x, y, z = (np.array(here) - tool_offset(pose.rotation, tool)).tolist()
     return Pose((x, y, z), pose.quaternion)
 
 
-_INSTEAD = hint("instead of --quaternion")
+_INSTEAD, _INSTEAD_AT_END = (values.hint(f"instead of --{at}quaternion") for at in ("", "to-"))
 
 
 @dataclass(frozen=True, kw_only=True)
 class EndOptions:
     """The options for the orientation or the folds at the end of a move."""
 
-    to_quaternion: Annotated[
-        Quadruple | None,
-        numbers("--to-quaternion", "w x y z"),
-        hint("default: that of the start"),
-    ] = None
+    to_quaternion: Annotated[values.Quaternion, values.hint("default: that of the start")] = None
     """Orientation of the platform at the end."""
 
-    to_yaw_pitch_roll: Annotated[
-        Triple | None,
-        numbers("--to-yaw-pitch-roll", "yaw pitch roll"),
-        hint("instead of --to-quaternion"),
-    ] = None
+    to_yaw_pitch_roll: Annotated[values.YawPitchRoll, _INSTEAD_AT_END] = None
     """Orientation of the platform at the end, in degrees."""
 
-    to_tilt_torsion: Annotated[
-        Triple | None,
-        numbers("--to-tilt-torsion", "azimuth tilt torsion"),
-        hint("instead of --to-quaternion"),
-    ] = None
+    to_tilt_torsion: Annotated[values.TiltTorsion, _INSTEAD_AT_END] = None
     """Azimuth, tilt and torsion of the platform at the end, in degrees."""
 
-    to_folds: Annotated[Six | None, fold_numbers("--to-folds"), hint("instead of --to")] = None
+    to_folds: Annotated[values.Folds, values.hint("instead of --to")] = None
     """Folds of the pose at the end; r in design units, angles in degrees."""
 
-    @property
-    def end(self) -> tuple[Quadruple | None, Triple | None, Triple | None, Six | None]:
-        """The orientations and folds that may be given, in the order of `make_pose`."""
-        return self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion, self.to_folds
+    def end(self, start: Pose, to: values.Numbers | None, tool: Triple | None) -> Pose | None:
+        """Return the given pose completed from the start, as `make_pose` does; None without one."""
+        given = to, self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion, self.to_folds
+        if all(value is None for value in given):
+            return None
+        return make_pose(self, "to_", start, to, tool)
 
 
 @dataclass(frozen=True, kw_only=True)
 class OrientationOptions:
     """The options for the orientation; that of the home pose by default."""
 
-    quaternion: Annotated[Quadruple | None, numbers("--quaternion", "w x y z"), OF_HOME] = None
+    quaternion: Annotated[values.Quaternion, values.OF_HOME] = None
     """Orientation of the platform; of any length but zero."""
 
-    yaw_pitch_roll: Annotated[
-        Triple | None, numbers("--yaw-pitch-roll", "yaw pitch roll"), _INSTEAD
-    ] = None
+    yaw_pitch_roll: Annotated[values.YawPitchRoll, _INSTEAD] = None
     """Orientation of the platform: angles in degrees about its own z, then y, then x axis."""
 
-    tilt_torsion: Annotated[
-        Triple | None, numbers("--tilt-torsion", "azimuth tilt torsion"), _INSTEAD
-    ] = None
+    tilt_torsion: Annotated[values.TiltTorsion, _INSTEAD] = None
     """Orientation of the platform in T&T angles: azimuth and angle of its tilt, and its torsion, in
     degrees."""
 
     def oriented_home(self, design: Design) -> Pose:
         """Return the home pose of the design with the given orientation, as `make_pose` does."""
-        return make_pose("--", design.home_pose, None, *self._orientation)
-
-    @property
-    def _orientation(self) -> tuple[Quadruple | None, Triple | None, Triple | None]:
-        """The orientations that may be given, in the order of `make_pose`."""
-        return self.quaternion, self.yaw_pitch_roll, self.tilt_torsion
+        return make_pose(self, "", design.home_pose)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoseOptions(OrientationOptions, PointOptions):
-    """The options for the pose; position and orientation are those of the home pose by default."""
+    """The options for the design and the pose, which is the home pose by default."""
 
-    position: Annotated[Triple | None, numbers("--position", "x y z"), OF_HOME] = None
+    position: Annotated[values.Position, values.OF_HOME] = None
     """Position of b4, or of the tool, in the base frame, in design units."""
 
-    folds: Annotated[
-        Six | None, fold_numbers("--folds"), hint("instead of position and orientation")
-    ] = None
+    folds: Annotated[values.Folds, values.hint("instead of position and orientation")] = None
     """Folds of the pose: the distance r of a1 and b4 in design units, then angles in degrees, beta
     and epsilon from 0 to 180, phi1, phi2 and phi3 from -180 to 180."""
 
     def pose(self, design: Design) -> Pose:
         """Return the given pose completed from the home pose, as `make_pose` does."""
-        given = (design.home_pose, self.position, *self._orientation, self.folds)
-        return make_pose("--", *given, self.tool(design))
+        return make_pose(self, "", design.home_pose, self.position, self.tool(design))
+
+
+def check_has_limits(design: Design) -> None:
+    """Check that a part of a design has a limit."""
+    from explorer.statics.reactions import has_limits
+
+    if not has_limits(design):
+        raise InputError(
+            "the design limits neither its actuators nor its struts nor its guide, so that it "
+            "holds any load: give its file a limit, such as actuators.push_n"
+        )
+
+
+def carrying_part(
+    design: Design, rotation: FloatArray, load: Six, tolerance: float | None
+) -> CarriedRegion:
+    """Return the part of the workspace of a design with limits that holds a load.
+
+    The load is (F; M) at the tool besides the payload, base axes, in N and N × unit.
+    """
+    from explorer.workspace.carried_region import carried_region
+
+    check_has_limits(design)
+    return carried_region(design, rotation, load, tolerance=tolerance)

@@ -25,7 +25,6 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_ascii, format_fixed
 
 if TYPE_CHECKING:
-    from explorer.measures.measure import Measure
     from explorer.measures.snapshot import Snapshot
     from explorer.workspace.solids.solid import Solid
 
@@ -97,11 +96,6 @@ def limits_lines(snapshot: Snapshot, subject: str = "") -> Iterator[str]:
     yield from (f"  {violation}" for violation in snapshot.violations)
 
 
-def write_lines(*lines: str) -> None:
-    """Write lines of text to standard output."""
-    write("\n".join(lines) + "\n")
-
-
 def table(rows: Sequence[Sequence[str]], align: str) -> str:
     """Return rows as lines of aligned columns.
 
@@ -131,13 +125,6 @@ def figure(value: float, size: float = 0.0) -> str:
         size: Magnitude of the terms that it is computed from; their rounding errors read 0.
     """
     return format_ascii(value, 6, size=size, padded=True)
-
-
-def measure_text(measure: Measure, value: float | None) -> str:
-    """Return the value of a measure as text, "none" if there is none."""
-    if value is None:
-        return "none"
-    return str(round(value)) if measure.is_whole else figure(value)
 
 
 def lengths(design: Design, value: float, size: float = 0.0) -> tuple[str, str]:

@@ -1,8 +1,7 @@
 """Parsing of arguments: tyro reads the options, and this module writes the error messages.
 
-tyro frames its messages in boxes of several lines; here a message becomes one line that ends
-with the command for help. Misspelt options and commands are caught before tyro, with a
-suggestion.
+tyro's messages have several lines; here a message becomes one line that ends with the command for
+help. Misspelt options and commands, with a suggestion, and bad values are caught before tyro.
 """
 
 from __future__ import annotations
@@ -14,32 +13,23 @@ import importlib
 import io
 import re
 from collections.abc import Iterable, Sequence
-from typing import Any, ClassVar, Protocol
+from itertools import takewhile
+from typing import Any, ClassVar, Protocol, get_type_hints
 
 import tyro
+from tyro.constructors import PrimitiveConstructorSpec
 
 from explorer.cli.streams import write
-from explorer.errors import ExplorerError
+from explorer.cli.values import UsageError
 
-
-class UsageError(ExplorerError):
-    """Invalid arguments.
-
-    The class is no ValueError, so that tyro does not replace its message.
-
-    Args:
-        reason: Reason, in one line.
-        program: Program or command that the arguments are for.
-    """
-
-    def __init__(self, reason: str, program: str = "explorer") -> None:
-        super().__init__(reason)
-        self.program = program
-
-
-_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
-_FRAME = "│╭╮╰╯─ "
 _HELP = ("-h", "--help")
+# Modules of the commands that have none of their own name.
+_MODULES = {
+    **dict.fromkeys(("inverse", "forward", "singularity"), "kinematics"),
+    **dict.fromkeys(("forces", "accuracy"), "statics"),
+    **dict.fromkeys(("interference", "path"), "moves"),
+    **dict.fromkeys(("serve", "report", "screenshot"), "page"),
+}
 
 
 class Command(Protocol):
@@ -57,7 +47,7 @@ def load_command(name: str, known: Iterable[str]) -> type[Command]:
     if name not in known:
         hint = suggestion(name, known) or f"there are {', '.join(known)}"
         raise UsageError(f"no command {name!r} ({hint}); see explorer --help")
-    module = importlib.import_module(f"explorer.cli.commands.{name}")
+    module = importlib.import_module(f"explorer.cli.commands.{_MODULES.get(name, name)}")
     return getattr(module, name.capitalize())
 
 
@@ -84,29 +74,17 @@ def parse(name: str, command: type[Command], argv: Sequence[str]) -> Command | N
 
 
 def condense(message: str) -> str:
-    """Return the first sentence of tyro's framed message, as one line without the frame."""
-    lines = [_COLOUR.sub("", line).strip() for line in message.strip().splitlines()]
-    has_title = bool(lines) and lines[0].startswith("╭")
-    sections: list[list[str]] = [[]]
-    for line in lines:
-        is_rule = line.startswith("╭") or not line.strip(_FRAME + "-")
-        if not is_rule:
-            sections[-1].append(line.strip(_FRAME))
-        elif sections[-1]:
-            sections.append([])
-    sections = [section for section in sections if section]
-    # Without line-drawing characters the title is a section of its own, over a rule.
-    body = sections[min(len(sections) - 1, 0 if has_title else 1)] if sections else []
-    text = " ".join(body)
+    """Return the body of tyro's message, which rules part from title and advice, as one line."""
+    sections = re.split(r"^ *-{3,} *$", message, flags=re.MULTILINE)
+    body = [line.strip() for line in sections[min(len(sections) - 1, 1)].splitlines()]
+    text = " ".join(filter(None, body))
     if text.startswith("Missing from"):
         options = [words.split()[0] for words in body if words.startswith("--")]
         return f"missing {', '.join(options)}" if options else "an option is missing"
     without_value = re.match(r"Missing value for argument '(--[a-z0-9-]+)'", text)
     if without_value:
         return f"{without_value[1]} needs a value"
-    if not text:
-        return "the arguments cannot be read"
-    return text[0].lower() + text[1:].rstrip(".")
+    return text[0].lower() + text[1:].rstrip(".") if text else "the arguments cannot be read"
 
 
 def suggestion(word: str, known: Iterable[str]) -> str | None:
@@ -116,7 +94,8 @@ def suggestion(word: str, known: Iterable[str]) -> str | None:
 
 
 def _check_options(command: type[Command], argv: Sequence[str]) -> None:
-    """Refuse options that the command lacks, and options given twice."""
+    """Refuse options that the command lacks, options given twice, and values of the wrong kind."""
+    hints = get_type_hints(command, include_extras=True)
     known = {"--help": "help"}
     for field in dataclasses.fields(command):
         # A field whose name Python reserves, such as from, ends in an underscore.
@@ -125,8 +104,10 @@ def _check_options(command: type[Command], argv: Sequence[str]) -> None:
         if isinstance(field.default, bool):
             known[f"--no-{option}"] = field.name
     given: dict[str, str] = {}
-    for argument in argv:
-        option = argument.partition("=")[0].replace("_", "-")
+    words: dict[str, list[str]] = {}
+    for index, argument in enumerate(argv):
+        option, equals, value = argument.partition("=")
+        option = option.replace("_", "-")
         if not option.startswith("--"):
             continue
         if option not in known:
@@ -138,3 +119,17 @@ def _check_options(command: type[Command], argv: Sequence[str]) -> None:
         if field in given:
             raise UsageError(f"{option} is given twice; give it once, with all its values")
         given[field] = option
+        after = takewhile(lambda word: not word.startswith("--"), argv[index + 1 :])
+        words[field] = [value] if equals else [*after]
+    for field, option in given.items():
+        _check_value(option, hints.get(field), words[field])
+
+
+def _check_value(option: str, hint: Any, words: list[str]) -> None:
+    """Refuse words that are no value of an option; tyro says which value is missing."""
+    for marker in getattr(hint, "__metadata__", ()):
+        if isinstance(marker, PrimitiveConstructorSpec) and (words or marker.nargs == "*"):
+            try:
+                marker.instance_from_str(words if marker.nargs == "*" else words[:1])
+            except UsageError as error:
+                raise UsageError(f"{option}{error}") from None

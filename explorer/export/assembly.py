@@ -1,9 +1,9 @@
-"""The prototype for printers, CAD and viewers: 3MF, GLB, and a zip with an STL for each part.
+"""The prototype for printers, CAD and viewers: 3MF, GLB, STEP, and a zip with an STL of each part.
 
-3MF and STL are in millimetres, GLB by its specification in metres with y up. The assembly is
-in the home pose. In 3MF each leg is a group of its parts; in GLB the tree of nodes is that of
-the joints, so that a rotated or moved node carries its children along. STL files hold each
-part in the frame of its body.
+3MF, STEP and STL are in millimetres, GLB by its specification in metres with y up. The assembly is
+in the home pose. In 3MF and STEP each leg is a group of its parts; in GLB the tree of nodes is that
+of the joints, so that a rotated or moved node carries its children along. STL files hold each part
+in the frame of its body.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from explorer.errors import InputError
-from explorer.export import packing
-from explorer.export.mesh import mesh_bytes
-from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.export import mesh, opencascade as cad
 from explorer.prototype.assembly import Prototype
-from explorer.prototype.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Places
+from explorer.prototype.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE
+from explorer.prototype.shapes import forms_of
+from explorer.prototype.sizes import Sizes
+from explorer.singularity.colours import Rgb
 
-COLOURS: Mapping[str, packing.Rgb] = MappingProxyType(
+COLOURS: Mapping[str, Rgb] = MappingProxyType(
     {
         "base": (214, 219, 226),
         "carriage": (238, 119, 51),
@@ -49,22 +49,11 @@ def assembly_bytes(prototype: Prototype, file_format: str) -> bytes:
 
     Raises:
         InputError: The format is unknown, or the parts are too large for it.
+        MissingExtraError: STEP without OpenCASCADE.
         ExplorerError: The library of the format refuses the parts.
     """
-    check_format(file_format)
+    mesh.check_format(file_format, FORMATS, "assembly")
     return FORMATS[file_format](prototype)
-
-
-def check_format(file_format: str) -> None:
-    """Refuse an unknown format.
-
-    Raises:
-        InputError: The format is unknown; the message lists the formats.
-    """
-    if file_format not in FORMATS:
-        raise InputError(
-            f"no format {file_format!r} of assemblies; there are {', '.join(FORMATS)}, step"
-        )
 
 
 def part_groups() -> Sequence[tuple[str, Sequence[str]]]:
@@ -77,34 +66,34 @@ def part_groups() -> Sequence[tuple[str, Sequence[str]]]:
 
 def _3mf(prototype: Prototype) -> bytes:
     design, unit, home = prototype.design, prototype.design.unit_mm, prototype.design.home_pose
-    packing.check_size(np.concatenate(prototype.at(home.position, home.rotation)) * unit)
+    mesh.check_size(np.concatenate(prototype.at(home.position, home.rotation)) * unit)
     places, kinds = prototype.chains.places_at(home.position, home.rotation), list(COLOURS)
     by_name = {part.name: part for part in prototype.parts}
-    with packing.refusals_of_lib3mf("parts"):
-        model = packing.Model(f"mechanism of {design.name}", design, COLOURS)
+    with mesh.refusals_of_lib3mf("parts"):
+        model = mesh.Model(f"mechanism of {design.name}", design, COLOURS)
         whole = model.add_group("mechanism")
         for name, members in part_groups():
             group = model.add_group(name)
             for member in members:
                 part, body = by_name[member], by_name[member].body_index
                 corners = part.vertices * unit
-                mesh = model.add_mesh(part.name, corners, part.faces, kinds.index(part.kind))
+                item = model.add_mesh(part.name, corners, part.faces, kinds.index(part.kind))
                 origin = places.origin[body] * unit
-                group.AddComponent(mesh, model.transform(places.rotation[body], origin))
+                group.AddComponent(item, model.transform(places.rotation[body], origin))
             whole.AddComponent(group, model.untransformed)
         return model.encode(whole, _DECIMALS)
 
 
 def _glb(prototype: Prototype) -> bytes:
-    metres = packing.METRES_PER_MILLIMETRE * prototype.design.unit_mm
+    metres = 1e-3 * prototype.design.unit_mm
     kinds = list(COLOURS)
-    return packing.glb_bytes(
+    return mesh.glb_bytes(
         {
             part.name: (part.vertices * metres, part.faces, kinds.index(part.kind))
             for part in prototype.parts
         },
         _nodes(prototype, metres),
-        [packing.material(kind, rgb, metallic=0.2, roughness=0.6) for kind, rgb in COLOURS.items()],
+        [mesh.material(kind, rgb, metallic=0.2, roughness=0.6) for kind, rgb in COLOURS.items()],
         prototype.design,
     )
 
@@ -113,39 +102,21 @@ def _nodes(prototype: Prototype, metres: float) -> list[dict[str, Any]]:
     """Return the nodes: the mechanism, the bodies from joint to joint, the balls."""
     home = prototype.design.home_pose
     places = prototype.chains.places_at(home.position, home.rotation)
-    nodes: list[dict[str, Any]] = [{"name": "mechanism", "rotation": packing.Y_UP, "children": [1]}]
-    indices: dict[str, int] = {}
+    nodes: list[dict[str, Any]] = [{"name": "mechanism", "rotation": mesh.Y_UP, "children": [1]}]
+    # Bodies come in the order of their chains; the node of one follows that of its index.
     for number, part in enumerate(prototype.parts):
-        node: dict[str, Any] = {"name": part.name, "mesh": number}
-        if part.name in BODIES:
-            indices[part.name] = len(nodes)
-            outer = _parent(part.name)
-            if outer is not None:
-                node.update(_relative(places, part.body_index, BODIES.index(outer), metres))
-                nodes[indices[outer]].setdefault("children", []).append(len(nodes))
-                if part.name != "platform":
-                    node["extras"] = {"joint": CHAIN_JOINTS[part.body_index - 1]}
-        else:
-            nodes[indices[part.body]].setdefault("children", []).append(len(nodes))
+        body, node = part.body_index, {"name": part.name, "mesh": number}
+        if part.name not in BODIES:
+            nodes[body + 1].setdefault("children", []).append(len(nodes))
+        elif body:
+            outer = body - 1 if (body - 1) % 3 else 0
+            offset, (w, x, y, z) = places.within(body, outer)
+            node |= {"rotation": [x, y, z, w], "translation": (offset * metres).tolist()}
+            nodes[outer + 1].setdefault("children", []).append(len(nodes))
+            if part.name != "platform":
+                node["extras"] = {"joint": CHAIN_JOINTS[body - 1]}
         nodes.append(node)
     return nodes
-
-
-def _parent(body: str) -> str | None:
-    """Return the parent of a body in its chain; None for the base."""
-    if body == "base":
-        return None
-    kind, _, leg = body.partition(" ")
-    before = {"rod": "cylinder", "cylinder": "carriage" if leg in "23" else "cross"}.get(kind)
-    return f"{before} {leg}" if before else "base"
-
-
-def _relative(places: Places, body: int, outer: int, metres: float) -> dict[str, list[float]]:
-    """Return the rotation (x, y, z, w) and translation in metres of a body within its parent."""
-    turn = places.rotation[outer].T
-    w, x, y, z = quaternion_from_rotation(turn @ places.rotation[body]).tolist()
-    offset = turn @ (places.origin[body] - places.origin[outer]) * metres
-    return {"rotation": [x, y, z, w], "translation": offset.tolist()}
 
 
 def _stl_zip(prototype: Prototype) -> bytes:
@@ -155,11 +126,48 @@ def _stl_zip(prototype: Prototype) -> bytes:
             # Without a date equal parts give equal files.
             entry = zipfile.ZipInfo(f"{part.name.replace(' ', '-')}.stl")
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
-            archive.writestr(entry, mesh_bytes(part.solid, "stl", prototype.design, part.name))
+            archive.writestr(entry, mesh.mesh_bytes(part.solid, "stl", prototype.design, part.name))
     return file.getvalue()
 
 
+def exact_parts(sizes: Sizes) -> dict[str, cad.ExactShape]:
+    """Return the parts by name, each in the frame of its body, in millimetres."""
+    return {name: shape for name, _, shape in forms_of(sizes, cad.ExactKernel())}
+
+
+def _step(prototype: Prototype) -> bytes:
+    design = prototype.design
+    home = design.home_pose
+    places = prototype.chains.places_at(home.position, home.rotation)
+    parts = exact_parts(prototype.sizes)
+    bodies = {part.name: part.body_index for part in prototype.parts}
+    document = cad.Document()
+
+    def add_group(name: str) -> Any:
+        label = document.shapes.NewShape()
+        document.set_name(label, name)
+        return label
+
+    def add(group: Any, label: Any, transformation: Any, name: str) -> None:
+        location = cad.occ("TopLoc_Location")(transformation)
+        document.set_name(document.shapes.AddComponent(group, label, location), name)
+
+    whole = add_group(f"mechanism of {design.name}")
+    for name, members in part_groups():
+        group = add_group(name)
+        for member in members:
+            label = document.shapes.AddShape(parts[member].shape, False)
+            document.set_name(label, member)
+            document.set_colour(label, COLOURS[member.partition(" ")[0]])
+            body = bodies[member]
+            place = cad.transform(places.rotation[body], places.origin[body] * design.unit_mm)
+            add(group, label, place, member)
+        add(whole, group, cad.occ("gp_Trsf")(), name)
+    document.shapes.UpdateAssemblies()
+    return document.step()
+
+
 FORMATS: Mapping[str, Callable[[Prototype], bytes]] = MappingProxyType(
-    {"3mf": _3mf, "glb": _glb, "stl-zip": _stl_zip}
+    {"3mf": _3mf, "glb": _glb, "stl-zip": _stl_zip, "step": _step}
 )
 """The writer of each format."""

@@ -1,44 +1,265 @@
-"""Meshes for printers, CAD and viewers: 3MF, STL, GLB, OBJ and PLY.
+"""Meshes for printers, CAD and viewers: 3MF, STL, GLB, OBJ and PLY, with names, colours and design.
 
-Coordinates are those of the base frame in millimetres; GLB is by its specification in
-metres with y up. 3MF, STL and GLB hold single precision (6e-8 of the largest coordinate),
-PLY and OBJ double. A file holds the name, a colour or group for each limit, and the design
-as JSON, as far as its format allows.
+Coordinates are those of the base frame in millimetres; GLB is by its specification in metres with
+y up. 3MF, STL and GLB hold single precision (6e-8 of the largest coordinate), PLY and OBJ double.
 
-trimesh packs GLB and STL, lib3mf 3MF. PLY and OBJ are written here: those of trimesh have no
-limits (comments, groups), and its PLY has single precision.
+trimesh packs GLB and STL, lib3mf 3MF. PLY and OBJ are written here: those of trimesh have no limits
+(comments, groups), and its PLY has single precision.
 """
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+import unicodedata
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
+import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
+from explorer import __version__
 from explorer.errors import ExplorerError, InputError, NoAnswerError
-from explorer.export.packing import (
-    APPLICATION,
-    METRES_PER_MILLIMETRE,
-    Y_UP,
-    Model,
-    Rgb,
-    ascii_name,
-    check_size,
-    comments,
-    design_json,
-    glb_bytes,
-    json_line,
-    material,
-    printable_name,
-    refusals_of_lib3mf,
-)
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
+from explorer.singularity.colours import Rgb, linear
 from explorer.workspace.solids.solid import Solid
+
+APPLICATION = f"flagged-explorer {__version__}"
+# Largest number of characters of a name in a file.
+LONGEST_NAME = 160
+
+# Readers of PLY take lines of a few hundred characters only. A piece of a comment ends after a
+# comma if it can; never at a blank, which programs trim, nor at a backslash, which in OBJ would
+# append the next line.
+_PIECE = re.compile(r".{1,160}(?<![ \\])(?! )(?:(?<=,)|$)|.{1,160}(?<![ \\])(?! )")
+
+
+def json_line(value: object) -> str:
+    """Return plain values as JSON on one line, in ASCII, that readers of comments stand.
+
+    It has no two backslashes in a row, and not the last word of the header of a PLY file.
+    """
+    text = json.dumps(value, separators=(",", ":")).replace("\\\\", "\\u005c")
+    return text.replace("end_header", "end\\u005fheader")
+
+
+def design_json(design: Design) -> str:
+    """Return the design as JSON, as `json_line` does."""
+    return json_line(json.loads(msgspec.json.encode(design)))
+
+
+def printable_name(name: str) -> str:
+    """Return a name as one printable line of 1 to `LONGEST_NAME` characters."""
+    printable = "".join(letter if letter.isprintable() else " " for letter in name)
+    return " ".join(printable.split())[:LONGEST_NAME].rstrip() or "workspace"
+
+
+def ascii_name(name: str) -> str:
+    """Return a name in ASCII: letters without their accents, others left out; δ1 becomes 1."""
+    return printable_name(unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode())
+
+
+def comments(mark: str, text: str) -> list[str]:
+    """Return a text in ASCII as comments of at most 160 characters, each after the same mark.
+
+    Args:
+        mark: Start of a comment, such as "comment design".
+        text: What `json_line` returns; joining what follows the marks gives it back.
+    """
+    return [f"{mark} {piece}" for piece in _PIECE.findall(text)]
+
+
+def check_format(file_format: str, formats: Collection[str], what: str) -> None:
+    """Refuse an unknown format of a file, such as a "mesh".
+
+    Raises:
+        InputError: The format is unknown; the message lists the formats.
+    """
+    if file_format not in formats:
+        raise InputError(f"no {what} format {file_format!r}; there are {', '.join(formats)}")
+
+
+Y_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
+"""The rotation (x, y, z, w) of the first node, which turns z up to y up."""
+
+
+def material(name: str, rgb: Rgb, *, metallic: float, roughness: float) -> dict[str, Any]:
+    """Return a material in glTF, with its metalness and roughness from 0 to 1."""
+    factors = {
+        "baseColorFactor": [*(linear(channel) for channel in rgb), 1.0],
+        "metallicFactor": metallic,
+        "roughnessFactor": roughness,
+    }
+    return {"name": name, "pbrMetallicRoughness": factors}
+
+
+def glb_bytes(
+    bodies: Mapping[str, tuple[FloatArray, NDArray[np.integer], int]],
+    nodes: Sequence[Mapping[str, Any]],
+    materials: Sequence[Mapping[str, Any]],
+    design: Design,
+) -> bytes:
+    """Return a GLB file.
+
+    Args:
+        bodies: Meshes by name: corners in metres, shape (n, 3), indices of the corners of each
+            triangle, shape (m, 3), and the index of a material; nodes refer to them in this order.
+        nodes: Nodes in glTF; the first is the root and rotates by `Y_UP`.
+        materials: Materials that the bodies refer to, as `material` returns them.
+        design: The design, kept as JSON in the file.
+    """
+    import trimesh
+
+    def complete(tree: dict[str, Any]) -> None:
+        extras = {
+            "unit": "metre; millimetres of the base frame times 0.001",
+            "up": "the first node turns the base frame, whose z is up, to y up",
+            "unit_mm": design.unit_mm,
+            "design": json.loads(design_json(design)),
+        }
+        tree["asset"] = {"version": "2.0", "generator": APPLICATION, "extras": extras}
+        tree["scenes"] = [{"nodes": [0]}]
+        tree["nodes"] = list(nodes)
+        tree["materials"] = list(materials)
+        for mesh, (_, _, index) in zip(tree["meshes"], bodies.values(), strict=True):
+            mesh["primitives"][0]["material"] = index
+
+    untyped: Any = trimesh
+    scene = untyped.Scene()
+    for name, (vertices, faces, _) in bodies.items():
+        scene.add_geometry(untyped.Trimesh(vertices, faces, process=False), geom_name=name)
+    return scene.export(file_type="glb", tree_postprocessor=complete)
+
+
+LARGEST = 1e9
+"""The largest coordinate that lib3mf takes, in millimetres."""
+
+NAMESPACE = "urn:flagged-explorer"
+"""The XML namespace of the design in a file's metadata."""
+
+
+def check_size(points: FloatArray) -> float:
+    """Return the largest magnitude of a coordinate of points (n, 3), in millimetres.
+
+    Raises:
+        InputError: Lib3mf does not accept the coordinate.
+    """
+    largest = float(np.abs(points).max())
+    if largest > LARGEST:
+        raise InputError(
+            f"lib3mf takes coordinates up to {LARGEST:g} mm; these reach {largest:.3g} mm: use "
+            "another format, or a smaller unit"
+        )
+    return largest
+
+
+@contextlib.contextmanager
+def refusals_of_lib3mf(what: str) -> Generator[None]:
+    """Raise an error of lib3mf as an `ExplorerError` that names what it refuses."""
+    import lib3mf  # pyright: ignore[reportMissingTypeStubs]
+
+    library: Any = lib3mf
+    try:
+        yield
+    except library.ELib3MFException as error:
+        raise ExplorerError(f"lib3mf refuses the {what}: {error}") from None
+
+
+class Model:
+    """A model of lib3mf with one group of materials.
+
+    Args:
+        name: Title of the file.
+        design: The design that the file is of.
+        colours: Colours of the materials by their names, one at least.
+    """
+
+    def __init__(self, name: str, design: Design, colours: Mapping[str, Rgb]) -> None:
+        import lib3mf  # pyright: ignore[reportMissingTypeStubs]
+
+        self._library: Any = lib3mf
+        wrapper = self._library.get_wrapper()
+        self.untransformed: Any = wrapper.GetIdentityTransform()
+        self._model: Any = wrapper.CreateModel()
+        self._model.SetUnit(self._library.ModelUnit.MilliMeter)
+        about = self._model.GetMetaDataGroup()
+        for key, value in (
+            ("Title", name),
+            ("Application", APPLICATION),
+            ("Description", f"{name}; one design unit is {design.unit_mm:g} mm"),
+        ):
+            about.AddMetaData("", key, value, "xs:string", True)
+        about.AddMetaData(NAMESPACE, "design", design_json(design), "xs:string", True)
+        group = self._model.AddBaseMaterialGroup()
+        self._materials: int = group.GetResourceID()
+        self._ids = [
+            group.AddMaterial(material, wrapper.RGBAToColor(*rgb, 255))
+            for material, rgb in colours.items()
+        ]
+
+    def add_mesh(
+        self, name: str, points: FloatArray, faces: NDArray[np.integer], material: int
+    ) -> Any:
+        """Add a mesh of one material and return it.
+
+        Args:
+            name: Name of the mesh.
+            points: Corners in millimetres, shape (n, 3).
+            faces: Indices of the corners of each triangle, shape (m, 3).
+            material: Index of its material.
+        """
+        mesh = self._model.AddMeshObject()
+        mesh.SetName(name)
+        corners = np.ascontiguousarray(points, dtype="<f4")
+        triangles = np.ascontiguousarray(faces, dtype="<u4")
+        mesh.SetGeometry(
+            (self._library.Position * len(corners)).from_buffer_copy(corners),
+            (self._library.Triangle * len(triangles)).from_buffer_copy(triangles),
+        )
+        mesh.SetObjectLevelProperty(self._materials, self._ids[material])
+        return mesh
+
+    def colour_faces(self, mesh: Any, material_of_face: NDArray[np.integer]) -> None:
+        """Give each triangle of a mesh the material of an index, shape (m,)."""
+        properties = np.empty((len(material_of_face), 4), dtype="<u4")
+        properties[:, 0] = self._materials
+        properties[:, 1:] = np.array(self._ids)[material_of_face][:, None]
+        mesh.SetAllTriangleProperties(
+            (self._library.TriangleProperties * len(properties)).from_buffer_copy(properties)
+        )
+
+    def add_group(self, name: str) -> Any:
+        """Add an object that holds others as components and return it."""
+        group = self._model.AddComponentsObject()
+        group.SetName(name)
+        return group
+
+    def transform(self, rotation: FloatArray, origin: FloatArray) -> Any:
+        """Return a rotation and a translation in millimetres: its columns, then the origin."""
+        transform = self._library.Transform()
+        for i, row in enumerate([*rotation.T.tolist(), origin.tolist()]):
+            for j, value in enumerate(row):
+                transform.Fields[i][j] = value
+        return transform
+
+    def encode(self, item: Any, decimals: int) -> bytes:
+        """Return the file that shows one object.
+
+        Args:
+            item: The object.
+            decimals: Decimals of the coordinates, which lib3mf writes with a fixed number.
+        """
+        self._model.AddBuildItem(item, self.untransformed)
+        writer = self._model.QueryWriter("3mf")
+        writer.SetDecimalPrecision(decimals)
+        return bytes(writer.WriteToBuffer())
+
 
 COLOURS: Mapping[str, Rgb] = MappingProxyType(
     {
@@ -74,23 +295,14 @@ def mesh_bytes(solid: Solid, file_format: str, design: Design, name: str) -> byt
         NoAnswerError: The solid is empty.
         ExplorerError: The solid is not closed, or the library of the format refuses it.
     """
-    check_format(file_format)
+    check_format(file_format, FORMATS, "mesh")
     if solid.is_empty:
         reason = f": {', '.join(solid.empty_because)}" if solid.empty_because else ""
         raise NoAnswerError(f"there is nothing to export, the workspace is empty{reason}")
     if not solid.is_watertight:
         raise ExplorerError("the mesh is not watertight, so that it encloses no volume to export")
+    solid = replace(solid, vertices=solid.vertices * design.unit_mm)
     return FORMATS[file_format](solid, design, printable_name(name))
-
-
-def check_format(file_format: str) -> None:
-    """Refuse an unknown format.
-
-    Raises:
-        InputError: The format is unknown; the message lists the formats.
-    """
-    if file_format not in FORMATS:
-        raise InputError(f"no mesh format {file_format!r}; there are {', '.join(FORMATS)}")
 
 
 def colour_of(limit: str) -> Rgb:
@@ -98,20 +310,11 @@ def colour_of(limit: str) -> Rgb:
     return COLOURS.get(limit.partition(" ")[0], HULL_COLOUR)
 
 
-def _millimetres(solid: Solid, design: Design) -> FloatArray:
-    return solid.vertices * design.unit_mm
-
-
-def _single(
-    points: FloatArray, solid: Solid, file_format: str, decimals: int | None = None
-) -> FloatArray:
-    """Return points rounded to single precision, and to decimals if given, as float64."""
-    rounded = points.astype(np.float32).astype(np.float64)
-    if decimals is not None:
-        rounded = rounded.round(decimals)
-    middle = points.mean(axis=0)
-    before, after = (_volume(corners - middle, solid) for corners in (points, rounded))
-    if abs(after - before) <= ROUNDING * before:
+def _single(solid: Solid, file_format: str, decimals: int | None = None) -> Solid:
+    """Return a solid rounded to single precision, and to decimals if given."""
+    points = solid.vertices.astype(np.float32).astype(np.float64)
+    rounded = replace(solid, vertices=points if decimals is None else points.round(decimals))
+    if abs(rounded.volume - solid.volume) <= ROUNDING * solid.volume:
         return rounded
     raise InputError(
         f"{file_format} holds single precision, which spoils a mesh of this size at coordinates up "
@@ -119,15 +322,10 @@ def _single(
     )
 
 
-def _volume(points: FloatArray, solid: Solid) -> float:
-    a, b, c = (points[solid.faces[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
-
-
-def _stl(solid: Solid, design: Design, name: str) -> bytes:
+def _stl(solid: Solid, _: Design, name: str) -> bytes:
     import trimesh
 
-    points = _single(_millimetres(solid, design), solid, "stl")
+    points = _single(solid, "stl").vertices
     # Rounding may merge corners; the facets that it degenerates are left out.
     a, b, c = (points[solid.faces[:, k]] for k in range(3))
     is_facet = ~((a == b).all(axis=1) | (b == c).all(axis=1) | (c == a).all(axis=1))
@@ -164,7 +362,7 @@ def _ply(solid: Solid, design: Design, name: str) -> bytes:
     faces["count"], faces["corners"] = 3, solid.faces
     faces["colour"] = np.array([colour_of(limit) for limit in solid.limits])[solid.limit_of_face]
     head = ("\n".join(lines) + "\n").encode("ascii")
-    return head + _millimetres(solid, design).astype("<f8").tobytes() + faces.tobytes()
+    return head + solid.vertices.astype("<f8").tobytes() + faces.tobytes()
 
 
 def _obj(solid: Solid, design: Design, name: str) -> bytes:
@@ -173,7 +371,7 @@ def _obj(solid: Solid, design: Design, name: str) -> bytes:
         "# unit millimetre",
         *comments("# design", design_json(design)),
         f"o {_word(name)}",
-        *(f"v {_join_numbers(point)}" for point in _millimetres(solid, design).tolist()),
+        *(f"v {_join_numbers(point)}" for point in solid.vertices.tolist()),
     ]
     for index, limit in enumerate(solid.limits):
         faces = solid.faces[solid.limit_of_face == index] + 1
@@ -184,9 +382,9 @@ def _obj(solid: Solid, design: Design, name: str) -> bytes:
 
 
 def _glb(solid: Solid, design: Design, name: str) -> bytes:
-    points = _single(_millimetres(solid, design) * METRES_PER_MILLIMETRE, solid, "glb")
+    metres = _single(replace(solid, vertices=1e-3 * solid.vertices), "glb")
     return glb_bytes(
-        {name: (points, solid.faces, 0)},
+        {name: (metres.vertices, solid.faces, 0)},
         [{"name": name, "mesh": 0, "rotation": Y_UP}],
         [material("workspace", HULL_COLOUR, metallic=0.0, roughness=0.8)],
         design,
@@ -194,11 +392,10 @@ def _glb(solid: Solid, design: Design, name: str) -> bytes:
 
 
 def _3mf(solid: Solid, design: Design, name: str) -> bytes:
-    points = _millimetres(solid, design)
-    largest = check_size(points)
+    largest = check_size(solid.vertices)
     # lib3mf writes fixed decimals, which it computes as integers of 64 bits.
     decimals = min(16, max(4, 11 - math.floor(math.log10(largest))))
-    points = _single(points, solid, "3mf", decimals)
+    points = _single(solid, "3mf", decimals).vertices
     with refusals_of_lib3mf("mesh"):
         model = Model(name, design, {limit: colour_of(limit) for limit in solid.limits})
         mesh = model.add_mesh(name, points, solid.faces, 0)

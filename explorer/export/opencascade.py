@@ -18,10 +18,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import ExplorerError, MissingExtraError
-from explorer.export.packing import Rgb, linear, printable_name
+from explorer.export.mesh import printable_name
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.forms import Circle, Kernel
+from explorer.prototype.shapes import Circle, Kernel
+from explorer.singularity.colours import Rgb, linear
 
 SCHEMA = "AP242DIS"
 
@@ -45,6 +46,11 @@ def occ(name: str) -> Any:
             'STEP needs OpenCASCADE, which is not installed: pip install "flagged-explorer[cad]"'
         ) from None
     return getattr(package, name)
+
+
+def check_extra() -> None:
+    """Raise a MissingExtraError, which says how to get OpenCASCADE, if it is not installed."""
+    occ("gp_Pnt")
 
 
 def point(position: FloatArray) -> Any:
@@ -73,9 +79,8 @@ def transform(rotation: FloatArray, origin: FloatArray) -> Any:
 def faces_of(shape: Any) -> Iterator[Any]:
     """Yield the faces of a shape."""
     walk = occ("TopExp_Explorer")(shape, occ("TopAbs_ShapeEnum").TopAbs_FACE)
-    namespace = occ("TopoDS")
     # Static functions had the suffix _s before OpenCASCADE 8.
-    to_face = getattr(namespace, "Face", None) or namespace.Face_s
+    to_face = getattr(occ("TopoDS"), "Face", None) or occ("TopoDS").Face_s
     while walk.More():
         yield to_face(walk.Current())
         walk.Next()
@@ -91,43 +96,43 @@ def volume_of(shape: Any) -> float:
 
 @dataclass(frozen=True)
 class ExactShape:
-    """A body with exact faces; implements `explorer.prototype.forms.Shape`."""
+    """A body with exact faces; implements `explorer.prototype.shapes.Shape`."""
 
     shape: Any
 
     def __add__(self, other: ExactShape) -> ExactShape:
-        return self._combined(other, "BRepAlgoAPI_Fuse")
+        return self._combine(other, "Fuse")
 
     def __sub__(self, other: ExactShape) -> ExactShape:
-        return self._combined(other, "BRepAlgoAPI_Cut")
+        return self._combine(other, "Cut")
 
     def __xor__(self, other: ExactShape) -> ExactShape:
-        return self._combined(other, "BRepAlgoAPI_Common")
+        return self._combine(other, "Common")
 
     def translate(self, offset: Triple) -> ExactShape:
         """Return the shape translated."""
-        return self._moved(transform(np.eye(3), np.array(offset)))
+        return self._move(transform(np.eye(3), np.array(offset)))
 
     def rotate(self, degrees: Triple) -> ExactShape:
         """Return the shape rotated about x, then y, then z, in degrees."""
         turn = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix()
-        return self._moved(transform(turn, np.zeros(3)))
+        return self._move(transform(turn, np.zeros(3)))
 
     def transform(self, matrix: FloatArray) -> ExactShape:
         """Return the shape rotated and translated by a matrix, shape (3, 4)."""
-        return self._moved(transform(matrix[:, :3], matrix[:, 3]))
+        return self._move(transform(matrix[:, :3], matrix[:, 3]))
 
     def mirror(self, normal: Triple) -> ExactShape:
         """Return the mirror image in a plane through the origin."""
         reflection = occ("gp_Trsf")()
         reflection.SetMirror(occ("gp_Ax2")(point(np.zeros(3)), direction(np.array(normal))))
-        return self._moved(reflection)
+        return self._move(reflection)
 
-    def _moved(self, transformation: Any) -> ExactShape:
+    def _move(self, transformation: Any) -> ExactShape:
         return ExactShape(occ("BRepBuilderAPI_Transform")(self.shape, transformation, True).Shape())
 
-    def _combined(self, other: ExactShape, operation: str) -> ExactShape:
-        work = occ(operation)(self.shape, other.shape)
+    def _combine(self, other: ExactShape, operation: str) -> ExactShape:
+        work = occ(f"BRepAlgoAPI_{operation}")(self.shape, other.shape)
         if not work.IsDone():
             raise ExplorerError(f"OpenCASCADE cannot combine two shapes ({operation})")
         return ExactShape(work.Shape())
@@ -222,7 +227,9 @@ class Document:
         Raises:
             ExplorerError: OpenCASCADE cannot write it.
         """
-        _silence_messages()
+        # OpenCASCADE would write its progress to standard output.
+        for printer in occ("Message").DefaultMessenger_s().Printers():
+            printer.SetTraceLevel(occ("Message_Gravity").Message_Alarm)
         occ("STEPCAFControl_Controller").Init_s()
         static = occ("Interface_Static")
         static.SetCVal_s("write.step.schema", SCHEMA)
@@ -245,20 +252,13 @@ def step_text(text: str) -> str:
     OpenCASCADE doubles apostrophes, but writes other letters than those of ASCII as UTF-8, and
     takes a backslash for the start of a directive.
     """
-    return re.sub(r"[^ -\[\]-~]+", _directive, text)
 
+    def directive(match: re.Match[str]) -> str:
+        plane, digits = ("X4", 8) if max(match[0]) > "\uffff" else ("X2", 4)
+        return f"\\{plane}\\{''.join(f'{ord(each):0{digits}X}' for each in match[0])}\\X0\\"
 
-def _directive(match: re.Match[str]) -> str:
-    letters = match[0]
-    plane, digits = ("X4", 8) if max(letters) > "\uffff" else ("X2", 4)
-    return f"\\{plane}\\{''.join(f'{ord(each):0{digits}X}' for each in letters)}\\X0\\"
+    return re.sub(r"[^ -\[\]-~]+", directive, text)
 
 
 def _text(text: str) -> Any:
     return occ("TCollection_ExtendedString")(text, True)
-
-
-def _silence_messages() -> None:
-    """Stop OpenCASCADE from writing progress to standard output."""
-    for printer in occ("Message").DefaultMessenger_s().Printers():
-        printer.SetTraceLevel(occ("Message_Gravity").Message_Alarm)

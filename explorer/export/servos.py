@@ -16,12 +16,12 @@ from scipy.spatial.transform import Rotation
 
 from explorer.errors import NoAnswerError
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.design import JOINTS, STRUT_ROWS, Design
 from explorer.mechanism.kinematics import inverse
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES, Chains
 from explorer.prototype.weights import Mass, machine_weights, total_mass
-from explorer.statics.compliance import stiffness_of
+from explorer.statics.compliance import softness_with_struts
 from explorer.statics.forces import actuator_forces, twists_of_actuators
 from explorer.statics.weights import carry
 from explorer.workspace.limits.table import joint_ranges
@@ -105,11 +105,9 @@ def servo_stiffness(design: Design) -> FloatArray | None:
     have at home. An actuator that the design leaves rigid is ten times as stiff as the stiffest of
     the others.
     """
-    stiffness, bending = stiffness_of(design)
     home = design.home_pose
-    softness = 1.0 / stiffness
-    lengths = inverse(design, home.position, home.rotation)[[2, 4]]
-    softness[[1, 3]] += lengths**3 / (3.0 * bending)
+    lengths = inverse(design, home.position, home.rotation)[STRUT_ROWS]
+    softness = softness_with_struts(design, lengths)
     gives = softness > 0.0
     if not gives.any():
         return None
@@ -118,28 +116,24 @@ def servo_stiffness(design: Design) -> FloatArray | None:
 
 
 def servos_of(design: Design, masses: Mapping[str, Mass], *, elastic: bool) -> Servos:
-    """Return the servos of a design.
+    """Return the servos of a design, given the masses of bodies as of `SimulationModel`.
 
-    Args:
-        design: The manipulator.
-        masses: Masses of the bodies without the payload, in their own frames, in metres and
-            kilograms.
-        elastic: Whether they have the stiffness that the design states. Others, and those of a
-            design that states none, have the frequency `FREQUENCY` with the inertia that they
-            move, and hold the weights at home.
+    Elastic servos have the stiffness that the design states. Others, and those of a design that
+    states none, have the frequency `FREQUENCY` with the inertia that they move, and hold the
+    weights at home.
 
     Raises:
         NoAnswerError: The home pose is singular.
     """
-    moved = np.diag(joint_inertia(design, with_payload(design, masses)))
+    inertia = np.diag(joint_inertia(design, with_payload(design, masses)))
     home = design.home_pose
     wrench = carry(Configuration.at(design, home), machine_weights(design, masses)).wrench
     weights = actuator_forces(design, home.position, home.rotation, wrench)
     stiffness = servo_stiffness(design) if elastic else None
     forces = weights if stiffness is None else np.zeros(6)
     if stiffness is None:
-        stiffness = FREQUENCY**2 * moved
-    rotors = np.maximum(moved, stiffness / FREQUENCY**2)
+        stiffness = FREQUENCY**2 * inertia
+    rotors = np.maximum(inertia, stiffness / FREQUENCY**2)
     return Servos(stiffness, 2.0 * np.sqrt(stiffness * rotors), rotors, weights, forces)
 
 
@@ -153,11 +147,8 @@ def with_payload(design: Design, masses: Mapping[str, Mass]) -> Mapping[str, Mas
 def joint_inertia(design: Design, masses: Mapping[str, Mass]) -> FloatArray:
     """Return the inertia of all bodies at home per joint rates, shape (6, 6), in kg.
 
-    The kinetic energy is half of rates @ inertia @ rates, with rates in metres per second.
-
-    Args:
-        design: The manipulator.
-        masses: Masses of the bodies in their own frames, in metres and kilograms.
+    The kinetic energy is half of rates @ inertia @ rates, with rates in metres per second; masses
+    are those of bodies in their own frames, in metres and kilograms.
 
     Raises:
         NoAnswerError: The home pose is singular.
@@ -182,11 +173,11 @@ def joint_inertia(design: Design, masses: Mapping[str, Mass]) -> FloatArray:
     inertia = np.zeros((6, 6))
     for name, mass in masses.items():
         index = BODIES.index(name)
-        moved = (ahead.origin - behind.origin)[:, index] / (2.0 * steps)
+        speeds = (ahead.origin - behind.origin)[:, index] / (2.0 * steps)
         turn = ahead.rotation[:, index] @ np.swapaxes(behind.rotation[:, index], -1, -2)
         spin = Rotation.from_matrix(turn).as_rotvec() / (2.0 * steps * metres)
         axes = here.rotation[index]
-        moved += np.cross(spin, axes @ mass.centre)
-        turned = spin @ axes
-        inertia += mass.mass * moved @ moved.T + turned @ mass.inertia @ turned.T
+        speeds += np.cross(spin, axes @ mass.centre)
+        spin = spin @ axes
+        inertia += mass.mass * speeds @ speeds.T + spin @ mass.inertia @ spin.T
     return inertia

@@ -4,41 +4,39 @@ Every leg is a chain of three joints from the body `base`; the platform, with th
 a ball joint at the end of leg 4, and three `connect` close the other loops. The home pose is the
 reference configuration. Six position servos move the actuators, see `explorer.export.servos`.
 
-The model can be part of a scene. It states no option and no compiler setting of the whole scene;
-angles are zero at home and limited by tendons, so that the scene may count them in degrees or
-radians. Gravity is that of the scene, downwards; a frame turns a base that stands otherwise.
+The model can be part of a scene: it has no option of the whole scene. Angles are zero at home and
+limited by tendons, so that the scene may count them in degrees or radians. Gravity is that of the
+scene, downwards; a frame turns a base that stands otherwise.
 
-MuJoCo's loops give way: by a ten-thousandth of what the bodies at their ends would do apart from
-each other, each as far as its centre of mass moves. A `connect` ends at a socket on the rod, a body
-of hardly any mass whose centre is the base joint, so that light legs do not let a heavy platform
-droop.
+MuJoCo's loops give way by a share of what the bodies at their ends would do apart from each other.
+A `connect` ends at a socket on the rod, a body of hardly any mass about the base joint, so that
+light legs do not let a heavy platform droop.
 
-The model of an imperfect machine has its dimensions, and starts where its loops close. A joint has
-the value that its encoder reads, which is off by the zero of the encoder: commands, ranges and
-`qpos` are what a controller knows. Its servos have the stiffness of the design.
+A joint of an imperfect machine has the value that its encoder reads: commands, ranges and `qpos`
+are what a controller knows. Its servos have the stiffness of the design.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import cast
 from xml.etree import ElementTree as ET
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer import __version__
 from explorer.errors import InputError
-from explorer.export.imperfect import ImperfectMachine
 from explorer.export.servos import servos_of, strokes_of, with_payload
 from explorer.mechanism.design import DOWN, JOINTS, Design
 from explorer.mechanism.machine import Guide
-from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED, BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Chains
+from explorer.prototype.imperfect import ImperfectMachine
 from explorer.prototype.weights import BALL, ROD, Mass, bar_masses, leg_radii
-from explorer.statics.accuracy import source_errors
+from explorer.statics.accuracy import SOURCES, source_errors
 from explorer.statics.compliance import is_elastic
 
 DENSITY = 1240.0
@@ -82,32 +80,6 @@ SPECK = 1e-12
 # A force that no servo has, in N; MuJoCo takes no infinite limits.
 NO_LIMIT = 1e10
 
-# Index of the rod on which the platform hangs.
-HOLDER = BODIES.index("rod 4")
-
-
-def simulation_joints(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Return the joint values of the model in a pose (MuJoCo's `qpos`), shape (..., 16).
-
-    The values are the joints of the four chains, in the order of `SIMULATION_JOINTS`: actuated
-    ones are lengths in metres, the others angles from home. Then comes the quaternion (w, x, y, z)
-    of the platform's ball joint, its rotation from home.
-
-    Args:
-        design: The manipulator.
-        position: Position of b4 in the base frame, shape (..., 3), in design units.
-        rotation: Rotation from platform to base, shape (..., 3, 3).
-    """
-    chains, home = Chains.of(design), design.home_pose
-    at_home = chains.joints(home.position, home.rotation)
-    joints = chains.joints(position, rotation)
-    is_actuated = np.isin(CHAIN_JOINTS, JOINTS)
-    values = np.where(is_actuated, 1e-3 * design.unit_mm * joints, joints - at_home)
-    start = chains.places(at_home, home.position, home.rotation).rotation[HOLDER]
-    rod = chains.places(joints, position, rotation).rotation[..., HOLDER, :, :]
-    ball = home.rotation.T @ start @ np.swapaxes(rod, -1, -2) @ rotation
-    return np.concatenate([values, quaternion_from_rotation(ball)], axis=-1)
-
 
 def simulation_mjcf(
     design: Design | ImperfectMachine,
@@ -144,11 +116,16 @@ class SimulationModel:
     ) -> None:
         if not (math.isfinite(density) and density > 0.0):
             raise InputError(f"the density must be positive; got {density:g}")
-        self.machine = given if isinstance(given, ImperfectMachine) else None
-        self.design = design = given.design if isinstance(given, ImperfectMachine) else given
+        self.is_perfect = not isinstance(given, ImperfectMachine)
+        self.machine = machine = (
+            given
+            if isinstance(given, ImperfectMachine)
+            else ImperfectMachine(given, np.zeros(len(SOURCES)))
+        )
+        self.design = design = machine.design
         self.metres = 1e-3 * design.unit_mm
-        home, chains = design.home_pose, Chains.of(design)
-        joints = chains.joints(home.position, home.rotation)
+        home = design.home_pose
+        joints = Chains.of(design).joints(home.position, home.rotation)
         for leg in LEGS:
             if not joints[3 * leg - 1] > 0.0:
                 raise InputError(
@@ -158,18 +135,14 @@ class SimulationModel:
         self.masses = masses or bar_masses(design, density)
         self._check_masses()
         self.radii = [radius * self.metres for radius in leg_radii(design)]
-        self.places = chains.places(joints, home.position, home.rotation)
-        # Joint values at home: those of the design, and those of the machine that has them.
-        self.nominal = self.joints = self.readings = joints
-        self.points = design.platform_points
-        if self.machine is not None:
-            true = self.machine.home
-            self.points = self.machine.points
-            self.joints = self.machine.chain_joints(true.position, true.rotation)
-            self.places = self.machine.places(self.joints, true.position, true.rotation)
-            self.readings = self.joints.copy()
-            self.readings[list(ACTUATED)] -= self.machine.encoder_offsets
-        self.servos = servos_of(design, self.masses, elastic=self.machine is not None)
+        # Joint values at home: those of the design, those of the machine that has them, and those
+        # that its encoders read.
+        self.nominal, true = joints, machine.home
+        self.joints = machine.chain_joints(true.position, true.rotation)
+        self.places = machine.places(self.joints, true.position, true.rotation)
+        self.readings = self.joints.copy()
+        self.readings[list(ACTUATED)] -= machine.encoder_offsets
+        self.servos = servos_of(design, self.masses, elastic=not self.is_perfect)
         self.masses = with_payload(design, self.masses)
         self.strokes = strokes_of(design, joints[list(ACTUATED)])
 
@@ -189,7 +162,7 @@ class SimulationModel:
             "the box of positions": limits.box is not None,
             "the least margins": bool(limits.margin),
             "limits that the home pose exceeds": self.strokes.exceeded,
-            "errors and stiffness": is_imprecise and self.machine is None,
+            "errors and stiffness": is_imprecise and self.is_perfect,
         }
         return tuple(each for each, is_left_out in words.items() if is_left_out)
 
@@ -217,22 +190,26 @@ class SimulationModel:
                 f"left out: {'; '.join(self.left_out)}",
             )
         )
-        if self.machine is not None:
+        if not self.is_perfect:
             root.append(_comment(*self.machine.remarks()))
-        default = ET.SubElement(ET.SubElement(root, "default"), "default", {"class": CLASS})
+        default = ET.SubElement(_add(root, "default"), "default", {"class": CLASS})
         for element, settings in DEFAULTS.items():
-            ET.SubElement(default, element, dict(settings))
-        self._bodies(ET.SubElement(root, "worldbody"))
-        equality = ET.SubElement(root, "equality")
-        for leg, point in zip(LEGS[:3], self.points * self.metres, strict=False):
+            _add(default, element, **settings)
+        self._bodies(_add(root, "worldbody"))
+        equality = _add(root, "equality")
+        for leg, point in zip(LEGS[:3], self.machine.points * self.metres, strict=False):
             ends = {"body1": "platform", "body2": f"socket_{leg}"}
-            _add_named(equality, "connect", f"ball_{leg}", **ends, anchor=_row(point))
+            _add_named(equality, "connect", f"ball_{leg}", **ends, anchor=point)
         self._limits(root)
-        self._servos(ET.SubElement(root, "actuator"))
-        key = ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="home")
+        self._servos(_add(root, "actuator"))
         values = np.where(np.isin(CHAIN_JOINTS, JOINTS), self.metres * self.readings, 0.0)
-        key.set("qpos", _row([*values, 1.0, 0.0, 0.0, 0.0]))
-        key.set("ctrl", _row(self.metres * self.nominal[list(ACTUATED)]))
+        _add(
+            _add(root, "keyframe"),
+            "key",
+            name="home",
+            qpos=[*values, 1.0, 0.0, 0.0, 0.0],
+            ctrl=self.metres * self.nominal[list(ACTUATED)],
+        )
         ET.indent(root)
         return ET.tostring(root, encoding="unicode") + "\n"
 
@@ -242,84 +219,64 @@ class SimulationModel:
             # The rotation that turns the direction of gravity downwards.
             x, y, z = design.gravity
             turn = [1.0 - z, -y, x, 0.0] if (x, y) != (0.0, 0.0) else [0.0, 1.0, 0.0, 0.0]
-            world = ET.SubElement(world, "frame", quat=_row(turn))
-        base = ET.SubElement(world, "body", name="base", childclass=CLASS)
+            world = _add(world, "frame", quat=turn)
+        base = _add(world, "body", name="base", childclass=CLASS)
         low, high = design.limits.guide or (0.0, design.a2x)
         thin = min(self.radii[1:3])
         if high > low:
             ends = [self._base_point(2, (x, 0.0)) for x in (low, high)]
-            _geom(base, "capsule", thin, fromto=_row([*ends[0], *ends[1]]))
+            _add(base, "geom", type="capsule", size=thin, fromto=np.concatenate(ends))
         for leg, place in ((1, (0.0, 0.0)), (4, design.a3)):
-            _geom(base, "sphere", thin, pos=_row(self._base_point(leg, place)))
+            _add(base, "geom", type="sphere", size=thin, pos=self._base_point(leg, place))
         rod = base
         for leg in LEGS:
             radius = self.radii[leg - 1]
             names = BODIES[3 * leg - 2 : 3 * leg + 1]
             length = self.metres * self.joints[3 * leg - 1]
             first = self._body(base, names[0], "base")
-            _geom(first, "sphere", BALL * radius)
+            _add(first, "geom", type="sphere", size=BALL * radius)
             cylinder = self._body(first, names[1], names[0])
             # Half of the leg at home, whatever the stroke, so that no gap shows.
-            _geom(cylinder, "capsule", radius, fromto=_row([0, 0, 0, 0, 0, 0.5 * length]))
+            half = [0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * length]
+            _add(cylinder, "geom", type="capsule", size=radius, fromto=half)
             rod = self._body(cylinder, names[2], names[1])
-            _geom(rod, "capsule", ROD * radius, fromto=_row([0, 0, -length, 0, 0, 0]))
+            back = [0.0, 0.0, -length, 0.0, 0.0, 0.0]
+            _add(rod, "geom", type="capsule", size=ROD * radius, fromto=back)
             if leg < LEGS[-1]:
-                socket = ET.SubElement(rod, "body", name=f"socket_{leg}")
-                mass = self.masses[names[2]]
-                ET.SubElement(
-                    socket,
-                    "inertial",
-                    pos=_row([0, 0, -length]),
-                    mass=repr(SPECK * mass.mass),
-                    diaginertia=_row([SPECK * np.trace(mass.inertia)] * 3),
-                )
+                mass, inertia = SPECK * self.masses[names[2]].mass, self.masses[names[2]].inertia
+                speck = [SPECK * float(np.trace(inertia))] * 3
+                socket = _add(rod, "body", name=f"socket_{leg}")
+                _add(socket, "inertial", pos=back[:3], mass=mass, diaginertia=speck)
         platform = self._body(rod, "platform", "rod 4")
-        points = self.points * metres
+        points = self.machine.points * metres
         hub = points.mean(axis=0)
         for radius, point in zip(self.radii, points, strict=True):
-            _geom(platform, "sphere", BALL * radius, pos=_row(point))
+            _add(platform, "geom", type="sphere", size=BALL * radius, pos=point)
             if (point != hub).any():
-                _geom(platform, "capsule", radius, fromto=_row([*hub, *point]))
-        ET.SubElement(
-            platform,
-            "site",
-            name="tool",
-            size=repr(self.radii[3]),
-            pos=_row(metres * np.array(design.tool.position)),
-            quat=_row(design.tool.quaternion),
-        )
+                ends = np.concatenate([hub, point])
+                _add(platform, "geom", type="capsule", size=radius, fromto=ends)
+        tool = {"pos": metres * np.array(design.tool.position), "quat": design.tool.quaternion}
+        _add(platform, "site", name="tool", size=self.radii[3], **tool)
 
     def _base_point(self, leg: int, place: tuple[float, float]) -> FloatArray:
         """Return where a point (x, y) of the base at a leg lies, shape (3,), in metres."""
-        point = np.array([*place, 0.0])
-        if self.machine is not None:
-            point = self.machine.shifts[leg - 1] + self.machine.turns[leg - 1] @ point
-        return point * self.metres
+        shift, turn = self.machine.shifts[leg - 1], self.machine.turns[leg - 1]
+        return (shift + turn @ [*place, 0.0]) * self.metres
 
     def _body(self, parent: ET.Element, name: str, within: str) -> ET.Element:
         """Add a body with its joint and its mass, placed as in the home pose."""
-        index, outer = BODIES.index(name), BODIES.index(within)
-        origin, turn = self.places.origin, self.places.rotation
-        offset = turn[outer].T @ (origin[index] - origin[outer]) * self.metres
-        quaternion = quaternion_from_rotation(turn[outer].T @ turn[index])
-        file_name = SIMULATION_BODIES[index]
-        body = ET.SubElement(
-            parent, "body", name=file_name, pos=_row(offset), quat=_row(quaternion)
-        )
+        index = BODIES.index(name)
+        offset, turn = self.places.within(index, BODIES.index(within))
+        place = {"pos": offset * self.metres, "quat": turn}
+        body = _add(parent, "body", name=SIMULATION_BODIES[index], **place)
         if name == "platform":
-            at_b4 = _row(self.points[3] * self.metres)
-            ET.SubElement(body, "joint", name=SIMULATION_JOINTS[-1], type="ball", pos=at_b4)
+            at_b4 = self.machine.points[3] * self.metres
+            _add(body, "joint", name=SIMULATION_JOINTS[-1], type="ball", pos=at_b4)
         else:
             self._joint(body, index - 1)
         mass = self.masses[name]
-        i = mass.inertia
-        ET.SubElement(
-            body,
-            "inertial",
-            pos=_row(mass.centre),
-            mass=repr(mass.mass),
-            fullinertia=_row([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]),
-        )
+        inertia = mass.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        _add(body, "inertial", pos=mass.centre, mass=mass.mass, fullinertia=inertia)
         return body
 
     def _joint(self, body: ET.Element, index: int) -> None:
@@ -329,10 +286,10 @@ class SimulationModel:
         slides = place == 2 or (place == 0 and on_guide)
         axis = "0 0 1" if place == 2 else "0 1 0" if place == 1 and not on_guide else "1 0 0"
         kind = "slide" if slides else "hinge"
-        joint = ET.SubElement(body, "joint", name=SIMULATION_JOINTS[index], type=kind, axis=axis)
+        joint = _add(body, "joint", name=SIMULATION_JOINTS[index], type=kind, axis=axis)
         if name in JOINTS:
-            joint.set("ref", repr(float(self.metres * self.readings[index])))
-            joint.set("armature", repr(float(self.servos.rotors[JOINTS.index(name)])))
+            joint.set("ref", _text(self.metres * self.readings[index]))
+            joint.set("armature", _text(self.servos.rotors[JOINTS.index(name)]))
             _limit(joint, "range", self.strokes.ranges.get(name))
 
     def _limits(self, root: ET.Element) -> None:
@@ -345,21 +302,18 @@ class SimulationModel:
         if self.strokes.gap > 0.0 or self.design.demanded_order:
             d1, d3 = (self.nominal[CHAIN_JOINTS.index(name)] for name in ("d1", "d3"))
             order = 1 if d1 > d3 else -1
-            ends = _row([self.strokes.gap, 1e3 * self.design.reach * self.metres])
+            ends = self.strokes.gap, 1e3 * self.design.reach * self.metres
             gap = _add_named(tendon, "fixed", "gap", range=ends)
             for joint, sign in (("d1", order), ("d3", -order)):
-                ET.SubElement(gap, "joint", joint=joint, coef=str(sign))
+                _add(gap, "joint", joint=joint, coef=str(sign))
         for leg, degrees in ((1, limits.swing.a1), (4, limits.swing.a3)):
             # A cone of 90° or more does not limit the joint's first angle.
             if degrees is None or degrees >= 90.0:
                 continue
             for index in (3 * leg - 3, 3 * leg - 2):
                 middle, half = (self.nominal - self.joints)[index], math.radians(degrees)
-                joint = SIMULATION_JOINTS[index]
-                swing = _add_named(
-                    tendon, "fixed", joint, range=_row([middle - half, middle + half])
-                )
-                ET.SubElement(swing, "joint", joint=joint, coef="1")
+                joint, ends = SIMULATION_JOINTS[index], (middle - half, middle + half)
+                _add(_add_named(tendon, "fixed", joint, range=ends), "joint", joint=joint, coef="1")
         if len(tendon):
             root.append(tendon)
 
@@ -369,7 +323,7 @@ class SimulationModel:
         forces = np.clip(np.stack([-pull, push], axis=1), -NO_LIMIT, NO_LIMIT)
         for index, name in enumerate(JOINTS):
             stiffness, damping, _, _, force = (float(each[index]) for each in self.servos)
-            law = {"gainprm": repr(stiffness), "biasprm": _row([force, -stiffness, -damping])}
+            law = {"gainprm": stiffness, "biasprm": [force, -stiffness, -damping]}
             servo = _add_named(parent, "general", name, joint=name, **law)
             _limit(servo, "ctrlrange", self.strokes.ranges.get(name))
             limited = (np.abs(forces[index]) < NO_LIMIT).any()
@@ -380,21 +334,24 @@ def _comment(*lines: str) -> ET.Element:
     return cast("ET.Element", ET.Comment("\n    ".join(["", *lines]) + "\n  "))
 
 
-def _add_named(parent: ET.Element, element: str, name: str, **settings: str) -> ET.Element:
+def _text(value: str | ArrayLike) -> str:
+    """Return words as they are, and numbers with all their digits."""
+    return value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))
+
+
+def _add(parent: ET.Element, tag: str, **settings: str | ArrayLike) -> ET.Element:
+    return ET.SubElement(parent, tag, {name: _text(each) for name, each in settings.items()})
+
+
+def _add_named(parent: ET.Element, tag: str, name: str, **settings: str | ArrayLike) -> ET.Element:
     """Add an element outside the bodies, which takes no class from them."""
-    return ET.SubElement(parent, element, {"name": name, "class": CLASS, **settings})
+    element = _add(parent, tag, name=name, **settings)
+    element.set("class", CLASS)
+    return element
 
 
 def _limit(element: ET.Element, name: str, ends: tuple[float, float] | None) -> None:
     """Set a range or its absence, whatever the scene holds for limited."""
     element.set(name.replace("range", "") + "limited", "false" if ends is None else "true")
     if ends is not None:
-        element.set(name, _row(ends))
-
-
-def _geom(parent: ET.Element, kind: str, radius: float, **where: str) -> None:
-    ET.SubElement(parent, "geom", {"type": kind, "size": repr(float(radius)), **where})
-
-
-def _row(values: Iterable[float]) -> str:
-    return " ".join(repr(float(value)) for value in values)
+        element.set(name, _text(ends))

@@ -1,10 +1,8 @@
-"""The workspace and the prototype as STEP: true spheres, cylinders, cones and planes.
+"""The workspace as STEP: true spheres, cylinders, cones and planes.
 
 Each limit of the workspace is an exact primitive of OpenCASCADE, which the booleans keep, so that
 the file is small and its volume is that of `explorer.workspace.slices.volume`; each face has the
-name and the colour of its limit. The prototype has subassemblies, names and colours as in 3MF, in
-the home pose. AP242, in millimetres of the base frame. Needs the extra `cad`, which is imported
-only when it is used.
+name and the colour of its limit. AP242, in millimetres of the base frame.
 """
 
 from __future__ import annotations
@@ -16,39 +14,24 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from explorer.errors import ExplorerError, InputError, NoAnswerError
-from explorer.export.assembly import COLOURS, part_groups
+from explorer.export import opencascade as cad
 from explorer.export.mesh import colour_of
-from explorer.export.opencascade import (
-    Document,
-    ExactKernel,
-    ExactShape,
-    coordinates,
-    direction,
-    faces_of,
-    occ,
-    point,
-    primitive,
-    transform,
-    volume_of,
-)
-from explorer.measures.size import corners_of
+from explorer.export.opencascade import Document, ExactShape, occ, primitive
+from explorer.measures.box import corners_of
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import BODIES, Chains
-from explorer.prototype.forms import forms_of
-from explorer.prototype.sizes import Sizes
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,
     Constraint,
-    HalfSpace,
     constraints,
+    orientation_of,
 )
 from explorer.workspace.limits.region import Region, region_of
-from explorer.workspace.slices.volume import home_rotation, workspace_volume
+from explorer.workspace.slices.volume import workspace_volume
 
 # OpenCASCADE merges points that are nearer than 1e-7, whatever the unit.
 SMALLEST_MM, LARGEST_MM = 1e-1, 1e7
@@ -76,7 +59,7 @@ class ExactSolid:
     @property
     def volume(self) -> float:
         """The volume in cubic millimetres, integrated over the exact faces."""
-        return volume_of(self.shape)
+        return cad.volume_of(self.shape)
 
     def shifted(self, offset: FloatArray) -> ExactSolid:
         """Return the solid moved by a vector in millimetres, shape (3,)."""
@@ -97,8 +80,8 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
         NoAnswerError: The workspace is empty.
         ExplorerError: A boolean operation fails.
     """
-    check_extra()
-    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    cad.check_extra()
+    r = orientation_of(design, rotation)
     exact = workspace_volume(design, r)
     if exact.volume <= 0.0:
         reason = ", ".join(exact.empty_because)
@@ -112,10 +95,10 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
             f"OpenCASCADE takes solids of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; this one is "
             f"{size:.3g} mm: choose another unit"
         )
-    best: ExactSolid | None = None
-    least_error = math.inf
+    best, least_error = None, math.inf
     for shape in _Primitives(lows, highs, unit).attempts(limits, region):
-        solid = ExactSolid(shape, tuple(_limit_of(face, limits, unit) for face in faces_of(shape)))
+        faces = cad.faces_of(shape)
+        solid = ExactSolid(shape, tuple(_limit_of(face, limits, unit) for face in faces))
         error = abs(solid.volume / unit**3 - exact.volume) / exact.volume
         if error < least_error:
             best, least_error = solid, error
@@ -127,16 +110,6 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
             "be too thin for it; as 3mf, ply or stl it can be exported"
         )
     return best
-
-
-def workspace_step(design: Design, rotation: ArrayLike | None = None) -> bytes:
-    """Return a STEP file of the constant-orientation workspace, as `exact_workspace` does."""
-    return step_bytes(exact_workspace(design, rotation), f"workspace of {design.name}")
-
-
-def check_extra() -> None:
-    """Raise a MissingExtraError, which says how to get OpenCASCADE, if it is not installed."""
-    occ("gp_Pnt")
 
 
 Step: TypeAlias = tuple[ExactShape, bool]
@@ -160,36 +133,28 @@ class _Primitives:
         steps = list(self._steps(limits, region))
         half = len(steps) // 2
         for order in (steps, steps[::-1], steps[half:] + steps[:half]):
-            shape = primitive("Box", point(self.lows), point(self.highs))
+            shape = primitive("Box", cad.point(self.lows), cad.point(self.highs))
             for block, inside in order:
                 shape = shape ^ block if inside else shape - block
             yield shape.shape
 
     def _steps(self, limits: tuple[Constraint, ...], region: Region) -> Iterator[Step]:
         """Yield the primitives that bound the region, and whether they keep p inside."""
-        planes = [end for end in (region.low_limit, region.high_limit, *region.plane_limits) if end]
-        for plane in planes:
-            if self._heights(plane).max() > plane.offset * self.unit:
+        corners = corners_of(np.array([self.lows, self.highs]))
+        for plane in (region.low_limit, region.high_limit, *region.plane_limits):
+            if plane and (corners @ plane.normal).max() > plane.offset * self.unit:
                 yield self._half_space(plane.normal, plane.offset), True
         for limit in region.circle_limits:
-            near, far = self._distances(limit)
-            radius = limit.radius * self.unit
+            axes, radius = slice(0 if limit.is_ball else 1, 3), limit.radius * self.unit
+            centre = limit.centre * self.unit
+            gaps = np.maximum(0.0, np.maximum(self.lows - centre, centre - self.highs))
+            near = np.linalg.norm(gaps[axes])
+            far = np.linalg.norm((corners - centre)[:, axes], axis=1).max()
             if radius < far if limit.inside else radius > near:
                 yield self._round(limit), limit.inside
         for limit in limits:
             if isinstance(limit, Cone):
                 yield from self._cone(limit)
-
-    def _heights(self, plane: HalfSpace) -> FloatArray:
-        return corners_of(np.array([self.lows, self.highs])) @ plane.normal
-
-    def _distances(self, limit: BallOrCylinder) -> tuple[float, float]:
-        start = 0 if limit.is_ball else 1
-        centre = limit.centre[start:] * self.unit
-        lows, highs = self.lows[start:] - centre, self.highs[start:] - centre
-        near = np.maximum(0.0, np.maximum(lows, -highs))
-        far = np.maximum(np.abs(lows), np.abs(highs))
-        return float(np.linalg.norm(near)), float(np.linalg.norm(far))
 
     def _half_space(self, normal: FloatArray, offset: float) -> ExactShape:
         """Return the block of the positions with normal · p <= offset."""
@@ -197,13 +162,11 @@ class _Primitives:
         unit_normal = normal / length
         middle = 0.5 * (self.lows + self.highs)
         foot = middle + (offset * self.unit / length - middle @ unit_normal) * unit_normal
-        frame: Any = occ("gp_Ax2")(point(foot), direction(-unit_normal))
+        frame: Any = occ("gp_Ax2")(cad.point(foot), cad.direction(-unit_normal))
         far = _FAR * self.size
-        x, y = (coordinates(frame.XDirection()), coordinates(frame.YDirection()))
-        corner: Any = occ("gp_Ax2")(
-            point(foot - far * (x + y)), direction(-unit_normal), frame.XDirection()
-        )
-        return primitive("Box", corner, 2.0 * far, 2.0 * far, 2.0 * far)
+        x, y = (cad.coordinates(axis) for axis in (frame.XDirection(), frame.YDirection()))
+        frame.SetLocation(cad.point(foot - far * (x + y)))
+        return primitive("Box", frame, 2.0 * far, 2.0 * far, 2.0 * far)
 
     def _round(self, limit: BallOrCylinder) -> ExactShape:
         radius, centre = limit.radius * self.unit, limit.centre * self.unit
@@ -226,8 +189,8 @@ class _Primitives:
         away = self._away(origin)
         across = _cross(_cross(axis, away), axis)
         if np.linalg.norm(across) <= 1e-9 * np.linalg.norm(away) * (axis @ axis):
-            return occ("gp_Ax2")(point(origin), direction(axis))
-        return occ("gp_Ax2")(point(origin), direction(axis), direction(across))
+            return occ("gp_Ax2")(cad.point(origin), cad.direction(axis))
+        return occ("gp_Ax2")(cad.point(origin), cad.direction(axis), cad.direction(across))
 
     def _cone(self, cone: Cone) -> Iterator[Step]:
         """Yield primitives and whether they keep p inside; a section of a cone is a wedge."""
@@ -244,29 +207,20 @@ class _Primitives:
             yield self._half_space(-axis, -float(axis @ apex)), True
         elif cone.flat:
             # The planes of a wedge meet in a line along x through the apex.
-            sides = [
-                self._half_space(side, float(side @ apex))
-                for side in (_turn(axis, sign * (angle + 0.5 * math.pi)) for sign in (1, -1))
-            ]
+            turns = (np.array([sign * (angle + 0.5 * math.pi), 0.0, 0.0]) for sign in (1, -1))
+            normals = [Rotation.from_rotvec(turn).apply(axis) for turn in turns]
+            sides = [self._half_space(normal, float(normal @ apex)) for normal in normals]
             if outside:
                 yield sides[0] ^ sides[1], False
             else:
                 yield from ((side, True) for side in sides)
         else:
-            yield self._round_cone(apex, axis, angle), not outside
-
-    def _round_cone(self, apex: FloatArray, axis: FloatArray, angle: float) -> ExactShape:
-        apex = apex * self.unit
-        far = np.maximum(np.abs(self.lows - apex), np.abs(self.highs - apex))
-        height = 1.1 * float(np.linalg.norm(far))
-        frame = self._frame(apex, axis)
-        return primitive("Cone", frame, 0.0, height * math.tan(angle), height)
-
-
-def _turn(vector: FloatArray, angle: float) -> FloatArray:
-    """Return a vector of the yz-plane rotated about x."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([0.0, c * vector[1] - s * vector[2], s * vector[1] + c * vector[2]])
+            apex = apex * self.unit
+            far = np.maximum(np.abs(self.lows - apex), np.abs(self.highs - apex))
+            height = 1.1 * float(np.linalg.norm(far))
+            frame = self._frame(apex, axis)
+            cone_shape = primitive("Cone", frame, 0.0, height * math.tan(angle), height)
+            yield cone_shape, not outside
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -280,7 +234,7 @@ def _limit_of(face: Any, limits: tuple[Constraint, ...], unit: float) -> str:
     u0, v0 = float(surface.FirstUParameter()), float(surface.FirstVParameter())
     du, dv = float(surface.LastUParameter()) - u0, float(surface.LastVParameter()) - v0
     samples = [surface.Value(u0 + a * du, v0 + b * dv) for a in shares for b in shares]
-    points = np.array([coordinates(point) for point in samples]) / unit
+    points = np.array([cad.coordinates(point) for point in samples]) / unit
     return min(limits, key=lambda limit: float(limit.distance(points).max())).name
 
 
@@ -289,47 +243,8 @@ def step_bytes(solid: ExactSolid, name: str) -> bytes:
     document = Document()
     top = document.shapes.AddShape(solid.shape, False)
     document.set_name(top, name)
-    for face, limit in zip(faces_of(solid.shape), solid.limit_of_face, strict=True):
+    for face, limit in zip(cad.faces_of(solid.shape), solid.limit_of_face, strict=True):
         label = document.shapes.AddSubShape(top, face)
         document.set_name(label, limit)
         document.set_colour(label, colour_of(limit))
     return document.step()
-
-
-def exact_parts(sizes: Sizes) -> dict[str, ExactShape]:
-    """Return the parts by name, each in the frame of its body, in millimetres."""
-    return {name: shape for name, _, shape in forms_of(sizes, ExactKernel())}
-
-
-def assembly_step(sizes: Sizes) -> bytes:
-    """Return a STEP file of the parts, assembled in the home pose."""
-    design = sizes.design
-    home = design.home_pose
-    places = Chains.of(design).places_at(home.position, home.rotation)
-    parts = exact_parts(sizes)
-    document = Document()
-    whole = _group(document, f"mechanism of {design.name}")
-    for name, members in part_groups():
-        group = _group(document, name)
-        for member in members:
-            label = document.shapes.AddShape(parts[member].shape, False)
-            document.set_name(label, member)
-            document.set_colour(label, COLOURS[member.partition(" ")[0]])
-            body = BODIES.index(member if member in BODIES else "platform")
-            location = transform(places.rotation[body], places.origin[body] * design.unit_mm)
-            _add(document, group, label, location, member)
-        _add(document, whole, group, occ("gp_Trsf")(), name)
-    document.shapes.UpdateAssemblies()
-    return document.step()
-
-
-def _group(document: Document, name: str) -> Any:
-    label = document.shapes.NewShape()
-    document.set_name(label, name)
-    return label
-
-
-def _add(document: Document, group: Any, label: Any, location: Any, name: str) -> None:
-    document.set_name(
-        document.shapes.AddComponent(group, label, occ("TopLoc_Location")(location)), name
-    )

@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterable
 
 import numpy as np
 
 from explorer.mechanism.design import JOINTS
 from explorer.paths.trajectory import Trajectory
 from explorer.statics.accuracy import IS_TILT, SOURCES
-from explorer.statics.budget.costs import PARTS, SourceCosts
-
-_TRAJECTORY_COLUMNS = ("time_s", *JOINTS, "x", "y", "z", "qw", "qx", "qy", "qz")
-"""The names of the columns, without the unit of lengths."""
-
-_TOOL_COLUMNS = ("tool_x", "tool_y", "tool_z")
-"""The names of the columns that follow if the tool point moves straight."""
-
-_LENGTHS = (*JOINTS, "x", "y", "z", *_TOOL_COLUMNS)
-"""The names of the columns in design units."""
+from explorer.statics.budget import PARTS, SourceCosts
 
 
 def trajectory_csv(trajectory: Trajectory) -> str:
@@ -29,15 +21,13 @@ def trajectory_csv(trajectory: Trajectory) -> str:
     last bit.
     """
     columns = [trajectory.time, trajectory.joints, trajectory.position, trajectory.quaternion]
-    names = _TRAJECTORY_COLUMNS
+    unit = repr(trajectory.unit_mm).removesuffix(".0")
+    head = ["time_s", *(f"{name} [{unit} mm]" for name in (*JOINTS, *"xyz"))]
+    head += ["qw", "qx", "qy", "qz"]
     if trajectory.tool_position is not None:
         columns.append(trajectory.tool_position)
-        names += _TOOL_COLUMNS
-    rows = np.column_stack(columns)
-    unit = repr(trajectory.unit_mm).removesuffix(".0")
-    head = [f"{name} [{unit} mm]" if name in _LENGTHS else name for name in names]
-    lines = [",".join(head), *(",".join(map(repr, row)) for row in rows.tolist())]
-    return "\n".join(lines) + "\n"
+        head += [f"tool_{axis} [{unit} mm]" for axis in "xyz"]
+    return _csv(head, np.column_stack(columns).tolist())
 
 
 TOLERANCE_COLUMNS = (
@@ -54,25 +44,17 @@ def tolerance_csv(costs: SourceCosts) -> str:
     The lines are sorted by part; a tolerance that may be any is empty. Numbers round-trip to the
     last bit.
     """
-    numbers = (
-        costs.displacement,
-        costs.turn,
-        costs.displacement_within,
-        costs.turn_within,
-        costs.shares,
-    )
+    effects = costs.displacement, costs.turn, costs.displacement_within, costs.turn_within
+    numbers = np.stack([*effects, costs.shares], axis=-1).tolist()
+    tolerances = [value if np.isfinite(value) else "" for value in costs.tolerances.tolist()]
+    rows = [
+        (PARTS[k], SOURCES[k], "degree" if IS_TILT[k] else "mm", tolerances[k], *numbers[k])
+        for k in sorted(range(len(SOURCES)), key=lambda k: PARTS[k])
+    ]
+    return _csv(TOLERANCE_COLUMNS, rows)
+
+
+def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(TOLERANCE_COLUMNS)
-    for k in sorted(range(len(SOURCES)), key=lambda k: PARTS[k]):
-        tolerance = float(costs.tolerances[k])
-        writer.writerow(
-            [
-                PARTS[k],
-                SOURCES[k],
-                "degree" if IS_TILT[k] else "mm",
-                repr(tolerance) if np.isfinite(tolerance) else "",
-                *(repr(float(values[k])) for values in numbers),
-            ]
-        )
+    csv.writer(text, lineterminator="\n").writerows([head, *rows])
     return text.getvalue()

@@ -48,12 +48,7 @@ _TYPE_OF_LETTER = {'"': "str", "[": "array", "{": "object", "n": "null", "t": "b
 
 
 class _Place(NamedTuple):
-    """The place of a value in a text.
-
-    Attributes:
-        start: Offset of the value, or of the name of its field.
-        mark: The value, of a list or an object the bracket.
-    """
+    """A value in a text: the offset of it or of its field's name; it, or its opening bracket."""
 
     start: int
     mark: str
@@ -123,12 +118,12 @@ def located_errors(
 ) -> Generator[str]:
     """Yield the text in some bytes, and raise every error of reading it with its place.
 
-    The message is one printable line of limited length.
+    The message is one printable line of limited length, which begins with the source.
 
     Args:
         data: The bytes.
         kind: Type of the value in the text.
-        source: Name of the text, with which the message begins.
+        source: Name of the text.
         error: Type of the error to raise.
 
     Raises:
@@ -160,8 +155,7 @@ def one_line(message: str) -> str:
 def _unique_fields(fields: list[tuple[str, object]]) -> dict[str, object]:
     unique = dict(fields)
     if len(unique) < len(fields):
-        counts = Counter(name for name, _ in fields)
-        twice = next(name for name, count in counts.items() if count > 1)
+        twice, _ = Counter(name for name, _ in fields).most_common(1)[0]
         raise InputError(f"the field {twice!r} is given twice; leave one of them out")
     return unique
 
@@ -177,18 +171,14 @@ def _words_of_syntax(fault: msgspec.DecodeError, text: str) -> str:
     if words is not None:
         reason, start = words[1], len(text.encode()[: int(words[2])].decode(errors="ignore"))
     begin = text.rfind("\n", 0, start) + 1
-    column = start - begin
-    line = text[begin:].partition("\n")[0]
+    line, column = text[begin:].partition("\n")[0], start - begin
     quote = line[max(0, column - _LONGEST_QUOTE // 2) :][:_LONGEST_QUOTE].strip()
     return f"line {_line_of(text[:start])}, column {column + 1}: {reason}: {quote}"
 
 
 def _first_places(text: str) -> dict[_Path, _Place]:
     """Return the first place of each value in a text, by its path."""
-    places: dict[_Path, _Place] = {}
-    for path, place in _places(text):
-        places.setdefault(path, place)
-    return places
+    return dict(reversed([*_places(text)]))
 
 
 def _words_of_refusal(fault: msgspec.ValidationError, text: str, kind: Any) -> str:
@@ -242,11 +232,10 @@ def _path_of(written: str) -> _Path:
 def _path_in_words(error: InputError, places: Mapping[_Path, _Place], outer: _Path) -> _Path:
     """Return the path of the field that a message names first, within an outer one."""
     named = error.field if isinstance(error, DesignError) and error.field else str(error)
+    inner = [each for each in places if each[: len(outer)] == outer]
     for word in re.findall(r"[a-z]\w*(?:\.\w+)*", named[:LONGEST_LINE]):
         steps = tuple(word.split("."))
-        like = [
-            each for each in places if each[-len(steps) :] == steps and outer == each[: len(outer)]
-        ]
+        like = [each for each in inner if each[-len(steps) :] == steps]
         if like:
             return min(like, key=len)
     return outer
@@ -313,9 +302,9 @@ def _allowed_at(kind: Any, path: _Path) -> list[str]:
     parts = list(_alternatives(kind))
     for step in path:
         if isinstance(step, str):
-            hints = [
-                get_type_hints(part, include_extras=True) for part in parts if _is_struct(part)
-            ]
+            hints = (
+                get_type_hints(each, include_extras=True) for each in parts if _is_struct(each)
+            )
             inner = [hint[step] for hint in hints if step in hint]
             parts = [part for each in inner for part in _alternatives(each)]
     allowed: list[str] = []

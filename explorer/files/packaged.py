@@ -1,4 +1,4 @@
-"""The files that are part of the explorer, its sources, and the versions of what it uses."""
+"""The files that are part of the explorer, with its manual, and the versions of what it uses."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ import platform
 from importlib import metadata, resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import NamedTuple
+
+from explorer.errors import InputError
 
 SOURCES = Path(__file__).parents[2]
 """The folder that holds the package `explorer`, for processes that must import the same sources."""
@@ -50,3 +53,58 @@ def _read_versions() -> dict[str, str]:
 
             versions[name] = __version__
     return versions
+
+
+MANUAL_FILES = (
+    "glossary.md",
+    "mechanism.md",
+    "page.md",
+    "workspace.md",
+    "orientation.md",
+    "singularity.md",
+    "legs.md",
+    "loads.md",
+    "precision.md",
+    "optimise.md",
+    "claims.md",
+    "studies.md",
+    "prototype-and-export.md",
+    "command-line.md",
+    "python.md",
+    "files.md",
+    "network.md",
+)
+
+
+class ManualPage(NamedTuple):
+    """A page of the manual.
+
+    Attributes:
+        title: Text of the page's first heading.
+        file: Name of the page's file, the argument of `read_page` and the target of links.
+    """
+
+    title: str
+    file: str
+
+
+def list_pages() -> tuple[ManualPage, ...]:
+    """Return the pages of the manual in the order to read them; the glossary is the first."""
+    titles = (read_page(file).partition("\n")[0].removeprefix("# ") for file in MANUAL_FILES)
+    return tuple(map(ManualPage, titles, MANUAL_FILES))
+
+
+def read_page(file: str) -> str:
+    """Return the Markdown of a page.
+
+    Args:
+        file: Name of the page's file, such as "glossary.md".
+
+    Raises:
+        InputError: The manual has no such page.
+    """
+    if file not in MANUAL_FILES:
+        raise InputError(
+            f"the manual has no page {file!r}; its pages are {', '.join(MANUAL_FILES)}"
+        )
+    return packaged_file("manual", file).read_text(encoding="utf-8")

@@ -45,7 +45,6 @@ def check_writable(path: Path) -> None:
         StorageError: The folder does not exist or takes no file, or the path is no plain file.
     """
     with _storage_errors("write", path):
-        _check_target(path)
         scratch = _scratch_path(path)
         # Permission bits mislead on read-only disks and for superusers, so try it.
         scratch.open("xb").close()
@@ -59,7 +58,6 @@ def write_whole(path: Path, data: bytes) -> None:
         StorageError: The file cannot be written; one that existed is unchanged.
     """
     with _storage_errors("write", path):
-        _check_target(path)
         scratch = _scratch_path(path)
         try:
             with scratch.open("xb") as file:
@@ -169,11 +167,7 @@ def _storage_errors(operation: str, path: Path) -> Generator[None]:
 
 
 def _scratch_path(path: Path) -> Path:
-    """Return an unused path in the same folder, since a rename is atomic only there."""
-    return path.resolve().parent / f".{path.name[:_SCRATCH_CHARACTERS]}.{uuid.uuid4().hex}.part"
-
-
-def _check_target(path: Path) -> None:
+    """Return an unused path in the folder of a file to write, as a rename is atomic only there."""
     if path.is_dir():
         raise StorageError(f"cannot write {str(path)!r}: it is a folder")
     if path.exists() and not path.is_file():
@@ -182,3 +176,4 @@ def _check_target(path: Path) -> None:
         raise StorageError(
             f"cannot write {str(path)!r}: there is no folder {str(path.parent)!r}; make it first"
         )
+    return path.resolve().parent / f".{path.name[:_SCRATCH_CHARACTERS]}.{uuid.uuid4().hex}.part"

@@ -18,14 +18,8 @@ from numpy.typing import ArrayLike
 
 from explorer.legs.clearance import PAIRS, closest_shares, joined_pairs, leg_axes
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
-from explorer.numerics.arrays import (
-    BoolArray,
-    FloatArray,
-    batch_shape,
-    finite_array,
-    rows_for_kernel,
-)
+from explorer.numerics import arrays
+from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, dot3, minus
 
@@ -203,9 +197,8 @@ def overlap_rows(p: FloatArray, q: FloatArray, overlap: BoolArray) -> None:
 def tetrahedra_overlap(p: ArrayLike, q: ArrayLike) -> BoolArray:
     """Return whether tetrahedra have a point in common, touching and containment included.
 
-    Flat ones (triangles, quadrilaterals, segments, points) are allowed. Two touch if their
-    gap is within the rounding of their coordinates: about 1e-14 of the largest coordinate
-    of the pair.
+    Flat ones (triangles, segments, points) are allowed. Two touch if their gap is within the
+    rounding of their coordinates: about 1e-14 of the largest coordinate of the pair.
 
     Args:
         p: Vertices, shape (..., 4, 3), in any unit.
@@ -214,59 +207,33 @@ def tetrahedra_overlap(p: ArrayLike, q: ArrayLike) -> BoolArray:
     Raises:
         InputError: P or q does not consist of finite numbers, or has another shape.
     """
-    a, b = finite_array("p", p, (4, 3)), finite_array("q", q, (4, 3))
-    batch = batch_shape((a, 2), (b, 2))
-    a_rows, b_rows = rows_for_kernel(a, batch, 2), rows_for_kernel(b, batch, 2)
+    a, b = arrays.finite_array("p", p, (4, 3)), arrays.finite_array("q", q, (4, 3))
+    batch = arrays.batch_shape((a, 2), (b, 2))
+    a_rows, b_rows = arrays.rows_for_kernel(a, batch, 2), arrays.rows_for_kernel(b, batch, 2)
     overlap = np.empty(len(a_rows), dtype=np.bool_)
     overlap_rows(len(a_rows), a_rows, b_rows, overlap)
     return overlap.reshape(batch)
 
 
-def swept_tetrahedra(
-    design: Design,
-    start_position: ArrayLike,
-    start_rotation: ArrayLike,
-    end_position: ArrayLike,
-    end_rotation: ArrayLike,
-) -> FloatArray:
+def swept_tetrahedra(start: Configuration, end: Configuration) -> FloatArray:
     """Return the tetrahedra that contain the four legs over a step, shape (..., 4, 4, 3).
 
     The vertices of a tetrahedron are the leg's base ends at the start and at the end of the
     step, then its platform ends. All batch axes are broadcast.
-
-    Args:
-        design: The manipulator.
-        start_position: b4 in the base frame, shape (..., 3), in design units.
-        start_rotation: Platform to base, shape (..., 3, 3).
-        end_position: b4 at the end of the step, shape (..., 3).
-        end_rotation: Platform to base at the end of the step, shape (..., 3, 3).
-
-    Raises:
-        InputError: A position is not finite, or a rotation is not one.
     """
-    start = leg_axes(Configuration(design, start_position, start_rotation))
-    end = leg_axes(Configuration(design, end_position, end_rotation))
-    start, end = np.broadcast_arrays(start, end)
     # From (base, platform) of both poses to (base, base, platform, platform).
-    both = np.stack([start, end], axis=-2)
+    both = np.stack(np.broadcast_arrays(leg_axes(start), leg_axes(end)), axis=-2)
     return both.reshape(*both.shape[:-3], 4, 3)
 
 
-def step_overlaps(
-    design: Design,
-    start_position: ArrayLike,
-    start_rotation: ArrayLike,
-    end_position: ArrayLike,
-    end_rotation: ArrayLike,
-) -> BoolArray:
+def step_overlaps(start: Configuration, end: Configuration) -> BoolArray:
     """Return which pairs of swept tetrahedra overlap, shape (..., 6), in the order of `PAIRS`.
 
     The result is False for a pair that shares a joint, see `explorer.legs.clearance.joined_pairs`.
-    Arguments and errors are those of `swept_tetrahedra`.
     """
-    swept = swept_tetrahedra(design, start_position, start_rotation, end_position, end_rotation)
+    swept = swept_tetrahedra(start, end)
     overlaps = np.zeros((*swept.shape[:-3], len(PAIRS)), dtype=np.bool_)
-    for index, joined in enumerate(joined_pairs(design)):
+    for index, joined in enumerate(joined_pairs(start.design)):
         if not joined:
             first, second = PAIRS[index]
             overlaps[..., index] = tetrahedra_overlap(

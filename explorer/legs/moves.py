@@ -3,7 +3,7 @@
 Over a straight move one point of the platform, b4 or the tool point, goes along a line and the
 platform turns about one fixed axis (slerp). An interval of the move is halved until a lower bound
 over all of it is within the tolerance of the least evaluated distance, see
-`explorer.legs.move_bounds`. The bound holds for every pose of the move, not only for those that
+`explorer.legs.clearance`. The bound holds for every pose of the move, not only for those that
 were evaluated.
 """
 
@@ -12,27 +12,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
-from explorer.legs.clearance import PAIRS, joined_pairs, leg_clearances, radii_of_pairs
+from explorer.legs.clearance import PAIRS, joined_pairs, least_rows, leg_clearances, radii_of_pairs
 from explorer.legs.interference import step_overlaps
-from explorer.legs.move_bounds import least_rows
 from explorer.mechanism.configuration import Configuration, one_tool, tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple, checked_rotation
-from explorer.numerics.arrays import (
-    BoolArray,
-    FloatArray,
-    IntArray,
-    batch_shape,
-    finite_array,
-    position_array,
-)
+from explorer.numerics import arrays
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 
 # Tolerances as shares of the reach, or of the longest travel of a leg's end if that is longer.
 DEFAULT_TOLERANCE = 1e-6
@@ -42,16 +35,16 @@ POSES_OF_MOVE = 64
 # A move has no length if no platform point goes farther than this share of the reach.
 NO_LENGTH = 1e-12
 
+Ends: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""b4 (n, 3) and the rotation (n, 3, 3) at the start of n moves, then those at the end."""
+
 
 class MoveClearances(NamedTuple):
-    """The least clearances of all pairs of legs over moves, in the order of `PAIRS`.
-
-    A pair that shares a joint has the clearance inf, as in `explorer.legs.clearance.LegClearances`.
+    """The least clearances of all pairs of legs over moves; inf for those that share a joint.
 
     Attributes:
         bound: Lower bound of the clearance over the move, to rounding, shape (..., 6).
-        clearance: Clearance at `share`, greater than the bound by at most the tolerance,
-            shape (..., 6).
+        clearance: That at `share`, greater than the bound by at most the tolerance, (..., 6).
         share: Share of the move, from 0 to 1, shape (..., 6).
     """
 
@@ -130,15 +123,9 @@ class StraightMoves:
     def between(
         p: FloatArray, r: FloatArray, q: FloatArray, s: FloatArray, tool: ArrayLike | None = None
     ) -> StraightMoves:
-        """Return the moves from poses to others, the shorter way round.
+        """Return the moves from poses p (n, 3), r (n, 3, 3) to q, s, the shorter way round.
 
-        Args:
-            p: b4 at the start, shape (n, 3), in design units.
-            r: Platform to base at the start, shape (n, 3, 3).
-            q: b4 at the end, shape (n, 3).
-            s: Platform to base at the end, shape (n, 3, 3).
-            tool: Point that moves straight in the platform frame, shape (3,), in design units; None
-                for b4.
+        The tool is the point that moves straight in the platform frame, shape (3,); None for b4.
 
         Raises:
             InputError: The tool is not finite.
@@ -155,12 +142,7 @@ class StraightMoves:
         return StraightMoves.between(p[:-1], r[:-1], p[1:], r[1:], tool)
 
     def poses(self, number: IntArray, share: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return positions of b4, shape (..., 3), and rotations, (..., 3, 3), at shares of moves.
-
-        Args:
-            number: Numbers of the moves, shape (...).
-            share: Shares of them, from 0 to 1, shape (...).
-        """
+        """Return b4 (..., 3) and rotations (..., 3, 3) at shares, 0 to 1, of moves by number."""
         turn = Rotation.from_rotvec(share[..., None] * self.turn[number])
         rotation = turn.as_matrix() @ self.rotation[number]
         at = self.start[number] + share[..., None] * self.step[number]
@@ -170,23 +152,38 @@ class StraightMoves:
 def poses_between(
     start: Pose, end: Pose, shares: ArrayLike, tool: ArrayLike | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the poses of a straight move.
+    """Return b4 (..., 3) and rotations (..., 3, 3) at shares (...), 0 to 1, of a straight move.
 
-    Args:
-        start: Pose at the start of the move.
-        end: Pose at its end; the platform turns the shorter way.
-        shares: Shares of the move, from 0 to 1, shape (...).
-        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
-            for b4.
-
-    Returns:
-        Positions of b4, shape (..., 3), and rotations, shape (..., 3, 3).
+    The tool is the point that moves straight in the platform frame, shape (3,); None for b4.
 
     Raises:
         InputError: Shares or the tool are not finite.
     """
-    share = finite_array("shares of the move", shares, ())
+    share = arrays.finite_array("shares of the move", shares, ())
     return StraightMoves.along((start, end), tool).poses(np.zeros(share.shape, np.int64), share)
+
+
+def ends_of_moves(
+    start_position: ArrayLike,
+    start_rotation: ArrayLike,
+    end_position: ArrayLike,
+    end_rotation: ArrayLike,
+) -> tuple[tuple[int, ...], Ends]:
+    """Return the batch axes of moves and their ends as one row each, in the same order.
+
+    Raises:
+        InputError: A position is not finite, a rotation is not one, or they do not broadcast.
+    """
+    p = arrays.position_array("start position", start_position)
+    q = arrays.position_array("end position", end_position)
+    r, s = checked_rotation(start_rotation), checked_rotation(end_rotation)
+    batch = arrays.batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
+    starts = arrays.rows_for_kernel(p, batch, 1), arrays.rows_for_kernel(r, batch, 2)
+    return batch, (
+        *starts,
+        arrays.rows_for_kernel(q, batch, 1),
+        arrays.rows_for_kernel(s, batch, 2),
+    )
 
 
 def move_clearances(
@@ -201,23 +198,14 @@ def move_clearances(
 ) -> MoveClearances:
     """Return the least clearances over straight moves; those of no length are allowed.
 
-    Args:
-        design: The manipulator; its limits hold the radii.
-        start_position: b4 in the base frame, shape (..., 3), in design units.
-        start_rotation: Platform to base, shape (..., 3, 3).
-        end_position: b4 at the end, shape (..., 3).
-        end_rotation: Platform to base at the end, shape (..., 3, 3); the platform turns the
-            shorter way.
-        tolerance: As for `move_clearance`.
-        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
-            for b4.
+    The ends are positions of b4, shape (..., 3), and rotations from platform to base, (..., 3, 3).
+    The tolerance is that of `move_clearance`, the tool that of `poses_between`.
 
     Raises:
         InputError: A pose or the tool is not finite, not a rotation, or the tolerance is too small.
     """
-    arrays = (start_position, start_rotation, end_position, end_rotation)
-    moves = _Moves.of(design, *arrays, tool=tool)
-    bound, least, share = moves.least(design, moves.tolerance(design, tolerance), math.nan)
+    ends = ends_of_moves(start_position, start_rotation, end_position, end_rotation)
+    bound, least, share, _ = _least_distances(design, *ends, tolerance, math.nan, tool)
     radii = radii_of_pairs(design)
     return MoveClearances(bound - radii, least - radii, share)
 
@@ -235,13 +223,11 @@ def pairs_are_clear(
     """Return which pairs have more than a clearance over whole moves, shape (..., 6).
 
     This is much faster than `move_clearances`, since the search ends once the result is certain.
-    True is proven. The result may be False for a pair whose least clearance is greater by less than
-    the default tolerance of `move_clearance`. It is True for a pair that shares a joint. Other
-    arguments and errors are those of `move_clearances`.
+    True is proven, also for a pair that shares a joint. The result may be False if the clearance is
+    exceeded by less than the default tolerance. Arguments and errors are as there.
     """
-    arrays = (start_position, start_rotation, end_position, end_rotation)
-    moves = _Moves.of(design, *arrays, tool=tool)
-    bound, _, _ = moves.least(design, moves.tolerance(design, None), clearance)
+    ends = ends_of_moves(start_position, start_rotation, end_position, end_rotation)
+    bound, *_ = _least_distances(design, *ends, None, clearance, tool)
     return np.asarray(bound > radii_of_pairs(design) + clearance)
 
 
@@ -270,26 +256,30 @@ def move_clearance(
     """
     if steps < 1:
         raise InputError(f"a move has at least one step; got {steps}")
-    arrays = (np.array(start.position), start.rotation, np.array(end.position), end.rotation)
-    moves = _Moves.of(design, *arrays, tool=tool)
-    if float(moves.travel[0]) <= NO_LENGTH * max(design.reach, *map(abs, start.position)):
-        shown = ", ".join(f"{x:g}" for x in start.position)
+    way = StraightMoves.along((start, end), tool)
+    length = np.linalg.norm(way.step) + design.reach * np.linalg.norm(way.turn)
+    if length <= NO_LENGTH * max(design.reach, *map(abs, start.position)):
+        place = ", ".join(f"{x:g}" for x in start.position)
         raise InputError(
-            f"a move needs two poses that differ; both have the position ({shown}) and the "
+            f"a move needs two poses that differ; both have the position ({place}) and the "
             "same orientation"
         )
-    tolerances = moves.tolerance(design, tolerance)
-    least = move_clearances(design, *arrays, tolerance=float(tolerances[0]), tool=tool)
+    ends = ends_of_moves(start.position, start.rotation, end.position, end.rotation)
+    bound, least, share, tolerances = _least_distances(design, *ends, tolerance, math.nan, tool)
+    radii = radii_of_pairs(design)
     positions, rotations = poses_between(start, end, np.linspace(0.0, 1.0, steps + 1), tool)
-    overlaps = step_overlaps(design, positions[:-1], rotations[:-1], positions[1:], rotations[1:])
-    closest = leg_clearances(Configuration(design, *poses_between(start, end, least.share, tool)))
+    overlaps = step_overlaps(
+        Configuration(design, positions[:-1], rotations[:-1]),
+        Configuration(design, positions[1:], rotations[1:]),
+    )
+    closest = leg_clearances(Configuration(design, *poses_between(start, end, share, tool)))
     pairs = np.arange(len(PAIRS))
     return MoveClearance(
         start=start,
         end=end,
-        bound=least.bound,
-        clearance=least.clearance,
-        share=least.share,
+        bound=bound - radii,
+        clearance=least - radii,
+        share=share,
         points=closest.points[pairs, pairs],
         tolerance=float(tolerances[0]),
         steps=steps,
@@ -298,83 +288,42 @@ def move_clearance(
     )
 
 
-@dataclass(frozen=True)
-class _Moves:
-    """Moves in the form of the kernel, one to a row.
+def _least_distances(
+    design: Design,
+    batch: tuple[int, ...],
+    ends: Ends,
+    requested: float | None,
+    target: float,
+    tool: ArrayLike | None,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return lower bounds, least distances, their shares, (..., 6) each, and tolerances (n,).
 
-    At the share t of a move a platform point is
-    start + t step + fixed + cos(t angle) across + sin(t angle) up.
-
-    Attributes:
-        batch: The batch axes.
-        start: Point that moves straight at the start, shape (n, 3).
-        step: Its displacement, shape (n, 3).
-        angle: Rotation of the platform, in radians, shape (n,).
-        parts: fixed, across and up of each leg's platform end, shape (n, 4, 3, 3).
-        travel: Upper bound of the longest travel of a leg's end, shape (n,).
+    The search ends once it is certain whether the least clearance is greater than the target; NaN
+    for a search to the tolerance.
     """
-
-    batch: tuple[int, ...]
-    start: FloatArray
-    step: FloatArray
-    angle: FloatArray
-    parts: FloatArray
-    travel: FloatArray
-
-    @staticmethod
-    def of(design: Design, *arrays: ArrayLike, tool: ArrayLike | None = None) -> _Moves:
-        """Return the moves of the positions and rotations of `move_clearances`, broadcast."""
-        p, q = (
-            position_array(f"{end} position", position)
-            for end, position in zip(("start", "end"), arrays[::2], strict=True)
-        )
-        r, s = map(checked_rotation, arrays[1::2])
-        batch = batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
-        p, q = (np.broadcast_to(x, (*batch, 3)).reshape(-1, 3) for x in (p, q))
-        r, s = (np.broadcast_to(x, (*batch, 3, 3)).reshape(-1, 3, 3) for x in (r, s))
-        moves = StraightMoves.between(p, r, q, s, tool)
-        angle = np.linalg.norm(moves.turn, axis=-1)
-        axis = moves.turn / np.where(angle > 0.0, angle, 1.0)[:, None]
-        arms = (design.platform_points - moves.tool) @ np.swapaxes(r, -1, -2)
-        fixed = (arms @ axis[:, :, None]) * axis[:, None, :]
-        up = np.cross(axis[:, None, :], arms)
-        across = np.where(angle[:, None, None] > 0.0, arms - fixed, 0.0)
-        parts = np.stack([arms - across, across, up], axis=2)
-        swing = angle * np.linalg.norm(across, axis=-1).max(axis=-1)
-        travel = np.linalg.norm(moves.step, axis=-1) + swing
-        return _Moves(batch, moves.start, moves.step, np.asarray(angle), parts, np.asarray(travel))
-
-    def tolerance(self, design: Design, requested: float | None) -> FloatArray:
-        """Return the tolerance of each move, shape (n,).
-
-        Raises:
-            InputError: The requested tolerance is too small.
-        """
-        size = np.maximum(design.reach, self.travel)
-        if requested is None:
-            return DEFAULT_TOLERANCE * size
-        least = SMALLEST_TOLERANCE * float(size.max(initial=design.reach))
-        if not requested >= least:
-            raise InputError(f"the tolerance must be at least {least:.2g}; got {requested:g}")
-        return np.full(len(size), requested)
-
-    def least(
-        self, design: Design, tolerance: FloatArray, target: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return lower bounds, least distances and their shares of the moves, shapes (..., 6).
-
-        Args:
-            design: The manipulator.
-            tolerance: Largest difference of a least distance and its bound, shape (n,).
-            target: Clearance; the search ends once it is certain whether the least is greater.
-                NaN for a search to the tolerance.
-        """
-        rows = len(self.start)
-        bound, least, share = (np.full((rows, len(PAIRS)), math.inf) for _ in range(3))
-        share[:] = 0.0
-        targets = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design) + target)
-        a3 = np.array([*design.a3, 0.0])
-        moves = (self.start, self.step, self.angle, self.parts, a3)
-        least_rows(POSES_OF_MOVE * rows, *moves, tolerance, targets, bound, least, share)
-        shape = (*self.batch, len(PAIRS))
-        return bound.reshape(shape), least.reshape(shape), share.reshape(shape)
+    moves = StraightMoves.between(*ends, tool)
+    # At the share t of a move a platform point is
+    # start + t step + fixed + cos(t angle) across + sin(t angle) up.
+    angle = np.linalg.norm(moves.turn, axis=-1)
+    axis = moves.turn / np.where(angle > 0.0, angle, 1.0)[:, None]
+    arms = (design.platform_points - moves.tool) @ np.swapaxes(moves.rotation, -1, -2)
+    fixed = (arms @ axis[:, :, None]) * axis[:, None, :]
+    up = np.cross(axis[:, None, :], arms)
+    across = np.where(angle[:, None, None] > 0.0, arms - fixed, 0.0)
+    parts = np.stack([arms - across, across, up], axis=2)
+    swing = angle * np.linalg.norm(across, axis=-1).max(axis=-1)
+    size = np.maximum(design.reach, np.linalg.norm(moves.step, axis=-1) + swing)
+    tolerances = DEFAULT_TOLERANCE * size
+    if requested is not None:
+        least_one = SMALLEST_TOLERANCE * float(size.max(initial=design.reach))
+        if not requested >= least_one:
+            raise InputError(f"the tolerance must be at least {least_one:.2g}; got {requested:g}")
+        tolerances = np.full(len(size), requested)
+    bound, least, share = (
+        np.full((len(size), len(PAIRS)), value) for value in (np.inf, np.inf, 0.0)
+    )
+    targets = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design) + target)
+    rows = moves.start, moves.step, np.asarray(angle), parts, np.array([*design.a3, 0.0])
+    least_rows(POSES_OF_MOVE * len(size), *rows, tolerances, targets, bound, least, share)
+    bound, least, share = (each.reshape(*batch, len(PAIRS)) for each in (bound, least, share))
+    return bound, least, share, tolerances

@@ -14,21 +14,39 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from explorer.measures.size import clearance_beyond, clearance_margin_of
+from explorer.legs.clearance import PAIRS
+from explorer.measures.box import BoxStatics
 from explorer.measures.snapshot import PoseIndices
-from explorer.measures.statics import BoxStatics
-from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.compliance import is_elastic
 from explorer.statics.reactions import has_limits
 from explorer.workspace.extremes import extent_of, least_margins
-from explorer.workspace.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
+from explorer.workspace.least_clearance import (
+    DEFAULT_NODES,
+    NodeMeasures,
+    least_clearances,
+    node_measures,
+)
 from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
 
 if TYPE_CHECKING:
     from explorer.workspace.carried_region import CarriedRegion
+
+CERTAIN = 1e-3
+"""Accuracy of the least clearance, as a share of the reach."""
+
+MARGIN_OF_CLEARANCE = 0.05
+"""Least |δ| of the positions at which clearances count by default, as a share of the reach."""
+
+
+def longest_leg(design: Design) -> float:
+    """Return the largest of the maximum lengths of l1, d2, d4 and l4, in design units.
+
+    It is the reach |a3| where all four are tied to it.
+    """
+    return max(design.length_range(name)[1] for name in LENGTHS)
 
 
 @dataclass
@@ -59,7 +77,8 @@ class Case:
     @property
     def clearance_margin(self) -> float:
         """The least |δ| at which clearances count, in design units."""
-        return clearance_margin_of(self.design) if self.margin is None else self.margin
+        default = MARGIN_OF_CLEARANCE * self.design.reach
+        return default if self.margin is None else self.margin
 
     @property
     def at(self) -> Pose:
@@ -94,24 +113,44 @@ class Case:
     @cached_property
     def home_indices(self) -> PoseIndices:
         """The indices of conditioning, manipulability and transmission at the case's pose."""
-        return PoseIndices(Configuration(self.design, self.at.position, self.rotation))
+        return PoseIndices(self.design, self.at.position, self.rotation)
 
     @cached_property
     def node_indices(self) -> PoseIndices:
         """The indices of conditioning, manipulability and transmission at the nodes."""
-        return PoseIndices(Configuration(self.design, self.at_nodes.positions, self.rotation))
+        return PoseIndices(self.design, self.at_nodes.positions, self.rotation)
 
     @cached_property
     def clearance(self) -> tuple[float, tuple[int, int] | None]:
-        """The least clearance where every |δ| is at least `clearance_margin`, and its two legs."""
-        return clearance_beyond(self.design, self.clearance_margin, self.rotation)
+        """The least clearance where every |δ| is at least `clearance_margin`, and its two legs.
+
+        It is accurate to a thousandth of the reach. Nearer to a singularity legs may have to meet.
+        Both are NaN and None where the workspace has no such position, or no volume: the positions
+        left may then all lie on a surface.
+        """
+        return self._clearance_beyond(self.clearance_margin)
 
     @cached_property
     def demanded_clearance(self) -> tuple[float, tuple[int, int] | None]:
         """The least clearance where every |δ| is at least `demanded_margin`, and its two legs."""
         if self.demanded_margin is None:
             return math.nan, None
-        return clearance_beyond(self.design, self.demanded_margin, self.rotation)
+        return self._clearance_beyond(self.demanded_margin)
+
+    def _clearance_beyond(self, margin: float) -> tuple[float, tuple[int, int] | None]:
+        if self.volume.volume <= 0.0:
+            return math.nan, None
+        design = self.design
+        clearances = least_clearances(
+            design.with_limits(margin=max(design.limits.margin or 0.0, margin)),
+            self.rotation,
+            CERTAIN * design.reach,
+            only_least=True,
+        ).clearance
+        pair = int(clearances.argmin())
+        if not np.isfinite(clearances[pair]):
+            return math.nan, None
+        return float(clearances[pair]), PAIRS[pair]
 
     @cached_property
     def extent(self) -> FloatArray:
@@ -148,43 +187,17 @@ class Case:
         position = self.at.position
         return BoxStatics(self.design, (position, position), self.rotation)
 
-    @property
-    def is_loaded(self) -> bool:
-        """Whether the design has a load."""
-        return bool(self.design.payload.mass_kg or self.design.payload.force_n)
-
-    @property
-    def is_limited(self) -> bool:
-        """Whether the design limits forces or moments."""
-        return has_limits(self.design)
-
-    @property
-    def limits_actuators(self) -> bool:
-        """Whether the design limits the forces of its actuators."""
-        return self.design.actuators.push_n is not None or self.design.actuators.pull_n is not None
-
-    @property
-    def has_errors(self) -> bool:
-        """Whether the design's actuators have errors."""
-        return any(self.design.actuators.error_mm)
-
-    @property
-    def is_elastic(self) -> bool:
-        """Whether the design's actuators or struts give way."""
-        return is_elastic(self.design)
-
-    def has(self, need: str) -> bool:
-        """Return whether the case has what a measure needs, an attribute."""
-        value = getattr(self, need)
-        return value is not None and value is not False
-
     @cached_property
-    def held(self) -> CarriedRegion:
+    def carried_region(self) -> CarriedRegion:
         """The part of the workspace where the design's load is held."""
         # It loads the kernel of solids.
         from explorer.workspace.carried_region import carried_region
 
         return carried_region(self.design, self.rotation)
+
+    def has(self, need: str) -> bool:
+        """Return whether the case has what a measure needs."""
+        return NEEDS[need][1](self)
 
 
 Place = Literal["compare", "optimise", "studies", "workspace", "report"]
@@ -194,35 +207,37 @@ Place = Literal["compare", "optimise", "studies", "workspace", "report"]
 Sense = Literal["more", "less"]
 Unit = Literal["", "°", "share", "N m", "kg", "mm/N"]
 Cost = Literal["low", "high"]
-Need = Literal[
-    "box",
-    "demanded_margin",
-    "is_loaded",
-    "is_limited",
-    "limits_actuators",
-    "has_errors",
-    "is_elastic",
-]
-
-NEED_WORDS: Mapping[Need, str] = MappingProxyType(
+NEEDS: Mapping[str, tuple[str, Callable[[Case], bool]]] = MappingProxyType(
     {
-        "box": "required box",
-        "demanded_margin": "demanded clearance",
-        "is_loaded": "payload or force at the tool",
-        "is_limited": "limit of actuators, struts or guide",
-        "limits_actuators": "limit of the actuators",
-        "has_errors": "errors of the actuators",
-        "is_elastic": "stiffness of actuators or struts",
+        "box": ("required box", lambda case: case.box is not None),
+        "demanded_margin": (
+            "demanded clearance",
+            lambda case: case.demanded_margin is not None,
+        ),
+        "is_loaded": (
+            "payload or force at the tool",
+            lambda case: bool(case.design.payload.mass_kg or case.design.payload.force_n),
+        ),
+        "is_limited": (
+            "limit of actuators, struts or guide",
+            lambda case: has_limits(case.design),
+        ),
+        "limits_actuators": (
+            "limit of the actuators",
+            lambda case: bool(case.design.actuators.push_n or case.design.actuators.pull_n),
+        ),
+        "has_errors": (
+            "errors of the actuators",
+            lambda case: any(case.design.actuators.error_mm),
+        ),
+        "is_elastic": (
+            "stiffness of actuators or struts",
+            lambda case: is_elastic(case.design),
+        ),
     }
 )
-"""Words for what measures need, without an article."""
+"""Words for what measures need, without an article, and whether a case has it."""
 
-COMPARE: frozenset[Place] = frozenset({"compare"})
-OPTIMISE: frozenset[Place] = frozenset({"optimise"})
-STUDIES: frozenset[Place] = frozenset({"studies"})
-WORKSPACE: frozenset[Place] = frozenset({"workspace"})
-REPORT: frozenset[Place] = frozenset({"report"})
-EVERYWHERE: frozenset[Place] = frozenset(get_args(Place))
 POWERS = {1: "", 2: "²", 3: "³"}
 
 
@@ -244,7 +259,7 @@ class Measure:
         names: Names of the whole numbers from 1, if it is one of several things.
         gradient: Partial derivatives by the name of the parameter, as in
             `explorer.workspace.slices.volume.Volume`; None if there is no closed form.
-        needs: Attributes of the case that the measure needs, see `Case.has`.
+        needs: What the measure needs of a case, out of `NEEDS`.
         reason: Why a workspace that is not empty lacks the value; "" if nothing is known.
         places: Where it is listed.
     """
@@ -261,9 +276,9 @@ class Measure:
     is_whole: bool = False
     names: tuple[str, ...] = ()
     gradient: Callable[[Case], Mapping[str, float]] | None = None
-    needs: tuple[Need, ...] = ()
+    needs: tuple[str, ...] = ()
     reason: Callable[[Case], str] = lambda _: ""
-    places: frozenset[Place] = EVERYWHERE
+    places: tuple[Place, ...] = get_args(Place)
 
     @property
     def heading(self) -> str:

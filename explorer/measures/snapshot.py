@@ -7,7 +7,6 @@ as it consists of angles between forces and velocities alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,18 +17,14 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.feasible_intervals import Interval, feasible_intervals
 from explorer.mechanism.kinematics import (
     ForwardKinematics,
+    determinant,
     forward,
+    jacobian_factors,
+    tetrahedron_volumes,
 )
 from explorer.mechanism.margins import describe_modes, mode_name, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, lengths_of
-from explorer.singularity.ellipsoids import (
-    determinant,
-    jacobian_of,
-    scaled_margins,
-    singular_values,
-    tetrahedron_volumes,
-)
 from explorer.singularity.freedoms import Freedoms, freedoms
 from explorer.singularity.gaps import FlagGaps, flag_gaps, least_turns
 from explorer.singularity.nearest import (
@@ -38,39 +33,25 @@ from explorer.singularity.nearest import (
     nearest_singular_poses,
     singularities_of,
 )
-from explorer.singularity.strata import GENERIC, incidences, inversions, stratum
+from explorer.singularity.strata import GENERIC, incidences, inversions, stratum_of
 from explorer.statics.forces import twists_of_actuators
 from explorer.workspace.limits.valid_poses import Violation, violations
 
 
-@dataclass(frozen=True)
-class PoseIndices:
-    """The indices of a design in poses; each is 0 in a singular pose.
+class PoseIndices(Configuration):
+    """A design in poses with its indices of conditioning; each is 0 in a singular pose.
 
-    Attributes:
-        configuration: Design and poses.
+    The first of them is `Configuration.inverse_condition`.
     """
-
-    configuration: Configuration
-
-    @cached_property
-    def singular_values(self) -> FloatArray:
-        """The singular values of J, made homogeneous by the reach, descending, shape (..., 6)."""
-        return singular_values(jacobian_of(self.configuration), self.configuration.design.reach)
-
-    @property
-    def inverse_condition(self) -> FloatArray:
-        """The inverse condition number 1/κ of the homogeneous J, from 0 to 1, shape (...)."""
-        return self.singular_values[..., -1] / self.singular_values[..., 0]
 
     @property
     def smallest_singular_value(self) -> FloatArray:
-        """The smallest singular value σ of the homogeneous J, shape (...).
+        """The smallest singular value σ of J with lengths over the reach, shape (...).
 
         Errors of actuators and loads are enlarged at most 1/σ times, see
-        `explorer.singularity.ellipsoids.singular_values`.
+        `Configuration.singular_values`.
         """
-        return self.singular_values[..., -1]
+        return self.singular_values.min(axis=-1)
 
     @property
     def manipulability(self) -> FloatArray:
@@ -101,13 +82,10 @@ class PoseIndices:
         The force of each actuator lies along its motion, so that the input transmission indices
         are 1.
         """
-        c = self.configuration
-        twists = np.swapaxes(twists_of_actuators(c), -1, -2)
-        ends = c.design.platform_points[[0, 1, 1, 2, 2, 3]] - c.tool[..., None, :]
-        arms = ends @ np.swapaxes(c.rotation, -1, -2)
+        twists = np.swapaxes(twists_of_actuators(self), -1, -2)
         # Velocities of the points are infinite in a singular pose.
         with np.errstate(invalid="ignore"):
-            speeds = lengths_of(twists[..., :3] + np.cross(twists[..., 3:], arms))
+            speeds = lengths_of(twists[..., :3] + np.cross(twists[..., 3:], self.joint_arms))
         return np.where(np.isnan(speeds), 0.0, 1.0 / speeds)
 
     @property
@@ -116,7 +94,7 @@ class PoseIndices:
         return self.transmissions.min(axis=-1)
 
 
-class Snapshot(Configuration):
+class Snapshot(PoseIndices):
     """A design in one pose, and the values that follow from both; lengths in design units.
 
     Args:
@@ -156,36 +134,6 @@ class Snapshot(Configuration):
         return abs(float(determinant(self.design, self.joints, enlarged)))
 
     @cached_property
-    def indices(self) -> PoseIndices:
-        """The indices of conditioning, manipulability and transmission."""
-        return PoseIndices(self)
-
-    @property
-    def inverse_condition(self) -> float:
-        """The inverse condition number of J, made homogeneous by the reach, 0 (singular) to 1."""
-        return float(self.indices.inverse_condition)
-
-    @property
-    def smallest_singular_value(self) -> float:
-        """The smallest singular value σ of J, made homogeneous by the reach; 0 if singular."""
-        return float(self.indices.smallest_singular_value)
-
-    @property
-    def manipulability(self) -> float:
-        """The manipulability |det J| of J, made homogeneous by the reach; 0 if singular."""
-        return float(self.indices.manipulability)
-
-    @property
-    def transmissions(self) -> FloatArray:
-        """The output transmission index of each actuator, from 0 (singular) to 1, shape (6,)."""
-        return self.indices.transmissions
-
-    @property
-    def transmission_index(self) -> float:
-        """The output transmission index, the least of `transmissions`."""
-        return float(self.indices.transmission_index)
-
-    @cached_property
     def least_turns(self) -> tuple[float, float, float]:
         """The least turns that lead to each incidence, in radians, in the order δ1, δ2, δ3."""
         first, second, third = least_turns(self.position, self.rotation).tolist()
@@ -194,13 +142,12 @@ class Snapshot(Configuration):
     @property
     def worst_conditioned(self) -> int:
         """The number 1 to 3 of the margin that makes the conditioning of J what it is."""
-        return int(scaled_margins(self.design, self.joints, self.margins).argmin()) + 1
+        return int(jacobian_factors(self.design, self.joints, self.margins).argmin()) + 1
 
     @cached_property
     def stratum(self) -> tuple[int, ...]:
         """The stratum: the permutation of the relative position of the two flags."""
-        permutation = stratum(self.position, self.rotation, self.design.reach)
-        return tuple(permutation.tolist())
+        return stratum_of(self)
 
     @property
     def is_singular(self) -> bool:
@@ -210,7 +157,7 @@ class Snapshot(Configuration):
     @cached_property
     def freedoms(self) -> Freedoms:
         """The freedoms of the platform with all actuators locked; none unless it is singular."""
-        return freedoms(self.design, self.pose)
+        return freedoms(self)
 
     @property
     def stratum_dimension(self) -> int:
@@ -295,11 +242,5 @@ class Snapshot(Configuration):
         return feasible_intervals(self.design, self.joints)
 
 
-def evaluate(design: Design, pose: Pose) -> Snapshot:
-    """Return the snapshot of a design in a pose.
-
-    Args:
-        design: The manipulator.
-        pose: The pose of the platform, in design units.
-    """
-    return Snapshot(design, pose)
+evaluate = Snapshot
+"""The snapshot of a design in a pose; callers outside the package know it by this name."""

@@ -22,7 +22,7 @@ warning value of its own, and the pose is near a singularity if any is below:
   (`explorer.singularity.ellipsoids.singular_values`). J is singular only where a margin is zero,
   but margins and distances do not bound its conditioning: in a nearly degenerate design, or far
   from the base, it is low in every pose. It counts for the incidence with the least scaled margin
-  (`explorer.singularity.ellipsoids.scaled_margins`).
+  (`explorer.mechanism.kinematics.jacobian_factors`).
 
 All warning values grow with the user's warning length.
 """
@@ -162,7 +162,7 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
         warn_below: Warning length of the margins, in design units; None for a share of the reach.
     """
     warn = warnings(snapshot.design.reach, warn_below)
-    holding = incidences(snapshot.stratum)
+    holding, condition = incidences(snapshot.stratum), float(snapshot.inverse_condition)
     worst_conditioned = snapshot.worst_conditioned
 
     def measures(incidence: int) -> dict[Cause, float]:
@@ -173,7 +173,7 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
             "turn": snapshot.least_turns[index] / warn.turn,
         }
         if incidence == worst_conditioned:
-            levels["condition"] = snapshot.inverse_condition / warn.condition
+            levels["condition"] = condition / warn.condition
         return levels
 
     def verdict_of(kind: Kind, named: tuple[int, ...], cause: Cause = "distance") -> Verdict:
@@ -181,7 +181,7 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
         distance, turn = snapshot.nearest_distances[index], snapshot.least_turns[index]
         if kind == "singular":
             distance = turn = 0.0
-        return Verdict(kind, levels, named, distance, turn, snapshot.inverse_condition, cause)
+        return Verdict(kind, levels, named, distance, turn, condition, cause)
 
     each = {incidence: measures(incidence) for incidence in (1, 2, 3)}
     level_1, level_2, level_3 = (

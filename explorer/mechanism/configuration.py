@@ -15,19 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import GUIDE_ROWS, LENGTH_ROWS, Design
 from explorer.mechanism.margins import margin_rows
 from explorer.mechanism.points import AttachmentPoints, joints_of, points_of
 from explorer.mechanism.pose import Pose, Triple, checked_rotation
-from explorer.numerics.arrays import (
-    FloatArray,
-    batch_shape,
-    for_kernel,
-    lengths_of,
-    position_array,
-    rotate,
-    rows_for_kernel,
-)
+from explorer.numerics import arrays
+from explorer.numerics.arrays import FloatArray
 
 Value = TypeVar("Value")
 
@@ -60,9 +53,9 @@ class Configuration:
         tool: ArrayLike | None = None,
     ) -> None:
         self.design = design
-        self.position = position_array("position", position)
+        self.position = arrays.position_array("position", position)
         self.rotation = checked_rotation(rotation)
-        self.tool = np.zeros(3) if tool is None else position_array("tool", tool)
+        self.tool = np.zeros(3) if tool is None else arrays.position_array("tool", tool)
         self.batch = self.batch_with()
 
     @classmethod
@@ -71,23 +64,12 @@ class Configuration:
         return cls(design, pose.position, pose.rotation, tool)
 
     def batch_with(self, *values: FloatArray) -> tuple[int, ...]:
-        """Return the batch axes of the poses and of other vectors, shape (..., k) each.
-
-        Raises:
-            InputError: The batch axes do not broadcast.
-        """
+        """Return the batch axes that poses and vectors (..., k) share."""
         own = (self.position, 1), (self.rotation, 2), (self.tool, 1)
-        return batch_shape(*own, *((value, 1) for value in values))
+        return arrays.batch_shape(*own, *((value, 1) for value in values))
 
     def spread(self, *values: FloatArray) -> Configuration:
-        """Return the configuration with the batch axes that it has together with other vectors.
-
-        Args:
-            values: Vectors of each pose, such as loads, shape (..., k) each.
-
-        Raises:
-            InputError: The batch axes do not broadcast.
-        """
+        """Return the configuration with the batch axes that it shares with vectors (..., k)."""
         batch = self.batch_with(*values)
         if batch == self.batch:
             return self
@@ -98,14 +80,7 @@ class Configuration:
         return spread
 
     def with_tool(self, tool: ArrayLike) -> Configuration:
-        """Return the configuration with another tool point.
-
-        Args:
-            tool: Tool point in the platform frame, shape (..., 3), in design units.
-
-        Raises:
-            InputError: The tool is not finite, or batch axes do not broadcast.
-        """
+        """Return the configuration with another tool point in the platform frame."""
         if np.array_equal(self.tool, tool):
             return self
         return Configuration(self.design, self.position, self.rotation, tool)
@@ -123,7 +98,7 @@ class Configuration:
     @cached_property
     def leg_lengths(self) -> FloatArray:
         """The lengths l1, d2, d4 and l4 of the legs, shape (..., 4), in design units."""
-        return lengths_of(self.legs)
+        return arrays.lengths_of(self.legs)
 
     @cached_property
     def leg_directions(self) -> FloatArray:
@@ -146,7 +121,54 @@ class Configuration:
     @cached_property
     def arm(self) -> FloatArray:
         """The vector from b4 to the tool point along the axes of the base, shape (..., 3)."""
-        return rotate(self.rotation, self.tool)
+        return arrays.rotate(self.rotation, self.tool)
+
+    @cached_property
+    def jacobian(self) -> FloatArray:
+        """The actuator Jacobian J, shape (..., 6, 6): joint rates = J @ twist.
+
+        J maps the platform's twist to the joint rates; Merlet ("Parallel Robots", 2006) calls this
+        matrix the inverse Jacobian. The twist is (v; ω): the velocity v of the tool point, in
+        design units per unit of time, and the angular velocity ω, in radians per unit of time, both
+        along the axes of the base frame. The rows are the rates of (l1, d1, d2, d3, d4, l4), the
+        order of `JOINTS`, in design units per unit of time; so columns 1 to 3 are dimensionless and
+        columns 4 to 6 are lengths in design units. The determinant does not depend on the tool.
+
+        A joint of length zero has no direction, and its row is zero: such a pose is singular.
+        """
+        out = np.zeros((*self.batch, 6, 6))
+        out[..., LENGTH_ROWS, :3] = self.leg_directions
+        out[..., GUIDE_ROWS, 0] = 1.0
+        # The moment arm × direction of every row; np.cross takes three times as long.
+        dx, dy, dz = (out[..., i] for i in range(3))
+        ax, ay, az = (self.joint_arms[..., i] for i in range(3))
+        out[..., 3] = ay * dz - az * dy
+        out[..., 4] = az * dx - ax * dz
+        out[..., 5] = ax * dy - ay * dx
+        return out
+
+    @cached_property
+    def joint_arms(self) -> FloatArray:
+        """The vectors from the tool point to the platform points of the joints, (..., 6, 3)."""
+        tool = self.position + self.arm
+        b1, b2, b3, b4 = (point - tool for point in self.points[3:])
+        return np.stack(np.broadcast_arrays(b1, b2, b2, b3, b3, b4), axis=-2)
+
+    @cached_property
+    def singular_values(self) -> FloatArray:
+        """The singular values of J with lengths over the reach, descending, shape (..., 6).
+
+        One over the smallest is the largest factor by which J⁻¹ enlarges errors of the actuators,
+        to those of the platform (displacement; reach × turn), and loads (force; moment / reach), to
+        forces of the actuators; all as Euclidean norms of six numbers.
+        """
+        homogeneous = self.jacobian / np.repeat([1.0, self.design.reach], 3)
+        return np.asarray(np.linalg.svd(homogeneous, compute_uv=False), dtype=np.float64)
+
+    @property
+    def inverse_condition(self) -> FloatArray:
+        """The inverse condition number 1/κ of J with lengths over the reach, shape (...)."""
+        return self.singular_values[..., -1] / self.singular_values[..., 0]
 
     @cached_property
     def variables(self) -> FloatArray:
@@ -161,7 +183,7 @@ class Configuration:
     @cached_property
     def rotations(self) -> FloatArray:
         """The rotations as rows for kernels, shape (n, 3, 3)."""
-        return rows_for_kernel(self.rotation, self.batch, 2)
+        return arrays.rows_for_kernel(self.rotation, self.batch, 2)
 
     @cached_property
     def tools(self) -> FloatArray:
@@ -170,11 +192,11 @@ class Configuration:
 
     def rows(self, vectors: FloatArray) -> FloatArray:
         """Return vectors (..., k) as one row for each pose."""
-        return rows_for_kernel(vectors, self.batch, 1)
+        return arrays.rows_for_kernel(vectors, self.batch, 1)
 
     def rows_or_one(self, vectors: FloatArray) -> FloatArray:
         """Return vectors (..., k) as one row for each pose, or as one row for all."""
-        return for_kernel(vectors[None]) if vectors.ndim == 1 else self.rows(vectors)
+        return arrays.for_kernel(vectors[None]) if vectors.ndim == 1 else self.rows(vectors)
 
 
 def computed_once(
@@ -214,55 +236,27 @@ def tool_position(pose: Pose, tool: Triple) -> Triple:
 
 
 def pose_with(design: Design, at: Point, position: Triple, pose: Pose) -> Pose:
-    """Return the pose with the orientation of a pose and a point at a position.
-
-    Args:
-        design: The manipulator.
-        at: The point that has the position.
-        position: Its position in the base frame, in design units.
-        pose: The pose with the orientation.
-
-    Raises:
-        InputError: The position is not finite, or too far away.
-    """
+    """Return a pose with the orientation of another and a point at a position in the base frame."""
     x, y, z = (np.array(position) - offset_of(design, pose.rotation, at)).tolist()
     return Pose((x, y, z), pose.quaternion)
 
 
 def offset_of(design: Design, rotation: FloatArray, at: Point) -> FloatArray:
-    """Return the vector from b4 to a point along the axes of the base, shape (..., 3).
-
-    Args:
-        design: The manipulator.
-        rotation: Platform to base, shape (..., 3, 3).
-        at: The point.
-    """
+    """Return the vector from b4 to a point along the axes of the base, shape (..., 3)."""
     return tool_offset(rotation, point_of(design, at))
 
 
 def one_tool(tool: ArrayLike | None) -> FloatArray:
-    """Return one tool point in the platform frame (3,) after checking it; that of b4 if None.
-
-    Raises:
-        InputError: The point is not finite, or there are several.
-    """
+    """Return one tool point in the platform frame (3,), checked; b4 if it is None."""
     if tool is None:
         return np.zeros(3)
-    t = position_array("tool", tool)
+    t = arrays.position_array("tool", tool)
     if t.ndim != 1:
         raise InputError(f"give one tool point, three numbers; got the shape {t.shape}")
-    return for_kernel(t)
+    return arrays.for_kernel(t)
 
 
 def tool_offset(rotation: FloatArray, tool: ArrayLike | None) -> FloatArray:
-    """Return the vector from b4 to a tool point along the axes of the base, shape (..., 3).
-
-    Args:
-        rotation: Platform to base, shape (..., 3, 3).
-        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Raises:
-        InputError: The tool is not finite.
-    """
-    t = np.zeros(3) if tool is None else position_array("tool", tool)
+    """Return the vector from b4 to a tool point along the axes of the base, shape (..., 3)."""
+    t = np.zeros(3) if tool is None else arrays.position_array("tool", tool)
     return np.asarray((rotation @ t[..., None])[..., 0])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Literal, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import msgspec
 from msgspec.structs import force_setattr as _set
@@ -29,18 +29,8 @@ from explorer.mechanism.machine import (
 from explorer.mechanism.margins import margins, mode_of, signs_of
 from explorer.mechanism.points import Variables, platform_points
 from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics import checks
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.checks import (
-    LEAST,
-    instance,
-    not_negative,
-    number,
-    numbers,
-    one_of,
-    ordered_pair,
-    positive,
-    two,
-)
 
 JOINTS = ("l1", "d1", "d2", "d3", "d4", "l4")
 """The joint variables, in the order of every array axis of six."""
@@ -50,6 +40,12 @@ LENGTHS = ("l1", "d2", "d4", "l4")
 
 LENGTH_ROWS = [JOINTS.index(name) for name in LENGTHS]
 """The places of the `LENGTHS` among the `JOINTS`."""
+
+GUIDE_ROWS = [1, 3]
+"""The places of d1 and d3 among the `JOINTS`, whose forces bend the struts."""
+
+STRUT_ROWS = [2, 4]
+"""The places of d2 and d4 among the `JOINTS`, the lengths of the struts of legs 2 and 3."""
 
 VARIABLES = ("a3x", "a3y", "b1x", "b1y", "b2", "b3")
 """The design variables X in the paper's order."""
@@ -104,7 +100,7 @@ class Swing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         for name in self.__struct_fields__:
             angle = getattr(self, name)
             if angle is not None:
-                checked = positive(f"limits.swing.{name}", angle)
+                checked = checks.positive(f"limits.swing.{name}", angle)
                 if checked > 180.0:
                     raise DesignError(
                         f"limits.swing.{name} is a half-angle of at most 180°; got {checked:g}",
@@ -147,10 +143,10 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         for name in LENGTHS:
-            low, high = two(f"limits.{name}", getattr(self, name))
-            low = not_negative(f"limits.{name} minimum", low)
+            low, high = checks.two(f"limits.{name}", getattr(self, name))
+            low = checks.not_negative(f"limits.{name} minimum", low)
             if high is not None:
-                high = number(f"limits.{name} maximum", high)
+                high = checks.number(f"limits.{name} maximum", high)
                 if high < low:
                     raise DesignError(
                         f"limits.{name}: the minimum {low:g} exceeds the maximum {high:g}",
@@ -158,28 +154,28 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                     )
             _set(self, name, (low, high))
         if self.guide is not None:
-            low, high = ordered_pair("limits.guide", *two("limits.guide", self.guide))
+            low, high = checks.ordered_pair("limits.guide", *checks.two("limits.guide", self.guide))
             _set(self, "guide", (low, high))
-        _set(self, "gap", not_negative("limits.gap", self.gap))
-        order = one_of("limits.carriage_order", self.carriage_order, get_args(CarriageOrder))
+        _set(self, "gap", checks.not_negative("limits.gap", self.gap))
+        order = checks.one_of("limits.carriage_order", self.carriage_order, get_args(CarriageOrder))
         _set(self, "carriage_order", order)
         if self.box is not None:
-            lows, highs = two("limits.box", self.box)
+            lows, highs = checks.two("limits.box", self.box)
             pairs = [
-                ordered_pair(f"limits.box {axis}", low, high)
+                checks.ordered_pair(f"limits.box {axis}", low, high)
                 for axis, low, high in zip(
                     "xyz",
-                    numbers("limits.box lows", lows, 3),
-                    numbers("limits.box highs", highs, 3),
+                    checks.numbers("limits.box lows", lows, 3),
+                    checks.numbers("limits.box highs", highs, 3),
                     strict=True,
                 )
             ]
             _set(self, "box", (tuple(low for low, _ in pairs), tuple(high for _, high in pairs)))
         if self.margin is not None:
-            _set(self, "margin", not_negative("limits.margin", self.margin))
-        instance("limits.swing", self.swing, Swing)
-        radii = numbers("limits.leg_radii", self.leg_radii, 4)
-        _set(self, "leg_radii", tuple(not_negative("limits.leg_radii", r) for r in radii))
+            _set(self, "margin", checks.not_negative("limits.margin", self.margin))
+        checks.instance("limits.swing", self.swing, Swing)
+        radii = checks.numbers("limits.leg_radii", self.leg_radii, 4)
+        _set(self, "leg_radii", tuple(checks.not_negative("limits.leg_radii", r) for r in radii))
 
 
 class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -232,20 +228,22 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         if self.schema != 2:
             raise DesignError(f"schema must be 2; got {self.schema!r}")
         _set(self, "schema", 2)
-        instance("name", self.name, str)
+        checks.instance("name", self.name, str)
         _set(self, "name", str(self.name))
         if len(self.name) > 100 or not self.name.isprintable():
             raise DesignError("name must be one printable line of at most 100 characters")
-        instance("limits", self.limits, Limits)
-        instance("home", self.home, Pose, type(None))
-        _set(self, "a3", tuple(numbers("a3", self.a3, 2)))
-        _set(self, "b1", tuple(numbers("b1", self.b1, 2)))
-        _set(self, "b2", number("b2", self.b2))
-        _set(self, "b3", number("b3", self.b3))
-        _set(self, "unit_mm", positive("unit_mm", self.unit_mm))
+        checks.instance("limits", self.limits, Limits)
+        checks.instance("home", self.home, Pose, type(None))
+        _set(self, "a3", tuple(checks.numbers("a3", self.a3, 2)))
+        _set(self, "b1", tuple(checks.numbers("b1", self.b1, 2)))
+        _set(self, "b2", checks.number("b2", self.b2))
+        _set(self, "b3", checks.number("b3", self.b3))
+        _set(self, "unit_mm", checks.positive("unit_mm", self.unit_mm))
         if self.node_step is not None:
-            _set(self, "node_step", positive("node_step", self.node_step))
-        size = number("the largest design variable", max(map(abs, self.variables)), LEAST)
+            _set(self, "node_step", checks.positive("node_step", self.node_step))
+        size = checks.number(
+            "the largest design variable", max(map(abs, self.variables)), checks.LEAST
+        )
         for name, value, zero in (
             ("a3y", self.a3[1], "a1, a2 and a3 lie on one line"),
             ("b1y", self.b1[1], "b1, b2 and b3 lie on one line"),
@@ -264,7 +262,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         for name, kind in _MACHINE.items():
             part = getattr(self, name)
             if type(part) is not kind:
-                instance(name, part, kind)
+                checks.instance(name, part, kind)
         # Searches make thousands of designs that differ in their variables only.
         if self.gravity is not DOWN:
             gravity = checked_gravity(self.gravity)
@@ -335,13 +333,22 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             return 0
         return 1 if difference > 0.0 else -1
 
+    def with_limits(self, **changes: Any) -> Design:
+        """Return this design with other values of some fields of its limits.
+
+        Raises:
+            DesignError: A value is not usable, see `Limits`.
+        """
+        limits = msgspec.structs.replace(self.limits, **changes)
+        return msgspec.structs.replace(self, limits=limits)
+
     def with_variables(self, values: Sequence[float]) -> Design:
         """Return this design with other values of X.
 
         Raises:
             DesignError: The values are not six finite numbers or make a degenerate design.
         """
-        a3x, a3y, b1x, b1y, b2, b3 = numbers("design variables", values, 6)
+        a3x, a3y, b1x, b1y, b2, b3 = checks.numbers("design variables", values, 6)
         return msgspec.structs.replace(self, a3=(a3x, a3y), b1=(b1x, b1y), b2=b2, b3=b3)
 
     def with_variable(self, name: str, value: float) -> Design:

@@ -129,7 +129,7 @@ def typical_machine(design: Design) -> tuple[Design, tuple[str, ...]]:
     if struts.outer_mm is None:
         struts = msgspec.structs.replace(struts, outer_mm=OUTER, inner_mm=INNER)
         assumed.append(f"struts of tube {OUTER:g} × {INNER:g} mm, {struts.modulus_gpa:g} GPa")
-    if not tolerances.values(design.unit_mm).any():
+    if not any(tolerances.stated):
         each: Triple = (LENGTH, LENGTH, LENGTH)
         tolerances = Tolerances(each, each, each, (TILT, TILT), each, each, each, each)
         assumed.append(f"tolerances {LENGTH:g} mm and {TILT:g}°")

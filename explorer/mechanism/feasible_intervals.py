@@ -16,7 +16,6 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
@@ -35,13 +34,7 @@ LARGEST_JOINT = 10.0 * MOST
 def feasible_intervals(design: Design, joints: FloatArray) -> tuple[tuple[Interval, ...], ...]:
     """Return, for each joint, the disjoint ascending intervals in which the joints close.
 
-    Args:
-        design: The manipulator.
-        joints: (l1, d1, d2, d3, d4, l4), shape (6,), in design units; the intervals of a joint
-            depend on the other five.
-
-    Returns:
-        Intervals (low, high) in design units, in the order of `JOINTS`.
+    They are (low, high) in design units; those of a joint depend on the other five.
 
     Raises:
         InputError: The joints are not usable, see `checked_joints`.
@@ -64,11 +57,7 @@ def nearest_feasible(
 ) -> float | None:
     """Return the nearest value of one joint at which the joints close; None if there is none.
 
-    Args:
-        design: The manipulator.
-        joints: The present values, shape (6,), in design units.
-        joint: Index of the joint in `JOINTS`.
-        intervals: Its intervals, from `feasible_intervals`.
+    The joint is an index in `JOINTS`, with its intervals from `feasible_intervals`.
     """
     value = float(joints[joint])
     if not intervals:
@@ -269,18 +258,6 @@ def possible_ranges(design: Design) -> PossibleRanges:
         (l4[0], min(l4[1], from_a3)),
     )
     return PossibleRanges(joints, (x, y, z))
-
-
-def without_guide(design: Design) -> Design:
-    """Return a design whose guide is unbounded."""
-    limits = msgspec.structs.replace(design.limits, guide=None)
-    return msgspec.structs.replace(design, limits=limits)
-
-
-def without_box(design: Design) -> Design:
-    """Return a design without a box for b4."""
-    limits = msgspec.structs.replace(design.limits, box=None)
-    return msgspec.structs.replace(design, limits=limits)
 
 
 def _farthest(ends: Pair, point: float = 0.0) -> float:

@@ -34,16 +34,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError
-from explorer.mechanism.pose import Pose, checked_rotation
-from explorer.numerics.arrays import (
-    FloatArray,
-    batch_shape,
-    finite_array,
-    for_kernel,
-    position_array,
-    rows_for_kernel,
-)
+from explorer.mechanism.pose import Pose, pose_rows
+from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
 from explorer.numerics.compiled import helper, kernel
 
 FOLDS = ("r", "β", "ε", "φ1", "φ2", "φ3")
@@ -73,10 +65,7 @@ def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     Raises:
         InputError: The position is not finite, or the rotation is not one.
     """
-    p = position_array("position", position)
-    matrices = checked_rotation(rotation)
-    shape = batch_shape((p, 1), (matrices, 2))
-    positions, rotations = rows_for_kernel(p, shape, 1), rows_for_kernel(matrices, shape, 2)
+    positions, rotations, batch = pose_rows(position, rotation)
     count = len(positions)
     coordinates = np.empty((count, 6))
     sines, cosines = np.empty((2, min(count, BLOCK), 5))
@@ -85,7 +74,7 @@ def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
         part = slice(start, start + len(rows))
         write_angles(len(rows), positions[part], rotations[part], rows, sines, cosines)
         np.arctan2(sines[: len(rows)], cosines[: len(rows)], out=rows[:, 1:])
-    return coordinates.reshape(*shape, 6)
+    return coordinates.reshape(*batch, 6)
 
 
 def from_folds(coordinates: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -99,8 +88,7 @@ def from_folds(coordinates: ArrayLike) -> tuple[FloatArray, FloatArray]:
         InputError: The coordinates are not six finite numbers, or r is negative.
     """
     array = finite_array(f"folds ({', '.join(FOLDS)})", coordinates, (6,))
-    if (array[..., 0] < 0.0).any():
-        raise InputError(f"r is a distance and must not be negative; got {array[..., 0].min():g}")
+    finite_array("the distance r", array[..., 0], (), signed=False)
     rows = for_kernel(array.reshape(-1, 6))
     positions, rotations = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3))
     write_poses(len(rows), rows, positions, rotations)
@@ -109,11 +97,7 @@ def from_folds(coordinates: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def pose_of_folds(folds: Sequence[float]) -> Pose:
-    """Return the pose of r in design units and β, ε, φ1, φ2, φ3 in degrees.
-
-    Raises:
-        InputError: They are not six finite numbers, r is negative, or b4 is too far away.
-    """
+    """Return the pose of r in design units and β, ε, φ1, φ2, φ3 in degrees."""
     r, *angles = folds
     return Pose.of(*from_folds([r, *np.radians(angles)]))
 

@@ -16,7 +16,7 @@ import numpy as np
 from explorer.mechanism.margins import margins
 from explorer.mechanism.points import Variables, joints_of, points_of
 from explorer.mechanism.pose import Pose, Triple, rotation_from_yaw_pitch_roll
-from explorer.numerics.arrays import FloatArray, lengths_of
+from explorer.numerics.arrays import lengths_of
 
 Ranges = tuple[tuple[float, float], ...]
 """(Lowest, highest) value of each joint, infinite for no limit."""
@@ -31,18 +31,17 @@ STEPS = 9
 def best_home(variables: Variables, ranges: Ranges, box: tuple[Triple, Triple] | None) -> Pose:
     """Return the best pose of a grid.
 
-    The grid spans the box (or the reach) with the platform level and yawed. The best pose has
-    the largest smallest margin of those within the limits of the lengths and the guide; if
-    none is, it is the pose that exceeds these limits the least.
-
-    Args:
-        variables: The design variables.
-        ranges: Limits of the joints, in the order of every array axis of six.
-        box: (lows, highs) of b4 in the base frame; None for no limit.
+    The grid spans the box (lows, highs) of b4, or the reach, with the platform level and yawed. The
+    best pose has the largest smallest margin of those within the ranges of the joints; if none is,
+    it is the pose that exceeds these the least.
     """
     reach = math.hypot(variables[0], variables[1])
     rotations = rotation_from_yaw_pitch_roll([(yaw, 0.0, 0.0) for yaw in YAWS])
-    positions = _candidates(reach, box)
+    lows, highs = box or ((-reach, -reach, 0.0), (reach, reach, reach))
+    # The ends are left out: there a margin or the distance to a limit is zero.
+    steps = np.linspace(0.0, 1.0, STEPS + 2)[1:-1]
+    axes = [low + (high - low) * steps for low, high in zip(lows, highs, strict=True)]
+    positions = np.array(list(itertools.product(*axes)))
     p, r = positions[None, :, :], rotations[:, None, :, :]
     least_margin = np.abs(margins(p, r)).min(axis=-1)
     points = points_of(variables, reach, p, r)
@@ -53,12 +52,3 @@ def best_home(variables: Variables, ranges: Ranges, box: tuple[Triple, Triple] |
     order = np.lexsort((-least_margin.ravel(), excess.ravel()))
     rotation, position = divmod(int(order[0]), len(positions))
     return Pose.of(positions[position], rotations[rotation])
-
-
-def _candidates(reach: float, box: tuple[Triple, Triple] | None) -> FloatArray:
-    """Return the positions of the grid, shape (n, 3), in design units."""
-    lows, highs = box or ((-reach, -reach, 0.0), (reach, reach, reach))
-    # The ends are left out: there a margin or the distance to a limit is zero.
-    shares = np.linspace(0.0, 1.0, STEPS + 2)[1:-1]
-    axes = [low + (high - low) * shares for low, high in zip(lows, highs, strict=True)]
-    return np.array(list(itertools.product(*axes)))

@@ -1,10 +1,11 @@
-"""Inverse and forward kinematics in closed form, over any batch, in the order of `JOINTS`.
+"""Inverse and forward kinematics and det J in closed form, over any batch.
 
-The inverse kinematics is that of `explorer.mechanism.points`. The forward kinematics, with its
-eight assembly modes, consists of three trilaterations (the paper's geometric analysis, Figure 2).
-With c = cos between the guide and the line b2b3, X and Y the platform's x and y components of the
-vector from a1 to b4, and r, β, ε and the folds φ1 to φ3 of `explorer.mechanism.folds`, the joints
-determine px, py, c, X and Y, and with them one cosine for each trilateration:
+The inverse kinematics is that of `explorer.mechanism.points`, and J itself a value of a
+configuration. The forward kinematics, with its eight assembly modes, consists of three
+trilaterations (the paper's geometric analysis, Figure 2). With c = cos between the guide and the
+line b2b3, X and Y the platform's x and y components of the vector from a1 to b4, and r, β, ε and
+the folds φ1 to φ3 of `explorer.mechanism.folds`, the joints determine px, py, c, X and Y, and with
+them one cosine for each trilateration:
 
     trilateration 1 (b1 b2 b3 a1):  cos φ1 = −Y / (r sin ε)
     trilateration 2 (a1 a2 b2 b3):  cos φ2 = (cos β cos ε − c) / (sin β sin ε)
@@ -22,16 +23,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import JOINTS, LENGTHS, Design
+from explorer.mechanism.design import JOINTS, LENGTH_ROWS, LENGTHS, Design
 from explorer.mechanism.folds import write_rotation
-from explorer.numerics.arrays import (
-    BoolArray,
-    FloatArray,
-    finite_array,
-    for_kernel,
-)
+from explorer.numerics.arrays import BoolArray, FloatArray, finite_array, for_kernel
 from explorer.numerics.checks import FARTHEST
 from explorer.numerics.compiled import helper, kernel
 
@@ -175,6 +170,53 @@ def inverse(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatAr
     return Configuration(design, position, rotation).joints
 
 
+def jacobian(
+    design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
+) -> FloatArray:
+    """Return J of `Configuration(design, position, rotation, tool)`, shape (..., 6, 6)."""
+    return Configuration(design, position, rotation, tool).jacobian
+
+
+def tetrahedron_volumes(design: Design, margin: FloatArray) -> FloatArray:
+    """Return the volumes of the three tetrahedra, shape (..., 3), in cubed design units.
+
+    They are proportional to the margins (δ1, δ2, δ3), shape (..., 3); the second and third also
+    to a2x, the position at which a2 is drawn.
+    """
+    span = design.b3 - design.b2
+    factors = np.array([design.b1[1] * span, design.a2x * span, design.a2x * design.a3[1]])
+    return np.abs(margin * factors) / 6.0
+
+
+def determinant(design: Design, joints: FloatArray, margin: FloatArray) -> FloatArray:
+    """Return det J, shape (...), in cubed design units, of joints (..., 6) and margins (..., 3).
+
+    The closed form is det J · l1 d2 d4 l4 = -b1y a3y (b3 - b2)² δ1 δ2 δ3. At a length of zero
+    the determinant has no limit; the result is then zero, as for the matrix J.
+    """
+    lengths = joints[..., LENGTH_ROWS]
+    product = np.prod(lengths, axis=-1)
+    factor = -design.b1[1] * design.a3[1] * (design.b3 - design.b2) ** 2
+    numerator = factor * np.prod(margin, axis=-1)
+    return np.divide(numerator, product, out=np.zeros_like(product), where=product > 0.0)
+
+
+def jacobian_factors(design: Design, joints: FloatArray, margin: FloatArray) -> FloatArray:
+    """Return the sizes of the margins as they enter the Jacobian, shape (..., 3), dimensionless.
+
+    Their product is |det J| over the cubed reach. The first and the third are the moment arms of
+    legs 1 and 4 about the lines b2b3 and a1a2, over the reach. Where J is badly conditioned, the
+    least of them names the incidence that makes it so; this may be far away if the design itself
+    is nearly degenerate.
+    """
+    span, reach = design.b3 - design.b2, design.reach
+    l1, d2, d4, l4 = (joints[..., index] for index in LENGTH_ROWS)
+    factors = np.array([design.b1[1] / reach, (span / reach) * span, design.a3[1] / reach])
+    lengths = np.stack([l1, d2 * d4, l4], axis=-1)
+    sizes = np.abs(margin * factors)
+    return np.divide(sizes, lengths, out=np.zeros(sizes.shape), where=lengths > 0.0)
+
+
 def forward(design: Design, joints: ArrayLike) -> ForwardKinematics:
     """Return all eight assembly modes of the joints.
 
@@ -192,14 +234,7 @@ def discriminants(design: Design, joints: ArrayLike) -> FloatArray:
     """Return δ1², δ2², δ3² of the joints, shape (..., 3), in squared design units.
 
     The joints close if none is negative (to rounding); a negative one shows which trilateration
-    fails, and by how much.
-
-    Args:
-        design: The manipulator.
-        joints: (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units.
-
-    Raises:
-        InputError: The joints are not usable, see `checked_joints`.
+    fails, and by how much. The joints and errors are those of `forward`.
     """
     return _solve(design, joints)[3]
 
@@ -212,12 +247,8 @@ def checked_joints(joints: ArrayLike) -> FloatArray:
             beyond `FARTHEST`.
     """
     array = finite_array(f"joints ({', '.join(JOINTS)})", joints, (6,), FARTHEST)
-    for index, name in enumerate(JOINTS):
-        if name in LENGTHS and (array[..., index] < 0.0).any():
-            raise InputError(
-                f"{name} is a length and must not be negative; "
-                f"got {float(array[..., index].min()):g}"
-            )
+    for name, row in zip(LENGTHS, LENGTH_ROWS, strict=True):
+        finite_array(f"the length {name}", array[..., row], (), signed=False)
     return array
 
 

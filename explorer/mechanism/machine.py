@@ -229,41 +229,20 @@ class Tolerances(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             given = two(field, values) if name == "guide_tilt_deg" else numbers(field, values, 3)
             _set(self, name, tuple(not_negative(field, value) for value in given))
 
-    def values(self, unit_mm: float) -> FloatArray:
-        """Return the tolerances in the order of `DIMENSIONS`, shape (23,).
-
-        Offsets are in design units, tilts in radians.
-
-        Args:
-            unit_mm: Millimetres in one design unit.
-        """
-        lengths = [*self.a1, *self.a3, *self.guide]
-        points = [*self.b1, *self.b2, *self.b3, *self.b4]
-        return np.concatenate(
-            [
-                np.array(lengths) / unit_mm,
-                np.radians(self.guide_tilt_deg),
-                np.array(points) / unit_mm,
-            ]
-        )
+    @property
+    def stated(self) -> tuple[float, ...]:
+        """The tolerances in the order of `DIMENSIONS`, in millimetres and degrees."""
+        return tuple(value for name in self.__struct_fields__ for value in getattr(self, name))
 
 
 def checked_gravity(value: object) -> Triple:
-    """Return a direction of gravity as a unit vector in the base frame.
-
-    Raises:
-        DesignError: It is not three finite numbers, or is zero.
-    """
+    """Return a direction of gravity in the base frame as a unit vector; it must not be zero."""
     x, y, z = _unit("gravity", numbers("gravity", value, 3))
     return x, y, z
 
 
 def check_near(name: str, point: Triple, reach: float) -> None:
-    """Check that a point of the platform lies within `LARGEST_DISTANCE` of b4.
-
-    Raises:
-        DesignError: It lies farther away.
-    """
+    """Check that a point of the platform lies within `LARGEST_DISTANCE` of b4."""
     distance, most = math.hypot(*point), LARGEST_DISTANCE * reach
     if distance > most:
         raise DesignError(

@@ -14,14 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import (
-    FloatArray,
-    IntArray,
-    batch_shape,
-    position_array,
-    rows_for_kernel,
-)
+from explorer.mechanism.pose import checked_rotation, pose_rows
+from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, column, dot3
 
@@ -37,6 +31,18 @@ TETRAHEDRA = (("b1", "b2", "b3", "a1"), ("a1", "a2", "b2", "b3"), ("b4", "a1", "
 
 MARGIN_KINDS = "δ1 and δ3 are distances, δ2 is a distance times a sine"
 """What the margins are, for texts that compare them with one another."""
+
+INCIDENT = 1e-9
+"""Tolerance of an incidence, by which a pose has its stratum: a share of the reach, or radians."""
+
+SINGULAR = 1e-13
+"""Share of |p| up to which a margin is rounding, so that forces are infinite."""
+
+LOST = 1e-13
+"""Share of the largest singular value of J, or length of a plane's normal, that is rounding."""
+
+ROUNDING = 1e-14
+"""Share of |p|, or sine of the lines' angle, at which a pose is its own nearest singular pose."""
 
 MODE_BITS = np.array([4, 2, 1])
 
@@ -56,12 +62,9 @@ def margins(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     Raises:
         InputError: The position is not finite, or the rotation is not one.
     """
-    p = position_array("position", position)
-    r = checked_rotation(rotation)
-    batch = batch_shape((p, 1), (r, 2))
-    p_rows, r_rows = rows_for_kernel(p, batch, 1), rows_for_kernel(r, batch, 2)
-    out = np.empty((len(p_rows), 3))
-    margin_rows(len(p_rows), p_rows, r_rows, out)
+    positions, rotations, batch = pose_rows(position, rotation)
+    out = np.empty((len(positions), 3))
+    margin_rows(len(out), positions, rotations, out)
     return out.reshape(*batch, 3)
 
 
@@ -86,6 +89,22 @@ def margin_rows(position: FloatArray, rotation: FloatArray, out: FloatArray) -> 
     """Write the margins of n poses, shape (n, 3)."""
     for k in range(position.shape[0]):
         out[k, 0], out[k, 1], out[k, 2] = margins_at(position[k], rotation[k])
+
+
+def planes_of_singularity(rotation: ArrayLike) -> FloatArray:
+    """Return the gradients of (δ1, δ2, δ3) with respect to p, shape (..., 3, 3), in rows.
+
+    At a fixed orientation the singular positions are up to three planes through a1 with these
+    normals; the first and the third coincide where the planes of platform and base are parallel.
+    The gradient of δ2 has the length of the sine between the lines a1a2 and b2b3, which is zero
+    if they are parallel; the others have unit length. The rotation has the shape (..., 3, 3).
+    """
+    r = checked_rotation(rotation)
+    gradients = np.zeros(r.shape)
+    gradients[..., 0, :] = -r[..., :, 2]
+    gradients[..., 1, 1], gradients[..., 1, 2] = -r[..., 2, 0], r[..., 1, 0]
+    gradients[..., 2, 2] = 1.0
+    return gradients
 
 
 def mode_of(margin: FloatArray) -> IntArray:

@@ -45,14 +45,7 @@ def platform_points(variables: Variables) -> FloatArray:
 
 
 def points_of(variables: Variables, a2x: float, p: FloatArray, r: FloatArray) -> AttachmentPoints:
-    """Return the attachment points of poses.
-
-    Args:
-        variables: The design variables.
-        a2x: The x of a2, which no joint depends on.
-        p: b4 in the base frame, shape (..., 3), in design units.
-        r: Platform to base, shape (..., 3, 3).
-    """
+    """Return the attachment points of poses (..., 3) and (..., 3, 3); no joint depends on a2x."""
     a3x, a3y, b1x, b1y, b2, b3 = variables
     x = r[..., 0]
     shape = np.broadcast_shapes(p.shape, x.shape)

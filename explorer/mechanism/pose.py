@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
-from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, position_array
+from explorer.numerics import arrays
+from explorer.numerics.arrays import FloatArray, finite_array
 from explorer.numerics.checks import FARTHEST
 from explorer.numerics.compiled import helper, kernel
 
@@ -65,7 +66,7 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @staticmethod
     def of(position: ArrayLike, rotation: ArrayLike) -> Pose:
         """Return the pose with this position (3,) and rotation matrix (3, 3)."""
-        x, y, z = position_array("position", position).tolist()
+        x, y, z = arrays.position_array("position", position).tolist()
         w, i, j, k = quaternion_from_rotation(rotation).tolist()
         return Pose((x, y, z), (w, i, j, k))
 
@@ -103,13 +104,7 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
 
 
 def quaternion_from_rotation(rotation: ArrayLike) -> FloatArray:
-    """Return unit quaternions (w, x, y, z), shape (..., 4), of rotation matrices (..., 3, 3).
-
-    The scalar part w is not negative.
-
-    Raises:
-        InputError: A matrix is not a rotation.
-    """
+    """Return unit quaternions (w, x, y, z), shape (..., 4), of rotations; w is not negative."""
     matrix = checked_rotation(rotation)
     return Rotation.from_matrix(matrix).as_quat(canonical=True, scalar_first=True)
 
@@ -147,7 +142,7 @@ def checked_rotation(rotation: ArrayLike) -> FloatArray:
         deviation, determinant = deviation_of(matrix.tolist())
     else:
         bounds = np.zeros(2)
-        matrices = for_kernel(matrix.reshape(-1, 3, 3))
+        matrices = arrays.for_kernel(matrix.reshape(-1, 3, 3))
         measure_rotations(len(matrices), matrices, bounds)
         deviation, determinant = bounds.tolist()
     if deviation > ORTHONORMAL_TOLERANCE:
@@ -158,6 +153,19 @@ def checked_rotation(rotation: ArrayLike) -> FloatArray:
     if determinant < 0.0:
         raise InputError("rotation must have determinant +1; this one is a reflection")
     return matrix
+
+
+def pose_rows(
+    position: ArrayLike, rotation: ArrayLike
+) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+    """Return positions (n, 3) and rotations (n, 3, 3) for kernels, and the batch axes of poses.
+
+    Raises:
+        InputError: A position is not finite, a rotation is not one, or batch axes do not broadcast.
+    """
+    p, r = arrays.position_array("position", position), checked_rotation(rotation)
+    batch = arrays.batch_shape((p, 1), (r, 2))
+    return arrays.rows_for_kernel(p, batch, 1), arrays.rows_for_kernel(r, batch, 2), batch
 
 
 @helper

@@ -42,9 +42,6 @@ def rotation_from_tilt_torsion(tilt_torsion: ArrayLike) -> FloatArray:
     """Return rotation matrices (..., 3, 3) of azimuth, tilt and torsion (..., 3) in degrees.
 
     Any finite angles are allowed; a negative tilt is one towards the opposite azimuth.
-
-    Raises:
-        InputError: An angle is not finite.
     """
     angles = finite_array("azimuth, tilt and torsion", tilt_torsion, (3,))
     turns = np.stack([angles[..., 0], angles[..., 1], angles[..., 2] - angles[..., 0]], axis=-1)
@@ -56,9 +53,6 @@ def tilt_torsion_from_rotation(rotation: ArrayLike) -> FloatArray:
 
     At tilt 0 every azimuth gives the same rotation, so the azimuth is 0. At tilt 180° only twice
     the azimuth less the torsion is determined, so the torsion is 0.
-
-    Raises:
-        InputError: A matrix is not a rotation.
     """
     r = checked_rotation(rotation)
     sine = np.hypot(r[..., 0, 2], r[..., 1, 2])
@@ -77,18 +71,10 @@ def tilt_torsion_from_rotation(rotation: ArrayLike) -> FloatArray:
 
 
 def pose_of_tilt_torsion(position: ArrayLike, tilt_torsion: ArrayLike) -> Pose:
-    """Return the pose with this position (3,) and azimuth, tilt and torsion (3,) in degrees.
-
-    Raises:
-        InputError: A number is not finite.
-    """
+    """Return the pose with this position and azimuth, tilt and torsion (3,) in degrees."""
     return Pose.of(position, rotation_from_tilt_torsion(tilt_torsion))
 
 
 def tilt_torsion_of(rotation: ArrayLike) -> TiltTorsion:
-    """Return azimuth, tilt and torsion of one rotation, platform to base, shape (3, 3).
-
-    Raises:
-        InputError: The matrix is not a rotation.
-    """
+    """Return azimuth, tilt and torsion of one rotation, platform to base, shape (3, 3)."""
     return TiltTorsion(*tilt_torsion_from_rotation(rotation).tolist())

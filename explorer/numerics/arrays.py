@@ -6,7 +6,6 @@ Leading axes are batch axes everywhere; docstrings give the shapes of the traili
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,13 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from explorer.errors import InputError
 from explorer.numerics.checks import FARTHEST, size_problem
 
-FloatArray: TypeAlias = NDArray[np.float64]
-IntArray: TypeAlias = NDArray[np.int64]
-BoolArray: TypeAlias = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 
 def finite_array(
-    name: str, value: ArrayLike, shape: tuple[int, ...], most: float = math.inf
+    name: str,
+    value: ArrayLike,
+    shape: tuple[int, ...],
+    most: float = math.inf,
+    *,
+    signed: bool = True,
 ) -> FloatArray:
     """Return numbers as a float64 array, after checking their shape and that all are finite.
 
@@ -29,10 +33,11 @@ def finite_array(
         value: Numbers that NumPy can read, shape (..., *shape).
         shape: Required trailing axes.
         most: Largest size of an entry.
+        signed: Whether an entry may be negative.
 
     Raises:
         InputError: The value is not numeric, has another shape, or has an entry that is not
-            finite or too large.
+            finite, too large, or negative where none may be.
     """
     try:
         array = np.asarray(value, dtype=np.float64)
@@ -50,6 +55,17 @@ def finite_array(
         if not math.isfinite(odd):
             raise InputError(f"{name} must be finite numbers; got {odd}")
         raise InputError(f"{name} {size_problem(odd, most=most)}")
+    if not signed and (array < 0.0).any():
+        raise InputError(f"{name} must not be negative; got {array.min():g}")
+    return array
+
+
+def positive_array(name: str, value: ArrayLike, count: int) -> FloatArray:
+    """Return positive numbers (..., count), which may be infinite for no limit or a rigid part."""
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape[-1:] != (count,) or not (array > 0.0).all():
+        text = np.array2string(array, threshold=12).replace("\n", "")
+        raise InputError(f"{name} must be {count} positive numbers, which may be inf; got {text}")
     return array
 
 
@@ -69,13 +85,7 @@ def for_kernel(array: FloatArray) -> FloatArray:
 
 
 def rows_for_kernel(array: FloatArray, batch: tuple[int, ...], trailing: int) -> FloatArray:
-    """Return an array of any batch as one row for each entry of a common batch, for a kernel.
-
-    Args:
-        array: Shape (..., *own).
-        batch: Batch axes to which those of the array are broadcast.
-        trailing: Number of own axes.
-    """
+    """Return an array with `trailing` axes of its own as one row for each entry of a batch."""
     own = array.shape[array.ndim - trailing :]
     shape = (*batch, *own)
     # A broadcast array is read-only and would be copied, also if it is as it was.
@@ -84,11 +94,7 @@ def rows_for_kernel(array: FloatArray, batch: tuple[int, ...], trailing: int) ->
 
 
 def batch_shape(*arrays: tuple[FloatArray, int]) -> tuple[int, ...]:
-    """Return the common batch shape of arrays, each given with its number of trailing axes.
-
-    Raises:
-        InputError: The batch axes do not broadcast.
-    """
+    """Return the common batch shape of arrays, each given with its number of trailing axes."""
     shapes = [array.shape[: array.ndim - trailing] for array, trailing in arrays]
     try:
         return np.broadcast_shapes(*shapes)

@@ -2,7 +2,7 @@
 
 A call with few rows runs the plain Python until the compiled form is loaded, because compiling
 takes seconds. A call with many rows loads the compiled form first. That is object code in a file,
-which comes with the explorer or lies in the user's cache (`explorer.numerics.kernel_cache`). If
+which comes with the explorer or lies in the user's cache (`explorer.numerics.object_code`). If
 there is no such file, a child process compiles the kernel into the cache.
 """
 
@@ -22,8 +22,14 @@ from typing import Any, Generic, ParamSpec, TypeVar
 import numpy as np
 
 from explorer.files.packaged import SOURCES
-from explorer.numerics.kernel_cache import cache_folder, fingerprint_of, read_code, write_code
-from explorer.numerics.object_code import compile_object, load_object
+from explorer.numerics.object_code import (
+    cache_folder,
+    compile_object,
+    fingerprint_of,
+    load_object,
+    read_code,
+    write_code,
+)
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")

@@ -8,7 +8,6 @@ so the surface is closed for any values; that of marching cubes need not be.
 from __future__ import annotations
 
 import itertools
-from typing import TypeAlias
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from explorer.numerics.arrays import FloatArray, IntArray
 # Share of an edge between a vertex and the edge's ends, so that no two vertices coincide.
 LEAST_SHARE = 1e-3
 
-Edge: TypeAlias = tuple[int, int]
+Edge = tuple[int, int]
 
 
 def _triangles(negative: tuple[int, ...]) -> list[tuple[Edge, Edge, Edge]]:

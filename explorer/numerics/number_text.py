@@ -4,6 +4,11 @@ Whether a value is a rounding error follows from the size of the numbers from wh
 computed: a design may have any unit, so no length is small in itself. Files and the command line
 have ASCII text, see `format_ascii` and `format_fixed`; pages and reports have `format_number`,
 `format_decimals`, `format_fitted` and `format_column`.
+
+The `size` of a number is the magnitude of those from which it was computed; 0 keeps every number.
+`digits` are significant ones, `decimals` those after the point, and `infinite` is the word for
+infinity. For people "–" stands for what is not a number, thousands are separated by commas, and a
+number that rounds to zero has no sign.
 """
 
 from __future__ import annotations
@@ -21,23 +26,12 @@ ROUNDING = 1e-12
 
 
 def drop_rounding(value: float, size: float) -> float:
-    """Return a number, or 0 if it is a rounding error; never −0.
-
-    Args:
-        value: The number.
-        size: Magnitude of the numbers from which it was computed; 0 keeps every number.
-    """
+    """Return a number, or 0 if it is a rounding error; never −0."""
     return 0.0 if abs(value) <= ROUNDING * size else value
 
 
 def snap_to_decimals(value: float, decimals: int, size: float) -> float:
-    """Return a number, or the one of so many decimals from which rounding errors alone part it.
-
-    Args:
-        value: The number.
-        decimals: Number of decimals.
-        size: Magnitude of the numbers from which it was computed.
-    """
+    """Return a number, or the one of so many decimals from which rounding errors alone part it."""
     rounded = round(value, decimals)
     return rounded + drop_rounding(value - rounded, size)
 
@@ -46,13 +40,7 @@ def format_ascii(value: float, digits: int, *, size: float = 0.0, padded: bool =
     """Return a number with at most `digits` significant digits and an ASCII minus sign.
 
     The text has a power of ten where that is below −4 or not below `digits`, as in Python's
-    format "g": 0.0001, 1e-05, and 1.235e+05 to four digits.
-
-    Args:
-        value: The number.
-        digits: Number of significant digits.
-        size: Magnitude of the numbers from which it was computed, see `drop_rounding`.
-        padded: Whether trailing zeros stay.
+    format "g": 0.0001, 1e-05, and 1.235e+05 to four digits. Trailing zeros stay if `padded`.
     """
     return f"{drop_rounding(value, size):{'#' if padded else ''}.{digits}g}"
 
@@ -70,16 +58,10 @@ def set_true_minus(text: str) -> str:
 def format_number(
     value: float, digits: int = 4, *, size: float = 0.0, infinite: str = "infinite"
 ) -> str:
-    """Return a number for people, with at least `digits` significant digits.
+    """Return a number for people, with at least `digits` significant digits; all of a whole one.
 
-    Trailing zeros are left out, thousands are separated by commas, and only a number that is tiny
-    or huge has a power of ten: 0.0001, 12,346, and 1.235 × 10⁻⁵ to four digits.
-
-    Args:
-        value: The number; "–" stands for one that is not a number.
-        digits: Number of significant digits; a whole number has all of its own.
-        size: Magnitude of the numbers from which it was computed, see `drop_rounding`.
-        infinite: Word for infinity.
+    Trailing zeros are left out, and only a number that is tiny or huge has a power of ten: 0.0001,
+    12,346, and 1.235 × 10⁻⁵ to four digits.
     """
     value = drop_rounding(value, size)
     if not math.isfinite(value):
@@ -94,16 +76,7 @@ def format_number(
 def format_decimals(
     value: float, decimals: int, *, signed: bool = False, infinite: str = "infinite"
 ) -> str:
-    """Return a number for people with a fixed number of decimals, as for a column of numbers.
-
-    Thousands are separated by commas, and a number that rounds to zero has no sign.
-
-    Args:
-        value: The number; "–" stands for one that is not a number.
-        decimals: Number of decimals.
-        signed: Whether a positive number has a plus sign.
-        infinite: Word for infinity.
-    """
+    """Return a number for people with a fixed number of decimals, and a plus sign if `signed`."""
     if math.isnan(value):
         return "–"
     if math.isinf(value):
@@ -116,14 +89,7 @@ def format_decimals(
 def format_column(
     values: Sequence[float], digits: int = 4, *, size: float = 0.0, infinite: str = "infinite"
 ) -> list[str]:
-    """Return numbers for people with equal decimals, which give the largest so many digits.
-
-    Args:
-        values: The numbers.
-        digits: Number of significant digits of the largest one.
-        size: Magnitude of the numbers from which they were computed, see `drop_rounding`.
-        infinite: Word for infinity.
-    """
+    """Return numbers for people with equal decimals, which give the largest so many digits."""
     finite = [abs(value) for value in values if math.isfinite(value)]
     largest = max(finite, default=0.0)
     if largest > 0.0 and not 10.0**LEAST_POWER <= largest < 10.0**MOST_POWER:
@@ -137,13 +103,8 @@ def format_column(
 def format_fitted(value: float, size: float, digits: int, *, infinite: str = "infinite") -> str:
     """Return a number whose decimals depend on a size alone, so that it holds still as it changes.
 
-    A number that would look like 0, though it is none, has digits of its own.
-
-    Args:
-        value: The number.
-        size: Size of the largest number expected.
-        digits: Number of digits at this size.
-        infinite: Word for infinity.
+    The size is that of the largest number expected, which has so many digits. A number that would
+    look like 0, though it is none, has digits of its own.
     """
     value = drop_rounding(value, size)
     decimals = decimals_for(size, digits)

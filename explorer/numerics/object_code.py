@@ -1,21 +1,33 @@
 """Object code of kernels: machine code that Numba makes, and that runs without Numba.
 
 Object code depends on the processor and the operating system, but neither on Numba nor on the
-version of Python, so that it can be packaged. Loading it takes llvmlite alone and milliseconds.
+version of Python, so that it can be packaged: for common processors, else in the user's cache.
+Loading it takes llvmlite alone and milliseconds. The name of a file has a fingerprint of the
+kernel's own source, of the functions that it calls and of the constants that it names: a change in
+other code, a second checkout and a new installation use the same files.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
+import hashlib
 import importlib
+import linecache
+import os
 import re
 import sys
-from collections.abc import Callable
-from types import FunctionType
+from collections.abc import Callable, Container
+from pathlib import Path
+from types import CodeType, FunctionType
 from typing import Any
 
 import numpy as np
+import platformdirs
+
+from explorer.files.packaged import packaged_file
+from explorer.files.writing import write_whole
 
 Function = Callable[..., Any]
 LLVM = "llvmlite.binding"
@@ -80,12 +92,8 @@ def arguments_of(signature: str) -> list[tuple[str, int]]:
 def compile_object(function: Function, helpers: dict[Function, Any], signature: str) -> bytes:
     """Return the object code of a function in the subset of Python that Numba compiles.
 
-    Its function `SYMBOL` takes arrays as pointers to their C structures.
-
-    Args:
-        function: Function that writes its results into arrays among its arguments.
-        helpers: Functions that it may call, with their compiled forms; None before they are made.
-        signature: Its type signature for Numba; all arrays are contiguous.
+    Its function `SYMBOL` takes arrays as pointers to their C structures. The helpers are functions
+    that it may call, with their compiled forms; None before they are made.
     """
     numba, llvm = _import("numba"), _import(LLVM)
     # The wrappers for calls from Python would need Numba at run time.
@@ -218,3 +226,68 @@ def _with_compiled_helpers(function: Function, helpers: dict[Function, Any]) -> 
     copy = FunctionType(code, names, function.__name__, function.__defaults__)
     copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
     return copy
+
+
+# Folder of the object code that comes with the explorer, a folder for each processor.
+PACKAGED = "kernels"
+# Number of bytes of the digest before the code in a file.
+DIGEST = hashlib.sha256().digest_size
+# Number of hexadecimal digits of a fingerprint.
+DIGITS = 16
+
+
+def read_code(file_name: str) -> bytes | None:
+    """Return the object code in a packaged or cached file; None if it is missing or damaged."""
+    for path in (packaged_file(f"{PACKAGED}/{processor()}", file_name), cache_folder() / file_name):
+        with contextlib.suppress(OSError):
+            data = path.read_bytes()
+            code = data[DIGEST:]
+            if hashlib.sha256(code).digest() == data[:DIGEST]:
+                return code
+    return None
+
+
+def write_code(folder: Path, file_name: str, code: bytes) -> None:
+    """Write object code atomically into a folder, after a digest of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(folder / file_name, hashlib.sha256(code).digest() + code)
+
+
+@functools.cache
+def cache_folder() -> Path:
+    """Return the folder for object code in the user's cache."""
+    root = Path(os.environ.get("XDG_CACHE_HOME") or platformdirs.user_cache_dir())
+    return root / "flagged-explorer" / "kernels" / processor()
+
+
+def fingerprint_of(
+    function: Callable[..., Any], helpers: Container[Callable[..., Any]], signature: str
+) -> str:
+    """Return digits that change with a function, the helpers that it calls, and its signature."""
+    digest = hashlib.sha256(repr((signature, OPTIONS)).encode())
+    visited: set[Callable[..., Any]] = {function}
+    waiting = [function]
+    while waiting:
+        called = waiting.pop()
+        assert isinstance(called, FunctionType)  # noqa: S101 - kernels and helpers are
+        code = called.__code__
+        digest.update(_source_of(code).encode())
+        for name in sorted(code.co_names):
+            value = called.__globals__.get(name)
+            if isinstance(value, FunctionType) and value in helpers:
+                if value not in visited:
+                    visited.add(value)
+                    waiting.append(value)
+            elif isinstance(value, bool | int | float | tuple):
+                digest.update(f"{name}={value!r}".encode())
+            elif isinstance(value, type):
+                # Compiled code addresses the fields of a named tuple by their order.
+                digest.update(f"{name}={getattr(value, '_fields', ())}".encode())
+    return digest.hexdigest()[:DIGITS]
+
+
+def _source_of(code: CodeType) -> str:
+    """Return the source of a function without comments; its bytecode varies with Python."""
+    last = max(end or line or 0 for line, end, _, _ in code.co_positions())
+    lines = linecache.getlines(code.co_filename)[code.co_firstlineno - 1 : last]
+    return "\n".join(re.sub(r"\s*(#.*)?\s$", "", line) for line in lines)

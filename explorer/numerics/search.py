@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
 
-Watch: TypeAlias = Callable[[str, float], None]
+Watch = Callable[[str, float], None]
 """Callback before each stage: it takes a description of the stage and the share of stages that
 are done, at least 0 and below 1, and ends the computation by raising an exception."""
 
@@ -19,12 +19,7 @@ def ignore_stage(words: str, share: float) -> None:
 
 
 class Stages:
-    """The stages of one computation.
-
-    Args:
-        watch: Callback before each stage.
-        count: Number of stages; an upper bound while it is not known.
-    """
+    """The stages of one computation, with a callback before each and a number, or a bound of it."""
 
     def __init__(self, watch: Watch, count: int) -> None:
         self.count = count
@@ -32,11 +27,7 @@ class Stages:
         self._started = 0
 
     def begin(self, words: str) -> None:
-        """Report to the callback that the next stage begins.
-
-        Args:
-            words: Description of what the stage computes.
-        """
+        """Report to the callback that the next stage begins, and what it computes."""
         self._watch(words, self._started / max(self.count, self._started + 1))
         self._started += 1
 
@@ -48,13 +39,9 @@ def descend(
 ) -> FloatArray | None:
     """Return the last iterate of SciPy's SLSQP, shape (n,); None if it is not finite.
 
-    Variables, objective and constraints must be scaled to the order of one. The caller checks
-    whether the result is feasible and better than the start.
-
-    Args:
-        objective: Function from variables (n,) to the value and its gradient (n,).
-        constraints: Function from variables (n,) to values (m,) that must not be negative.
-        start: Initial variables, shape (n,).
+    The objective gives a value and its gradient (n,), the constraints values (m,) that must not be
+    negative, all scaled to the order of one. The caller checks whether the result is feasible and
+    better than the start.
     """
     from scipy import optimize
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
 
-Vector: TypeAlias = tuple[float, float, float]
+Vector = tuple[float, float, float]
 
 
 @helper

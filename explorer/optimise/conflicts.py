@@ -17,21 +17,10 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import LENGTHS, Design, Limits
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.margins import SINGULAR, planes_of_singularity
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.optimise.demands import Box
-from explorer.optimise.problem import (
-    MAXIMA,
-    OF_THE_MACHINE,
-    REACH,
-    SHIFTS,
-    YAW,
-    Problem,
-    start_value,
-    with_box,
-)
-from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.statics.forces import SINGULAR
+from explorer.optimise import problem as problems
 from explorer.workspace.limits.table import GAP
 
 # Excess over its bound that makes a demand impossible, as a share: searches have tolerances.
@@ -55,7 +44,7 @@ class Conflict(NamedTuple):
     message: str
 
 
-def find_conflicts(problem: Problem) -> tuple[Conflict, ...]:
+def find_conflicts(problem: problems.Problem) -> tuple[Conflict, ...]:
     """Return the reasons why no design within the bounds meets the demands, one for each limit."""
     intervals, found = Intervals(problem), dict[str, Conflict]()
     for find in (_of_volume, _of_lengths, _of_required_box, _of_margins):
@@ -64,9 +53,9 @@ def find_conflicts(problem: Problem) -> tuple[Conflict, ...]:
     return tuple(found.values())
 
 
-def paper_box(problem: Problem) -> Box | None:
+def paper_box(problem: problems.Problem) -> problems.Box | None:
     """Return the box of the paper's optimum, or None if it is too small for the demands too."""
-    boxed = msgspec.structs.replace(problem, start=with_box(problem.start, PAPER_BOX))
+    boxed = msgspec.structs.replace(problem, start=problems.with_box(problem.start, PAPER_BOX))
     is_too_small = any(conflict.limit == BOX_LIMIT for conflict in find_conflicts(boxed))
     return None if is_too_small else PAPER_BOX
 
@@ -74,34 +63,32 @@ def paper_box(problem: Problem) -> Box | None:
 def without_limit(design: Design, limit: str) -> Design | None:
     """Return a design without one limit, its home where it was; None if it has no such limit.
 
-    Args:
-        design: The manipulator.
-        limit: Name as in a conflict or a `StartError`. A maximum becomes the reach.
+    The limit is named as in a conflict or a `StartError`. A maximum becomes the reach.
     """
-    name, limits = limit.partition(" ")[0], design.limits
-    lengths = LENGTHS if limit == MAXIMA else {name}.intersection(LENGTHS)
-    free = {length: (getattr(limits, length)[0], None) for length in lengths}
+    name = limit.partition(" ")[0]
+    lengths = LENGTHS if limit == problems.MAXIMA else {name}.intersection(LENGTHS)
+    free = {length: (getattr(design.limits, length)[0], None) for length in lengths}
     if name in ("box", "guide", "margin", "gap", "swing"):
         free[name] = getattr(Limits(), name)
-    lifted = msgspec.structs.replace(limits, **free)
-    if lifted == limits:
-        return None
-    return msgspec.structs.replace(design, limits=lifted, home=design.home_pose)
+    lifted = design.with_limits(**free)
+    return None if lifted == design else msgspec.structs.replace(lifted, home=design.home_pose)
 
 
 class Intervals:
     """Intervals that hold every value of a quantity within the bounds, and may be wider."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: problems.Problem) -> None:
         self.problem = problem
         self.rotation = problem.start.home_pose.rotation
         self._bounds = {each.name: (each.low, each.high) for each in problem.variables}
-        self.is_turning = len({*self._bounds.get(YAW, ())}) > 1
+        self.is_turning = len({*self._bounds.get(problems.YAW, ())}) > 1
 
     def of(self, *names: str) -> FloatArray:
         """Return the intervals of k design variables or shifts of the required box, (k, 2)."""
         start, bounds = self.problem.start, self._bounds
-        return np.array([bounds.get(name) or (start_value(start, name),) * 2 for name in names])
+        return np.array(
+            [bounds.get(name) or (problems.start_value(start, name),) * 2 for name in names]
+        )
 
     def in_base(self, vector: ArrayLike) -> FloatArray:
         """Return the base intervals (3, 2) of a vector with x and y (2, 2) on the platform."""
@@ -120,10 +107,10 @@ class Intervals:
     def maximum(self, name: str) -> tuple[str, float, float]:
         """Return the limit that is the maximum of a length, and its least and its most."""
         fixed, a3 = getattr(self.problem.start.limits, name)[1], self.of("a3x", "a3y")
-        if REACH not in self._bounds and fixed is not None:
+        if problems.REACH not in self._bounds and fixed is not None:
             return f"{name} maximum", fixed, fixed
         of_a3 = (math.hypot(*_smallest(a3)), math.hypot(*np.abs(a3).max(axis=1)))
-        low, high = self._bounds.get(REACH, of_a3)
+        low, high = self._bounds.get(problems.REACH, of_a3)
         return LONGEST_LEG, low, min(high, self.problem.demands.reach or math.inf)
 
 
@@ -138,7 +125,7 @@ def _smallest(intervals: FloatArray) -> FloatArray:
     return np.maximum(0.0, np.maximum(intervals[..., 0], -intervals[..., 1]))
 
 
-def needed_lengths(intervals: Intervals, required: Box) -> dict[str, float]:
+def needed_lengths(intervals: Intervals, required: problems.Box) -> dict[str, float]:
     """Return the least that each length must reach over a box, wherever the bounds place it."""
     (lows, highs), still = np.array(required), (0.0, 0.0)
     # What is to be added to b4 to have the offset from the centre or axis of each length.
@@ -148,7 +135,10 @@ def needed_lengths(intervals: Intervals, required: Box) -> dict[str, float]:
         "d4": intervals.in_base([*intervals.of("b3"), still])[1:],
         "l4": np.array([*-intervals.of("a3x", "a3y")[:, ::-1], still]),
     }
-    middle, half = 0.5 * (lows + highs)[:, None] + intervals.of(*SHIFTS), 0.5 * (highs - lows)
+    middle, half = (
+        0.5 * (lows + highs)[:, None] + intervals.of(*problems.SHIFTS),
+        0.5 * (highs - lows),
+    )
     return {
         name: math.hypot(*(half[-len(arm) :] + _smallest(middle[-len(arm) :] + arm)))
         for name, arm in arms.items()
@@ -204,7 +194,7 @@ def _of_required_box(intervals: Intervals) -> Iterator[Conflict]:
     box, required = intervals.problem.start.limits.box, intervals.problem.demands.required_box
     if required is None:
         return
-    shifts = intervals.of(*SHIFTS)
+    shifts = intervals.of(*problems.SHIFTS)
     for axis, name in enumerate("xyz" if box is not None else ""):
         (low, high), (least, most) = ends = np.array([required, box])[:, :, axis].tolist()
         # It may be shifted by what lies in both intervals, if anything does.
@@ -226,8 +216,8 @@ def _of_margins(intervals: Intervals) -> Iterator[Conflict]:
     if required is None:
         return
     is_loaded = demands.held or demands.error or demands.deflection
-    needs_regular = is_loaded or problem.objective in OF_THE_MACHINE
-    corners, shifts = np.transpose(required), intervals.of(*SHIFTS)
+    needs_regular = is_loaded or problem.objective in problems.OF_THE_MACHINE
+    corners, shifts = np.transpose(required), intervals.of(*problems.SHIFTS)
     rounding = SINGULAR * float(np.linalg.norm(corners[:, 1] - corners[:, 0]))
     planes, signs = planes_of_singularity(intervals.rotation), problem.start.home_signs
     # The planes of δ1 and δ2 turn with the yaw.

@@ -12,22 +12,11 @@ from collections.abc import Iterable
 import msgspec
 
 from explorer.errors import InputError
-from explorer.measures.size import MARGIN_OF_CLEARANCE, longest_leg
+from explorer.measures.measure import MARGIN_OF_CLEARANCE, longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.checks import MOST
-from explorer.optimise.demands import Box, Demands
-from explorer.optimise.problem import (
-    DISTANCES,
-    REACH,
-    SHIFTS,
-    ObjectiveName,
-    Problem,
-    Variable,
-    distance_of,
-    longest_minimum,
-    start_value,
-)
+from explorer.optimise import problem
 
 PAPER_VOLUME = 8000.0
 """Volume that the paper demands, V′, in cubed design units."""
@@ -45,7 +34,7 @@ YAW_WITHIN, LINES_APART = 45.0, 5.0
 
 def make_problem(
     start: Design,
-    objective: ObjectiveName,
+    objective: problem.ObjectiveName,
     *,
     volume: float | None = None,
     reach: float | None = None,
@@ -53,14 +42,14 @@ def make_problem(
     clearance_margin: float | None = None,
     least: float | None = None,
     stroke_ratio: float | None = None,
-    required_box: Box | None = None,
+    required_box: problem.Box | None = None,
     held: bool = False,
     error: float | None = None,
     deflection: float | None = None,
     tilt: float | None = None,
     free: Iterable[str] = (),
-    bounds: Iterable[Variable] = (),
-) -> Problem:
+    bounds: Iterable[problem.Variable] = (),
+) -> problem.Problem:
     """Return a problem with sensible bounds and margins where none are given.
 
     Args:
@@ -93,14 +82,17 @@ def make_problem(
     if reach is None and objective == "largest-volume":
         reach = longest_leg(start)
     if least is None:
-        least = min(LEAST * size, 0.5 * min(abs(distance_of(start, name)) for name in DISTANCES))
+        least = min(
+            LEAST * size,
+            0.5 * min(abs(problem.distance_of(start, name)) for name in problem.DISTANCES),
+        )
     if clearance_margin is None:
         clearance_margin = MARGIN_OF_CLEARANCE * start.reach
-    return Problem(
+    return problem.Problem(
         start=start,
         objective=objective,
         variables=tuple(variables),
-        demands=Demands(
+        demands=problem.Demands(
             volume=volume,
             reach=reach,
             clearance=clearance,
@@ -116,29 +108,29 @@ def make_problem(
     )
 
 
-def default_variable(start: Design, name: str) -> Variable:
+def default_variable(start: Design, name: str) -> problem.Variable:
     """Return a variable with bounds that leave room around a start.
 
     Raises:
         InputError: No such variable.
     """
     size = max(map(abs, start.variables))
-    value = start_value(start, name)
+    value = problem.start_value(start, name)
     if name in ("a3x", "a3y"):
         within = min(A3_WITHIN * size, MOST)
-        return Variable(name, -within, within)
+        return problem.Variable(name, -within, within)
     if name in VARIABLES:
-        return Variable(name, -B_WITHIN * size, B_WITHIN * size)
-    if name == REACH:
-        low = max(value / A3_WITHIN, longest_minimum(start))
-        return Variable(name, low, min(A3_WITHIN * value, MOST))
-    if name in SHIFTS:
-        return Variable(name, -size, size)
+        return problem.Variable(name, -B_WITHIN * size, B_WITHIN * size)
+    if name == problem.REACH:
+        low = max(value / A3_WITHIN, problem.longest_minimum(start))
+        return problem.Variable(name, low, min(A3_WITHIN * value, MOST))
+    if name in problem.SHIFTS:
+        return problem.Variable(name, -size, size)
     # The lines are parallel at multiples of 180°; stay between two of them if the start does.
     below = 180.0 * math.floor(value / 180.0)
     low = max(value - YAW_WITHIN, min(value, below + LINES_APART))
     high = min(value + YAW_WITHIN, max(value, below + 180.0 - LINES_APART))
-    return Variable(name, low, high)
+    return problem.Variable(name, low, high)
 
 
 def _own_volume(start: Design) -> float:
@@ -156,21 +148,20 @@ def paper_start() -> Design:
     return msgspec.structs.replace(initial, limits=optimal.limits)
 
 
-def paper_problem(clearance: float | None = CLEARANCE) -> Problem:
+def paper_problem(clearance: float | None = CLEARANCE) -> problem.Problem:
     """Return the paper's problem: from its initial design to a volume of 8000."""
     return make_problem(paper_start(), "match-volume", volume=PAPER_VOLUME, clearance=clearance)
 
 
-def reach_problem(clearance: float | None = None) -> Problem:
+def reach_problem(clearance: float | None = None) -> problem.Problem:
     """Return the smallest reach for the exact volume of the paper's optimum.
 
     |b1y|, |a3y| and |b3 − b2| are at least 1 and every coordinate of b within ±10.
     """
-    optimal = PRESETS["paper-optimal"]
-    bounds = [Variable(name, -10.0, 10.0) for name in ("b1x", "b1y", "b2", "b3")]
-    bounds += [Variable("a3x", -40.0, 40.0), Variable("a3y", 1.0, 40.0)]
+    bounds = [problem.Variable(name, -10.0, 10.0) for name in ("b1x", "b1y", "b2", "b3")]
+    bounds += [problem.Variable("a3x", -40.0, 40.0), problem.Variable("a3y", 1.0, 40.0)]
     return make_problem(
-        optimal,
+        PRESETS["paper-optimal"],
         "smallest-reach",
         clearance=clearance,
         clearance_margin=paper_problem().demands.clearance_margin,

@@ -1,22 +1,31 @@
-"""The outcome of an optimisation: status, every iterate, and the demand or bound that holds it.
+"""The outcome of an optimisation with every iterate, its record in a file, and curves of iterates.
 
-All are plain values, to send to another process or write into a file.
+Records are JSON, read strictly: the problem, the settings, every iterate, and the versions of the
+libraries. All are plain values, to send to another process or write into a file.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
 import msgspec
+import numpy as np
 
+from explorer.files.json_text import decode_strictly
+from explorer.files.packaged import versions
+from explorer.files.writing import read_at_most
+from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import Design
-from explorer.optimise.problem import Problem
+from explorer.numerics.arrays import FloatArray
+from explorer.optimise.problem import ObjectiveName, Problem
 
 Status = Literal["converged", "not converged", "infeasible", "stalled", "outdone", "cancelled"]
-"""Converged: the design, read back from its file, meets all demands and has a workspace, and no
-design nearby that meets them has a better objective. Not converged: the iterations ended first.
+"""Converged: the design meets all demands and has a workspace, and no design nearby that meets
+them has a better objective. Not converged: the iterations ended first.
 Infeasible: the search found no design that meets all demands. Stalled: the demands are met,
 but no step improves the objective although the conditions of an optimum fail. Outdone: even
 without the clearance demanded, the best design is no better than that of an earlier start.
@@ -27,7 +36,7 @@ Phase = Literal["opening", "growing", "solving"]
 since the volume was out of reach. Solving: the problem itself."""
 
 
-class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class IterateRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """An iterate without its design, which follows from the values.
 
     Attributes:
@@ -53,7 +62,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     spare: float
 
 
-class Iterate(Step, frozen=True, kw_only=True):
+class Iterate(IterateRecord, frozen=True, kw_only=True):
     """A design that the solver accepted on its way."""
 
     design: Design
@@ -150,3 +159,144 @@ class Outcome:
     def evaluations(self) -> int:
         """Number of designs that were measured in the best run."""
         return self.run.evaluations
+
+
+# Largest record that is read, in bytes; real ones are much smaller.
+LARGEST_FILE = 200_000_000
+
+
+class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Settings of a search; see `optimise_design`."""
+
+    starts: int = 1
+    seed: int = 0
+    iterations: int = 300
+
+
+class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An optimisation as a file holds it.
+
+    Attributes:
+        schema: Version of the file format.
+        problem: The problem.
+        settings: Settings of the search.
+        design: Best design.
+        chosen: Index of the best run.
+        runs: Run from each start; the best iterate is an index into the history.
+        history: Every iterate.
+        seconds: Duration in seconds.
+        versions: Versions of Python and the libraries by name.
+    """
+
+    schema: Literal[1] = 1
+    problem: Problem
+    settings: Settings
+    design: Design
+    chosen: int
+    runs: tuple[RunRecord, ...]
+    history: tuple[IterateRecord, ...]
+    seconds: float
+    versions: dict[str, str]
+
+
+def record_of(outcome: Outcome, settings: Settings) -> Record:
+    """Return the record of an optimisation that was run with these settings."""
+    runs = (RunRecord(best=run.best.number, **_fields(RunSummary, run)) for run in outcome.runs)
+    return Record(
+        problem=outcome.problem,
+        settings=settings,
+        design=outcome.design,
+        chosen=outcome.chosen,
+        runs=tuple(runs),
+        history=tuple(map(step_of, outcome.history)),
+        seconds=outcome.seconds,
+        versions=versions(),
+    )
+
+
+def encode_record(record: Record) -> bytes:
+    """Return a record as indented JSON, which `decode_record` reads back unchanged."""
+    return msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n"
+
+
+def decode_record(data: bytes, source: str) -> Record:
+    """Return the record in a JSON text, of which error messages tell the source.
+
+    Raises:
+        InputError: Not JSON, of another schema, or with unknown, repeated or unusable fields.
+    """
+    return decode_strictly(data, Record, source)
+
+
+def load_record(path: Path) -> Record:
+    """Return the record in a file.
+
+    Raises:
+        InputError: The file holds no record.
+        StorageError: The file cannot be read.
+    """
+    return decode_record(read_at_most(path, LARGEST_FILE), str(path))
+
+
+def step_of(iterate: Iterate) -> IterateRecord:
+    """Return an iterate without its design."""
+    return IterateRecord(**_fields(IterateRecord, iterate))
+
+
+def _fields(base: type[msgspec.Struct], value: msgspec.Struct) -> dict[str, Any]:
+    """Return the values of those fields that a value has from a base."""
+    return {name: getattr(value, name) for name in base.__struct_fields__}
+
+
+GOALS: Mapping[ObjectiveName, str] = {
+    "match-volume": "volume",
+    "smallest-reach": "longest_leg",
+    "largest-volume": "volume",
+    "largest-margin": "box_margin",
+    "smallest-load": "load_share",
+    "smallest-error": "worst_error",
+    "smallest-deflection": "deflection",
+}
+"""The name in the catalogue of the measure that each objective improves."""
+
+OBJECTIVE_SYMBOLS: Mapping[ObjectiveName, str] = {
+    **{objective: CATALOGUE[name].label for objective, name in GOALS.items()},
+    "match-volume": "F",
+}
+"""The name of the value of each objective: F, or the label of the measure in the catalogue."""
+
+# Value drawn for an objective of zero, which has no logarithm.
+LEAST = 1e-16
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Values of the iterates of one start.
+
+    Attributes:
+        kind: Quantity of the values.
+        values: Value of each iterate, shape (n,); NaN for an infinite one.
+        level: Value to compare the others with, or None.
+        powers: Whether the values are exponents of ten.
+    """
+
+    kind: Literal["objective", "volume", "spare"]
+    values: FloatArray
+    level: float | None
+    powers: bool = False
+
+
+def curves_of(problem: Problem, iterates: Sequence[IterateRecord]) -> list[Curve]:
+    """Return the curves of the iterates of one start, of which there is at least one."""
+    objective = np.array([iterate.objective for iterate in iterates], dtype=np.float64)
+    curves: list[Curve] = []
+    if problem.objective == "match-volume":
+        powers = np.log10(np.maximum(objective, LEAST))
+        curves.append(Curve("objective", powers, None, powers=True))
+    elif problem.objective != "largest-volume":
+        curves.append(Curve("objective", objective, None))
+    volume = np.array([iterate.volume for iterate in iterates])
+    curves.append(Curve("volume", volume, problem.demands.volume))
+    if any(iterate.worst for iterate in iterates):
+        curves.append(Curve("spare", np.array([iterate.spare for iterate in iterates]), 0.0))
+    return curves

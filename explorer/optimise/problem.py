@@ -1,4 +1,4 @@
-"""Problems of optimal design: variables, objective and demands.
+"""Problems of optimal design: variables, objective, and demands besides the limits of the design.
 
 A problem is a plain value that can be sent to another process or written into a file. It starts
 from a design, whose own limits (the box among them) bound its workspace as always.
@@ -6,18 +6,18 @@ from a design, whose own limits (the box among them) bound its workspace as alwa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import msgspec
 import numpy as np
 
 from explorer.errors import InputError
-from explorer.measures.size import longest_leg
+from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design
-from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
-from explorer.numerics.checks import number
-from explorer.optimise.demands import MOST_TILT, Box, Demands
+from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.numerics import checks
 from explorer.statics.compliance import is_elastic
 from explorer.statics.reactions import part_limits
 from explorer.workspace.limits.table import bounds_angles
@@ -75,6 +75,82 @@ class StartError(InputError):
         self.limit = limit
 
 
+Box = tuple[Triple, Triple]
+
+AZIMUTHS = 12
+"""Number of azimuths, at equal distances from the yaw of home, in which a tilt is demanded."""
+
+MOST_TILT = 90.0
+
+
+class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Demands besides the design's own limits; None is no demand.
+
+    Attributes:
+        volume: Exact volume of the workspace to match, or the least one, in cubed design units.
+        reach: Longest leg allowed, in design units.
+        clearance: Smallest clearance of each pair of legs, radii taken off, wherever in the
+            workspace every margin is at least `clearance_margin`. Nearer to a singularity
+            legs may have to meet: with a level platform all four lie in the base at δ3 = 0.
+        clearance_margin: Least margin at which clearance is demanded, in design units.
+        least: Smallest |a3y|, |b1y| and |b3 − b2|, at zero of which a design is degenerate.
+        stroke_ratio: Longest over shortest of each actuator: raises its minimum length to
+            its maximum over this ratio, so that the workspace is what such strokes reach.
+        required_box: (lows, highs) of positions that must lie in the workspace.
+        held: Whether the design's load must be held over the required box, within the limits of
+            its actuators, struts and guide.
+        tilt: Tilt from the orientation of home that the required box must allow in every azimuth,
+            in degrees. It is demanded in `AZIMUTHS` of them; between these the box may allow
+            some hundredths less.
+        error: Worst displacement of the tool by the actuators' errors over the required box, in
+            design units.
+        deflection: Largest displacement of the tool under the design's load over the required box,
+            in design units.
+    """
+
+    volume: float | None = None
+    reach: float | None = None
+    clearance: float | None = None
+    clearance_margin: float = 0.0
+    least: float = 0.0
+    stroke_ratio: float | None = None
+    required_box: Box | None = None
+    held: bool = False
+    error: float | None = None
+    deflection: float | None = None
+    tilt: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.volume is not None:
+            if not 0.0 < self.volume < math.inf:
+                raise InputError(
+                    f"the volume demanded must be a positive, finite number; got {self.volume:g}"
+                )
+            msgspec.structs.force_setattr(self, "volume", float(self.volume))
+        for field in ("reach", "clearance", "stroke_ratio", "error", "deflection", "tilt"):
+            value = getattr(self, field)
+            if value is not None:
+                label = f"the {field.replace('_', ' ')} demanded"
+                msgspec.structs.force_setattr(self, field, checks.positive(label, value))
+        for field in ("clearance_margin", "least"):
+            value = checks.not_negative(f"the {field.replace('_', ' ')}", getattr(self, field))
+            msgspec.structs.force_setattr(self, field, value)
+        msgspec.structs.force_setattr(self, "held", bool(self.held))
+        if self.required_box is not None:
+            lows, highs = checks.two("the required box", self.required_box)
+            pairs = [
+                checks.ordered_pair(f"the required box {axis}", low, high)
+                for axis, low, high in zip(
+                    "xyz",
+                    checks.numbers("the required box's lows", lows, 3),
+                    checks.numbers("the required box's highs", highs, 3),
+                    strict=True,
+                )
+            ]
+            box = tuple(low for low, _ in pairs), tuple(high for _, high in pairs)
+            msgspec.structs.force_setattr(self, "required_box", box)
+
+
 class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A variable and its bounds.
 
@@ -90,7 +166,7 @@ class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         msgspec.structs.force_setattr(self, "name", str(self.name))
         for field in ("low", "high"):
-            value = number(f"the {field} bound of {self.name}", getattr(self, field))
+            value = checks.number(f"the {field} bound of {self.name}", getattr(self, field))
             msgspec.structs.force_setattr(self, field, value)
 
 
@@ -154,19 +230,8 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         Raises:
             DesignError: The values make a degenerate design.
         """
-        design = varied(self.start, dict(zip(self.names, values, strict=True)))
+        design = with_values(self.start, dict(zip(self.names, values, strict=True)))
         return with_strokes(design, self.demands.stroke_ratio)
-
-    @property
-    def wanted_volume(self) -> float:
-        """The demanded volume, in cubed design units.
-
-        Raises:
-            InputError: No volume is demanded.
-        """
-        if self.demands.volume is None:
-            raise InputError("this problem demands no volume")
-        return self.demands.volume
 
     def required_box_at(self, values: Iterable[float]) -> Box:
         """Return the required box where these values of the variables shift it to.
@@ -182,12 +247,8 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return (ax + x, ay + y, az + z), (bx + x, by + y, bz + z)
 
 
-def varied(design: Design, values: Mapping[str, float]) -> Design:
-    """Return a design with other values of some variables, see `start_value`.
-
-    Args:
-        design: The design.
-        values: Values by name, of `VARIABLES`, `YAW` and `REACH`; other names change nothing.
+def with_values(design: Design, values: Mapping[str, float]) -> Design:
+    """Return a design with other values of `VARIABLES`, `YAW` and `REACH`; others change nothing.
 
     Raises:
         DesignError: The values make a degenerate design.
@@ -201,24 +262,23 @@ def varied(design: Design, values: Mapping[str, float]) -> Design:
         changed = msgspec.structs.replace(changed, home=home)
     if REACH in values:
         ranges = {name: (getattr(changed.limits, name)[0], values[REACH]) for name in LENGTHS}
-        limits = msgspec.structs.replace(changed.limits, **ranges)
-        changed = msgspec.structs.replace(changed, limits=limits)
+        changed = changed.with_limits(**ranges)
     return changed
+
+
+def with_limits(design: Design, **limits: Any) -> Design:
+    """Return a design with other values of some fields of its limits."""
+    changed = msgspec.structs.replace(design.limits, **limits)
+    return msgspec.structs.replace(design, limits=changed)
 
 
 def with_box(design: Design, box: Box | None) -> Design:
     """Return a design with another box, or none; its home stays where it was."""
-    limits = msgspec.structs.replace(design.limits, box=box)
-    return msgspec.structs.replace(design, limits=limits, home=design.home_pose)
+    return msgspec.structs.replace(design.with_limits(box=box), home=design.home_pose)
 
 
 def with_strokes(design: Design, ratio: float | None) -> Design:
-    """Return a design whose minimum lengths are raised to keep a stroke ratio.
-
-    Args:
-        design: The design.
-        ratio: Longest over shortest length of each actuator; None for no demand.
-    """
+    """Return a design with minimum lengths that keep a ratio, longest over shortest, if any."""
     if ratio is None:
         return design
     limits = design.limits
@@ -229,7 +289,7 @@ def with_strokes(design: Design, ratio: float | None) -> Design:
         )
         for name in LENGTHS
     }
-    return msgspec.structs.replace(design, limits=msgspec.structs.replace(limits, **ranges))
+    return design.with_limits(**ranges)
 
 
 DISTANCES = ("a3y", "b1y", "b3 − b2")
@@ -344,26 +404,20 @@ def _check_statics(problem: Problem) -> None:
 
 
 def _check_objective(problem: Problem) -> None:
-    limits = problem.start.limits
-    names, demands = problem.names, problem.demands
-    is_tied = all(getattr(limits, name)[1] is None for name in LENGTHS)
-    match problem.objective:
-        case "match-volume" | "smallest-reach":
-            if demands.volume is None:
-                raise InputError(f"{problem.objective} needs a volume")
-            if problem.objective == "smallest-reach" and not (REACH in names or is_tied):
-                raise StartError(
-                    "the design fixes maximum lengths: tie them to the reach |a3|, or let the "
-                    "reach change as a variable of its own",
-                    MAXIMA,
-                )
-        case "largest-volume" | "smallest-load" | "smallest-error" | "smallest-deflection":
-            pass
-        case "largest-margin":
-            if demands.required_box is None:
-                raise InputError("largest-margin needs a required box to be margins over")
-            if not {YAW, *SHIFTS} & {*names}:
-                raise InputError(
-                    "margins do not depend on the design variables: let the yaw or the place "
-                    "of the required box (shift-x, shift-y, shift-z) change"
-                )
+    objective, names, demands = problem.objective, problem.names, problem.demands
+    if objective in ("match-volume", "smallest-reach") and demands.volume is None:
+        raise InputError(f"{objective} needs a volume")
+    is_tied = all(getattr(problem.start.limits, name)[1] is None for name in LENGTHS)
+    if objective == "smallest-reach" and not (REACH in names or is_tied):
+        raise StartError(
+            "the design fixes maximum lengths: tie them to the reach |a3|, or let the reach change "
+            "as a variable of its own",
+            MAXIMA,
+        )
+    if objective == "largest-margin" and demands.required_box is None:
+        raise InputError("largest-margin needs a required box to be margins over")
+    if objective == "largest-margin" and not {YAW, *SHIFTS} & {*names}:
+        raise InputError(
+            "margins do not depend on the design variables: let the yaw or the place of the "
+            "required box (shift-x, shift-y, shift-z) change"
+        )

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 
 from explorer.errors import InputError
 from explorer.numerics.compiled import warm_in_background
-from explorer.optimise.outcome import Outcome, Run
+from explorer.optimise.outcome import Iterate, Outcome, Run
 from explorer.optimise.problem import Problem
 from explorer.optimise.search.search import SAME, Search
-from explorer.optimise.search.sqp import Trail, Watch
+from explorer.optimise.search.sqp import Trail
 from explorer.optimise.search.starts import check_starts, more_starts
 
 MOST_ITERATIONS = 300
@@ -22,7 +22,7 @@ def optimise_design(
     starts: int = 1,
     seed: int = 0,
     iterations: int = MOST_ITERATIONS,
-    watch: Watch | None = None,
+    watch: Callable[[Iterate], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Outcome:
     """Search for the best design.
@@ -74,16 +74,15 @@ def _best(runs: Sequence[Run], trail: Trail) -> int:
 
     Of runs with the same objective the first one counts.
     """
+
+    def rank(run: Run) -> tuple[tuple[object, ...], float]:
+        *missed, value = trail.rank(run.best)
+        return (run.status != "converged", *missed), value
+
     best = 0
     for index in range(1, len(runs)):
-        (*missed, value), (*least_missed, least) = (
-            trail.rank(run.best) for run in (runs[index], runs[best])
-        )
-        converged = runs[index].status == "converged"
-        if converged != (runs[best].status == "converged"):
-            best = index if converged else best
-        elif missed != least_missed:
-            best = index if missed < least_missed else best
-        elif value < least - SAME * abs(least):
+        (missed, value), (least_missed, least) = rank(runs[index]), rank(runs[best])
+        is_better = value < least - SAME * abs(least)
+        if missed < least_missed or (missed == least_missed and is_better):
             best = index
     return best

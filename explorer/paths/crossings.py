@@ -121,9 +121,8 @@ def _merge_corners(crossings: list[Crossing]) -> list[Crossing]:
         ]
         if twins and crossing.share <= NEAREST_ROOTS:
             before = merged[twins[-1]]
-            merged[twins[-1]] = dataclasses.replace(
-                before, changes_sign=before.side != crossing.side
-            )
+            changes_sign = before.side != crossing.side
+            merged[twins[-1]] = dataclasses.replace(before, changes_sign=changes_sign)
         else:
             merged.append(crossing)
     return merged

@@ -19,19 +19,18 @@ from numpy.typing import ArrayLike
 
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import LENGTH_ROWS, Design
+from explorer.mechanism.design import GUIDE_ROWS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import (
     BoolArray,
     FloatArray,
     IntArray,
-    finite_array,
     lengths_of,
     rotate,
 )
 from explorer.paths.crossings import PathMargins, path_margins
-from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, twists_of_actuators
+from explorer.statics.forces import load_array, twists_of_actuators
 from explorer.statics.reactions import LIMITED, Reactions, limit_shares, reactions
 from explorer.statics.weights import Weights, design_weights
 
@@ -79,13 +78,7 @@ class PathLoads:
 
 @dataclass(frozen=True)
 class DemandedLoad:
-    """A load that every pose of a path has to hold within the limits.
-
-    Attributes:
-        design: The manipulator.
-        load: (F; M) at the tool point of the design, shape (6,), in N and N × unit.
-        weights: All masses, the payload's included.
-    """
+    """A load that every pose of a path must hold within the limits, as in `path_loads`."""
 
     design: Design
     load: FloatArray
@@ -93,30 +86,22 @@ class DemandedLoad:
 
     @staticmethod
     def of(design: Design, load: ArrayLike, weights: Weights | None = None) -> DemandedLoad:
-        """Return a load on a design.
-
-        Arguments and errors are those of `path_loads`.
-        """
-        checked = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
-        masses = design_weights(design) if weights is None else weights
-        return DemandedLoad(design, checked, masses)
+        """Return a load on a design; arguments and errors are those of `path_loads`."""
+        six = load_array(load)
+        return DemandedLoad(design, six, design_weights(design) if weights is None else weights)
 
     def shares(self, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
         """Return the shares of the limits in poses, shape (..., 12), in the order of `LIMITED`.
 
-        Args:
-            position: b4 in the base frame, shape (..., 3), in design units.
-            rotation: Platform to base, shape (..., 3, 3).
+        The poses are positions of b4, shape (..., 3), and rotations, shape (..., 3, 3).
         """
-        return limit_shares(
-            self.design, self._reactions(Configuration(self.design, position, rotation))
-        )
+        poses = Configuration(self.design, position, rotation)
+        return limit_shares(self.design, self._reactions(poses))
 
     def holds_along(self, moves: StraightMoves) -> BoolArray:
-        """Return whether the load is held along moves, shape (m,).
+        """Return whether no sample of moves exceeds a limit, shape (m,).
 
-        True says that no sample exceeds a limit, and that no pose between exceeds it by more than
-        `TOLERANCE` of it.
+        No pose between then exceeds it by more than `TOLERANCE` of it.
         """
         return np.asarray(self._sample(moves, only_holds=True)[2] <= 1.0 + TOLERANCE)
 

@@ -6,16 +6,15 @@ see `explorer.paths.loads`.
 Two kinds of ends that no path joins are refused before any search: those of different modes, and
 those between which two legs would have to pass each other on the guide. Other ends are joined by
 the straight line in the folds, which meets no singularity and keeps the margins of its ends. Only
-where that line is not proven valid, mostly for another limit, does `explorer.paths.tree_search`
-look for a way round. In both cases a proof of the limits covers every move as a whole.
+where that line is not proven valid, mostly for another limit, does `explorer.paths.search` look for
+a way round. In both cases a proof of the limits covers every move as a whole.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -33,13 +32,13 @@ from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.loads import ROUNDING, DemandedLoad
 from explorer.paths.proofs import Proofs, divide_line, positions_and_rotations
-from explorer.paths.smoothing import Smoother, lengths_of_moves
-from explorer.paths.tree_search import TreeSearch
+from explorer.paths.search import lengths_of_moves, search_tree, smooth
 from explorer.singularity.strata import incidences
 from explorer.statics.reactions import PART_NAMES
 from explorer.statics.weights import Weights
+from explorer.workspace.limits.quantities import valid_rows
 from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_rows
-from explorer.workspace.limits.valid_poses import Rules, valid_rows, violations
+from explorer.workspace.limits.valid_poses import Rules, violations
 
 DEFAULT_SECONDS = 2.0
 # Preferred margin and clearance, as shares of those of the ends. The line in the folds keeps all of
@@ -50,28 +49,10 @@ SHARE_FOR_PREFERRED = 0.5
 D1, D3 = JOINTS.index("d1"), JOINTS.index("d3")
 
 Reason = Literal["other mode", "other order", "out of time"]
-EndReason = Literal["outside limits", "singular", "load not held"]
-
-
-class EndError(InputError):
-    """A start or goal that no path can have.
-
-    Attributes:
-        reason: Kind of the error; the message names the end, and the limits, incidences, or the
-            part that does not hold the load.
-    """
-
-    def __init__(self, reason: EndReason, message: str) -> None:
-        super().__init__(message)
-        self.reason: EndReason = reason
 
 
 class NoPathError(NoAnswerError):
-    """There is no path, or the search ended without one.
-
-    Attributes:
-        reason: Kind of the error; "other mode" and "other order" are proofs of no path.
-    """
+    """There is no path, as "other mode" and "other order" prove, or the search found none."""
 
     def __init__(self, reason: Reason, message: str) -> None:
         super().__init__(message)
@@ -141,9 +122,9 @@ def plan_path(
         weights: All masses for the load, the payload's included; None for the payload alone.
 
     Raises:
-        EndError: The start or the goal is singular, outside the limits or does not hold the load.
-        InputError: `seconds` is not a positive number, or the tool or the load is not three or six
-            finite numbers.
+        InputError: The start or the goal is singular, outside the limits or does not hold the load;
+            `seconds` is not a positive number, or the tool or the load is not three or six finite
+            numbers.
         NoPathError: There is no path, or the search ended without one.
         MissingExtraError: The straight line in the folds is not valid, and OMPL is not installed.
     """
@@ -154,21 +135,13 @@ def plan_path(
         tool = (x, y, z)
     demanded_load = None if load is None else DemandedLoad.of(design, load, weights)
     ends = evaluate(design, start), evaluate(design, goal)
-    named_ends = {"start": ends[0], "goal": ends[1]}
-    for name, snapshot in named_ends.items():
-        _check_not_singular(name, snapshot)
-    _check_same_mode(*ends)
-    for name, snapshot in named_ends.items():
-        _check_within(name, snapshot, ends[0].signs)
-        if demanded_load is not None:
-            _check_load(name, snapshot.pose, demanded_load)
-    _check_same_order(*ends)
+    _check_ends(*ends, demanded_load)
     # Compiling takes seconds, once on a machine; they do not count as search.
     for kernel in (divide_line, valid_move_rows, valid_rows, write_poses):
         kernel.compile()
-    started = time.perf_counter()
     planner = _Planner(design, (start, goal), seed, tool, demanded_load)
-    rules = Rules.of(design, ends[0].signs, _order(ends[0]))
+    order = int(np.sign(ends[0].joints[D3] - ends[0].joints[D1]))
+    rules = Rules.of(design, ends[0].signs, order)
     margin, clearance = _preferred_bounds(*ends)
     demanded = _Demand(rules, 0.0, 0.0)
     preferred = _Demand(rules.tighten(margin, clearance), margin, clearance)
@@ -176,10 +149,8 @@ def plan_path(
         planner.plan_line(preferred)
         or planner.plan_line(demanded)
         or planner.search(preferred, SHARE_FOR_PREFERRED * seconds)
+        or planner.search(demanded, max(seconds - planner.seconds, 0.0))
     )
-    if path is None:
-        remaining = seconds - (time.perf_counter() - started)
-        path = planner.search(demanded, max(remaining, 0.0))
     if path is None:
         raise NoPathError(
             "out of time",
@@ -187,7 +158,7 @@ def plan_path(
             f"{seconds:g} s ({planner.checked} lines tried); there may be one: allow more time, "
             "or go by a pose in between",
         )
-    return dataclasses.replace(path, seconds=time.perf_counter() - started, checked=planner.checked)
+    return path
 
 
 class _Demand(NamedTuple):
@@ -208,6 +179,12 @@ class _Planner:
     tool: Triple | None
     load: DemandedLoad | None
     checked: int = 0
+    started: float = field(default_factory=time.perf_counter)
+
+    @property
+    def seconds(self) -> float:
+        """Time since the start of the first search, in seconds."""
+        return time.perf_counter() - self.started
 
     @cached_property
     def folds(self) -> FloatArray:
@@ -233,14 +210,13 @@ class _Planner:
     def search(self, demand: _Demand, seconds: float) -> PlannedPath | None:
         """Return a smoothed path of OMPL's search, or None if the time was too short."""
         proofs = self._proofs(demand)
-        tree = TreeSearch(proofs)
         first, last = self.folds
-        corners = tree.find_path(first, last, seconds)
-        self.checked += tree.checked
+        corners, checked = search_tree(proofs, first, last, seconds)
+        self.checked += checked
         if corners is None:
             return None
         unsmoothed = self._poses(corners)
-        return self._path(demand, unsmoothed, Smoother(proofs, self.seed).smooth(unsmoothed))
+        return self._path(demand, unsmoothed, smooth(proofs, unsmoothed, self.seed))
 
     def _proofs(self, demand: _Demand) -> Proofs:
         return Proofs(self.design, demand.rules, self.tool, self.load, self.tolerance)
@@ -260,8 +236,8 @@ class _Planner:
             length=float(lengths_of_moves(self.design, poses).sum()),
             margin=max(self.design.limits.margin or 0.0, demand.margin),
             clearance=demand.clearance,
-            seconds=0.0,
-            checked=0,
+            seconds=self.seconds,
+            checked=self.checked,
             tool=self.tool,
         )
 
@@ -274,12 +250,29 @@ def _preferred_bounds(start: Snapshot, goal: Snapshot) -> tuple[float, float]:
     return SHARE_OF_MARGIN * margin, min(preferred, SHARE_OF_CLEARANCE * clearance)
 
 
-def _check_not_singular(name: str, snapshot: Snapshot) -> None:
-    vanishing = incidences(snapshot.stratum)
-    if vanishing:
-        words = " and ".join(INCIDENCES[index - 1] for index in vanishing)
-        message = f"the {name} is singular ({words}); a path cannot start or end there"
-        raise EndError("singular", message)
+def _check_ends(start: Snapshot, goal: Snapshot, load: DemandedLoad | None) -> None:
+    named = {"start": start, "goal": goal}
+    for name, end in named.items():
+        vanishing = incidences(end.stratum)
+        if vanishing:
+            words = " and ".join(INCIDENCES[index - 1] for index in vanishing)
+            message = f"the {name} is singular ({words}); a path cannot start or end there"
+            raise InputError(message)
+    _check_same_mode(start, goal)
+    for name, end in named.items():
+        # `_check_same_order` compares the order of the carriages at both ends.
+        broken = [str(violation) for violation in violations(end, start.signs, order=0)[0]]
+        clearances = end.clearances.clearance.tolist()
+        for (first, second), value in zip(PAIRS, clearances, strict=True):
+            if not value > 0.0:
+                number = f"{value:.4g}".replace("-", "−")
+                broken.append(f"legs {first} and {second} collide (clearance {number})")
+        if broken:
+            message = f"the {name} is outside the limits: {'; '.join(broken)}"
+            raise InputError(message)
+        if load is not None:
+            _check_load(name, end.pose, load)
+    _check_same_order(start, goal)
 
 
 def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
@@ -298,30 +291,15 @@ def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
     )
 
 
-def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) -> None:
-    # `_check_same_order` compares the order of the carriages at both ends.
-    broken = [str(violation) for violation in violations(snapshot, signs, order=0)[0]]
-    clearances = snapshot.clearances.clearance.tolist()
-    for (first, second), value in zip(PAIRS, clearances, strict=True):
-        if not value > 0.0:
-            shown = f"{value:.4g}".replace("-", "−")
-            broken.append(f"legs {first} and {second} collide (clearance {shown})")
-    if broken:
-        raise EndError("outside limits", f"the {name} is outside the limits: {'; '.join(broken)}")
-
-
 def _check_load(name: str, pose: Pose, load: DemandedLoad) -> None:
     shares = load.shares(pose.position, pose.rotation)
     part, share = int(shares.argmax()), float(shares.max())
     if share > 1.0 + ROUNDING:
-        shown = f"{100.0 * share:.{4 if share > 1.001 else 9}g}"
-        message = f"the {name} does not hold the load: {PART_NAMES[part]} at {shown} % of its limit"
-        raise EndError("load not held", message)
-
-
-def _order(snapshot: Snapshot) -> int:
-    """Return the sign of d3 − d1."""
-    return int(np.sign(snapshot.joints[D3] - snapshot.joints[D1]))
+        number = f"{100.0 * share:.{4 if share > 1.001 else 9}g}"
+        message = (
+            f"the {name} does not hold the load: {PART_NAMES[part]} at {number} % of its limit"
+        )
+        raise InputError(message)
 
 
 def _check_same_order(start: Snapshot, goal: Snapshot) -> None:
@@ -330,11 +308,11 @@ def _check_same_order(start: Snapshot, goal: Snapshot) -> None:
     Legs 1, 2 and 3 start from the guide at 0, d1 and d3. Two legs touch where two of these
     are equal, so their order is the same all along a path without collisions.
     """
-    orders = [
-        sorted((("a1", 0.0), ("d1", float(q[D1])), ("d3", float(q[D3]))), key=lambda base: base[1])
+    names = np.array(["a1", "d1", "d3"])
+    first, last = (
+        names[np.argsort([0.0, q[D1], q[D3]], kind="stable")].tolist()
         for q in (start.joints, goal.joints)
-    ]
-    first, last = ([name for name, _ in order] for order in orders)
+    )
     if first != last:
         raise NoPathError(
             "other order",

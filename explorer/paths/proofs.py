@@ -45,7 +45,7 @@ class Proofs:
         design: The manipulator.
         rules: Rules that every pose keeps.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
-        load: Load that the moves hold, see `DemandedLoad.holds_along`; None for none.
+        load: Load that the moves hold; None for none.
         tolerance: Length by which limits may be exceeded between poses that keep them, in design
             units; a 10,000th of the reach if None.
     """

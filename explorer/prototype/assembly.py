@@ -14,10 +14,9 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES, LEGS, Chains, Places
-from explorer.prototype.dimensions import Stroke
-from explorer.prototype.fitting import broken_joint_limits, sizes_of
-from explorer.prototype.shapes import Part
-from explorer.prototype.sizes import Sizes
+from explorer.prototype.fitting import sizes_of
+from explorer.prototype.shapes import Part, make_parts
+from explorer.prototype.sizes import Sizes, Stroke
 from explorer.prototype.weights import Mass, total_mass
 
 # The gap between layers of the exploded view: over the reach, and over the largest leg radius.
@@ -55,10 +54,6 @@ class Prototype:
         index = [part.body_index for part in self.parts]
         return Places(bodies.origin[..., index, :], bodies.rotation[..., index, :, :])
 
-    def broken_joint_limits(self, position: ArrayLike, rotation: ArrayLike) -> tuple[str, ...]:
-        """Return the joint limits that one pose breaks, see `broken_joint_limits`."""
-        return broken_joint_limits(self.sizes, position, rotation)
-
     def masses(self, density: float) -> Mapping[str, Mass]:
         """Return the masses of all bodies but the base, in kg and metres; density in kg/m³."""
         return {
@@ -84,8 +79,6 @@ def make_prototype(design: Design) -> Prototype:
         InputError: The design is too tight for the parts; the message says what would fit.
         ExplorerError: A body cannot be made.
     """
-    from explorer.prototype.shapes import make_parts
-
     sizes = sizes_of(design)
     return Prototype(sizes, make_parts(sizes))
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.pose import checked_rotation, quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 
 LEGS = (1, 2, 3, 4)
@@ -68,6 +68,12 @@ class Places(NamedTuple):
 
     origin: FloatArray
     rotation: FloatArray
+
+    def within(self, body: int, outer: int) -> tuple[FloatArray, FloatArray]:
+        """Return origin (3,) and quaternion (w, x, y, z) of a body in the frame of another one."""
+        turn = self.rotation[outer].T
+        offset = turn @ (self.origin[body] - self.origin[outer])
+        return offset, quaternion_from_rotation(turn @ self.rotation[body])
 
 
 @dataclass(frozen=True)

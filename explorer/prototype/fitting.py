@@ -19,8 +19,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import MOST
 from explorer.numerics.number_text import format_number
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, joints_of_leg
-from explorer.prototype.dimensions import FIRST_SWING, SECOND_SWING
-from explorer.prototype.sizes import Sizes
+from explorer.prototype.sizes import FIRST_SWING, SECOND_SWING, Sizes
 
 BALL_SWING = math.radians(85.0)
 """Largest angle between a leg and the normal of the platform."""
@@ -33,12 +32,8 @@ def broken_joint_limits(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) 
     """Return the limits of actuators, joints and distances that one pose breaks, as sentences.
 
     Where none is broken, the parts of different legs keep their clearance. It may be kept in other
-    poses too, since each leg is taken as thick as capsules about its parts.
-
-    Args:
-        sizes: Sizes of the parts.
-        position: Position of b4 in the base frame, shape (3,), in design units.
-        rotation: Rotation from platform to base, shape (3, 3).
+    poses too, since each leg is taken as thick as capsules about its parts. For the pose see
+    `Chains.joints`.
     """
     chains = sizes.chains
     joints = chains.joints(position, rotation)
@@ -145,10 +140,8 @@ def _fitting_factors(
     """Return the factors on the radii that fit: the largest up to 1, the smallest from 1 on."""
 
     def first_fitting(shares: FloatArray) -> float | None:
-        for share in shares.tolist():
-            if _sizes(design, unit, share, all_of).worst is None:
-                return share
-        return None
+        fits = (s for s in shares.tolist() if _sizes(design, unit, s, all_of).worst is None)
+        return next(fits, None)
 
     # Thin legs lack room for walls, thick legs room beside each other, so one interval fits.
     return first_fitting(np.geomspace(1.0, 1e-2, 100)), first_fitting(np.geomspace(1.0, 1e2, 100))
@@ -172,10 +165,7 @@ def _refusal(design: Design, worst: tuple[str, float, float]) -> TooTightError:
     elif larger is not None:
         ways.append(f"with legs of radius at least {_round(larger * largest_radius, up=True):.6g}")
     if not ways:
-        text += (
-            "; no unit makes that fit: take thinner legs, another home, or points that are farther "
-            "apart"
-        )
+        text += "; no unit makes that fit: take thinner legs, another home, or points farther apart"
         return TooTightError(text, None)
     return TooTightError(f"{text}; it fits {' or '.join(ways)}", unit)
 

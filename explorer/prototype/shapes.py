@@ -1,13 +1,19 @@
-"""The parts as closed meshes, made by manifold3d; no other module of the prototype uses it."""
+"""The forms of the parts, as booleans of simple shapes that any `Kernel` can make, and as meshes.
+
+Shapes are in millimetres, each in the frame of its body (`explorer.prototype.chains`). Closed
+meshes are made by manifold3d, which no other module of the prototype uses.
+"""
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+import operator
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +21,206 @@ from numpy.typing import NDArray
 from explorer.errors import ExplorerError
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import BODIES
-from explorer.prototype.forms import Circle, Kernel, forms_of
-from explorer.prototype.sizes import Sizes
+from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE
+from explorer.prototype.sizes import CLEARANCE, LegSizes, Sizes
 from explorer.prototype.weights import Mass, mesh_mass
 from explorer.workspace.solids.solid import Solid
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
+
+Shape: TypeAlias = Any
+"""A body: `+`, `-` and `^` are union, difference and intersection; it has the methods
+`translate`, `rotate` (degrees about x, y and z in turn), `mirror` (normal to an axis) and
+`transform` (a matrix of three rows and four columns)."""
+
+
+class Circle(NamedTuple):
+    """A circle in a plane normal to z."""
+
+    radius: float
+    x: float = 0.0
+    y: float = 0.0
+
+
+class Kernel(ABC):
+    """A maker of bodies, in millimetres."""
+
+    @abstractmethod
+    def disc(self, circle: Circle, low: float, high: float) -> Shape:
+        """Return a cylinder along z between two heights."""
+
+    @abstractmethod
+    def ball(self, radius: float) -> Shape:
+        """Return a ball about the origin."""
+
+    @abstractmethod
+    def box(self, low: Triple, high: Triple) -> Shape:
+        """Return a box between two corners."""
+
+    @abstractmethod
+    def hull(self, circles: Sequence[Circle], low: float, high: float) -> Shape:
+        """Return a plate between two heights, whose outline is the convex hull of circles."""
+
+    def hole(self, circle: Circle, low: float, high: float) -> Shape:
+        """Return the tool that cuts a round hole; its chords lie outside the circle."""
+        return self.disc(circle, low, high)
+
+    def cavity(self, radius: float) -> Shape:
+        """Return the tool that cuts a seat for a ball about the origin."""
+        return self.ball(radius)
+
+    def union(self, shapes: Sequence[Shape]) -> Shape:
+        """Return the union of shapes."""
+        return functools.reduce(operator.add, shapes)
+
+
+# Half the width of lugs and arms, over the radius of their eyes.
+_SLIM = 0.55
+
+
+def forms_of(sizes: Sizes, k: Kernel) -> Iterator[tuple[str, str, Shape]]:
+    """Yield the name, the body and the shape of all parts, the base first."""
+    yield "base", "base", _base(k, sizes)
+    for leg, dims in zip(LEGS, sizes.legs, strict=True):
+        if leg in ON_GUIDE:
+            yield f"carriage {leg}", f"carriage {leg}", _carriage(k, sizes, dims)
+        else:
+            yield f"cross {leg}", f"cross {leg}", _cross(k, dims)
+        yield f"cylinder {leg}", f"cylinder {leg}", _cylinder(k, sizes, leg)
+        yield f"rod {leg}", f"rod {leg}", _rod(k, sizes, leg)
+    yield "platform", "platform", _platform(k, sizes)
+    for leg in LEGS:
+        yield f"ball {leg}", "platform", _ball(k, sizes, leg)
+
+
+def _base(k: Kernel, sizes: Sizes) -> Shape:
+    """Return the base: its plate, the lugs of both universal joints, the rails on pillars."""
+    side, unit = sizes.chains.side, sizes.design.unit_mm
+    low, high = -sizes.depth - sizes.base_plate, -sizes.depth
+    a3 = (sizes.design.a3[0] * unit, sizes.design.a3[1] * unit * side)
+    guide = sizes.guide
+    ends = [x for rail in sizes.rails for x in rail]
+    feet = [
+        Circle(sizes.legs[0].swing),
+        Circle(sizes.legs[3].swing, *a3),
+        *(Circle(2.0 * guide.radius, x) for x in ends),
+    ]
+    pieces = [k.hull(feet, low, high)]
+    for index, (x, y) in ((0, (0.0, 0.0)), (3, a3)):
+        mount = np.diag([1.0, side, side]) @ sizes.chains.mounts[index]
+        lugs = _lugs(k, sizes.legs[index], low)
+        pieces.append(lugs.transform(np.column_stack([mount, [x, y, 0.0]])))
+    for start, end in sizes.rails:
+        pieces.append(k.box((start, -guide.shaft, -guide.shaft), (end, guide.shaft, guide.shaft)))
+        pieces.extend(
+            k.box((foot, -guide.shaft, low), (foot + guide.pillar, guide.shaft, guide.shaft))
+            for foot in (start, end - guide.pillar)
+        )
+    # All above is for a platform above the base.
+    return k.union(pieces).rotate((180.0 * (side < 0), 0.0, 0.0))
+
+
+def _lugs(k: Kernel, dims: LegSizes, low: float) -> Shape:
+    """Return the two eyes that hold the first axis, on stems down to the base plate."""
+    eye = k.disc(Circle(dims.eye), dims.inner, dims.outer).rotate((0.0, 90.0, 0.0))
+    # The lug is as narrow as the fork's arms, which pass it when the leg leans both ways.
+    half = _SLIM * dims.eye
+    lug = eye + k.box((dims.inner, -half, low + 0.5 * dims.plate), (dims.outer, half, 0.0))
+    hole = k.hole(Circle(dims.pin + CLEARANCE), -dims.outer - 1.0, dims.outer + 1.0)
+    return k.union([lug, lug.mirror((1.0, 0.0, 0.0))]) - hole.rotate((0.0, 90.0, 0.0))
+
+
+def _cross(k: Kernel, dims: LegSizes) -> Shape:
+    """Return the cross of a universal joint: two shafts, their ends thinner."""
+    half = dims.inner - CLEARANCE
+    pin = k.disc(Circle(dims.pin), -dims.outer, dims.outer)
+    shaft = k.disc(Circle(0.8 * dims.radius), -half, half) + pin
+    return shaft.rotate((0.0, 90.0, 0.0)) + shaft.rotate((90.0, 0.0, 0.0))
+
+
+def _carriage(k: Kernel, sizes: Sizes, dims: LegSizes) -> Shape:
+    """Return a sleeve on the square shaft, with a flange at both ends."""
+    guide, half = sizes.guide, dims.radius
+    flange = _flange(dims)
+    pieces = [
+        k.disc(Circle(guide.sleeve), -half, half),
+        k.disc(Circle(guide.flange), -half, flange - half),
+        k.disc(Circle(guide.flange), half - flange, half),
+    ]
+    hole = guide.shaft + CLEARANCE
+    sleeve = k.union(pieces).rotate((0.0, 90.0, 0.0))
+    return sleeve - k.box((-half - 1.0, -hole, -hole), (half + 1.0, hole, hole))
+
+
+def _flange(dims: LegSizes) -> float:
+    return max(0.2 * dims.radius, 0.25)
+
+
+def _cylinder(k: Kernel, sizes: Sizes, leg: int) -> Shape:
+    """Return a cylinder, open at its end, with the eye or the fork that joins it to the base."""
+    dims, stroke = sizes.legs[leg - 1], sizes.strokes[leg - 1]
+    top = stroke.shortest - dims.end - CLEARANCE
+    bottom = dims.floor - dims.plate
+    tube = k.disc(Circle(dims.radius), bottom, top)
+    tube -= k.hole(Circle(dims.bore), dims.floor, top + 1.0)
+    return tube + (_ring(k, sizes, dims) if leg in ON_GUIDE else _fork(k, dims))
+
+
+def _ring(k: Kernel, sizes: Sizes, dims: LegSizes) -> Shape:
+    """Return the eye of a leg about the guide."""
+    guide = sizes.guide
+    half = dims.radius - _flange(dims) - CLEARANCE
+    around = k.disc(Circle(guide.eye), -half, half).rotate((0.0, 90.0, 0.0))
+    # The neck fills the space between the eye and the round bottom.
+    neck = k.box((-half, -0.6 * guide.eye, 0.0), (half, 0.6 * guide.eye, guide.eye + dims.plate))
+    neck ^= k.disc(Circle(dims.radius), 0.0, guide.eye + dims.plate)
+    hole = k.hole(Circle(guide.sleeve + CLEARANCE), -half - 1.0, half + 1.0)
+    return (around + neck) - hole.rotate((0.0, 90.0, 0.0))
+
+
+def _fork(k: Kernel, dims: LegSizes) -> Shape:
+    """Return the two eyes that hold the second axis, and the bridge between them."""
+    eye = k.disc(Circle(dims.eye), dims.inner, dims.outer).rotate((-90.0, 0.0, 0.0))
+    half = _SLIM * dims.eye
+    arm = k.box((-half, dims.inner, 0.0), (half, dims.outer, dims.floor))
+    hole = k.hole(Circle(dims.pin + CLEARANCE), -dims.outer - 1.0, dims.outer + 1.0)
+    bridge = k.box((-dims.eye, -dims.outer, dims.bottom), (dims.eye, dims.outer, dims.floor))
+    arms = k.union([eye, arm]) - hole.rotate((90.0, 0.0, 0.0))
+    return k.union([arms, arms.mirror((0.0, 1.0, 0.0)), bridge])
+
+
+def _rod(k: Kernel, sizes: Sizes, leg: int) -> Shape:
+    """Return a rod with the cup of the ball joint, whose centre is the origin."""
+    dims, stroke = sizes.legs[leg - 1], sizes.strokes[leg - 1]
+    length = stroke.shortest - dims.floor - CLEARANCE
+    cup = k.disc(Circle(dims.cup), -dims.end, -dims.rim) - k.cavity(dims.ball + CLEARANCE)
+    return cup + k.disc(Circle(dims.rod), -length, -dims.end + 0.5 * dims.wall)
+
+
+def _platform(k: Kernel, sizes: Sizes) -> Shape:
+    """Return the platform plate, beyond the platform plane, with a hole for each ball's neck."""
+    points = sizes.design.platform_points * sizes.design.unit_mm
+    low, high = sizes.standoff, sizes.standoff + sizes.platform_plate
+    pads: list[Circle] = []
+    holes: list[Shape] = []
+    for dims, (x, y, _) in zip(sizes.legs, points.tolist(), strict=True):
+        pads.append(Circle(1.5 * dims.radius, x, y))
+        holes.append(k.hole(Circle(dims.neck + CLEARANCE, x, y), low - 1.0, high + 1.0))
+    return _facing(k.hull(pads, low, high) - k.union(holes), sizes)
+
+
+def _ball(k: Kernel, sizes: Sizes, leg: int) -> Shape:
+    """Return a ball on its neck, which reaches through the platform plate."""
+    dims = sizes.legs[leg - 1]
+    x, y, _ = (sizes.design.platform_points[leg - 1] * sizes.design.unit_mm).tolist()
+    neck = k.disc(Circle(dims.neck), 0.0, sizes.standoff + sizes.platform_plate)
+    return _facing((k.ball(dims.ball) + neck).translate((x, y, 0.0)), sizes)
+
+
+def _facing(shape: Shape, sizes: Sizes) -> Shape:
+    """Return a shape made for a1 below the platform, mirrored if a1 is above it."""
+    return shape.mirror((0.0, 0.0, 1.0)) if sizes.chains.platform_side > 0 else shape
 
 
 @dataclass(frozen=True)
@@ -65,7 +263,7 @@ class Part:
     def mass(self, density: float, unit_mm: float) -> Mass:
         """Return the mass properties in kilograms and metres, at a density in kg/m³."""
         metres = 1e-3 * unit_mm
-        return self.unit_mass.scaled(metres, density * metres**3)
+        return self.unit_mass.in_units(metres, density * metres**3)
 
 
 SEGMENTS = 48

@@ -36,7 +36,7 @@ class Mass:
     centre: FloatArray
     inertia: FloatArray
 
-    def scaled(self, length: float, mass: float = 1.0) -> Mass:
+    def in_units(self, length: float, mass: float) -> Mass:
         """Return the properties in other units, given the factors for lengths and masses."""
         return Mass(self.mass * mass, self.centre * length, self.inertia * (mass * length**2))
 
@@ -99,28 +99,6 @@ def leg_radii(design: Design) -> tuple[float, ...]:
     return tuple(radius or DEFAULT_RADIUS * design.reach for radius in design.limits.leg_radii)
 
 
-def sketch_masses(chains: Chains, home_joints: FloatArray, density: float) -> Mapping[str, Mass]:
-    """Return the masses of all bodies but the base, in the bodies' frames and design units.
-
-    The joint values at home have the shape (12,); the density is per cubed design unit.
-    """
-    radii = leg_radii(chains.design)
-    masses: dict[str, Mass] = {}
-    for leg, radius in enumerate(radii, 1):
-        length = SHARE * max(float(joints_of_leg(home_joints, leg)[-1]), radius)
-        joint = "carriage" if leg in ON_GUIDE else "cross"
-        along = np.array([0.0, 0.0, length])
-        masses[f"{joint} {leg}"] = ball(JOINT * radius, np.zeros(3), density)
-        masses[f"cylinder {leg}"] = bar(radius, np.zeros(3), along, density)
-        masses[f"rod {leg}"] = bar(ROD * radius, -along, np.zeros(3), density)
-    points = chains.design.platform_points
-    hub = points.mean(axis=0)
-    balls = (ball(BALL * r, point, density) for r, point in zip(radii, points, strict=True))
-    bars = (bar(r, hub, point, density) for r, point in zip(radii, points, strict=True))
-    masses["platform"] = total_mass([*balls, *bars])
-    return masses
-
-
 def machine_weights(design: Design, masses: Mapping[str, Mass], *, payload: bool = True) -> Weights:
     """Return the weights of bodies and of the design's payload.
 
@@ -150,13 +128,24 @@ def machine_weights(design: Design, masses: Mapping[str, Mass], *, payload: bool
 
 
 def bar_masses(design: Design, density: float) -> Mapping[str, Mass]:
-    """Return the masses of bars with the legs' radii in place of parts, in metres and kilograms.
+    """Return the masses of all bodies but the base, as bars with the legs' radii in place of parts.
 
-    Args:
-        design: The manipulator.
-        density: Density of the bars, in kg/m³.
+    They are in the bodies' own frames, in metres and kilograms; the density is in kg/m³.
     """
     chains, home, metres = Chains.of(design), design.home_pose, 1e-3 * design.unit_mm
-    joints = chains.joints(np.array(home.position), home.rotation)
-    masses = sketch_masses(chains, joints, 1.0)
-    return {name: each.scaled(metres, density * metres**3) for name, each in masses.items()}
+    joints = metres * chains.joints(home.position, home.rotation)
+    radii = [metres * radius for radius in leg_radii(design)]
+    masses: dict[str, Mass] = {}
+    for leg, radius in zip(LEGS, radii, strict=True):
+        length = SHARE * max(float(joints_of_leg(joints, leg)[-1]), radius)
+        joint = "carriage" if leg in ON_GUIDE else "cross"
+        along = np.array([0.0, 0.0, length])
+        masses[f"{joint} {leg}"] = ball(JOINT * radius, np.zeros(3), density)
+        masses[f"cylinder {leg}"] = bar(radius, np.zeros(3), along, density)
+        masses[f"rod {leg}"] = bar(ROD * radius, -along, np.zeros(3), density)
+    points = metres * design.platform_points
+    hub = points.mean(axis=0)
+    balls = (ball(BALL * r, point, density) for r, point in zip(radii, points, strict=True))
+    bars = (bar(r, hub, point, density) for r, point in zip(radii, points, strict=True))
+    masses["platform"] = total_mass([*balls, *bars])
+    return masses

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -29,18 +29,30 @@ class Measurement:
     """The measurement of a claim.
 
     Attributes:
-        text: The measured values, in sentences.
         verdict: Judgement, which follows from the values.
+        words: Values by their names in the sentences of the claim.
         values: The values by name.
         table: Lines of a table with more of them.
         condition: Condition under which the claim is confirmed; "" for the other verdicts.
+        text: The measured values, in sentences.
     """
 
-    text: str
     verdict: Verdict
-    values: Values = field(default_factory=dict[str, object])
+    words: Values
+    values: Values
     table: tuple[str, ...] = ()
     condition: str = ""
+    text: str = ""
+
+
+def judge(
+    is_so: bool, words: Values, values: Values, table: Sequence[str] = (), condition: str = ""
+) -> Measurement:
+    """Return a measurement that confirms a claim, or does so under a condition that is not ""."""
+    if is_so:
+        return Measurement("confirmed", words, values, tuple(table))
+    verdict = "confirmed within" if condition else "not confirmed"
+    return Measurement(verdict, words, values, tuple(table), condition)
 
 
 @dataclass(frozen=True)
@@ -52,6 +64,7 @@ class Claim:
         title: The claim, one sentence.
         paper: Words of the paper; … marks what is left out, [] what the scan lost.
         reading: What the paper leaves open, and how it is read here; "" if nothing.
+        found: Sentences on the measured values, a format string of the words of a measurement.
         command: Command that shows a part of it.
         measure: Function that measures it; random cases have fixed seeds.
     """
@@ -60,6 +73,7 @@ class Claim:
     title: str
     paper: str
     reading: str
+    found: str
     command: str
     measure: Callable[[], Measurement]
 

@@ -4,32 +4,28 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 from explorer.errors import InputError
 from explorer.files.packaged import packaged_file
-from explorer.reproduce import kinematics
+from explorer.reproduce import comparison, flags, interference, kinematics, optima
 from explorer.reproduce.claim import Claim, Measurement, Result
-from explorer.reproduce.comparison import large_workspace, orientations
-from explorer.reproduce.flags import chart, strata, uncoupled
-from explorer.reproduce.interference import clear_optimum, lower_risk
-from explorer.reproduce.search import search
-from explorer.reproduce.table_one import extents
 
 _MEASURES: Mapping[str, Callable[[], Measurement]] = {
-    "same-kinematics": kinematics.same_kinematics,
-    "interference": lower_risk,
-    "closed-form": kinematics.closed_form,
-    "flat-tetrahedra": kinematics.flat_tetrahedra,
-    "strata": strata,
-    "uncoupled-motions": uncoupled,
-    "charts": chart,
-    "paths": kinematics.mode_paths,
-    "clear-optimum": clear_optimum,
-    "table-1": extents,
-    "search": search,
-    "workspace": large_workspace,
-    "orientations": orientations,
+    "same-kinematics": kinematics.measure_same_kinematics,
+    "interference": interference.measure_risk,
+    "closed-form": kinematics.measure_closed_form,
+    "flat-tetrahedra": kinematics.measure_flat_tetrahedra,
+    "strata": flags.measure_strata,
+    "uncoupled-motions": flags.measure_uncoupled_motions,
+    "charts": flags.measure_charts,
+    "paths": kinematics.measure_mode_paths,
+    "clear-optimum": interference.measure_optimum,
+    "table-1": optima.measure_table,
+    "search": optima.measure_search,
+    "workspace": comparison.measure_workspaces,
+    "orientations": comparison.measure_orientations,
 }
 
 CLAIMS: Mapping[str, Claim] = MappingProxyType(
@@ -61,4 +57,5 @@ def measure_claims(
         claim = CLAIMS[name]
         if report is not None:
             report(claim.title)
-        yield Result(claim, claim.measure())
+        measured = claim.measure()
+        yield Result(claim, replace(measured, text=claim.found.format(**measured.words)))

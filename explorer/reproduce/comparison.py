@@ -14,7 +14,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins, mode_of
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.reproduce.claim import Measurement
+from explorer.reproduce.claim import Measurement, judge
 from explorer.reproduce.six_legs import SixLegs, octahedral, six_four_twin
 from explorer.workspace.limits.valid_poses import poses_are_valid
 from explorer.workspace.slices.volume import workspace_volume
@@ -22,8 +22,8 @@ from explorer.workspace.slices.volume import workspace_volume
 OPTIMAL = PRESETS["paper-optimal"]
 # The optimum with no limit but its mode, the order of its carriages, and a stroke of one reach for
 # each actuator, as the legs of the others have: the guide goes from a1 to a2.
-STROKES = msgspec.structs.replace(OPTIMAL.limits, box=None, guide=(0.0, OPTIMAL.reach))
-FREE = msgspec.structs.replace(OPTIMAL, limits=STROKES, home=OPTIMAL.home_pose)
+STROKES = OPTIMAL.with_limits(box=None, guide=(0.0, OPTIMAL.reach))
+FREE = msgspec.structs.replace(STROKES, home=OPTIMAL.home_pose)
 A2X = (10.0, OPTIMAL.reach)
 """Positions of a2 at which the twin is measured, in design units."""
 SIZES = (0.75, 1.0, 1.5)
@@ -64,7 +64,7 @@ class Abilities:
     tilt_error: float
 
 
-def large_workspace() -> Measurement:
+def measure_workspaces() -> Measurement:
     """Compare the volume of the 4-4's workspace with those of six-legged mechanisms."""
     exact = workspace_volume(FREE).volume / OPTIMAL.reach**3
     return judge_workspace(
@@ -77,33 +77,25 @@ def large_workspace() -> Measurement:
 def judge_workspace(
     ours: Workspace, twins: Sequence[Workspace], octahedra: Sequence[Workspace]
 ) -> Measurement:
-    """Return the measurement of the volumes of workspaces."""
+    """Judge the volumes of workspaces."""
     others = (*twins, *octahedra)
     lines = [f"{'':18}{'volume/reach³':>14}{'error':>8}"]
     lines += [f"{each.name:18}{each.volume:14.3f}{each.error:8.3f}" for each in (ours, *others)]
-    text = (
-        "With a stroke of one reach for each actuator and no other limit, at home's orientation "
-        f"and in home's mode, the volume over the cubed reach is {ours.volume:.3f}, beside "
-        + ", ".join(f"{each.volume:.3f} ({each.name})" for each in others)
-        + ". The volume of an octahedral platform depends on the size of its base, given as a "
-        "factor, and the paper names none."
-    )
+    words = {
+        "ours": ours,
+        "others": ", ".join(f"{each.volume:.3f} ({each.name})" for each in others),
+    }
     values = {"mechanisms": [asdict(each) for each in (ours, *others)]}
 
     def is_largest(among: Sequence[Workspace]) -> bool:
         return all(each.volume < (1.0 - ALIKE) * ours.volume for each in among)
 
-    if is_largest(others):
-        return Measurement(text, "confirmed", values, tuple(lines))
-    if is_largest(twins) and any(is_largest([each]) for each in octahedra):
-        condition = (
-            "beside the 6-4; an octahedral platform has more or less by the size of its base"
-        )
-        return Measurement(text, "confirmed within", values, tuple(lines), condition)
-    return Measurement(text, "not confirmed", values, tuple(lines))
+    condition = "beside the 6-4; an octahedral platform has more or less by the size of its base"
+    is_within = is_largest(twins) and any(is_largest([each]) for each in octahedra)
+    return judge(is_largest(others), words, values, lines, condition if is_within else "")
 
 
-def orientations() -> Measurement:
+def measure_orientations() -> Measurement:
     """Compare the orientations of the 4-4 with those of six-legged mechanisms."""
     reach = OPTIMAL.reach
     points = qmc.scale(_points(0), 3 * [-2.0 * reach], 3 * [2.0 * reach])
@@ -120,22 +112,18 @@ def orientations() -> Measurement:
 def judge_orientations(
     ours: Abilities, crossed: Abilities, others: Sequence[Abilities]
 ) -> Measurement:
-    """Return the measurement of the orientations; `crossed` is reported but not judged."""
+    """Judge the orientations; those with crossed carriages are reported only."""
     lines = [f"{'':18}{'mean share':>12}{'error':>8}{'mean tilt':>11}{'error':>8}"]
     lines += [
         f"{a.name:18}{a.share:12.1%}{a.share_error:8.1%}{a.tilt:10.1f}°{a.tilt_error:7.1f}°"
         for a in (ours, crossed, *others)
     ]
-    text = (
-        "Over positions of each workspace the mean share of all orientations is "
-        f"{ours.share:.1%}, beside "
-        + ", ".join(f"{a.share:.1%} ({a.name})" for a in others)
-        + f"; the mean greatest tilt in every azimuth is {ours.tilt:.0f}°, beside "
-        + ", ".join(f"{a.tilt:.0f}° ({a.name})" for a in others)
-        + ". The 4-4 keeps the order of its carriages, a limit that the 6-4 has not; without it "
-        f"the share would be {crossed.share:.1%}. The mode of the octahedral platform is read as "
-        "the sign of det J, which may hold several modes."
-    )
+    words = {
+        "ours": ours,
+        "crossed": crossed,
+        "shares": ", ".join(f"{a.share:.1%} ({a.name})" for a in others),
+        "tilts": ", ".join(f"{a.tilt:.0f}° ({a.name})" for a in others),
+    }
     values = {"mechanisms": [asdict(each) for each in (ours, crossed, *others)]}
     by_share = all(
         ours.share - a.share > SIGMAS * np.hypot(ours.share_error, a.share_error) for a in others
@@ -143,12 +131,9 @@ def judge_orientations(
     by_tilt = all(
         ours.tilt - a.tilt > SIGMAS * np.hypot(ours.tilt_error, a.tilt_error) for a in others
     )
-    if by_share and by_tilt:
-        return Measurement(text, "confirmed", values, tuple(lines))
-    if by_share or by_tilt:
-        condition = "by the share of all orientations" if by_share else "by the greatest tilt"
-        return Measurement(text, "confirmed within", values, tuple(lines), condition)
-    return Measurement(text, "not confirmed", values, tuple(lines))
+    condition = "by the greatest tilt" if by_tilt else ""
+    condition = "by the share of all orientations" if by_share else condition
+    return judge(by_share and by_tilt, words, values, lines, condition)
 
 
 def four_four(position: FloatArray, rotation: FloatArray) -> BoolArray:

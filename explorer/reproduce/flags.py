@@ -13,24 +13,11 @@ import numpy as np
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.folds import from_folds, to_folds
-from explorer.mechanism.kinematics import forward, inverse
+from explorer.mechanism.kinematics import forward, inverse, jacobian
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, lengths_of
-from explorer.reproduce.claim import (
-    BETA,
-    EPSILON,
-    PHI1,
-    PHI2,
-    PHI3,
-    Measurement,
-    R,
-    below,
-    flatten,
-    random_folds,
-    random_poses,
-)
-from explorer.singularity.ellipsoids import jacobian
+from explorer.reproduce import claim
 from explorer.singularity.freedoms import UNCOUPLED
 from explorer.singularity.strata import STRATA, inversions, is_below, stratum
 
@@ -44,56 +31,48 @@ LOCKED = 1e-12
 Order = set[tuple[tuple[int, ...], tuple[int, ...]]]
 
 
-def strata() -> Measurement:
+def measure_strata() -> claim.Measurement:
     """Place poses in the strata by some of six motions, and their neighbours by more of them."""
     random = np.random.default_rng(6)
     choices = np.array(list(itertools.product((False, True), repeat=6)))
     pairs = [(a, b) for a in choices for b in choices if (a <= b).all()]
     some, more = np.repeat(np.array(pairs), NEIGHBOURS, axis=0).swapaxes(0, 1)
-    at = random_folds(random, some)
-    near = at + NEAR * random_folds(random, more & ~some)
+    at = claim.random_folds(random, some)
+    near = at + NEAR * claim.random_folds(random, more & ~some)
     of, others = (map(tuple, stratum(*from_folds(each), 1.0).tolist()) for each in (at, near))
     return judge_strata(set(zip(of, others, strict=True)), len(at))
 
 
-def judge_strata(neighbours: Order, count: int) -> Measurement:
-    """Return the measurement of the strata.
-
-    Args:
-        neighbours: Strata of a pose and of a neighbour of it, as they were found.
-        count: Number of poses with a neighbour.
-    """
+def judge_strata(neighbours: Order, count: int) -> claim.Measurement:
+    """Judge by the strata of poses and of neighbours of them, of which there are a number."""
     found = {w for w, _ in neighbours}
     order = {(w, other) for w in STRATA for other in STRATA if is_below(w, other)}
     outside, missing = len(neighbours - order), len(order - neighbours)
     counts = [sum(inversions(w) == k for w in STRATA) for k in range(7)]
-    text = (
-        f"Poses are found in {len(found)} of the {len(STRATA)} strata, "
-        f"{', '.join(map(str, counts))} of which have the dimensions 0 to 6. {count:,} poses with "
-        f"a neighbour show {len(neighbours)} pairs of a stratum and one that it borders on, "
-        f"{outside} of them outside the Bruhat order, of whose {len(order)} pairs {missing} are "
-        "missing: the closure of a stratum is it and all that are below it in this order. A "
-        "stratum depends on the relative position of the flags alone, and on no parameter of the "
-        "design."
-    )
-    is_so = len(found) == len(STRATA) and neighbours == order
-    return Measurement(
-        text,
-        "confirmed" if is_so else "not confirmed",
-        {"found": len(found), "by_dimension": counts, "outside": outside, "missing": missing},
-    )
+    words = {
+        "found": len(found),
+        "strata": len(STRATA),
+        "counts": ", ".join(map(str, counts)),
+        "poses": count,
+        "pairs": len(neighbours),
+        "outside": outside,
+        "order": len(order),
+        "missing": missing,
+    }
+    values = {"found": len(found), "by_dimension": counts, "outside": outside, "missing": missing}
+    return claim.judge(len(found) == len(STRATA) and neighbours == order, words, values)
 
 
-def uncoupled() -> Measurement:
+def measure_uncoupled_motions() -> claim.Measurement:
     """Move random poses along the six uncoupled motions, by one actuator, and at a singularity."""
     random = np.random.default_rng(7)
-    positions, rotations = random_poses(random, MOVED, OPTIMAL.reach)
+    positions, rotations = claim.random_poses(random, MOVED, OPTIMAL.reach)
     own, others = np.inf, 0.0
     for position, rotation in zip(positions, rotations, strict=True):
         pose = Pose.of(tuple(position.tolist()), rotation)
         before = margins(pose.position, pose.rotation)
         for motion in UNCOUPLED:
-            moved = motion.moved(pose, float(random.uniform(0.5, 1.0)))
+            moved = motion.move(pose, float(random.uniform(0.5, 1.0)))
             change = np.abs(margins(moved.position, moved.rotation) - before) / OPTIMAL.reach
             own = min(own, float(change[motion.incidence - 1]))
             others = max(others, float(np.delete(change, motion.incidence - 1).max()))
@@ -103,34 +82,27 @@ def uncoupled() -> Measurement:
 
 def judge_uncoupled(
     own: float, others: float, of_actuators: dict[str, tuple[str, ...]], rate: float
-) -> Measurement:
-    """Return the measurement of the uncoupled motions.
+) -> claim.Measurement:
+    """Judge by the least own and the largest other change of a margin, over the reach.
 
-    Args:
-        own: Least change of the margin that a motion moves, over the reach.
-        others: Largest change of the two others, over the reach.
-        of_actuators: Margins that change with each actuator alone.
-        rate: Largest relative rate of an actuator as a flat fold turns about its line.
+    Also by the margins that each actuator alone moves, and the largest rate of one as a fold turns.
     """
     single = [f"{name} moves {which[0]}" for name, which in of_actuators.items() if len(which) == 1]
     several = [name for name, which in of_actuators.items() if len(which) > 1]
-    text = (
-        f"Over {MOVED} random poses each of six motions, four of them rotations and two "
-        f"translations, changes its margin and leaves the other two to {below(others, SAME)} of "
-        f"the reach. As single actuators {' and '.join(single)} alone; "
-        f"{', '.join(several)} move several margins. Where one margin vanishes, a rotation is "
-        "free though all actuators are locked: about the line b2b3 where δ1 does, about the line "
-        "a1b4 where δ2 does, and about the guide where δ3 does. The relative rates of the "
-        f"actuators are {below(rate, LOCKED)} there."
-    )
+    words = {
+        "poses": MOVED,
+        "others": claim.below(others, SAME),
+        "single": " and ".join(single),
+        "several": ", ".join(several),
+        "rate": claim.below(rate, LOCKED),
+    }
     values = {
         "least_own_change": own,
         "largest_other_change": others,
         "margins_of_actuators": of_actuators,
         "largest_rate_of_a_freedom": rate,
     }
-    is_so = others < SAME < own and rate < LOCKED
-    return Measurement(text, "confirmed" if is_so else "not confirmed", values)
+    return claim.judge(others < SAME < own and rate < LOCKED, words, values)
 
 
 def _margins_of_actuators(
@@ -153,17 +125,16 @@ def _margins_of_actuators(
 
 
 def _rates_of_freedoms(positions: FloatArray, rotations: FloatArray) -> float:
-    """Return the largest rate of an actuator as a flat fold turns about its line.
-
-    The rate is relative to the length of J's row and that of the twist.
-    """
+    """Return the largest rate of an actuator, relative to J, as a flat fold turns."""
     worst = 0.0
-    for column in (PHI1, PHI2, PHI3):
-        p, r = flatten(positions, rotations, column)
+    for column in (claim.PHI1, claim.PHI2, claim.PHI3):
+        p, r = claim.flatten(positions, rotations, column)
         guide = np.broadcast_to([1.0, 0.0, 0.0], p.shape)
-        axis = {PHI1: r[..., 0], PHI2: p / lengths_of(p)[:, None], PHI3: guide}[column]
+        axis = {claim.PHI1: r[..., 0], claim.PHI2: p / lengths_of(p)[:, None], claim.PHI3: guide}[
+            column
+        ]
         # b4 lies on the first two lines; the third passes through a1.
-        velocity = np.cross(axis, p) if column == PHI3 else np.zeros_like(p)
+        velocity = np.cross(axis, p) if column == claim.PHI3 else np.zeros_like(p)
         twist = np.concatenate([velocity, axis], axis=-1)
         j = jacobian(OPTIMAL, p, r)
         rates = np.abs(np.einsum("nij,nj->ni", j, twist))
@@ -181,17 +152,19 @@ REGULAR = 1e-3
 
 _TURN_PLANE, _TURN_LINE, _MOVE_POINT = UNCOUPLED[:3]
 MOTIONS = (
-    (_TURN_PLANE, PHI3, 1.0),
-    (_TURN_LINE, BETA, 1.0),
-    (_MOVE_POINT, R, 1.0),
-    (_TURN_PLANE, PHI2, -1.0),
-    (_TURN_LINE, EPSILON, 1.0),
-    (_TURN_PLANE, PHI1, -1.0),
+    (_TURN_PLANE, claim.PHI3, 1.0),
+    (_TURN_LINE, claim.BETA, 1.0),
+    (_MOVE_POINT, claim.R, 1.0),
+    (_TURN_PLANE, claim.PHI2, -1.0),
+    (_TURN_LINE, claim.EPSILON, 1.0),
+    (_TURN_PLANE, claim.PHI1, -1.0),
 )
 """The motions that make a pose, each with the column of its amount and a sign."""
 
 STRATUM_FOLDS = tuple(
-    (R, BETA, PHI3)[:of_b4] + (EPSILON, PHI2)[:of_line] + (PHI1,)[:of_plane]
+    (claim.R, claim.BETA, claim.PHI3)[:of_b4]
+    + (claim.EPSILON, claim.PHI2)[:of_line]
+    + (claim.PHI1,)[:of_plane]
     for of_b4, of_line, of_plane in itertools.product(range(4), range(3), range(2))
 )
 """Columns of the coordinates of each stratum; the others are zero in it."""
@@ -208,19 +181,19 @@ TABLE = (
 """The coordinates in the order of their motions, as in `MOTIONS`."""
 
 
-def chart() -> Measurement:
+def measure_charts() -> claim.Measurement:
     """Try the folds as coordinates of all poses, of each stratum, and of the home pose."""
     random, home = np.random.default_rng(9), OPTIMAL.home_pose
-    p, r = random_poses(random, POSES, 1.0)
+    p, r = claim.random_poses(random, POSES, 1.0)
     p[0], r[0] = np.array(home.position) / OPTIMAL.reach, home.rotation
     folds = to_folds(p, r)
     sines = np.sin(folds[:, 1:])
     beta, epsilon = sines[:, 0], sines[:, 1]
     products = folds[:, :1] * sines[:, 2:]
     products *= np.stack([epsilon, beta * epsilon, beta], axis=-1)
-    determinants = np.abs(np.linalg.det(_twists(folds))) / folds[:, R] ** 2
+    determinants = np.abs(np.linalg.det(_twists(folds))) / folds[:, claim.R] ** 2
     free = np.repeat([np.isin(range(6), columns) for columns in STRATUM_FOLDS], PLACES, axis=0)
-    of_strata = random_folds(random, free)
+    of_strata = claim.random_folds(random, free)
     poses = from_folds(of_strata)
     found = stratum(*poses, 1.0).reshape(-1, PLACES, 4)
     ours = {
@@ -232,48 +205,34 @@ def chart() -> Measurement:
         poses=_largest_difference(from_folds(folds), (p, r)),
         folds=_error_of_folds(of_strata, to_folds(*poses)),
         strata=len(ours),
-        motions=_error_of_motions(random_folds(random, np.full((MADE, 6), True))),
+        motions=_error_of_motions(claim.random_folds(random, np.full((MADE, 6), True))),
         margins=float(np.abs(products - margins(p, r)).max()),
         determinant=float(np.abs(determinants - beta * epsilon).max()),
         at_home=float(determinants[0]),
     )
 
 
-def judge_chart(strata: int, determinant: float, at_home: float, **errors: float) -> Measurement:
-    """Return the measurement of the folds as a chart, with the reach as unit of length.
+def judge_chart(
+    strata: int, determinant: float, at_home: float, **errors: float
+) -> claim.Measurement:
+    """Judge the folds as a chart by largest errors, with the reach as unit of length.
 
-    Args:
-        strata: Number of strata that have as many coordinates as dimensions.
-        determinant: Largest error of sin β sin ε as the determinant of the chart over r².
-        at_home: That determinant at the home pose of the optimum.
-        errors: Largest errors of `poses` by their folds, of the `folds` of a stratum by the pose
-            that they make, of poses that the platform's `motions` make, and of the `margins` as
-            products of r and sines.
+    They are of `poses` by their folds, of the `folds` of a stratum by the pose that they make, of
+    poses that `motions` make, of the `margins` as products, and of the determinant over r².
     """
     exact = max(errors.values())
-    text = (
-        "The amounts of six motions of the platform on its own axes, made one after the other from "
-        "the pose in which both flags coincide, are such coordinates: r, β, ε and the folds φ1, φ2 "
-        "and φ3. Each of these motions moves one element of the platform's flag and leaves two. "
-        f"{POSES:,} random poses have coordinates that give them back, and the margins are "
-        "δ1 = r sin ε sin φ1, δ2 = r sin β sin ε sin φ2 and δ3 = r sin β sin φ3. So the poses that "
-        "are not singular are eight boxes, one for each triple of signs, connected and "
-        "contractible; on the walls of a box a fold is flat, or r, sin β or sin ε vanishes. "
-        f"Likewise {strata} of the {len(STRATA)} strata have as many of the coordinates as "
-        "dimensions; the others are zero, up to half turns about the platform's axes, which leave "
-        f"its flag where it is. This holds to {below(exact, EXACT)} of the reach and in radians. "
-        "The determinant of the chart is r² sin β sin ε, by finite differences to "
-        f"{below(determinant, BY_DIFFERENCES)} of r², so that it is regular in every box. A "
-        "fold changes one margin; r, β and ε change several in size, and none in sign. The six "
-        "motions of the claim uncoupled-motions, each made once, are no chart: at the optimum's "
-        "home, as wherever the platform is parallel to the base, four of them move it parallel to "
-        "the base, which has three freedoms; there the determinant of the folds is "
-        f"{at_home:.2f} r²."
-    )
+    words = {
+        "poses": POSES,
+        "strata": strata,
+        "all": len(STRATA),
+        "exact": claim.below(exact, EXACT),
+        "determinant": claim.below(determinant, BY_DIFFERENCES),
+        "at_home": at_home,
+    }
     is_exact = exact < EXACT and determinant < BY_DIFFERENCES
     is_so = is_exact and strata == len(STRATA) and at_home > REGULAR
     values = {**errors, "strata": strata, "determinant": determinant, "at_home": at_home}
-    return Measurement(text, "confirmed" if is_so else "not confirmed", values, TABLE)
+    return claim.judge(is_so, words, values, TABLE)
 
 
 def _twists(folds: FloatArray) -> FloatArray:
@@ -295,11 +254,11 @@ def _largest_difference(
 def _error_of_folds(given: FloatArray, found: FloatArray) -> float:
     """Return the largest error of the folds of poses by the folds of which they are made."""
     # Where a1 is on the line b2b3, ε is 0 and φ1 + φ2 alone is determined.
-    straight, found = given[:, EPSILON] == 0.0, found.copy()
-    found[straight, PHI1] += found[straight, PHI2]
-    found[straight, PHI2] = 0.0
+    straight, found = given[:, claim.EPSILON] == 0.0, found.copy()
+    found[straight, claim.PHI1] += found[straight, claim.PHI2]
+    found[straight, claim.PHI2] = 0.0
     apart = found - given
-    apart[:, BETA:] -= 2.0 * np.pi * np.round(apart[:, BETA:] / (2.0 * np.pi))
+    apart[:, claim.BETA :] -= 2.0 * np.pi * np.round(apart[:, claim.BETA :] / (2.0 * np.pi))
     return float(np.abs(apart).max())
 
 
@@ -309,7 +268,7 @@ def _error_of_motions(folds: FloatArray) -> float:
     for row, position, rotation in zip(folds, *from_folds(folds), strict=True):
         pose = Pose.of((0.0, 0.0, 0.0), np.eye(3))
         for motion, column, sign in MOTIONS:
-            pose = motion.moved(pose, sign * float(row[column]))
+            pose = motion.move(pose, sign * float(row[column]))
         found = np.array(pose.position), pose.rotation
         worst = max(worst, _largest_difference(found, (position, rotation)))
     return worst

@@ -13,7 +13,7 @@ from explorer.legs.interference import step_overlaps
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.reproduce.claim import Measurement
+from explorer.reproduce.claim import Measurement, judge
 from explorer.reproduce.six_legs import six_four_twin
 from explorer.workspace.limits.constraints import constraints, satisfies
 
@@ -68,7 +68,7 @@ class Interference:
     steps: tuple[tuple[float, ...], ...]
 
 
-def lower_risk() -> Measurement:
+def measure_risk() -> Measurement:
     """Compare clearances and swept steps of the 4-4 and of its 6-4 twin over a workspace."""
     nodes = _nodes(NODE_STEP, LOWEST[0])
     pairs = leg_clearances(Configuration(OPTIMAL, nodes, ROTATION)).clearance
@@ -86,16 +86,10 @@ def lower_risk() -> Measurement:
 def judge_risk(
     ours: Interference, twins: Sequence[Interference], beyond: Interference, apart: float
 ) -> Measurement:
-    """Return the measurement of the risk.
+    """Judge the risk beside twins with a2 within the reach; that beyond it is only reported.
 
     The claim is confirmed for legs thinner than half the distance of legs 2 and 3 if for each such
     radius the 4-4 has as many positions free of collisions as every twin.
-
-    Args:
-        ours: The 4-4.
-        twins: The 6-4 with a2 within the reach.
-        beyond: The 6-4 with a2 beyond it, which is reported but not judged.
-        apart: Distance of legs 2 and 3 of the 4-4, in design units.
     """
     thin = [k for k, radius in enumerate(RADII) if 2.0 * radius < apart]
     thick = [k for k in range(len(RADII)) if k not in thin]
@@ -106,35 +100,29 @@ def judge_risk(
     least = [twin.least[1] for twin in twins]
     clearer = [twin.clearer or 0.0 for twin in twins]
     medians = [twin.median for twin in twins]
-    relation = "at least as many" if is_as_free(thin) else "not always as many"
-    text = (
-        f"Legs 2 and 3 of the 4-4 are {apart:.3f} units apart everywhere, (b3 − b2) times the "
-        "cosine of the yaw. With each radius of the table below half of that its legs have "
-        f"{relation} positions free of collisions as those of every 6-4 whose a2 lies within the "
-        "reach; with thicker ones they have none. The least clearance of thin legs at "
-        f"z ≥ {LOWEST[1]:g} is {ours.least[1]:.3f}, beside {min(least):.3f} to {max(least):.3f}, "
-        f"and {beyond.least[1]:.3f} with a2x = {BEYOND:g}. Yet at {min(clearer):.0%} to "
-        f"{max(clearer):.0%} of the nodes the 6-4 is the clearer one: the median of the clearance "
-        f"is {ours.median:.3f}, beside {min(medians):.3f} to {max(medians):.3f}. By the paper's "
-        "test of swept tetrahedra the 4-4 collides on fewer steps along z than a 6-4 with a2 "
-        "within the reach, and on every step along x that is longer than the distance of legs 2 "
-        "and 3, where the 6-4 collides on none."
-    )
+    words = {
+        "apart": apart,
+        "relation": "at least as many" if is_as_free(thin) else "not always as many",
+        "z": LOWEST[1],
+        "ours": ours,
+        "least": (min(least), max(least)),
+        "beyond": beyond,
+        "a2x": BEYOND,
+        "clearer": (min(clearer), max(clearer)),
+        "medians": (min(medians), max(medians)),
+    }
     mechanisms = (ours, *twins, beyond)
     values = {"legs_2_and_3_apart": apart, "mechanisms": [asdict(each) for each in mechanisms]}
-    table = tuple(_table(mechanisms))
-    if is_as_free(thin) and is_as_free(thick) and max(clearer) < 0.5:
-        return Measurement(text, "confirmed", values, table)
-    if thin and is_as_free(thin):
-        condition = (
-            f"for legs with radii below {0.5 * apart:.2f} units and a2 within the reach, at home's "
-            "orientation, by the share of positions free of collisions"
-        )
-        return Measurement(text, "confirmed within", values, table, condition)
-    return Measurement(text, "not confirmed", values, table)
+    is_so = is_as_free(thin) and is_as_free(thick) and max(clearer) < 0.5
+    condition = (
+        f"for legs with radii below {0.5 * apart:.2f} units and a2 within the reach, at home's "
+        "orientation, by the share of positions free of collisions"
+    )
+    is_within = thin and is_as_free(thin)
+    return judge(is_so, words, values, _table(mechanisms), condition if is_within else "")
 
 
-def clear_optimum() -> Measurement:
+def measure_optimum() -> Measurement:
     """Test steps of the paper's optimum by swept tetrahedra, and its nodes by clearances."""
     nodes = _nodes(NODE_STEP, LOWEST[0])
     pairs = leg_clearances(Configuration(OPTIMAL, nodes, ROTATION)).clearance
@@ -149,41 +137,29 @@ def clear_optimum() -> Measurement:
 def judge_optimum(
     steps: tuple[tuple[float, ...], ...], apart: float, touching: int, nodes: int, highest: float
 ) -> Measurement:
-    """Return the measurement of the optimum.
-
-    Args:
-        steps: Shares of colliding steps, by length as in `STEPS` and by axis.
-        apart: Distance of legs 2 and 3, in design units.
-        touching: Number of the nodes, out of those by which Table 1 is read, where legs touch.
-        nodes: Number of all these nodes.
-        highest: Largest z of a node where legs touch, in design units.
-    """
+    """Judge by the shares of colliding steps, and the nodes where legs touch, up to a height."""
     lines = [f"{'step':>8}" + "".join(f"{axis:>8}" for axis in "xyz")]
-    lines += [
-        f"{length:8g}" + "".join(f"{share:8.1%}" for share in shares)
-        for length, shares in zip(STEPS, steps, strict=True)
-    ]
+    for length, shares in zip(STEPS, steps, strict=True):
+        lines.append(f"{length:8g}" + "".join(f"{share:8.1%}" for share in shares))
     shortest, longest = max(steps[0]), max(steps[-1])
-    text = (
-        f"At the nodes of the optimum's workspace with z ≥ {FROM:g}, {shortest:.2%} of the steps "
-        f"of {STEPS[0]:g} units along the worst axis collide by this test, and {longest:.0%} of "
-        f"those of {STEPS[-1]:g} units, our reading of the step of the optimum's nodes. Legs 2 and "
-        f"3 are {apart:.3f} units apart: on a longer step along the guide each passes where the "
-        "other was or will be, though they never touch. The answer depends on the sampling "
-        f"interval, which the paper does not print. Whatever it is, legs touch at {touching} of "
-        f"the {nodes} nodes by which we read the volume, none of them above z = "
-        f"{highest:g}; the paper does not say whether it counts such nodes."
-    )
+    words = {
+        "z": FROM,
+        "shortest": shortest,
+        "longest": longest,
+        "steps": (STEPS[0], STEPS[-1]),
+        "apart": apart,
+        "touching": touching,
+        "nodes": nodes,
+        "highest": highest,
+    }
     values = {
         "steps": dict(zip(map(str, STEPS), steps, strict=True)),
         "apart": apart,
         "touching": {"count": touching, "nodes": nodes, "highest": highest},
     }
-    if shortest == longest == touching == 0:
-        return Measurement(text, "confirmed", values, tuple(lines))
     if shortest < RARE < longest:
-        return Measurement(text, "not testable from the paper", values, tuple(lines))
-    return Measurement(text, "not confirmed", values, tuple(lines))
+        return Measurement("not testable from the paper", words, values, tuple(lines))
+    return judge(shortest == longest == touching == 0, words, values, lines)
 
 
 def _interference(
@@ -216,7 +192,8 @@ def _shares_of_steps(nodes: FloatArray, collides: Collides) -> tuple[tuple[float
 
 
 def _four_collides(start: FloatArray, end: FloatArray) -> BoolArray:
-    return np.asarray(step_overlaps(OPTIMAL, start, ROTATION, end, ROTATION).any(axis=-1))
+    ends = (Configuration(OPTIMAL, position, ROTATION) for position in (start, end))
+    return np.asarray(step_overlaps(*ends).any(axis=-1))
 
 
 def _table(mechanisms: Sequence[Interference]) -> list[str]:
@@ -228,16 +205,15 @@ def _table(mechanisms: Sequence[Interference]) -> list[str]:
         lines.append(f"{each.name:18}{least}{each.median:9.3f}{clearer:>9}".rstrip())
     lines += ["share of nodes without a collision, by the radius of all legs"]
     lines.append(f"{'':18}" + "".join(f"{radius:8g}" for radius in RADII))
-    lines += [
-        f"{each.name:18}" + "".join(f"{share:8.1%}" for share in each.free) for each in mechanisms
-    ]
+    lines += [_shares_line(each.name, each.free) for each in mechanisms]
     lines += ["share of steps that collide by the paper's test, by length and axis"]
     lines.append(f"{'':18}" + "".join(f"{f'{s:g} {a}':>8}" for s in STEPS for a in "xyz"))
-    lines += [
-        f"{each.name:18}" + "".join(f"{share:8.1%}" for shares in each.steps for share in shares)
-        for each in mechanisms
-    ]
+    lines += [_shares_line(each.name, sum(each.steps, ())) for each in mechanisms]
     return lines
+
+
+def _shares_line(name: str, shares: Sequence[float]) -> str:
+    return f"{name:18}" + "".join(f"{share:8.1%}" for share in shares)
 
 
 def _nodes(step: float, lowest: float) -> FloatArray:

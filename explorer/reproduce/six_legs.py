@@ -116,21 +116,13 @@ class SixLegs:
 
 
 def six_four_twin(design: Design, a2x: float) -> SixLegs:
-    """Return the 6-4 twin of a design: each leg along the guide becomes two from a1 and a2.
+    """Return the 6-4 twin of a design: each leg along the guide becomes two, from a1 and from a2.
 
-    Args:
-        design: The design; every leg of the twin is at most as long as its longest one.
-        a2x: Position of a2 on the base's x-axis, which the 4-4 leaves free.
+    The 4-4 leaves a2x free. Every leg is at most as long as the longest one of the design.
     """
-    points = {
-        "a1": np.zeros(3),
-        "a2": np.array([a2x, 0.0, 0.0]),
-        "a3": np.array([*design.a3, 0.0]),
-        "b1": np.array([*design.b1, 0.0]),
-        "b2": np.array([design.b2, 0.0, 0.0]),
-        "b3": np.array([design.b3, 0.0, 0.0]),
-        "b4": np.zeros(3),
-    }
+    flat = {"a2": (a2x, 0.0), "a3": design.a3, "b1": design.b1}
+    flat |= {"b2": (design.b2, 0.0), "b3": (design.b3, 0.0)}
+    points = {name: (*flat.get(name, (0.0, 0.0)), 0.0) for pair in TWIN for name in pair}
     home = design.home_pose
     return SixLegs(
         f"6-4, a2x = {a2x:.4g}",
@@ -143,31 +135,18 @@ def six_four_twin(design: Design, a2x: float) -> SixLegs:
 
 
 def octahedral(design: Design, size: float = 1.0) -> SixLegs:
-    """Return the octahedral Stewart-Gough platform of the same reach.
+    """Return the octahedral Stewart-Gough platform of the same reach, its base scaled by a size.
 
     Base and platform are equilateral triangles with the areas of a1 a2 a3 and b1 b2 b3, turned
     against each other by 60°; neighbouring legs share their joints.
-
-    Args:
-        design: The design with these areas.
-        size: Factor of the edges of the base.
     """
-    base = size * _circumradius(0.5 * abs(design.a2x * design.a3[1]))
-    platform = _circumradius(0.5 * abs((design.b3 - design.b2) * design.b1[1]))
-    corners = np.radians([0.0, 120.0, 240.0])
-    tips = np.radians([60.0, 180.0, 300.0])
-    a = base * np.column_stack([np.cos(corners), np.sin(corners), np.zeros(3)])
+    areas = design.a2x * design.a3[1], (design.b3 - design.b2) * design.b1[1]
+    # The circumradius of an equilateral triangle follows from its area.
+    base, platform = (math.sqrt(2.0 * abs(area) / (3.0 * math.sqrt(3.0))) for area in areas)
+    corners, tips = np.radians([[0.0, 120.0, 240.0], [60.0, 180.0, 300.0]])
+    a = size * base * np.column_stack([np.cos(corners), np.sin(corners), np.zeros(3)])
     b = platform * np.column_stack([np.cos(tips), np.sin(tips), np.zeros(3)])
-    return SixLegs(
-        "octahedral" if size == 1.0 else f"octahedral × {size:g}",
-        a[[0, 1, 1, 2, 2, 0]],
-        b[[0, 0, 1, 1, 2, 2]],
-        design.reach,
-        flags=False,
-        home=(np.array([0.0, 0.0, 0.5 * design.reach]), np.eye(3)),
-    )
-
-
-def _circumradius(area: float) -> float:
-    """Return the circumradius of the equilateral triangle with an area."""
-    return math.sqrt(4.0 * area / (3.0 * math.sqrt(3.0)))
+    name = "octahedral" if size == 1.0 else f"octahedral × {size:g}"
+    home = np.array([0.0, 0.0, 0.5 * design.reach]), np.eye(3)
+    base_points, tips = a[[0, 1, 1, 2, 2, 0]], b[[0, 0, 1, 1, 2, 2]]
+    return SixLegs(name, base_points, tips, design.reach, flags=False, home=home)

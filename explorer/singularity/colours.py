@@ -12,9 +12,8 @@ the margin, δ1 to δ3, or a dash of its own stands beside them.
 from __future__ import annotations
 
 import itertools
-from typing import TypeAlias
 
-Rgb: TypeAlias = tuple[int, int, int]
+Rgb = tuple[int, int, int]
 
 SINGULAR: Rgb = (196, 52, 8)
 WARNED: Rgb = (246, 178, 76)
@@ -40,22 +39,12 @@ BAND_EDGES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, FAR_WARNINGS)
 
 
 def warning_condition(reach: float, warn_below: float) -> float:
-    """Return the warning value of the inverse condition number, which grows with that of margins.
-
-    Args:
-        reach: Reach of the design, in design units.
-        warn_below: Warning length of the margins, in design units.
-    """
+    """Return the warning value of the inverse condition number for a warning length of margins."""
     return WARN_CONDITION * (warn_below / (WARN_SHARE * reach))
 
 
 def proximity_colour(level: float) -> Rgb:
-    """Return the colour of a level.
-
-    Args:
-        level: Margin over the warning length, of either sign; or a level of
-            `explorer.measures.verdict`.
-    """
+    """Return the colour of a level: a margin over the warning length, or the level of a verdict."""
     share = abs(level)
     if share < 1.0:
         return mix(SINGULAR, WARNED, share)
@@ -63,11 +52,7 @@ def proximity_colour(level: float) -> Rgb:
 
 
 def margin_text(incidence: int) -> tuple[Rgb, Rgb]:
-    """Return the colour of a margin's name on light pages and on dark ones.
-
-    Args:
-        incidence: Number 1, 2 or 3 of the margin.
-    """
+    """Return the colour of the name of margin 1, 2 or 3 on light pages and on dark ones."""
     colour = MARGIN_COLOURS[incidence - 1]
     return mix(colour, (0, 0, 0), TEXT_SHARE), mix(colour, (255, 255, 255), TEXT_SHARE)
 
@@ -87,3 +72,9 @@ def mix(a: Rgb, b: Rgb, share: float) -> Rgb:
     """Return the mixture of two colours; a share of 0 is the first, 1 the second."""
     red, green, blue = (round(x + share * (y - x)) for x, y in zip(a, b, strict=True))
     return red, green, blue
+
+
+def linear(channel: int) -> float:
+    """Return a channel of sRGB, 0 to 255, as linear light from 0 to 1 (IEC 61966-2-1)."""
+    share = channel / 255.0
+    return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4

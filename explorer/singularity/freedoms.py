@@ -28,24 +28,19 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import LENGTH_ROWS, Design
+from explorer.mechanism.design import LENGTH_ROWS
 from explorer.mechanism.folds import FOLD_LINES
-from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import FloatArray
-from explorer.singularity.ellipsoids import jacobian
-from explorer.singularity.strata import incidences, stratum
+from explorer.numerics.arrays import FloatArray, lengths_of
+from explorer.singularity.strata import incidences, stratum_of
 
 
 @dataclass(frozen=True)
 class UncoupledMotion:
     """A motion along or about an axis of a frame that changes one margin and no other.
 
-    Attributes:
-        frame: Frame of the axis, which passes through b4 (platform) or a1 (base).
-        kind: Translation along the axis or rotation about it.
-        axis: Axis of the frame.
-        incidence: Index 1, 2 or 3 of the margin that changes.
+    The axis passes through b4 (platform) or a1 (base); the incidence is the number 1, 2 or 3 of the
+    margin that changes.
     """
 
     frame: Literal["platform", "base"]
@@ -67,16 +62,8 @@ class UncoupledMotion:
             return np.zeros(3), unit
         return np.array(pose.position), pose.rotation @ unit
 
-    def moved(self, pose: Pose, amount: float) -> Pose:
-        """Return the pose after the motion.
-
-        Args:
-            pose: Pose before the motion.
-            amount: Distance in design units (translation) or angle in radians (rotation).
-
-        Raises:
-            InputError: The amount is not finite.
-        """
+    def move(self, pose: Pose, amount: float) -> Pose:
+        """Return a pose after the motion by a distance in design units or an angle in radians."""
         if not math.isfinite(amount):
             raise InputError(f"a motion {self.name} needs a finite amount; got {amount}")
         point, direction = self.line(pose)
@@ -143,28 +130,24 @@ class Freedoms:
     turns: tuple[FreeTurn, ...]
 
 
-def freedoms(design: Design, pose: Pose) -> Freedoms:
-    """Return the freedoms that a pose leaves the platform with all actuators locked.
+def freedoms(configuration: Configuration) -> Freedoms:
+    """Return the freedoms that one pose leaves the platform with all actuators locked.
 
-    Incidences hold to 1e-9 of the reach (`explorer.singularity.strata`), and rates that are below
-    1e-7, with lengths over the reach, count as zero.
-
-    Args:
-        design: The manipulator.
-        pose: The pose of the platform.
+    The tool point of the configuration is b4. Incidences hold to 1e-9 of the reach
+    (`explorer.singularity.strata`), and rates below 1e-7 of the reach count as zero.
     """
-    p, r, reach = np.array(pose.position), pose.rotation, design.reach
-    holding = incidences(tuple(stratum(p, r, reach).tolist()))
+    c, p, r = configuration, configuration.position, configuration.rotation
+    reach = c.design.reach
+    holding = incidences(stratum_of(c))
     if not holding:
         return Freedoms(0, ())
-    a1, distance = np.zeros(3), math.hypot(*pose.position)
+    a1, distance = np.zeros(3), float(lengths_of(p))
     lines = {1: (p, r[:, 0]), 3: (a1, np.array([1.0, 0.0, 0.0]))}
     # Where a1 and b4 coincide they have no line.
     if distance > ZERO * reach:
         lines[2] = a1, p / distance
-    locked = _locked_rates(design, pose)
+    locked = _locked_rates(c)
     values = np.linalg.svd(locked, compute_uv=False)
-    joints = inverse(design, p, r)
     turns: list[FreeTurn] = []
     twists: list[FloatArray] = []
     for incidence, (point, direction) in lines.items():
@@ -176,27 +159,26 @@ def freedoms(design: Design, pose: Pose) -> Freedoms:
         # The line a1b4 is the line b2b3 where a1 is on that one, the guide where b4 is.
         if is_free and np.linalg.matrix_rank(np.array([*twists, twist]), ZERO) > len(twists):
             # Joints depend on the cosine of the angle alone, so that half a turn is the test.
-            half = pose.turn(point, math.pi * direction)
-            change = np.abs(inverse(design, half.position, half.rotation) - joints).max()
+            half = 2.0 * np.outer(direction, direction) - np.eye(3)
+            there = Configuration(c.design, point + half @ (p - point), half @ r)
+            change = np.abs(there.joints - c.joints).max()
             turns.append(FreeTurn(incidence, point, direction, bool(change <= ZERO * reach)))
             twists.append(twist)
     # A nearly degenerate design has singular values near the limit.
     return Freedoms(max(int(np.sum(values <= ZERO)), len(turns)), tuple(turns))
 
 
-def _locked_rates(design: Design, pose: Pose) -> FloatArray:
+def _locked_rates(c: Configuration) -> FloatArray:
     """Return the rates that locked actuators hold at zero, by the twist (v over the reach; ω).
 
     They are those of the joints over the reach and, for a leg of length zero, the velocity of its
     end, shape (6 or more, 6).
     """
-    p, r, reach = np.array(pose.position), pose.rotation, design.reach
-    points = Configuration(design, p, r).points
-    rows = [jacobian(design, p, r)]
-    lengths = inverse(design, p, r)[LENGTH_ROWS]
-    for end, length in zip((points.b1, points.b2, points.b3, points.b4), lengths, strict=True):
-        if length <= ZERO * reach:
+    rows = [c.jacobian]
+    for arm, length in zip(c.joint_arms[LENGTH_ROWS], c.leg_lengths, strict=True):
+        if length <= ZERO * c.design.reach:
             # The columns are those of v + ω × arm.
-            turned = np.cross(np.eye(3), end - p).T
-            rows.append(np.hstack([np.eye(3), turned]))
-    return np.vstack(rows) / np.array([1.0, 1.0, 1.0, reach, reach, reach])
+            x, y, z = arm.tolist()
+            turning = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+            rows.append(np.hstack([np.eye(3), turning]))
+    return np.vstack(rows) / np.repeat([1.0, c.design.reach], 3)

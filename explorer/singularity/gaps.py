@@ -19,12 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.margins import margins
+from explorer.mechanism.margins import ROUNDING, margins
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, dot, position_array
-
-# Sine between two lines up to which they count as parallel: rounding errors of a rotation.
-PARALLEL = 1e-14
 
 
 @dataclass(frozen=True)
@@ -47,17 +44,12 @@ class FlagGaps:
 
 
 def flag_gaps(position: FloatArray, rotation: FloatArray) -> FlagGaps:
-    """Return the gaps of a pose.
-
-    Args:
-        position: b4 in the base frame, shape (3,), in design units.
-        rotation: Platform to base, shape (3, 3).
-    """
+    """Return the gaps of a pose."""
     x, y, z = position.tolist()
     height = float(rotation[:, 2] @ position)
     along, uy, uz = rotation[:, 0].tolist()
     sine = math.hypot(uy, uz)
-    are_parallel = sine <= PARALLEL
+    are_parallel = sine <= ROUNDING
     if are_parallel:
         on_line = (x, y, z)
         on_guide, distance = (x, 0.0, 0.0), math.hypot(y, z)
@@ -77,14 +69,8 @@ def flag_gaps(position: FloatArray, rotation: FloatArray) -> FlagGaps:
 def least_turns(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """Return the least turns to δ1 = 0, δ2 = 0 and δ3 = 0, shape (..., 3), in radians.
 
-    They are from 0, for a pose that has the incidence, to a quarter turn.
-
-    Args:
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-
-    Raises:
-        InputError: The position is not finite, or the rotation is not one.
+    They are from 0, for a pose that has the incidence, to a quarter turn. Arguments and errors are
+    those of `explorer.mechanism.margins.margins`.
     """
     p, r = position_array("position", position), checked_rotation(rotation)
     line = r[..., :, 0]

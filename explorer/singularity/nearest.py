@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import Design
-from explorer.mechanism.margins import INCIDENCES, margins_at
+from explorer.mechanism.margins import INCIDENCES, ROUNDING, margins_at
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import FloatArray, batch_shape, dot, position_array
 from explorer.numerics.compiled import helper, kernel
@@ -41,8 +41,7 @@ class PlatformPoints:
 
     Attributes:
         points: b1, b2, b3 and b4, shape (4, 3), in design units.
-        centroid: Mean c of the points, shape (3,), in design units.
-        scatter: Mean of (b − c)(b − c)ᵀ, shape (3, 3), in squared design units.
+        centroid, scatter: Mean c of the points, (3,), and of (b − c)(b − c)ᵀ, (3, 3).
         length: Root-mean-square distance of the points from the centroid, in design units.
     """
 
@@ -70,15 +69,8 @@ def displacement(
 ) -> FloatArray:
     """Return the root-mean-square displacement of b1 to b4, shape (...), in design units.
 
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        other_position: b4 of the other pose, shape (..., 3).
-        other_rotation: Platform to base in the other pose, shape (..., 3, 3).
-
     Raises:
-        InputError: A position is not finite, or a rotation is not one.
+        InputError: A position is not finite, a rotation is not one, or batch axes do not broadcast.
     """
     p = position_array("position", position)
     q = position_array("other position", other_position)
@@ -87,10 +79,6 @@ def displacement(
     # For close poses the formula with the scatter would cancel; these squares do not.
     moves = (q - p)[..., None, :] + design.platform_points @ np.swapaxes(s - r, -1, -2)
     return np.sqrt(dot(moves, moves).mean(axis=-1))
-
-
-# Share of the magnitude of its terms up to which a margin counts as zero.
-ROUNDING = 1e-14
 
 
 class NearestPoses(NamedTuple):
@@ -117,7 +105,7 @@ class NearestSingularity:
     """The nearest pose with one of the three incidences.
 
     Attributes:
-        incidence: Index 1, 2 or 3 of the margin δ1, δ2 or δ3 that vanishes.
+        incidence: Number 1, 2 or 3 of the margin δ1, δ2 or δ3 that vanishes.
         distance: Root-mean-square displacement of b1 to b4, in design units; 0 for a pose with
             the incidence.
         bound: Proven lower bound of the distance, in design units, see `NearestPoses`.
@@ -140,9 +128,7 @@ def nearest_singularities(
 ) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
     """Return the nearest singular pose of each incidence, in the order δ1, δ2, δ3.
 
-    Args:
-        design: The manipulator, which gives the unit of all lengths.
-        pose: Pose of its platform, which may be singular itself.
+    The pose may be singular itself.
     """
     return singularities_of(nearest_singular_poses(Configuration.at(design, pose)), pose)
 

@@ -18,12 +18,12 @@ of the four corners; that value less bounds of the second-order terms is a lower
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
 
-Angles: TypeAlias = tuple[float, float]
+Angles = tuple[float, float]
 
 # Numbers of initial boxes over half the torus, since (φ + π, σ + π) is the same pose.
 FIRST_PHI, FIRST_SIGMA = 6, 12

@@ -15,12 +15,11 @@ of them is the combination of their quaternions at which x = s.
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
 
-Quaternion: TypeAlias = tuple[float, float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 ROOT_STEPS = 200
 SWEEPS = 20

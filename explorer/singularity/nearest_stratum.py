@@ -22,10 +22,10 @@ from types import MappingProxyType
 import numpy as np
 
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.angle_minima import ANGLES, grid_minima, minimise, powers_of
 from explorer.singularity.nearest import PlatformPoints, displacement, nearest_singularities
 from explorer.singularity.strata import (
     OF_INCIDENCES,
@@ -34,6 +34,7 @@ from explorer.singularity.strata import (
     codimension,
     is_below,
     stratum,
+    stratum_of,
 )
 
 X, _, Z = np.eye(3)
@@ -43,11 +44,8 @@ X, _, Z = np.eye(3)
 class NearestInStratum:
     """The nearest pose in the closure of a stratum.
 
-    Attributes:
-        stratum: Requested stratum.
-        seen: Stratum of the nearest pose, which is the requested one or lies in its closure.
-        distance: Root-mean-square displacement of b1 to b4, in design units.
-        pose: The nearest pose.
+    The stratum `seen` of that pose is the requested one or lies in its closure. The distance is the
+    root-mean-square displacement of b1 to b4, in design units.
     """
 
     stratum: Stratum
@@ -60,12 +58,9 @@ class NearestInStratum:
 class _Closure:
     """The closure of a stratum as conditions on the rotation and on b4.
 
-    Attributes:
-        axes: Base axes; the rotation is the product of turns about them in this order.
-        flips: Axes of half turns, one of which multiplies the rotation on the right; "" for
-            none.
-        place: Set of positions of b4: a line through a1, which is "u" (b2b3), "guide" or "node"
-            (where the planes intersect), the plane "platform" or "base" through a1, or "a1".
+    The rotation is the product of turns about the base axes in their order, times one of the half
+    turns `flips`, "" for none. The place of b4 is a line through a1, which is "u" (b2b3), "guide"
+    or "node" (where the planes intersect), the plane "platform" or "base" through a1, or "a1".
     """
 
     axes: str
@@ -110,35 +105,20 @@ _CLOSURES: Mapping[Stratum, _Closure] = MappingProxyType(
 def nearest_in_stratum(design: Design, pose: Pose, asked: Stratum) -> NearestInStratum:
     """Return the nearest pose in the closure of a stratum; the pose itself if it lies in it.
 
-    Args:
-        design: The manipulator.
-        pose: Pose of its platform.
-        asked: Requested stratum, a permutation of (1, 2, 3, 4).
-
     Raises:
-        InputError: There is no such stratum.
+        InputError: The stratum asked for is no permutation of (1, 2, 3, 4).
     """
     w = tuple(asked)
     if w not in STRATA:
         raise InputError(f"a stratum is a permutation of (1, 2, 3, 4); got {w}")
-    return _nearest(design, pose, (w,))[w]
+    return nearest_in_strata(design, pose, (w,))[w]
 
 
-def nearest_in_strata(design: Design, pose: Pose) -> Mapping[Stratum, NearestInStratum]:
-    """Return the nearest pose in the closure of each of the 24 strata, by stratum."""
-    return _nearest(design, pose, STRATA)
-
-
-def seen_stratum(design: Design, pose: Pose) -> Stratum:
-    """Return the stratum of a pose, with a tolerance relative to the design's reach."""
-    return tuple(stratum(pose.position, pose.rotation, design.reach).tolist())
-
-
-def _nearest(
-    design: Design, pose: Pose, strata: Sequence[Stratum]
-) -> dict[Stratum, NearestInStratum]:
-    """Return the nearest poses in the closures of strata."""
-    here = seen_stratum(design, pose)
+def nearest_in_strata(
+    design: Design, pose: Pose, strata: Sequence[Stratum] = STRATA
+) -> Mapping[Stratum, NearestInStratum]:
+    """Return the nearest pose in the closure of each stratum, by stratum."""
+    here = stratum_of(Configuration.at(design, pose))
     found = {w: NearestInStratum(w, here, 0.0, pose) for w in strata if is_below(here, w)}
     apart = [w for w in strata if w not in found]
     if not apart:
@@ -167,10 +147,8 @@ def _nearest(
 class _Target:
     """The pose to approximate; the unit of length is `PlatformPoints.length`.
 
-    Attributes:
-        centroid: Centroid of the points in the platform frame, shape (3,).
-        goal: Centroid of the points of the given pose in the base frame, shape (3,).
-        rotated_scatter: Product R M of the given rotation and the scatter, shape (3, 3).
+    It is the centroid of the points in the platform frame, the same in the base frame (`goal`),
+    and the product R M of rotation and scatter.
     """
 
     centroid: FloatArray
@@ -311,3 +289,104 @@ def _nearest_rotation(matrix: FloatArray) -> FloatArray:
     left, _, right = np.linalg.svd(matrix)
     side = np.sign(np.linalg.det(left @ right))
     return left @ np.diag([1.0, 1.0, side]) @ right
+
+
+# Number of grid angles in a turn, largest number of Newton steps, and the last step in radians.
+GRID, STEPS, LAST_STEP = 12, 60, 1e-12
+ANGLES = 3
+"""Largest number of angles."""
+
+# Relative rounding error of a value.
+ROUNDING = 1e-15
+# Orders of derivatives by each angle, of the gradient and of the Hessian.
+_ORDERS = np.eye(ANGLES, dtype=np.int64)
+FIRST = tuple(_ORDERS.T)
+SECOND = tuple(np.moveaxis(_ORDERS[:, None] + _ORDERS, -1, 0))
+
+
+def grid_minima(coefficients: FloatArray, sign: float, count: int) -> FloatArray:
+    """Return the angles (n, 3) of local minima of a squared distance on a grid over all turns.
+
+    For two angles these are the minima along either angle alone: far from a1 the value has
+    valleys too narrow for the grid to locate the lowest point of their floor. For three
+    angles there would be too many.
+    """
+    turn = np.linspace(0.0, 2.0 * math.pi, GRID, endpoint=False)
+    powers = powers_of(turn)[:, 0]
+    grids = [powers] * count + [powers[:1]] * (ANGLES - count)
+    linear, square = coefficients
+    for grid in reversed(grids):
+        linear, square = (np.moveaxis(each @ grid.T, -1, 0) for each in (linear, square))
+    value = linear + sign * square**2
+    if count == 0:
+        return np.zeros((1, ANGLES))
+    along = [
+        (value <= np.roll(value, 1, axis=axis)) & (value <= np.roll(value, -1, axis=axis))
+        for axis in range(count)
+    ]
+    low = np.any(along, axis=0) if count == 2 else np.all(along, axis=0)
+    return turn[np.argwhere(low)]
+
+
+def minimise(coefficients: FloatArray, sign: FloatArray, angles: FloatArray) -> FloatArray:
+    """Lower squared distances by Newton's method: change the angles (n, 3), return the values."""
+    value, slope, curvature = derivatives(coefficients, sign, angles)
+    rounding = ROUNDING * np.abs(coefficients[:, 0]).sum(axis=(1, 2, 3))
+    damping = np.zeros(len(angles))
+    active = np.arange(len(angles))
+    for _ in range(STEPS):
+        curvatures, axes = np.linalg.eigh(curvature[active])
+        # The step descends even if the value is not convex, and is short if it is flat.
+        curvatures = np.maximum(np.abs(curvatures), 1e-9) + damping[active, None]
+        along = (np.swapaxes(axes, -1, -2) @ slope[active, :, None])[..., 0] / curvatures
+        step = -(axes @ along[..., None])[..., 0]
+        longest = np.abs(step).max(axis=-1)
+        step *= np.minimum(1.0, 0.5 / np.maximum(longest, 1e-300))[:, None]
+        trial = angles[active] + step
+        moved = derivatives(coefficients[active], sign[active], trial)
+        better = moved[0] <= value[active] + rounding[active]
+        done = active[better]
+        angles[done] = trial[better]
+        value[done], slope[done], curvature[done] = (each[better] for each in moved)
+        old = damping[active]
+        damping[active] = np.where(better, 0.1 * old, np.maximum(10.0 * old, 1e-2))
+        active = active[longest > LAST_STEP]
+        if not len(active):
+            break
+    return value
+
+
+def derivatives(
+    coefficients: FloatArray, sign: FloatArray, angles: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return values (n,), gradients (n, 3) and Hessians (n, 3, 3) of squared distances.
+
+    The coefficients of L and S are of shape (n, 2, 3, 3, 3), the signs s of S² of shape (n,).
+    """
+    count = len(angles)
+    powers = np.swapaxes(powers_of(angles), -1, -2)
+    # Each product replaces the last axis by orders of derivatives, and puts it first.
+    result = coefficients.reshape(count, 2, 9, 3)
+    for angle in (2, 1, 0):
+        product = result.reshape(count, -1, 3) @ powers[:, angle]
+        result = np.moveaxis(product.reshape(count, 2, 9, 3), 3, 2)
+    result = result.reshape(count, 2, 3, 3, 3)
+    linear, square = result[:, 0], result[:, 1]
+    base = square[:, 0, 0, 0]
+    first = square[:, *FIRST]
+    value = linear[:, 0, 0, 0] + sign * base**2
+    slope = linear[:, *FIRST] + 2.0 * (sign * base)[:, None] * first
+    curvature = linear[:, *SECOND] + 2.0 * sign[:, None, None] * (
+        base[:, None, None] * square[:, *SECOND] + first[:, :, None] * first[:, None, :]
+    )
+    return value, slope, curvature
+
+
+def powers_of(angles: FloatArray) -> FloatArray:
+    """Return cosine, sine and 1 of angles (...), and two derivatives of each, (..., 3, 3)."""
+    cosine, sine = np.cos(angles), np.sin(angles)
+    powers = np.zeros((*angles.shape, 3, 3))
+    powers[..., 0, 0], powers[..., 0, 1], powers[..., 0, 2] = cosine, sine, 1.0
+    powers[..., 1, 0], powers[..., 1, 1] = -sine, cosine
+    powers[..., 2, 0], powers[..., 2, 1] = -cosine, -sine
+    return powers

@@ -17,17 +17,14 @@ import itertools
 from collections.abc import Mapping
 from functools import cache
 from types import MappingProxyType
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.margins import INCIDENCES
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.margins import INCIDENCES, INCIDENT
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray, batch_shape, dot, position_array
-
-# Tolerance of an incidence: a share of the normalising length, or an angle in radians.
-TOLERANCE = 1e-9
 
 GENERIC = (4, 3, 2, 1)
 
@@ -76,6 +73,12 @@ def stratum(position: ArrayLike, rotation: ArrayLike, length: float | None = Non
     return np.array(STRATA)[np.argmax(holds, axis=-1)]
 
 
+def stratum_of(configuration: Configuration) -> Stratum:
+    """Return the stratum of one pose, with a tolerance relative to the design's reach."""
+    c = configuration
+    return tuple(stratum(c.position, c.rotation, c.design.reach).tolist())
+
+
 def _ranks_of_pose(
     p: FloatArray, r: FloatArray, length: float | None
 ) -> dict[tuple[int, int], IntArray]:
@@ -83,18 +86,18 @@ def _ranks_of_pose(
     u, n = r[..., 0], r[..., 2]
     across = np.hypot(p[..., 1], p[..., 2])
     distance = np.hypot(p[..., 0], across)
-    near = TOLERANCE * (distance if length is None else length)
+    near = INCIDENT * (distance if length is None else length)
 
     point_on_point = distance <= near
     a1_on_line = _cross_norm(u, p) <= near
     a1_on_plane = np.abs(dot(n, p)) <= near
     b4_on_line = across <= near
     b4_on_plane = np.abs(p[..., 2]) <= near
-    lines_parallel = np.hypot(u[..., 1], u[..., 2]) <= TOLERANCE
+    lines_parallel = np.hypot(u[..., 1], u[..., 2]) <= INCIDENT
     lines_meet = np.abs(u[..., 1] * p[..., 2] - u[..., 2] * p[..., 1]) <= near
-    base_line_along_plane = np.abs(n[..., 0]) <= TOLERANCE
-    line_along_base_plane = np.abs(u[..., 2]) <= TOLERANCE
-    planes_parallel = np.hypot(n[..., 0], n[..., 1]) <= TOLERANCE
+    base_line_along_plane = np.abs(n[..., 0]) <= INCIDENT
+    line_along_base_plane = np.abs(u[..., 2]) <= INCIDENT
+    planes_parallel = np.hypot(n[..., 0], n[..., 1]) <= INCIDENT
 
     def count(least: int, one_more: object) -> IntArray:
         return least + np.asarray(one_more, dtype=np.int64)
@@ -119,8 +122,8 @@ def _cross_norm(u: FloatArray, p: FloatArray) -> FloatArray:
     return np.hypot(np.hypot(b * z - c * y, c * x - a * z), a * y - b * x)
 
 
-Stratum: TypeAlias = tuple[int, ...]
-Condition: TypeAlias = tuple[int, int, int]
+Stratum = tuple[int, ...]
+Condition = tuple[int, int, int]
 
 OF_INCIDENCES: tuple[Stratum, ...] = ((3, 4, 2, 1), (4, 2, 3, 1), (4, 3, 1, 2))
 """The strata of codimension one, in which δ1, δ2 or δ3 alone vanishes."""
@@ -174,7 +177,7 @@ def describe_stratum(stratum: Stratum) -> str:
 
 @cache
 def incidences(stratum: Stratum) -> tuple[int, ...]:
-    """Return the indices 1, 2 and 3 of those of δ1, δ2 and δ3 that vanish in a stratum."""
+    """Return the numbers 1, 2 and 3 of those of δ1, δ2 and δ3 that vanish in a stratum."""
     return tuple(
         index for index, closure in enumerate(OF_INCIDENCES, 1) if is_below(stratum, closure)
     )

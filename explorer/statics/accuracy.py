@@ -5,7 +5,7 @@ the errors of the dimensions g while the actuators hold their values. The sums �
 e_i within ±b_i fill a zonotope, whose farthest vertex is the exact worst error.
 
 Errors are independent, and each is uniform within ± its bound, as those of the machines that
-`explorer.export.imperfect` draws. Root-mean-square errors are those of this model.
+`explorer.prototype.imperfect` draws. Root-mean-square errors are those of this model.
 """
 
 from __future__ import annotations
@@ -16,11 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import DIMENSIONS
-from explorer.numerics.arrays import FloatArray, for_kernel, lengths_of
+from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, lengths_of
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, along, cross3, dot3, vector
 from explorer.statics.forces import A3X, A3Y, B1X, B1Y, B2, B3, twists_of_actuators
@@ -159,21 +158,15 @@ def pose_error_by_geometry(
 
 
 def worst_errors(configuration: Configuration, errors: ArrayLike) -> ToolError:
-    """Return the largest errors of the tool for actuator errors within ±errors.
+    """Return the largest errors of the tool for actuator errors within ±errors, shape (..., 6).
 
     They are exact for the linear model: the largest over the 64 corners of the cube of errors.
-    With six sources this is faster than `largest_error`.
-
-    Args:
-        configuration: Design and poses, with the tool point.
-        errors: Bounds of the errors, shape (..., 6), in design units, not negative.
+    With six sources this is faster than `largest_error`. The errors are in design units.
 
     Raises:
         InputError: An error is negative or not finite, or batch axes do not broadcast.
     """
-    e = _check_bounds(errors)
-    if e.shape[-1:] != (6,):
-        raise InputError(f"give the errors of six actuators; got the shape {e.shape}")
+    e = finite_array("the errors of the six actuators", errors, (6,), signed=False)
     c = configuration.spread(e)
     out = np.empty((len(c.positions), 2))
     worst_rows(len(out), twists_of_actuators(c).reshape(-1, 6, 6), c.rows_or_one(e), out)
@@ -330,22 +323,22 @@ def farthest_rows(vectors: FloatArray, signs: FloatArray) -> None:
                 signs[n, k] = 1.0 if side > 0.0 else -1.0
 
 
-def source_errors(design: Design) -> FloatArray:
-    """Return the largest errors of the sources of a design, shape (29,).
+def stated_tolerances(design: Design) -> FloatArray:
+    """Return the errors of a design's actuators and its tolerances, shape (29,), as in `UNITS`."""
+    return np.array([*design.actuators.error_mm, *design.tolerances.stated])
 
-    They have the order of `SOURCES`: the errors of the actuators, then the tolerances of the
-    dimensions. Lengths are in design units, tilts of the guide in radians.
+
+def source_errors(design: Design) -> FloatArray:
+    """Return the largest errors of the sources of a design, shape (29,), in the order of `SOURCES`.
+
+    Lengths are in design units, tilts of the guide in radians.
     """
-    return np.concatenate([actuator_errors(design), design.tolerances.values(design.unit_mm)])
+    stated = stated_tolerances(design)
+    return np.where(IS_TILT, np.radians(stated), stated / design.unit_mm)
 
 
 def drawing_values(design: Design, errors: FloatArray) -> FloatArray:
-    """Return errors of the sources, shape (29,), in the units of `UNITS`.
-
-    Args:
-        design: The manipulator.
-        errors: Errors in design units and radians, shape (29,).
-    """
+    """Return errors in design units and radians, shape (29,), in the units of `UNITS`."""
     return np.where(IS_TILT, np.degrees(errors), errors * design.unit_mm)
 
 
@@ -361,20 +354,16 @@ def error_by_source(configuration: Configuration) -> FloatArray:
 
 
 def largest_error(by_source: FloatArray, bounds: ArrayLike) -> LargestError:
-    """Return the largest errors for errors of the sources within ±bounds.
+    """Return the largest errors for errors of the sources within ±bounds, shape (..., n).
 
-    They are exact for the linear model: the largest over all combinations of signs. Some of the
-    sources alone are a slice of both arguments.
-
-    Args:
-        by_source: Errors of the tool per error of each source, shape (..., 6, n).
-        bounds: Bounds of the sources' errors, shape (..., n), not negative.
+    They are exact for the linear model: the largest over all combinations of signs. `by_source` has
+    the errors of the tool per error of each source, shape (..., 6, n). Some of the sources alone
+    are a slice of both arguments.
 
     Raises:
         InputError: A bound is negative or not finite.
     """
-    limits = _check_bounds(bounds)
-    halves = _halves(by_source, limits)
+    halves = _halves(by_source, bounds)
     signs = np.empty((*halves.shape[:-2], halves.shape[-1]))
     count = math.prod(signs.shape[:-1])
     farthest_rows(
@@ -390,50 +379,31 @@ def largest_error(by_source: FloatArray, bounds: ArrayLike) -> LargestError:
 def errors_alone(by_source: FloatArray, bounds: ArrayLike) -> ToolError:
     """Return the largest errors of the tool by each source alone, each of shape (..., n).
 
-    Args:
-        by_source: Errors of the tool per error of each source, shape (..., 6, n).
-        bounds: Bounds of the sources' errors, shape (..., n), not negative.
-
-    Raises:
-        InputError: A bound is negative or not finite.
+    The arguments and errors are those of `largest_error`.
     """
-    limits = _check_bounds(bounds)
-    halves = _halves(by_source, limits)
+    halves = _halves(by_source, bounds)
     sizes = np.sqrt(np.einsum("...ij,...ij->...j", halves, halves))
     # A source without an error moves nothing, also in a singular pose.
-    sizes = np.where(limits[..., None, :] > 0.0, sizes, 0.0)
+    sizes = np.where(np.asarray(bounds)[..., None, :] > 0.0, sizes, 0.0)
     return ToolError(sizes[..., 0, :], sizes[..., 1, :])
 
 
 def rms_of_sources(by_source: FloatArray, bounds: ArrayLike) -> ToolError:
     """Return the root-mean-square errors of the tool for errors that are uniform within ±bounds.
 
-    The errors of the sources are independent.
-
-    Args:
-        by_source: Errors of the tool per error of each source, shape (..., 6, n).
-        bounds: Bounds of the sources' errors, shape (..., n), not negative.
-
-    Raises:
-        InputError: A bound is negative or not finite.
+    The errors of the sources are independent. The arguments and errors are those of
+    `largest_error`.
     """
-    halves = _halves(by_source, UNIFORM * _check_bounds(bounds))
-    size = np.sqrt(np.einsum("...ij,...ij->...", halves, halves))
+    halves = _halves(by_source, bounds)
+    size = UNIFORM * np.sqrt(np.einsum("...ij,...ij->...", halves, halves))
     size = np.where(np.isfinite(size), size, np.inf)
     return ToolError(size[..., 0], size[..., 1])
 
 
-def _halves(by_source: FloatArray, bounds: FloatArray) -> FloatArray:
+def _halves(by_source: FloatArray, bounds: ArrayLike) -> FloatArray:
     """Return displacements and turns by sources at their bounds, shape (..., 2, 3, n)."""
+    limits = finite_array("the bounds of errors", bounds, (), signed=False)
     # Zero times infinity is no number, where a source has no error in a singular pose.
     with np.errstate(invalid="ignore"):
-        moved = for_kernel(by_source * bounds[..., None, :])
+        moved = for_kernel(by_source * limits[..., None, :])
     return moved.reshape(*moved.shape[:-2], 2, 3, moved.shape[-1])
-
-
-def _check_bounds(bounds: ArrayLike) -> FloatArray:
-    limits = np.asarray(bounds, dtype=np.float64)
-    if not (np.isfinite(limits) & (limits >= 0.0)).all():
-        text = np.array2string(limits, threshold=12).replace("\n", "")
-        raise InputError(f"the bounds of errors must be finite numbers, none negative; got {text}")
-    return limits

@@ -13,12 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import LENGTH_ROWS, Design
-from explorer.numerics.arrays import FloatArray, finite_array, lengths_of
+from explorer.mechanism.design import GUIDE_ROWS, LENGTH_ROWS, STRUT_ROWS, Design
+from explorer.numerics.arrays import FloatArray, finite_array, lengths_of, positive_array
 from explorer.numerics.compiled import helper, kernel
-from explorer.statics.forces import B2, B3, STRUT_ROWS, twists_of_actuators
+from explorer.statics.forces import B2, B3, load_array, twists_of_actuators
 
 # Number of halvings, of the logarithm where it can be, that find the worst force to rounding.
 HALVINGS = 70
@@ -41,12 +40,10 @@ class PrincipalCompliances(NamedTuple):
 
 
 class ComplianceShares(NamedTuple):
-    """Parts of the work that a load does on what gives way, each from 0 to 1.
+    """Parts of the work that a load does on what gives way, each from 0 to 1, shape (...).
 
-    Attributes:
-        guide: Share of the actuators d1 and d3, which hold the carriages, shape (...).
-        struts: Share of the bending of struts 2 and 3, shape (...).
-        actuators: Share of the actuators l1, d2, d4 and l4, shape (...).
+    They are that of the actuators d1 and d3, which hold the carriages (guide), of the bending of
+    struts 2 and 3, and of the actuators l1, d2, d4 and l4.
     """
 
     guide: FloatArray
@@ -112,14 +109,8 @@ def compliance_of(
     """Return the compliance C at the tool, shape (..., 6, 6): (displacement; turn) = C (F; M).
 
     Axes are those of the base. The blocks are in units/N, 1/N and rad/(N × unit). All entries are
-    infinite in a singular pose.
-
-    Args:
-        configuration: Design and poses, with the tool point.
-        stiffness: Stiffness of the actuators, shape (..., 6), in N/unit, positive; infinite for
-            rigid ones.
-        bending_stiffness: EI of struts 2 and 3, shape (..., 2), in N × unit², positive; None for
-            rigid struts.
+    infinite in a singular pose. The stiffness of the actuators, shape (..., 6), is in N/unit, and
+    EI of struts 2 and 3, shape (..., 2), in N × unit²; they are infinite, or None, where rigid.
 
     Raises:
         InputError: A stiffness is not positive, or batch axes do not broadcast.
@@ -150,6 +141,17 @@ def stiffness_of(design: Design) -> tuple[FloatArray, FloatArray]:
     return stiffness, np.full(2, design.struts.bending_stiffness / design.unit_mm**2)
 
 
+def softness_with_struts(design: Design, struts: FloatArray) -> FloatArray:
+    """Return the softness of a design's actuators, in units/N, shape (..., 6).
+
+    That of the guide's contains the bending of struts of lengths d2 and d4, shape (..., 2).
+    """
+    stiffness, bending = stiffness_of(design)
+    softness = np.zeros((*struts.shape[:-1], 6)) + 1.0 / stiffness
+    softness[..., GUIDE_ROWS] += struts**3 / (3.0 * bending)
+    return softness
+
+
 def is_elastic(design: Design) -> bool:
     """Return whether a design states the stiffness of its actuators or the tubes of its struts."""
     return design.actuators.stiffness_n_mm is not None or design.struts.outer_mm is not None
@@ -167,7 +169,7 @@ def deflection(compliance: FloatArray, load: ArrayLike) -> FloatArray:
     Raises:
         InputError: The load is not finite.
     """
-    w = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
+    w = load_array(load)
     regular = np.isfinite(compliance[..., 0, 0])
     finite = np.where(regular[..., None, None], compliance, 0.0)
     moved = np.einsum("...ij,...j->...i", finite, w)
@@ -179,28 +181,17 @@ def largest_deflection(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest displacement of the tool under a load and a force of any direction.
 
-    The force adds to the load at the tool. Its directions move the tool on an ellipsoid about the
-    displacement under the load; of this the farthest point from zero is the root of one equation,
-    as in a trust region. Both results are infinite in a singular pose.
-
-    Args:
-        compliance: C at the tool, shape (..., 6, 6).
-        load: (F; M) at the tool, shape (..., 6), in N and N × unit.
-        force: Size of the force of any direction, shape (...), in N, not negative.
-
-    Returns:
-        The displacement, shape (...), in design units, and the force that causes it, base axes,
-        shape (..., 3), in N.
+    The force, of a size in N of shape (...), adds to the load at the tool. Its directions move the
+    tool on an ellipsoid about the displacement under the load; of this the farthest point from zero
+    is the root of one equation, as in a trust region. The results are that displacement, shape
+    (...), and the force that causes it, base axes, shape (..., 3); both are infinite in a singular
+    pose.
 
     Raises:
         InputError: The load or the force is not finite, or the force is negative.
     """
     moved = deflection(compliance, load)[..., :3]
-    most = np.asarray(force, dtype=np.float64)
-    if not (np.isfinite(most) & (most >= 0.0)).all():
-        raise InputError(
-            f"the force of any direction must be finite and not negative; got {force!r}"
-        )
+    most = finite_array("the force of any direction", force, (), signed=False)
     regular = np.isfinite(compliance[..., 0, 0]) & np.isfinite(moved).all(axis=-1)
     block = np.where(regular[..., None, None], compliance[..., :3, :3], 0.0)
     soft, axes = np.linalg.eigh(block)
@@ -245,12 +236,9 @@ def _over(pull: FloatArray, divisor: FloatArray) -> FloatArray:
 
 
 def principal_compliances(compliance: FloatArray) -> PrincipalCompliances:
-    """Return the six principal directions of a compliance, three of forces and three of moments.
+    """Return the six principal directions of a compliance C, three of forces and three of moments.
 
     In a singular pose the values are infinite and the directions NaN.
-
-    Args:
-        compliance: C at the tool, shape (..., 6, 6).
     """
     displacement, forces = _principal(compliance[..., :3, :3])
     turn, moments = _principal(compliance[..., 3:, 3:])
@@ -274,19 +262,14 @@ def compliance_shares(
 ) -> ComplianceShares:
     """Return which parts of the deflection's work guide, struts and actuators take.
 
-    The shares add up to 1; they are NaN where nothing gives way, and in singular poses.
-
-    Args:
-        configuration: Design and poses, with the tool point.
-        load: (F; M) at the tool, shape (..., 6), in N and N × unit.
-        stiffness: Stiffness of the actuators, shape (..., 6), in N/unit.
-        bending_stiffness: EI of struts 2 and 3, shape (..., 2), in N × unit²; None for rigid ones.
+    The shares add up to 1; they are NaN where nothing gives way, and in singular poses. Stiffnesses
+    are those of `compliance_of`, and the load acts at the tool.
 
     Raises:
         InputError: A stiffness is not positive, the load is not finite, or batch axes do not
             broadcast.
     """
-    w = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
+    w = load_array(load)
     soft, bending = _softness(stiffness, bending_stiffness)
     poses = configuration.spread(w, soft, bending)
     twists = twists_of_actuators(poses).reshape(-1, 6, 6)
@@ -294,8 +277,8 @@ def compliance_shares(
     forces = np.einsum("nji,nj->ni", np.where(regular[:, None, None], twists, 0.0), poses.rows(w))
     lengths = poses.joints[..., STRUT_ROWS].reshape(-1, 2)
     work = forces**2 * poses.rows(soft)
-    bent = (forces[:, [1, 3]] ** 2 * poses.rows(bending) * lengths**3).sum(axis=1)
-    guide, actuators = work[:, [1, 3]].sum(axis=1), work[:, LENGTH_ROWS].sum(axis=1)
+    bent = (forces[:, GUIDE_ROWS] ** 2 * poses.rows(bending) * lengths**3).sum(axis=1)
+    guide, actuators = work[:, GUIDE_ROWS].sum(axis=1), work[:, LENGTH_ROWS].sum(axis=1)
     total: FloatArray = guide + actuators + bent
     parts = [
         np.divide(part, total, out=np.full(total.shape, np.nan), where=total > 0.0)
@@ -308,15 +291,7 @@ def _softness(
     stiffness: ArrayLike, bending_stiffness: ArrayLike | None
 ) -> tuple[FloatArray, FloatArray]:
     """Return 1 / k, shape (..., 6), and 1 / 3EI, shape (..., 2)."""
-    k = _positive("the stiffness of the actuators", stiffness, 6)
+    k = positive_array("the stiffness of the actuators", stiffness, 6)
     if bending_stiffness is None:
         return 1.0 / k, np.zeros(2)
-    return 1.0 / k, 1.0 / (3.0 * _positive("the bending stiffness", bending_stiffness, 2))
-
-
-def _positive(name: str, values: ArrayLike, count: int) -> FloatArray:
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape[-1:] != (count,) or not (array > 0.0).all():
-        text = np.array2string(array, threshold=12).replace("\n", "")
-        raise InputError(f"{name} must be {count} positive numbers, infinite if rigid; got {text}")
-    return array
+    return 1.0 / k, 1.0 / (3.0 * positive_array("the bending stiffness", bending_stiffness, 2))

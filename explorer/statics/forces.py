@@ -21,26 +21,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError
 from explorer.mechanism.configuration import Configuration, computed_once
-from explorer.mechanism.design import Design
-from explorer.mechanism.margins import margins_at, margins_of
-from explorer.numerics.arrays import FloatArray, IntArray, finite_array
+from explorer.mechanism.design import GUIDE_ROWS, STRUT_ROWS, Design
+from explorer.mechanism.margins import SINGULAR, margins_at, margins_of
+from explorer.numerics.arrays import FloatArray, IntArray, finite_array, positive_array
+from explorer.numerics.checks import FARTHEST
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, along, column, cross3, dot3, times
 
-# Share of |p| up to which a margin is zero but for rounding.
-SINGULAR = 1e-13
 # |p| over the reach up to which b4 is at a1, where all margins vanish.
 AT_A1 = 1e-26
 
 # Columns of the row of design variables, `Design.variables`.
 A3X, A3Y, B1X, B1Y, B2, B3 = range(6)
-
-GUIDE_ROWS = (1, 3)
-"""Indices of d1 and d3, whose forces bend the struts."""
-STRUT_ROWS = (2, 4)
-"""Indices of d2 and d4, the lengths of the struts of legs 2 and 3."""
 
 
 @helper
@@ -167,19 +160,25 @@ def twists_of_actuators(configuration: Configuration) -> FloatArray:
     return out.reshape(*c.batch, 6, 6)
 
 
+def load_array(load: ArrayLike) -> FloatArray:
+    """Return loads (F; M) along base axes, shape (..., 6), in N and N × unit.
+
+    Raises:
+        InputError: A load is not six numbers, or one of them exceeds `FARTHEST`.
+    """
+    return finite_array("load (FX FY FZ MX MY MZ)", load, (6,), FARTHEST)
+
+
 def forces_of(configuration: Configuration, load: ArrayLike) -> FloatArray:
     """Return the actuator forces f = −J⁻ᵀ (F; M) that hold a load, shape (..., 6), in newtons.
 
-    Their order is that of `JOINTS`. All six are infinite in a singular pose.
-
-    Args:
-        configuration: Design and poses, with the tool point at which the load acts.
-        load: (F; M) on the platform, base axes, shape (..., 6), in N and N × unit.
+    Their order is that of `JOINTS`. All six are infinite in a singular pose. The load acts at the
+    tool point, see `load_array`.
 
     Raises:
-        InputError: The load is not finite, or batch axes do not broadcast.
+        InputError: The load is unusable, or batch axes do not broadcast.
     """
-    w = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
+    w = load_array(load)
     c = configuration.spread(w)
     out = np.empty((len(c.positions), 6))
     force_rows(len(out), c.variables, c.tools, c.positions, c.rotations, c.rows_or_one(w), out)
@@ -223,20 +222,12 @@ def strut_bending(
     They are |f(d1)| d2 and |f(d3)| d4; the guide takes the same moments. Both are infinite in a
     singular pose. The arguments are those of `Configuration` and the load of `forces_of`.
     """
-    configuration = Configuration(design, position, rotation, tool)
-    return bending_of(forces_of(configuration, load), configuration.joints)
-
-
-def bending_of(forces: FloatArray, joints: FloatArray) -> FloatArray:
-    """Return the bending moments of actuator forces (..., 6) at joints (..., 6), shape (..., 2).
-
-    An infinite force gives an infinite moment, even if its strut has no length.
-    """
-    along_guide = np.abs(forces[..., GUIDE_ROWS])
-    lengths = np.broadcast_to(joints[..., STRUT_ROWS], along_guide.shape)
-    out = np.full(along_guide.shape, np.inf)
-    np.multiply(along_guide, lengths, out=out, where=np.isfinite(along_guide))
-    return out
+    c = Configuration(design, position, rotation, tool)
+    along = np.abs(forces_of(c, load)[..., GUIDE_ROWS])
+    # An infinite force gives an infinite moment, even if its strut has no length.
+    with np.errstate(invalid="ignore"):
+        moments = along * c.joints[..., STRUT_ROWS]
+    return np.where(np.isinf(along), np.inf, moments)
 
 
 def largest_force(
@@ -259,23 +250,14 @@ def largest_force(
 def worst_direction(configuration: Configuration, most: ArrayLike) -> WorstDirection:
     """Return the direction in which a force at the tool loads an actuator most.
 
-    The opposite direction is as bad, with a pull for a push. The share is infinite in a singular
-    pose, and zero if no actuator has a limit.
-
-    Args:
-        configuration: Design and poses, with the tool point.
-        most: Largest force of each actuator to either side, shape (..., 6), in N, positive; may
-            be infinite.
+    The limits of the actuators to either side, shape (..., 6), in N, may be infinite. The opposite
+    direction is as bad, with a pull for a push. The share is infinite in a singular pose, and zero
+    if no actuator has a limit.
 
     Raises:
         InputError: A limit is not positive, or batch axes do not broadcast.
     """
-    limits = np.asarray(most, dtype=np.float64)
-    if limits.shape[-1:] != (6,) or not (limits > 0.0).all():
-        raise InputError(
-            "the largest forces must be six positive numbers (l1, d1, d2, d3, d4, l4), infinite "
-            f"for no limit; got {np.array2string(limits, threshold=12)}".replace("\n", "")
-        )
+    limits = positive_array("the largest forces", most, 6)
     twists = twists_of_actuators(configuration)
     # Row i: the force of actuator i is the product with the load's force.
     rows = -np.swapaxes(twists[..., :3, :], -1, -2)

@@ -15,10 +15,10 @@ import math
 import numpy as np
 
 from explorer.mechanism.design import Design
+from explorer.mechanism.margins import planes_of_singularity
 from explorer.numerics.arrays import FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import norm3
-from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.forces import B2, B3, holding_forces, is_singular
 from explorer.statics.reactions import part_limits
 from explorer.statics.weights import payload_wrench
@@ -42,17 +42,12 @@ TOOL, WRENCH, FORCE, LIMITS, INWARD = 6, 9, 15, 16, 36
 def load_case(
     design: Design, rotation: FloatArray, load: FloatArray, limits: FloatArray | None = None
 ) -> FloatArray:
-    """Return what the kernels need of a design, an orientation and a load, shape (45,).
+    """Return what the kernels need of a design, an orientation and a load at the tool, shape (45,).
 
-    It is the design variables, the tool from b4 along the axes of the base, the load
-    about b4, the force of any direction, the limits of the parts, and the unit normals of the
-    singular planes towards the home mode.
-
-    Args:
-        design: The manipulator, with its payload and limits.
-        rotation: Platform to base, shape (3, 3).
-        load: (F; M) at the tool besides the payload, base axes, shape (6,), in N and N × unit.
-        limits: Limits as of `part_limits`, shape (2, 10); those of the design if None.
+    It is the design variables, the tool from b4 along the axes of the base, the load and the
+    payload's weight about b4, the force of any direction, the limits of the parts as of
+    `part_limits` (those of the design if None), and the unit normals of the singular planes towards
+    the home mode.
     """
     tool = rotation @ np.array(design.tool.position)
     wrench = payload_wrench(design, rotation) + load
@@ -333,13 +328,8 @@ def largest_shares(
 ) -> tuple[FloatArray, IntArray]:
     """Return the largest shares of a limit at positions (n, 3), and the parts, shape (n,) each.
 
-    Shares are infinite if singular. The parts are indices of those of
-    `explorer.statics.reactions.part_limits`.
-
-    Args:
-        case: What `load_case` returns; with a limit of 1 a share is the value itself.
-        rotation: Platform to base, shape (3, 3).
-        positions: b4 in the base frame, in design units.
+    Shares are infinite if singular; if the limits of the `load_case` are 1, a share is the value
+    itself. The parts are indices of those of `explorer.statics.reactions.part_limits`.
     """
     out, parts = np.empty(len(positions)), np.empty(len(positions), dtype=np.int64)
     share_rows(len(positions), case, for_kernel(rotation), for_kernel(positions), out, parts)
@@ -367,15 +357,10 @@ def settle_on_limit(
     beside: FloatArray,
     step: FloatArray,
 ) -> FloatArray:
-    """Return points on a limit near points (n, 3), shape (n, 3).
+    """Return points on a limit, as of `limit_values`, near points (n, 3), shape (n, 3).
 
-    Args:
-        case: What `load_case` returns.
-        rotation: Platform to base, shape (3, 3).
-        limit: The limit, as of `limit_values`.
-        points: Points near the limit.
-        beside: The node at the end of its edge that keeps the limit, for each, shape (n, 3).
-        step: Size of a cell on each axis, shape (3,); points move by no more than one.
+    Each point has the node at the end of its edge that keeps the limit beside it, shape (n, 3), and
+    moves by no more than a cell, whose size on each axis is the step, shape (3,).
     """
     out, limits = np.empty(points.shape), np.array([limit], dtype=np.int64)
     rows = limits, for_kernel(points), for_kernel(beside), for_kernel(step), out

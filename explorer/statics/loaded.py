@@ -6,41 +6,22 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import GUIDE_ROWS, Design
 from explorer.mechanism.machine import Payload, Six
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.statics.accuracy import (
-    UNIFORM,
-    LargestError,
-    ToolError,
-    error_by_source,
-    errors_alone,
-    largest_error,
-    rms_of_sources,
-    source_errors,
-)
-from explorer.statics.compliance import (
-    ComplianceShares,
-    PrincipalCompliances,
-    compliance_of,
-    compliance_shares,
-    deflection,
-    largest_deflection,
-    principal_compliances,
-    stiffness_of,
-)
-from explorer.statics.forces import GUIDE_ROWS, twists_of_actuators
+from explorer.numerics.arrays import FloatArray
+from explorer.statics import accuracy, compliance as elasticity
+from explorer.statics.forces import twists_of_actuators
 from explorer.statics.reactions import (
     Reactions,
     has_limits,
     largest_payload,
     limit_shares,
-    limited_parts,
-    reactions_beside,
+    reactions,
 )
 from explorer.statics.weights import NO_WEIGHTS, Carried, Weights, carry
 
@@ -106,24 +87,19 @@ class LoadedPose:
         return carry(self.configuration, self.weights)
 
     @cached_property
-    def held(self) -> Reactions:
-        """All that holds the load and the weights."""
-        return reactions_beside(self.configuration, self.load, self.carried)
+    def reactions(self) -> Reactions:
+        """The reactions to the load and the weights."""
+        return reactions(self.configuration, self.load, self.carried)
 
     @cached_property
     def shares(self) -> FloatArray:
         """Shares of the limits, shape (12,), in the order of `LIMITED`; 0 without a limit."""
-        return limit_shares(self.design, self.held)
-
-    @cached_property
-    def limited(self) -> BoolArray:
-        """Whether each part has a limit, shape (12,), in the order of `LIMITED`."""
-        return limited_parts(self.design)
+        return limit_shares(self.design, self.reactions)
 
     @cached_property
     def is_regular(self) -> bool:
         """Whether forces hold the load: whether the pose is not singular."""
-        return bool(np.isfinite(self.held.actuators).all())
+        return bool(np.isfinite(self.reactions.actuators).all())
 
     @property
     def worst(self) -> int:
@@ -141,32 +117,21 @@ class LoadedPose:
         return float(largest_payload(self.configuration, self.load, self.own))
 
     @cached_property
-    def newton(self) -> WorstForce:
+    def unit_force(self) -> WorstForce:
         """A force of 1 N alone at the tool, in the direction that uses the largest share.
 
         Neither load nor payload act besides; the largest force that all parts hold in every
         direction is 1 / share.
         """
-        return self._worst_force(1.0, NO_LOAD, carry(self.configuration, NO_WEIGHTS), spreads=False)
+        bare = msgspec.structs.replace(self.design, payload=Payload())
+        return LoadedPose(bare, self.pose, point=self.tool).worst_force(1.0)
 
     def worst_force(self, force: float) -> WorstForce:
-        """Return the direction of an added force at the tool that uses the largest share.
+        """Return the direction of an added force at the tool, in N, that uses the largest share.
 
         What a limit bounds is linear in the force, or the length of a vector that is, and changes
         with one component of the force only: that along the row of an actuator in J⁻ᵀ. So the
         largest share is that of one of these six directions or of their opposites.
-
-        Args:
-            force: Size of the force, in N.
-        """
-        return self._worst_force(force, self.load, self.carried, spreads=True)
-
-    def _worst_force(
-        self, force: float, load: Six, carried: Carried, *, spreads: bool
-    ) -> WorstForce:
-        """Return the worst direction of a force beside a load and weights.
-
-        The payload's force of any direction acts too if it `spreads`.
         """
         rows = twists_of_actuators(self.configuration)[:3].T
         if not np.isfinite(rows).all():
@@ -176,12 +141,9 @@ class LoadedPose:
         sizes = np.linalg.norm(rows, axis=1)
         units = rows[sizes > 0.0] / sizes[sizes > 0.0, None]
         directions = np.concatenate([units, -units])
-        loads = np.tile(load, (len(directions), 1))
+        loads = np.tile(self.load, (len(directions), 1))
         loads[:, :3] += force * directions
-        held = reactions_beside(self.configuration, loads, carried)
-        if not spreads:
-            held = held._replace(spread=np.zeros(12))
-        shares = limit_shares(self.design, held)
+        shares = limit_shares(self.design, reactions(self.configuration, loads, self.carried))
         row, part = (int(i) for i in np.unravel_index(shares.argmax(), shares.shape))
         share = float(shares[row, part])
         direction = directions[row] if share > 0.0 else np.full(3, np.nan)
@@ -222,8 +184,8 @@ class ToolPrecision:
     @cached_property
     def compliance(self) -> FloatArray:
         """The compliance at the tool, shape (6, 6)."""
-        stiffness = stiffness_of(self.loaded.design)
-        return compliance_of(self.loaded.configuration, *stiffness)
+        stiffness = elasticity.stiffness_of(self.loaded.design)
+        return elasticity.compliance_of(self.loaded.configuration, *stiffness)
 
     @cached_property
     def is_regular(self) -> bool:
@@ -238,36 +200,32 @@ class ToolPrecision:
     @cached_property
     def bounds(self) -> FloatArray:
         """Largest errors of the sources, shape (29,), in design units and radians."""
-        return source_errors(self.loaded.design)
+        return accuracy.source_errors(self.loaded.design)
 
     @cached_property
     def by_source(self) -> FloatArray:
         """The tool's error per error of each source, shape (6, 29)."""
-        return error_by_source(self.loaded.configuration)
+        return accuracy.error_by_source(self.loaded.configuration)
 
-    def worst(self, sources: slice = BY_ALL) -> LargestError:
+    def worst(self, sources: slice = BY_ALL) -> accuracy.LargestError:
         """Return the largest errors by some of the sources."""
-        return largest_error(self.by_source[:, sources], self.bounds[sources])
+        return accuracy.largest_error(self.by_source[:, sources], self.bounds[sources])
 
-    def rms(self, sources: slice = BY_ALL) -> ToolError:
+    def rms(self, sources: slice = BY_ALL) -> accuracy.ToolError:
         """Return the root-mean-square errors by some of the sources, uniform within bounds."""
-        return rms_of_sources(self.by_source[:, sources], self.bounds[sources])
+        return accuracy.rms_of_sources(self.by_source[:, sources], self.bounds[sources])
 
     @cached_property
-    def alone(self) -> ToolError:
+    def alone(self) -> accuracy.ToolError:
         """The errors that each source alone causes, each of shape (29,)."""
-        return errors_alone(self.by_source, self.bounds)
+        return accuracy.errors_alone(self.by_source, self.bounds)
 
     @cached_property
     def ellipsoid(self) -> ErrorEllipsoid:
         """The ellipsoid of the tool's RMS displacement by all sources, in a regular pose."""
-        values, vectors = np.linalg.eigh(self._covariance)
+        by_source = self.by_source[:3] * (accuracy.UNIFORM * self.bounds)
+        values, vectors = np.linalg.eigh(by_source @ by_source.T)
         return ErrorEllipsoid(np.sqrt(np.maximum(values[::-1], 0.0)), vectors[:, ::-1].T)
-
-    @property
-    def _covariance(self) -> FloatArray:
-        moved = self.by_source[:3] * (UNIFORM * self.bounds)
-        return moved @ moved.T
 
     @cached_property
     def wrench(self) -> FloatArray:
@@ -277,28 +235,27 @@ class ToolPrecision:
     @cached_property
     def deflection(self) -> FloatArray:
         """Displacement and turn of the tool under the wrench, shape (6,)."""
-        return deflection(self.compliance, self.wrench)
+        return elasticity.deflection(self.compliance, self.wrench)
 
     @cached_property
-    def principal(self) -> PrincipalCompliances:
+    def principal(self) -> elasticity.PrincipalCompliances:
         """The six principal directions of the compliance."""
-        return principal_compliances(self.compliance)
+        return elasticity.principal_compliances(self.compliance)
 
     @cached_property
-    def shares(self) -> ComplianceShares:
+    def shares(self) -> elasticity.ComplianceShares:
         """Shares of guide, struts and actuators in the deflection's work."""
-        stiffness = stiffness_of(self.loaded.design)
-        return compliance_shares(self.loaded.configuration, self.wrench, *stiffness)
+        stiffness = elasticity.stiffness_of(self.loaded.design)
+        return elasticity.compliance_shares(self.loaded.configuration, self.wrench, *stiffness)
 
     @cached_property
     def largest_displacement(self) -> float:
         """Largest displacement of the tool with the payload's force besides, in design units."""
         force = self.loaded.design.payload.force_n
-        return float(largest_deflection(self.compliance, self.wrench, force)[0])
+        return float(elasticity.largest_deflection(self.compliance, self.wrench, force)[0])
 
     @cached_property
     def carriages(self) -> FloatArray:
         """Displacements of the carriages along the guide, shape (2,), in a regular pose."""
-        guide = list(GUIDE_ROWS)
-        forces = -twists_of_actuators(self.loaded.configuration)[:, guide].T @ self.wrench
-        return -forces / stiffness_of(self.loaded.design)[0][guide]
+        by_guide = twists_of_actuators(self.loaded.configuration)[:, GUIDE_ROWS]
+        return by_guide.T @ self.wrench / elasticity.stiffness_of(self.loaded.design)[0][GUIDE_ROWS]

@@ -8,15 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import JOINTS, LENGTH_ROWS, Design
+from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.machine import Payload
 from explorer.numerics.arrays import BoolArray, FloatArray, dot
-from explorer.statics.forces import (
-    GUIDE_ROWS,
-    STRUT_ROWS,
-    forces_of,
-    twists_of_actuators,
-)
+from explorer.statics.forces import forces_of, twists_of_actuators
 from explorer.statics.weights import NO_WEIGHTS, Carried, Weights, carry
 
 LIMITED = (
@@ -63,7 +58,7 @@ class Reactions(NamedTuple):
 
 
 def reactions(
-    configuration: Configuration, load: ArrayLike, weights: Weights | None = None
+    configuration: Configuration, load: ArrayLike, weights: Weights | Carried | None = None
 ) -> Reactions:
     """Return all that holds a load and weights.
 
@@ -76,16 +71,13 @@ def reactions(
     Args:
         configuration: Design and poses, with the tool point at which the load acts.
         load: (F; M) on the platform, base axes, shape (..., 6), in N and N × unit.
-        weights: Masses of the moving bodies; None for none.
+        weights: Masses of the moving bodies, or what they do by `carry`; None for none.
 
     Raises:
         InputError: The load is not finite, or batch axes do not broadcast.
     """
-    return reactions_beside(configuration, load, carry(configuration, weights or NO_WEIGHTS))
-
-
-def reactions_beside(configuration: Configuration, load: ArrayLike, carried: Carried) -> Reactions:
-    """Return `reactions` to a load beside weights of which it is known what they do."""
+    known = isinstance(weights, Carried)
+    carried = weights if known else carry(configuration, weights or NO_WEIGHTS)
     forces = forces_of(configuration, carried.wrench + np.asarray(load, dtype=np.float64))
     signed = _signed(configuration, forces, carried)
     across = signed[..., 8:].reshape(*signed.shape[:-1], 2, 2)
@@ -99,13 +91,9 @@ def reactions_beside(configuration: Configuration, load: ArrayLike, carried: Car
 
 
 def limit_shares(design: Design, held: Reactions) -> FloatArray:
-    """Return the shares of their limits that reactions use, shape (..., 12), as in `LIMITED`.
+    """Return the shares of a design's limits that reactions use, shape (..., 12), as in `LIMITED`.
 
     A share of a part without a limit is 0, unless the pose is singular.
-
-    Args:
-        design: The manipulator, with the limits of its actuators, struts and guide.
-        held: Reactions of poses of this design.
     """
     push, pull = design.actuators.limits
     values = np.concatenate(

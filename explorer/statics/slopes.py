@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.design import VARIABLES, Design
-from explorer.numerics.arrays import FloatArray, IntArray, dot
+from explorer.mechanism.design import GUIDE_ROWS, STRUT_ROWS, VARIABLES, Design
+from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.statics.accuracy import actuator_errors, largest_error
-from explorer.statics.compliance import largest_deflection, stiffness_of
-from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, twists_of_actuators
+from explorer.statics.compliance import largest_deflection, softness_with_struts, stiffness_of
+from explorer.statics.forces import twists_of_actuators
 from explorer.statics.weights import payload_wrench
 
 PARAMETERS = (*VARIABLES, "yaw", "x", "y", "z")
@@ -24,7 +24,6 @@ PARAMETERS = (*VARIABLES, "yaw", "x", "y", "z")
 
 # Divisor in place of a length of zero.
 LEAST_LENGTH = 1e-300
-RADIAL = np.array([0.0, 1.0, 1.0])
 VERTICAL = np.array([0.0, 0.0, 1.0])
 
 
@@ -45,90 +44,35 @@ class TwistSlopes(NamedTuple):
 
 
 def twist_slopes(design: Design, positions: FloatArray, rotation: FloatArray) -> TwistSlopes:
-    """Return J⁻¹ at the design's tool at regular positions, with its derivatives.
-
-    Args:
-        design: The manipulator.
-        positions: b4 in the base frame, shape (n, 3), in design units.
-        rotation: Platform to base, shape (3, 3).
-
-    Raises:
-        InputError: A position is not finite.
-    """
-    tool = np.array(design.tool.position)
-    twists = twists_of_actuators(Configuration(design, positions, rotation, tool))
-    # Joints' points on the platform and the tool, from b4 along the axes of the base.
-    u, v = rotation[:, 0], rotation[:, 1]
-    b1, b2, b3 = rotation[:, :2] @ np.array(design.b1), design.b2 * u, design.b3 * u
-    still, to_tool = np.zeros(3), rotation @ tool
-    offsets = np.array([b1, b2, b2, b3, b3, still])
-    arms = offsets - to_tool
-    arms_by = _arms_by(u, v, (b1, b2, b3)) - _turned(to_tool)
-    from_base = positions[:, None, :] + offsets
-    from_base[:, 5, :2] -= design.a3
-    from_base_by = _from_base_by(u, v, (b1, b2, b3))
-    directions, directions_by = _directions(from_base, from_base_by)
-    rows_by = np.concatenate(
-        [
-            directions_by,
-            np.cross(arms_by, directions[:, None]) + np.cross(arms, directions_by),
-        ],
-        axis=-1,
-    )
-    by = -(twists[:, None] @ rows_by @ twists[:, None])
-    radial = from_base[:, (2, 4)] * RADIAL
-    lengths = np.sqrt(dot(radial, radial))
-    lengths_by = np.einsum("nki,nqki->nqk", directions[:, (2, 4)], from_base_by[None, :, (2, 4)])
-    return TwistSlopes(twists, by, lengths, lengths_by)
-
-
-def _turned(vector: FloatArray) -> FloatArray:
-    """Return the derivatives of a vector fixed to the platform by `PARAMETERS`, (10, 1, 3)."""
-    by = np.zeros((len(PARAMETERS), 1, 3))
-    by[PARAMETERS.index("yaw"), 0] = np.cross(VERTICAL, vector)
-    return by
-
-
-def _arms_by(
-    u: FloatArray, v: FloatArray, points: tuple[FloatArray, FloatArray, FloatArray]
-) -> FloatArray:
-    """Return the derivatives of the offsets of the six joints from b4, shape (10, 6, 3)."""
-    b1, b2, b3 = points
-    by = np.zeros((len(PARAMETERS), 6, 3))
-    by[PARAMETERS.index("b1x"), 0] = u
-    by[PARAMETERS.index("b1y"), 0] = v
-    by[PARAMETERS.index("b2"), 1:3] = u
-    by[PARAMETERS.index("b3"), 3:5] = u
-    for joint, point in enumerate((b1, b2, b2, b3, b3)):
-        by[PARAMETERS.index("yaw"), joint] = np.cross(VERTICAL, point)
-    return by
-
-
-def _from_base_by(
-    u: FloatArray, v: FloatArray, points: tuple[FloatArray, FloatArray, FloatArray]
-) -> FloatArray:
-    """Return the derivatives of the vectors to the joints' points, shape (10, 6, 3)."""
-    by = _arms_by(u, v, points)
-    by[PARAMETERS.index("a3x"), 5, 0] = -1.0
-    by[PARAMETERS.index("a3y"), 5, 1] = -1.0
+    """Return J⁻¹ at the design's tool at regular positions (n, 3), with its derivatives."""
+    c = Configuration(design, positions, rotation, design.tool.position)
+    twists, directions = twists_of_actuators(c), c.jacobian[..., :3]
+    # Joints' points on the platform, from b4 and from the tool, along the axes of the base.
+    offsets = design.platform_points[[0, 1, 1, 2, 2, 3]] @ rotation.T
+    arms = offsets - c.arm
+    arms_by = np.zeros((len(PARAMETERS), 6, 3))
+    for name, joints, axis in (
+        ("b1x", [0], 0),
+        ("b1y", [0], 1),
+        ("b2", [1, 2], 0),
+        ("b3", [3, 4], 0),
+    ):
+        arms_by[PARAMETERS.index(name), joints] = rotation[:, axis]
+    points_by, yaw = arms_by.copy(), PARAMETERS.index("yaw")
+    arms_by[yaw], points_by[yaw] = np.cross(VERTICAL, arms), np.cross(VERTICAL, offsets)
     for axis, name in enumerate("xyz"):
-        by[PARAMETERS.index(name), :, axis] = 1.0
-    return by
-
-
-def _directions(from_base: FloatArray, by: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the directions of the joints' rates, (n, 6, 3), and derivatives, (n, 10, 6, 3)."""
-    across = np.ones((6, 3))
-    across[[2, 4]] = RADIAL
-    vectors = from_base * across
-    lengths = np.maximum(np.sqrt(dot(vectors, vectors)), LEAST_LENGTH)[..., None]
-    directions = vectors / lengths
-    moved = (by * across)[None]
-    along = np.einsum("nki,nqki->nqk", directions, moved)[..., None]
-    directions_by = (moved - along * directions[:, None]) / lengths[:, None]
-    directions[:, [1, 3]] = (1.0, 0.0, 0.0)
-    directions_by[:, :, [1, 3]] = 0.0
-    return directions, directions_by
+        points_by[PARAMETERS.index(name), :, axis] = 1.0
+    points_by[PARAMETERS.index("a3x"), 5, 0] = points_by[PARAMETERS.index("a3y"), 5, 1] = -1.0
+    # Struts and their lengths are perpendicular to the guide.
+    points_by[:, STRUT_ROWS, 0] = 0.0
+    lengths_by = np.einsum("nki,qki->nqk", directions, points_by)
+    lengths = np.maximum(np.abs(c.joints), LEAST_LENGTH)[:, None, :, None]
+    directions_by = (points_by - lengths_by[..., None] * directions[:, None]) / lengths
+    directions_by[:, :, GUIDE_ROWS] = 0.0
+    moments_by = np.cross(arms_by, directions[:, None]) + np.cross(arms, directions_by)
+    rows_by = np.concatenate([directions_by, np.asarray(moments_by, dtype=np.float64)], axis=-1)
+    by = -(twists[:, None] @ rows_by @ twists[:, None])
+    return TwistSlopes(twists, by, c.joints[:, STRUT_ROWS], lengths_by[..., STRUT_ROWS])
 
 
 ACTUATOR_OF = np.array([*range(6), *GUIDE_ROWS, *STRUT_ROWS])
@@ -151,12 +95,8 @@ def share_slopes(
 ) -> tuple[FloatArray, FloatArray]:
     """Return shares of limits, shape (k,), and their derivatives by `PARAMETERS`, shape (k, 10).
 
-    Args:
-        design: The manipulator, with its tool and its payload.
-        rotation: Platform to base, shape (3, 3).
-        slopes: J⁻¹ at n positions, with its derivatives.
-        parts: Index of the position, and of the part, of each share, shape (k,) each.
-        limits: Limits of the parts, shape (2, 10), as in `explorer.statics.reactions.part_limits`.
+    The parts are the index of the position and that of the part for each share, shape (k,) each;
+    the limits (2, 10) are those of `explorer.statics.reactions.part_limits`.
     """
     row, part = parts
     joint = ACTUATOR_OF[part]
@@ -187,10 +127,7 @@ def error_slopes(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the worst errors of the tool, shape (n,), and derivatives by `PARAMETERS`, (n, 10).
 
-    Args:
-        design: The manipulator, with the errors of its actuators.
-        slopes: J⁻¹ at n positions, with its derivatives.
-        rows: Rows of twists, `DISPLACEMENT` or `TURN`.
+    The rows of twists are `DISPLACEMENT` or `TURN`.
     """
     half, errors = rows.start // 3, actuator_errors(design)
     found = largest_error(slopes.twists, errors)
@@ -206,22 +143,14 @@ def deflection_slopes(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest displacements of the tool under the load, (n,), and derivatives, (n, 10).
 
-    Args:
-        design: The manipulator, with its payload and its stiffness.
-        rotation: Platform to base, shape (3, 3).
-        slopes: J⁻¹ at n positions, with its derivatives.
+    The arguments are those of `share_slopes`.
     """
     weight, turned = _weight_and_turn(design, rotation)
     return _moved_by(design, slopes, weight, turned, design.payload.force_n)
 
 
 def compliance_slopes(design: Design, slopes: TwistSlopes) -> tuple[FloatArray, FloatArray]:
-    """Return the largest displacements of the tool per force, (n,), and derivatives, (n, 10).
-
-    Args:
-        design: The manipulator, with its stiffness.
-        slopes: J⁻¹ at n positions, with its derivatives.
-    """
+    """Return the largest displacements of the tool per force, (n,), and derivatives, (n, 10)."""
     return _moved_by(design, slopes, np.zeros(6), np.zeros(6), 1.0)
 
 
@@ -233,9 +162,7 @@ def _moved_by(
     The force has the worst direction, so that its change by a parameter does not count. The
     wrench changes by `turned` with the yaw.
     """
-    stiffness, bending = stiffness_of(design)
-    soft = np.tile(1.0 / stiffness, (len(slopes.twists), 1))
-    soft[:, GUIDE_ROWS] += slopes.struts**3 / (3.0 * bending)
+    soft, bending = softness_with_struts(design, slopes.struts), stiffness_of(design)[1]
     soft_by = np.zeros((*slopes.by.shape[:2], 6))
     soft_by[:, :, GUIDE_ROWS] = slopes.struts[:, None] ** 2 * slopes.struts_by / bending
     twists = slopes.twists

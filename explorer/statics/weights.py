@@ -28,14 +28,13 @@ X_AXIS = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True, kw_only=True)
 class Weights:
-    """Masses of the moving bodies, in kilograms, with distances in design units.
+    """Masses of the moving bodies, in kilograms, with distances in design units, by leg.
 
     Attributes:
         on_platform: Masses that move with the platform, such as the platform and its payload.
         carriages: Masses of the carriages of legs 2 and 3; those of legs 1 and 4 do not move.
-        cylinders: Masses of the cylinders, by leg.
+        cylinders, rods: Masses of the cylinders and of the rods.
         cylinder_centres: Distances of their centres from the base joints, along the legs.
-        rods: Masses of the rods, by leg.
         rod_centres: Distances of their centres from the platform joints, back along the legs.
 
     Raises:
@@ -90,24 +89,13 @@ def design_weights(design: Design) -> Weights:
 
 
 def payload_wrench(design: Design, rotation: FloatArray) -> FloatArray:
-    """Return the weight of the design's payload as a wrench (F; M) at its tool, shape (6,).
-
-    Args:
-        design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-    """
-    weight = design.payload.weight_n * np.array(design.gravity)
-    arm = rotation @ (np.array(design.payload.centre) - design.tool.position)
-    return np.concatenate([weight, np.cross(arm, weight)])
+    """Return the weight of the design's payload as a wrench (F; M) at its tool, shape (6,)."""
+    g, tool = STANDARD_GRAVITY * np.array(design.gravity), np.array(design.tool.position)
+    return np.concatenate(_of_bodies(rotation, rotation @ tool, design_weights(design), g))
 
 
 def carry(configuration: Configuration, weights: Weights) -> Carried:
-    """Return what weights do in poses, in the design's direction of gravity.
-
-    Args:
-        configuration: Design and poses, with the tool point at which the wrench acts.
-        weights: Masses of the moving bodies.
-    """
+    """Return what weights do in poses, in the design's direction of gravity."""
     c = configuration
     points, shift = c.points, c.arm
     g = STANDARD_GRAVITY * np.array(c.design.gravity)

@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Generator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any, ParamSpec, TypeVar
-from urllib.parse import urlsplit
 
 from explorer.errors import InputError, MissingExtraError
 from explorer.sweep.workers import Workers
@@ -22,10 +21,6 @@ from explorer.sweep.workers import Workers
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
-SCHEMES = ("tcp", "tls", "ws", "wss")
-
-# Shortest duration of a task that repays its 8 ms of scheduler, worker and client, in seconds.
-TASK_SECONDS = 0.4
 # Seconds between two counts of the workers, which come and go.
 COUNT_SECONDS = 1.0
 # Seconds to wait for a scheduler that may not be there.
@@ -44,12 +39,9 @@ class DaskWorkers(Workers):
         MissingExtraError: Dask is not installed.
     """
 
-    task_seconds = TASK_SECONDS
-
     def __init__(self, address: str, *, patience: float | None = None) -> None:
         distributed = _distributed()
         timeout = PATIENCE if patience is None else patience
-        _check_address(address)
         with contextlib.ExitStack() as quiet:
             quiet.enter_context(_silence())
             try:
@@ -57,11 +49,11 @@ class DaskWorkers(Workers):
                 self._client: Any = distributed.Client(
                     address, timeout=timeout, set_as_default=False, name="explorer"
                 )
-            except Exception as error:  # noqa: BLE001 - other protocols make Dask raise anything
+            except Exception as error:  # noqa: BLE001 - Dask raises anything for other addresses
                 raise InputError(
                     f"no Dask scheduler answers at {address} within {timeout:g} s "
                     f"({type(error).__name__}): start one with dask scheduler, and workers with "
-                    f"dask worker {address}"
+                    "dask worker and its address, such as tcp://10.0.0.1:8786"
                 ) from None
             # A scheduler may be lost at any time.
             self._quiet = quiet.pop_all()
@@ -104,20 +96,6 @@ class DaskWorkers(Workers):
             # The scheduler may be gone.
             with contextlib.suppress(OSError, TimeoutError):
                 self._client.close()
-
-
-def _check_address(address: str) -> None:
-    """Raise an `InputError` unless a text is the address of a scheduler."""
-    try:
-        parts = urlsplit(address)
-        is_address = parts.scheme in SCHEMES and bool(parts.hostname) and bool(parts.port)
-    except ValueError:
-        is_address = False
-    if not is_address:
-        raise InputError(
-            f"a scheduler has an address such as tcp://10.0.0.1:8786, with its host and its port; "
-            f"got {address!r}"
-        )
 
 
 def _try_connection(distributed: Any, address: str, timeout: float) -> None:

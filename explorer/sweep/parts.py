@@ -20,11 +20,18 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from explorer.errors import InputError, MissingExtraError
+from explorer.files.json_text import one_line
 from explorer.files.writing import make_folder, storage_error, write_whole
-from explorer.sweep.rows import Kind, Rows, columns_of, one_line
+from explorer.sweep.rows import Kind, Rows, columns_of
 from explorer.sweep.study import Study, decode_study, encode_study, study_hash
 
 SUFFIX = ".parquet"
+ARROW_TYPES: dict[Kind, str] = {
+    "count": "int64",
+    "number": "float64",
+    "flag": "bool",
+    "text": "string",
+}
 
 _STUDY, _HASH, _SEED = b"explorer.study", b"explorer.study_hash", b"explorer.seed"
 _CHUNK, _VERSIONS = b"explorer.chunk", b"explorer.versions"
@@ -100,12 +107,6 @@ def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -
         StorageError: The part cannot be written; a part that was there is unchanged.
     """
     arrow = pyarrow()
-    fields: list[Any] = []
-    columns: list[Any] = []
-    for name, kind in columns_of(study).items():
-        fields.append(arrow.field(name, _type(kind)))
-        values = [value for piece in pieces for value in piece.columns[name]]
-        columns.append(arrow.array(values, type=_type(kind)))
     metadata = {
         _STUDY: encode_study(study),
         _HASH: study_hash(study).encode(),
@@ -113,6 +114,9 @@ def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -
         _CHUNK: str(chunk).encode(),
         _VERSIONS: json.dumps(pieces[0].versions, sort_keys=True).encode(),
     }
+    kinds = columns_of(study)
+    fields = [(name, arrow.type_for_alias(ARROW_TYPES[kind])) for name, kind in kinds.items()]
+    columns = {name: [value for piece in pieces for value in piece.columns[name]] for name in kinds}
     table = arrow.table(columns, schema=arrow.schema(fields, metadata=metadata))
     data = io.BytesIO()
     arrow.parquet.write_table(table, data, compression="zstd", write_page_checksum=True)
@@ -136,7 +140,7 @@ def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, A
             part = _part_of(file.metadata.metadata or {})
             return part, file.read(columns=None if columns is None else list(columns))
     except (arrow.ArrowException, OSError, ValueError, KeyError) as error:
-        raise BadPartError(f"{path} is no part of a study: {one_line(error)}") from None
+        raise BadPartError(one_line(f"{path} is no part of a study: {error}")) from None
 
 
 def _part_of(metadata: Mapping[bytes, bytes]) -> Part:
@@ -207,16 +211,6 @@ def pyarrow() -> Any:
             "studies are kept as Parquet, which needs the extra study: "
             'pip install "flagged-explorer[study]"'
         ) from None
-
-
-def _type(kind: Kind) -> Any:
-    arrow = pyarrow()
-    return {
-        "count": arrow.int64(),
-        "number": arrow.float64(),
-        "flag": arrow.bool_(),
-        "text": arrow.string(),
-    }[kind]
 
 
 LOCK_FILE = ".lock"

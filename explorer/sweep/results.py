@@ -18,7 +18,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.sweep.parts import sound_parts, stray_paths, words_of_paths
-from explorer.sweep.rows import Value, columns_of, design_of
+from explorer.sweep.rows import Kind, Value, columns_of, design_of
 from explorer.sweep.study import Objective, Study
 
 
@@ -168,23 +168,27 @@ def design_at(folder: str | Path, index: int) -> Design:
     raise InputError(f"design {index} has not been computed yet")
 
 
-def load_results(folder: str | Path) -> Results:
+def load_results(folder: str | Path, study: Study | None = None) -> Results:
     """Return the rows of a results folder, as far as they have been computed.
 
+    Args:
+        folder: Results folder.
+        study: Study of the folder, which may then have no rows yet; that of its parts if None.
+
     Raises:
-        InputError: The folder holds no results, or those of several studies.
+        InputError: The folder holds no results, or those of another study or of several.
         MissingExtraError: Pyarrow is not installed.
     """
     damaged: list[Path] = []
-    parts = list(sound_parts(Path(folder), damaged))
-    if not parts:
+    parts = list(sound_parts(Path(folder), damaged, study))
+    if not parts and (study is None or damaged):
         raise _no_results(folder, damaged)
-    study = parts[0][0]
-    columns = {
-        name: np.concatenate([_column(table, name, kind) for *_, table in parts])
-        for name, kind in columns_of(study).items()
-    }
-    return Results(study, columns)
+    known = parts[0][0] if study is None else study
+    columns: dict[str, Column] = {}
+    for name, kind in columns_of(known).items():
+        found = [_column(table, name, kind) for *_, table in parts]
+        columns[name] = np.concatenate([np.zeros(0, _dtype(name, kind)), *found])
+    return Results(known, columns)
 
 
 def summarise(folder: str | Path) -> Summary:
@@ -215,10 +219,13 @@ def summarise(folder: str | Path) -> Summary:
     return Summary(study, dict(counts), best, lacking, len(damaged), strays)
 
 
-def _column(table: Any, name: str, kind: str) -> Column:
+def _column(table: Any, name: str, kind: Kind) -> Column:
+    return np.asarray(table.column(name).to_numpy(), _dtype(name, kind))
+
+
+def _dtype(name: str, kind: Kind) -> Any:
     # Missing numbers become NaN; the index and texts are never missing.
-    dtype = object if kind == "text" else np.int64 if name == "index" else np.float64
-    return np.asarray(table.column(name).to_numpy(), dtype=dtype)
+    return object if kind == "text" else np.int64 if name == "index" else np.float64
 
 
 def _no_results(folder: str | Path, damaged: Sequence[Path]) -> InputError:

@@ -1,7 +1,8 @@
 """Rows of a study: one for each design, whatever happens to it.
 
-A row is a function of the study and its index alone. Its status and reason say what went wrong
-with the design, so that no row is missing.
+A row and its sample are functions of the study and the index alone, so that any process can compute
+any chunk, in any order, repeatedly. The status and the reason of a row say what went wrong with the
+design, so that no row is missing.
 """
 
 from __future__ import annotations
@@ -9,23 +10,23 @@ from __future__ import annotations
 import functools
 import importlib
 import math
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import msgspec
+import numpy as np
 
 from explorer.errors import DesignError, InputError
+from explorer.files.json_text import one_line
 from explorer.files.packaged import versions
-from explorer.measures.catalogue import CATALOGUE
+from explorer.measures.catalogue import CATALOGUE, measure_design, reason_for_missing, unmet_needs
 from explorer.measures.measure import Case
-from explorer.measures.measurements import measure_design, reason_for_missing, unmet_needs
 from explorer.mechanism.design import Design
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
-from explorer.optimise.problem import YAW, Problem, Variable, start_value, varied, with_strokes
+from explorer.optimise.problem import YAW, Problem, Variable, start_value, with_strokes, with_values
 from explorer.sweep.machine import MACHINE
-from explorer.sweep.sampling import samples
 from explorer.sweep.study import RADIUS, Study, decode_study
 
 Kind = Literal["count", "number", "flag", "text"]
@@ -34,7 +35,6 @@ Value: TypeAlias = float | int | bool | str | None
 
 # Number of designs tried before a study is refused because none of them can be made.
 MOST_TRIED = 256
-GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 # Rounding error of an angle, in turns.
 ROUNDING = 1e-12
@@ -94,21 +94,6 @@ def evaluate(study: bytes, start: int, stop: int) -> Rows:
     return _as_columns(decoded, indices, rows)
 
 
-def answer(
-    function: Callable[[bytes, int, int], Rows], study: bytes, pieces: Sequence[range]
-) -> tuple[tuple[Rows, ...], float]:
-    """Return the rows of several pieces of a study, and the seconds that they took.
-
-    Args:
-        function: Function that returns the rows of one piece, such as `evaluate`.
-        study: Study encoded by `encode_study`.
-        pieces: Indices of the designs of each piece.
-    """
-    began = time.perf_counter()
-    rows = tuple(function(study, piece.start, piece.stop) for piece in pieces)
-    return rows, time.perf_counter() - began
-
-
 def rows_of_dead_workers(study: Study, indices: range, reason: str) -> Rows:
     """Return the rows of designs whose evaluation killed its workers."""
     rows: list[dict[str, Value]] = []
@@ -126,10 +111,9 @@ def design_of(study: Study, values: Mapping[str, float], name: str | None = None
         values: Values by variable; others are those of the study's design.
         name: Name of the design; that of the study's design if None.
     """
-    design = varied(study.base, values)
+    design = with_values(study.base, values)
     if RADIUS in values:
-        limits = msgspec.structs.replace(design.limits, leg_radii=(values[RADIUS],) * 4)
-        design = msgspec.structs.replace(design, limits=limits)
+        design = design.with_limits(leg_radii=(values[RADIUS],) * 4)
     for variable, number in values.items():
         if variable in MACHINE:
             design = MACHINE[variable].with_value(design, number)
@@ -240,8 +224,8 @@ def _spread_samples(study: Study) -> list[list[float]]:
     if study.sampling.method != "grid" or count <= MOST_TRIED:
         # The first points of a sequence or a hypercube are spread like the others.
         return samples(study, range(min(count, MOST_TRIED))).tolist()
-    # Multiples of the golden section leave no gaps and keep no step with a grid.
-    indices = [int(count * (k * GOLDEN % 1.0)) for k in range(MOST_TRIED)]
+    # Random indices keep no step with a grid.
+    indices = np.random.default_rng(0).integers(count, size=MOST_TRIED).tolist()
     return [samples(study, range(index, index + 1))[0].tolist() for index in indices]
 
 
@@ -277,11 +261,11 @@ def _row(study: Study, index: int, sample: dict[str, float]) -> dict[str, Value]
     try:
         _measure(study, sample, row)
     except DesignError as error:
-        row |= {"status": "invalid design", "reason": one_line(error)}
+        row |= {"status": "invalid design", "reason": one_line(str(error))}
     except InputError as error:
-        row |= {"status": "failed", "reason": one_line(error)}
+        row |= {"status": "failed", "reason": one_line(str(error))}
     except Exception as error:  # noqa: BLE001 - an error of one design must not end the others
-        row |= {"status": "failed", "reason": f"{type(error).__name__}: {one_line(error)}"}
+        row |= {"status": "failed", "reason": one_line(f"{type(error).__name__}: {error}")}
     return row
 
 
@@ -337,6 +321,57 @@ def _finite_or_none(value: Value) -> Value:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def one_line(error: Exception) -> str:
-    """Return the message of an error in one line, or the name of its kind if it has none."""
-    return " ".join(str(error).split()) or type(error).__name__
+def samples(study: Study, rows: range) -> FloatArray:
+    """Return the values of the variables of some designs.
+
+    Args:
+        study: The study.
+        rows: Indices of the designs, without gaps.
+
+    Returns:
+        Values in the order of the study's variables, shape (len(rows), d).
+    """
+    ends = np.array(list(study.variables.values()))
+    lows, highs = ends[:, 0], ends[:, 1]
+    match study.sampling.method:
+        case "sobol":
+            shares = _sobol(study, rows)
+        case "latin-hypercube":
+            shares = _hypercube(len(ends), study.count, study.sampling.seed)[rows.start : rows.stop]
+        case "grid":
+            shares = _grid(study, rows)
+    # Rounding must not lead beyond the ends.
+    return np.clip(lows + (highs - lows) * shares, lows, highs)
+
+
+def _sobol(study: Study, rows: range) -> FloatArray:
+    from scipy.stats import qmc
+
+    sequence = qmc.Sobol(len(study.variables), rng=study.sampling.seed)
+    # SciPy warns of other than powers of two in the first draw, so that is one point.
+    first = sequence.random(1)
+    if rows.start > 1:
+        sequence.fast_forward(rows.start - 1)
+    others = len(rows) - (rows.start == 0)
+    points = sequence.random(others) if others else first[:0]
+    return points if rows.start > 0 else np.concatenate([first, points])
+
+
+@functools.lru_cache(1)
+def _hypercube(variables: int, count: int, seed: int) -> FloatArray:
+    """Return the whole hypercube, shape (count, variables), which a process makes once."""
+    from scipy.stats import qmc
+
+    return qmc.LatinHypercube(variables, rng=seed).random(count)
+
+
+def _grid(study: Study, rows: range) -> FloatArray:
+    shape = study.shape
+    at = np.unravel_index(np.arange(rows.start, rows.stop), shape)
+    # A single value lies in the middle of the range.
+    return np.column_stack(
+        [
+            index / (count - 1.0) if count > 1 else np.full(len(rows), 0.5)
+            for index, count in zip(at, shape, strict=True)
+        ]
+    )

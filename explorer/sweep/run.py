@@ -11,21 +11,13 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 from explorer.errors import ExplorerError
 from explorer.files.packaged import versions
 from explorer.numerics.compiled import warm
 from explorer.sweep.parts import claim, pyarrow, sound_parts, write_part
-from explorer.sweep.rows import (
-    Rows,
-    answer,
-    check_study,
-    evaluate,
-    load_kernels,
-    rows_of_dead_workers,
-)
+from explorer.sweep.rows import Rows, check_study, evaluate, load_kernels, rows_of_dead_workers
 from explorer.sweep.study import Study, encode_study
 from explorer.sweep.workers import NoWorkerError, Workers
 
@@ -116,7 +108,7 @@ def run_study(
 
 @dataclass
 class _Piece:
-    """Designs of a task that are retried together: those of a chunk, or one of them."""
+    """Designs of a task: those of a chunk, or one of them."""
 
     chunk: int
     indices: range
@@ -140,11 +132,9 @@ class _Run:
         self.retries: deque[_Piece] = deque()
         # Designs whose evaluation may have killed a worker; each is tried alone.
         self.suspects: deque[_Piece] = deque()
-        self.under_way: dict[Future[tuple[tuple[Rows, ...], float]], list[_Piece]] = {}
+        self.under_way: dict[Future[Rows], _Piece] = {}
         # Rows of the chunks that have no part yet.
         self.pending: dict[int, list[Rows]] = {}
-        # Designs that workers have evaluated in this run, and the seconds that they took.
-        self.timed_designs, self.timed_seconds = 0, 0.0
 
     def run(self, limit: int | None, stop: Callable[[], bool] | None) -> Progress:
         """Compute the missing rows."""
@@ -180,44 +170,26 @@ class _Run:
 
     def _submit_tasks(self, missing: Iterator[_Piece]) -> bool:
         """Keep the workers busy; return whether any task is under way."""
-        # Where long tasks pay, the first ones are timed.
-        is_timed = self.workers.task_seconds == 0.0 or self.timed_designs > 0
-        room = (AHEAD if is_timed else 1) * self.workers.size
-        while len(self.under_way) < room:
-            if self.retries:
-                pieces = [self.retries.popleft()]
-            else:
-                pieces = [*islice(missing, self._chunks_of_task())]
-            if not pieces:
+        while len(self.under_way) < AHEAD * self.workers.size:
+            piece = self.retries.popleft() if self.retries else next(missing, None)
+            if piece is None:
                 break
-            self._submit(pieces)
+            self._submit(piece)
         if not self.under_way and self.suspects:
-            self._submit([self.suspects.popleft()])
+            self._submit(self.suspects.popleft())
         return bool(self.under_way)
 
-    def _chunks_of_task(self) -> int:
-        """Return the number of chunks of the next task.
+    def _submit(self, piece: _Piece) -> None:
+        start, stop = piece.indices.start, piece.indices.stop
+        self.under_way[self.workers.submit(evaluate, self.encoded, start, stop)] = piece
 
-        They take as long as a task of these workers should, and less near the end, so that
-        all workers end at the same time.
-        """
-        if self.workers.task_seconds == 0.0 or self.timed_seconds == 0.0:
-            return 1
-        seconds = self.study.chunk * self.timed_seconds / self.timed_designs
-        share = (self.is_written.count(0) - len(self.pending)) // (2 * self.workers.size)
-        return max(1, min(int(self.workers.task_seconds / seconds), share))
-
-    def _submit(self, pieces: list[_Piece]) -> None:
-        ranges = [piece.indices for piece in pieces]
-        self.under_way[self.workers.submit(answer, evaluate, self.encoded, ranges)] = pieces
-
-    def _collect(self, future: Future[tuple[tuple[Rows, ...], float]]) -> None:
+    def _collect(self, future: Future[Rows]) -> None:
         """Add the rows of a task, or queue it again if its worker died."""
-        pieces = self.under_way.pop(future)
+        piece = self.under_way.pop(future)
         try:
-            found, seconds = future.result()
+            rows = future.result()
         except self.workers.died:
-            self._retry(pieces)
+            self._retry(piece)
             return
         except CancelledError:
             raise RunError(
@@ -232,29 +204,22 @@ class _Run:
             raise RunError(
                 f"the workers cannot do the tasks: {type(error).__name__}: {error}"
             ) from error
-        self.timed_designs += sum(len(piece.indices) for piece in pieces)
-        self.timed_seconds += seconds
-        for piece, rows in zip(pieces, found, strict=True):
-            if rows.versions != versions():
-                there, here = (
-                    ", ".join(map(" ".join, each.items())) for each in (rows.versions, versions())
-                )
-                raise RunError(
-                    f"the workers have other versions than this process: {there} there, {here} "
-                    "here; install the same everywhere"
-                )
-            self._add(piece.chunk, rows)
+        if rows.versions != versions():
+            there, here = (
+                ", ".join(map(" ".join, each.items())) for each in (rows.versions, versions())
+            )
+            raise RunError(
+                f"the workers have other versions than this process: {there} there, {here} "
+                "here; install the same everywhere"
+            )
+        self._add(piece.chunk, rows)
 
-    def _retry(self, pieces: list[_Piece]) -> None:
+    def _retry(self, piece: _Piece) -> None:
         """Queue a task again whose worker died.
 
-        At first its chunks are tried one by one, then their designs, and in the end each with
+        The designs of a chunk are tried one by one after some deaths, and in the end each with
         nothing else under way: a scheduler blames all tasks that a dead worker had.
         """
-        if len(pieces) > 1:
-            self.retries.extend(pieces)
-            return
-        (piece,) = pieces
         piece.deaths += 1
         if len(piece.indices) > 1:
             if piece.deaths < CHUNK_DEATHS:

@@ -24,16 +24,16 @@ from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.checks import instance, number, one_of, positive, two, whole
-from explorer.optimise.demands import Demands
 from explorer.optimise.problem import (
     OBJECTIVES,
     REACH,
     YAW,
+    Demands,
     ObjectiveName,
     longest_minimum,
 )
 from explorer.sweep.machine import MACHINE
-from explorer.workspace.node_measures import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
+from explorer.workspace.least_clearance import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
 
 Method = Literal["sobol", "latin-hypercube", "grid"]
 Sense = Literal["min", "max"]

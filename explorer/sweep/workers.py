@@ -11,17 +11,16 @@ import contextlib
 import importlib
 import os
 import pickle
-import queue
 import signal
 import sys
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import Any, NamedTuple, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from explorer.errors import InputError
 
@@ -58,18 +57,10 @@ class Workers(Executor, ABC):
     died: tuple[type[BaseException], ...] = (BrokenExecutor,)
     """Errors of the future of a task whose worker died."""
 
-    task_seconds: float = 0.0
-    """Shortest duration of a task that repays handing it over, in seconds."""
-
     @property
     @abstractmethod
     def size(self) -> int:
         """Number of tasks that run at the same time."""
-
-
-class _Task(NamedTuple):
-    future: Future[Any]
-    call: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 
 
 class LocalWorkers(Workers):
@@ -86,99 +77,72 @@ class LocalWorkers(Workers):
         count = cores() if size is None else size
         if not 1 <= count <= MOST_WORKERS:
             raise InputError(f"the workers must be from 1 to {MOST_WORKERS}; got {count}")
-        self._tasks: queue.SimpleQueue[_Task | None] = queue.SimpleQueue()
-        self._is_over = threading.Event()
-        # Guards the processes, by the number of their thread.
+        self._size = count
+        self._threads = ThreadPoolExecutor(count, "worker", _block_interrupts)
+        # The process of each thread; the lock guards all of them.
+        self._own = threading.local()
         self._lock = threading.Lock()
-        self._children: dict[int, ChildProcess] = {}
-        self._threads = [
-            threading.Thread(target=self._serve, args=(k,), name=f"worker {k}", daemon=True)
-            for k in range(count)
-        ]
-        for thread in self._threads:
-            thread.start()
+        self._children: set[ChildProcess] = set()
+        self._is_over = self._is_cancelled = False
 
     @property
     def size(self) -> int:
         """Number of processes."""
-        return len(self._threads)
-
-    @property
-    def process_ids(self) -> list[int]:
-        """Ids of the processes that exist now."""
-        with self._lock:
-            return [child.process.pid or 0 for child in self._children.values()]
+        return self._size
 
     def submit(
         self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> Future[Result]:
         """Call a function in one of the processes, see `concurrent.futures.Executor`."""
-        if self._is_over.is_set():
-            raise RuntimeError("cannot submit after shutdown")
-        future: Future[Result] = Future()
-        self._tasks.put(_Task(future, (fn, args, kwargs)))
-        return future
+        return self._threads.submit(self._call, (fn, args, kwargs))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes.
 
         Args:
-            wait: Whether to return only when they have ended.
+            wait: Whether to return only when they have ended; else they end with this process.
             cancel_futures: Whether to drop tasks that have not begun, and kill those that have.
         """
-        self._is_over.set()
+        self._is_over = True
+        self._threads.shutdown(wait=False, cancel_futures=cancel_futures)
         if cancel_futures:
-            with contextlib.suppress(queue.Empty):
-                while (task := self._tasks.get_nowait()) is None or task.future.cancel():
-                    pass
             with self._lock:
-                for child in self._children.values():
+                self._is_cancelled = True
+                for child in self._children:
                     child.process.kill()
-        for _ in self._threads:
-            self._tasks.put(None)
+        self._threads.shutdown(wait=wait)
         if wait:
-            for thread in self._threads:
-                thread.join()
+            while self._children:
+                self._children.pop().end()
 
-    def _serve(self, number: int) -> None:
-        """Do tasks with the process of a thread, until there are no more."""
-        if sys.platform != "win32":
-            # A terminal sends Ctrl-C to the children too, which inherit this; the parent ends them.
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    def _call(self, call: object) -> Any:
+        """Return the result of a call in the process of this thread."""
         try:
-            while (task := self._tasks.get()) is not None:
-                if task.future.set_running_or_notify_cancel():
-                    self._do(task, number)
-        finally:
-            self._drop(number)
-
-    def _do(self, task: _Task, number: int) -> None:
-        try:
-            is_good, value = self._ready_child(number).call(task.call)
+            is_good, value = self._ready_child().call(call)
         except PIPE_ERRORS:
-            self._drop(number)
-            is_good, value = False, WorkerDiedError("the worker process died")
-        except Exception as error:  # noqa: BLE001 - the future raises it
-            is_good, value = False, error
-        if is_good:
-            task.future.set_result(value)
-        else:
-            task.future.set_exception(value)
+            self._drop()
+            raise WorkerDiedError("the worker process died") from None
+        if not is_good:
+            raise value
+        return value
 
-    def _ready_child(self, number: int) -> ChildProcess:
-        """Return the process of a thread, ready for tasks; a failed start is no task's fault."""
+    def _ready_child(self) -> ChildProcess:
+        """Return the process of this thread, ready for tasks; a failed start is no task's fault."""
         last = ""
         for _ in range(STARTS):
             try:
                 with self._lock:
-                    child = self._children.get(number)
+                    if self._is_cancelled:
+                        raise WorkerDiedError("the worker process was ended")
+                    child: ChildProcess | None = getattr(self._own, "child", None)
                     if child is None:
-                        child = self._children[number] = ChildProcess()
+                        child = self._own.child = ChildProcess()
+                        self._children.add(child)
                 child.wait_until_ready()
             except PIPE_ERRORS as error:
                 last = f" ({error})" if str(error) else ""
-                self._drop(number)
-                if self._is_over.is_set():
+                self._drop()
+                if self._is_over:
                     raise WorkerDiedError("the worker process was ended") from None
             else:
                 return child
@@ -188,12 +152,21 @@ class LocalWorkers(Workers):
             "each of them imports it"
         )
 
-    def _drop(self, number: int) -> None:
-        """End the process of a thread, if there is one."""
-        with self._lock:
-            child = self._children.pop(number, None)
+    def _drop(self) -> None:
+        """End the process of this thread, if there is one."""
+        child: ChildProcess | None = getattr(self._own, "child", None)
+        self._own.child = None
         if child is not None:
+            with self._lock:
+                self._children.discard(child)
             child.end()
+
+
+def _block_interrupts() -> None:
+    """Keep Ctrl-C from the processes that this thread starts; the parent ends them."""
+    if sys.platform != "win32":
+        # A terminal sends it to the children too, which inherit this.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 class ChildProcess:

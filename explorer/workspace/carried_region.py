@@ -15,29 +15,26 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, finite_array
-from explorer.statics.load_cases import (
-    INWARD,
-    LIMITS,
-    PARTS,
-    largest_shares,
-    limit_values,
-    load_case,
-    settle_on_limit,
-)
+from explorer.numerics import checks
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.statics import load_cases
+from explorer.statics.forces import load_array
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.nodes import Grid, make_grid
-from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, constraints, slacks
-from explorer.workspace.slices.volume import home_rotation, workspace_volume
-from explorer.workspace.solids.booleans import Surface, carved_solid, cut_solid
-from explorer.workspace.solids.solid import Solid
+from explorer.workspace.limits.constraints import (
+    Cone,
+    Constraint,
+    HalfSpace,
+    constraints,
+    orientation_of,
+    slacks,
+)
+from explorer.workspace.slices.volume import workspace_volume
+from explorer.workspace.solids.solid import Solid, Surface, carved_solid, cut_solid
 from explorer.workspace.solids.solids import workspace_solid
 
 # Numbers of nodes on each axis of the box about the part, and beyond it on either side.
@@ -120,28 +117,39 @@ def carried_region(
         InputError: Not a rotation, a load that is not finite, or a number out of range.
         ExplorerError: A boolean fails.
     """
-    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
-    w = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
-    if not FEWEST_NODES <= nodes <= MOST_NODES:
-        raise InputError(
-            f"the nodes on an axis must be from {FEWEST_NODES} to {MOST_NODES}; got {nodes}"
-        )
+    r = orientation_of(design, rotation)
+    w = load_array(load)
+    checks.whole("the number of nodes on an axis", nodes, FEWEST_NODES, MOST_NODES)
     if design.limits.margin is None:
-        limits = msgspec.structs.replace(design.limits, margin=0.0)
-        design = msgspec.structs.replace(design, limits=limits)
+        design = design.with_limits(margin=0.0)
     exact = workspace_volume(design, r)
     whole = workspace_solid(design, r, tolerance, volume=exact)
     if whole.is_empty:
         return CarriedRegion(exact.volume, 0.0, whole)
-    local = _LocalLoad(load_case(design, r, w), r, constraints(design, r), part_names(design))
+    case = load_cases.load_case(design, r, w)
+    local = _LocalLoad(case, r, constraints(design, r), part_names(design))
     solid = _carried_part(whole, local, nodes)
     if solid.is_empty:
-        best = _best_within(whole, local)
+        best = local.best_within(whole)
         factor = 1.0 / max(best.share, LEAST_SHARE)
         empty = replace(solid, empty_because=(local.part_names[best.part],))
         return CarriedRegion(exact.volume, 0.0, empty, best.position, factor)
     # The mesh of the whole lacks a share of the exact volume, and so does its part.
     return CarriedRegion(exact.volume, solid.volume * exact.volume / whole.volume, solid)
+
+
+class Best(NamedTuple):
+    """A position where the largest share of a limit is least, of those that were tried.
+
+    Attributes:
+        position: b4 in the base frame, shape (3,).
+        share: The share.
+        part: Index of the part of the machine with that share.
+    """
+
+    position: FloatArray
+    share: float
+    part: int
 
 
 @dataclass(frozen=True)
@@ -162,7 +170,7 @@ class _LocalLoad:
 
     def holds(self, positions: FloatArray) -> BoolArray:
         """Return at which positions (n, 3) the parts hold the load, shape (n,)."""
-        return largest_shares(self.case, self.rotation, positions)[0] <= 1.0
+        return load_cases.largest_shares(self.case, self.rotation, positions)[0] <= 1.0
 
     def allows(self, positions: FloatArray) -> BoolArray:
         """Return which positions (n, 3) keep the limits of the workspace, shape (n,)."""
@@ -174,19 +182,13 @@ class _LocalLoad:
         limits = tuple(limit for limit in self.limits if not isinstance(limit, Cone))
         return np.asarray((slacks(limits, positions) >= -distance).all(axis=-1))
 
-
-class Best(NamedTuple):
-    """A position where the largest share of a limit is least, of those that were tried.
-
-    Attributes:
-        position: b4 in the base frame, shape (3,).
-        share: The share.
-        part: Index of the part of the machine with that share.
-    """
-
-    position: FloatArray
-    share: float
-    part: int
+    def best_within(self, whole: Solid) -> Best:
+        """Return the best position found within the limits."""
+        grid = make_grid(*whole.ends, COARSE, 0)
+        tried = np.vstack([whole.vertices, positions_within(whole, grid, self.allows)])
+        shares = partial(load_cases.largest_shares, self.case, self.rotation)
+        found = best_positions(tried, grid.step, shares, self.allows)
+        return min(found, key=lambda best: best.share)
 
 
 def _carried_part(whole: Solid, load: _LocalLoad, nodes: int) -> Solid:
@@ -201,7 +203,7 @@ def _carried_part(whole: Solid, load: _LocalLoad, nodes: int) -> Solid:
     positions = grid.positions.reshape(-1, 3)
     kept = positions[load.holds(positions) & load.allows(positions)]
     if not len(kept):
-        best = _best_within(whole, load)
+        best = load.best_within(whole)
         if best.share > 1.0:
             return replace(whole, vertices=kept, faces=whole.faces[:0])
         kept = best.position[None]
@@ -255,22 +257,24 @@ def _without_limits(solid: Solid, dropped: set[int]) -> Solid:
 
 def _carve(near: Solid, load: _LocalLoad, nodes: int) -> tuple[Solid, FloatArray]:
     """Return the positions of a solid that hold a load, by a grid, and the step of that."""
+    from scipy.ndimage import maximum_filter
+
     grid = make_grid(*near.ends, nodes, BEYOND)
     positions = grid.positions.reshape(-1, 3)
-    limits = np.flatnonzero(np.isfinite(load.case[LIMITS:INWARD]))
-    values = limit_values(load.case, load.rotation, limits, positions)
+    limits = np.flatnonzero(np.isfinite(load.case[load_cases.LIMITS : load_cases.INWARD]))
+    values = load_cases.limit_values(load.case, load.rotation, limits, positions)
     # Two limits may have the same surface, such as those of a part without a load of one direction.
     distinct = np.sort(np.unique(np.round(values, SAME_DIGITS), axis=0, return_index=True)[1])
     limits, values = limits[distinct], values[distinct].reshape(-1, *grid.counts)
     left = load.is_near(positions, float(np.linalg.norm(grid.step))).reshape(grid.counts)
 
-    def settle(limit: int, left: BoolArray, points: FloatArray, beside: FloatArray) -> FloatArray:
+    def project(limit: int, left: BoolArray, points: FloatArray, beside: FloatArray) -> FloatArray:
         """Move the points onto the limit that other limits have not yet removed."""
         nodes = np.rint((beside - grid.lows) / grid.step).astype(np.int64)
-        chosen, settled = left[tuple(nodes.T)], points.copy()
+        chosen, projected = left[tuple(nodes.T)], points.copy()
         rows = points[chosen], beside[chosen], grid.step
-        settled[chosen] = settle_on_limit(load.case, load.rotation, limit, *rows)
-        return settled
+        projected[chosen] = load_cases.settle_on_limit(load.case, load.rotation, limit, *rows)
+        return projected
 
     def surfaces() -> Iterator[Surface]:
         remaining, waiting = left, set(range(len(limits)))
@@ -282,29 +286,12 @@ def _carve(near: Solid, load: _LocalLoad, nodes: int) -> tuple[Solid, FloatArray
                 return
             waiting.remove(index)
             limit = int(limits[index])
-            name = load.part_names[limit % PARTS]
-            own = partial(settle, limit, remaining)
+            name = load.part_names[limit % load_cases.PARTS]
+            own = partial(project, limit, remaining)
             yield Surface(values[index], grid.lows, grid.step, own, (name,))
-            remaining = remaining & (_highest_around(values[index]) >= 0.0)
+            remaining = remaining & (maximum_filter(values[index], 3, mode="nearest") >= 0.0)
 
     return carved_solid(near, surfaces()), grid.step
-
-
-def _highest_around(values: FloatArray) -> FloatArray:
-    """Return the highest of the values at each node of a grid and at its neighbours."""
-    for axis in range(3):
-        padded = np.pad(values, [(int(k == axis),) * 2 for k in range(3)], mode="edge")
-        rows = np.moveaxis(padded, axis, 0)
-        values = np.moveaxis(np.maximum(np.maximum(rows[:-2], rows[1:-1]), rows[2:]), 0, axis)
-    return values
-
-
-def _best_within(whole: Solid, load: _LocalLoad) -> Best:
-    """Return the best position found within the limits."""
-    grid = make_grid(*whole.ends, COARSE, 0)
-    tried = np.vstack([whole.vertices, positions_within(whole, grid, load.allows)])
-    shares = partial(largest_shares, load.case, load.rotation)
-    return min(best_positions(tried, grid.step, shares, load.allows), key=lambda best: best.share)
 
 
 def positions_within(

@@ -26,9 +26,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import TOLERANCE, Design
+from explorer.mechanism.margins import planes_of_singularity
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot, rotate
-from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,
@@ -36,6 +36,8 @@ from explorer.workspace.limits.constraints import (
     HalfSpace,
     Never,
     constraints,
+    shift,
+    surface_of,
 )
 from explorer.workspace.limits.region import box_of
 
@@ -93,7 +95,7 @@ def extreme_positions(design: Design, rotation: FloatArray, normals: FloatArray)
         for limit in (*limits, *(HalfSpace("", normal, 0.0) for normal in directions))
         if isinstance(limit, Cone) or float(limit.distance(middle)) <= unit * (1.0 + 1e-12)
     ]
-    surfaces = Surfaces.of([limit.shifted(-middle) for limit in crossing], unit)
+    surfaces = Surfaces.of([shift(limit, -middle) for limit in crossing], unit)
     radii = [limit.radius for limit in crossing if isinstance(limit, BallOrCylinder)]
     directions = np.vstack([np.eye(3), directions])
 
@@ -114,15 +116,14 @@ def extreme_positions(design: Design, rotation: FloatArray, normals: FloatArray)
 
 @dataclass(frozen=True)
 class Surfaces:
-    """The surfaces steepness |s (p − centre)| + axis · (p − centre) = level, n of them.
+    """The surfaces of limits as those of `surface_of`, n of them.
 
     Attributes:
-        kind: `SPHERE`, `PLANE`, `CYLINDER` or `CONE`, ascending, shape (n,). The scale s of the
-            axes is (0, 1, 1) for a cylinder, otherwise 1.
+        kind: `SPHERE`, `PLANE`, `CYLINDER` or `CONE`, ascending, shape (n,).
         centre: Centres, points of the axes or apexes, shape (n, 3); 0 for a plane.
-        steepness: 1, for a plane 0, for a cone minus the cosine of its half-angle, shape (n,).
-        axis: Unit normals of planes and unit axes of cones, otherwise 0, shape (n, 3).
-        level: Radii, or offsets of planes, or 0 for cones, shape (n,).
+        steepness: 1 or −1, for a plane 0, for a cone the cosine of its half-angle, shape (n,).
+        axis: Unit normals of planes, minus the unit axes of cones, otherwise 0, shape (n, 3).
+        level: Radii or their negatives, offsets of planes, or 0 for cones, shape (n,).
     """
 
     kind: IntArray
@@ -135,18 +136,9 @@ class Surfaces:
     def of(limits: Sequence[Constraint], unit: float) -> Surfaces:
         """Return the surfaces of limits, lengths divided by a unit."""
         rows = sorted((row for limit in limits for row in _rows(limit, unit)), key=itemgetter(0))
-        count = len(rows)
-        kinds, *numbers = (
-            np.array([row[column] for row in rows], dtype=np.float64) for column in range(5)
-        )
-        centre, steepness, axis, level = numbers
-        return Surfaces(
-            kinds.astype(np.int64),
-            centre.reshape(count, 3),
-            steepness,
-            axis.reshape(count, 3),
-            level,
-        )
+        kind, centre, steepness, axis, level = zip(*rows, strict=True)
+        numbers = np.array(centre), np.array(steepness), np.array(axis), np.array(level)
+        return Surfaces(np.array(kind, dtype=np.int64), *numbers)
 
     @cached_property
     def scale(self) -> FloatArray:
@@ -261,28 +253,23 @@ class Surfaces:
 
 def _rows(limit: Constraint, unit: float) -> Iterator[_Row]:
     """Yield the surfaces of a limit as rows of `Surfaces`, lengths divided by a unit."""
-    match limit:
-        case BallOrCylinder():
-            kind = SPHERE if limit.is_ball else CYLINDER
-            yield kind, limit.centre / unit, 1.0, np.zeros(3), limit.radius / unit
-        case HalfSpace():
-            norm = float(np.linalg.norm(limit.normal))
-            yield PLANE, np.zeros(3), 0.0, limit.normal / norm, limit.offset / (norm * unit)
-        case Cone():
-            apex, cosine = limit.apex / unit, math.cos(limit.half_angle)
-            if not limit.flat and abs(cosine) > ZERO:
-                yield CONE, apex, -cosine, limit.axis, 0.0
-                return
-            # A right angle leaves a plane. A flat cone lies between two planes along x.
-            axis = limit.axis * [0.0, 1.0, 1.0] if limit.flat else limit.axis
-            across = cosine * np.cross([1.0, 0.0, 0.0], axis) if limit.flat else np.zeros(3)
-            along = float(axis @ axis) - cosine**2
-            for sign in (-1.0, 1.0) if along > 0.0 else ():
-                normal = math.sqrt(along) * axis + sign * across
-                normal /= float(np.linalg.norm(normal))
-                yield PLANE, np.zeros(3), 0.0, normal, float(normal @ apex)
-        case Never():
-            pass
+    if isinstance(limit, Never):
+        return
+    origin, scale, axis, steepness, level = surface_of(limit)
+    is_cone = isinstance(limit, Cone)
+    if not (is_cone and (limit.flat or abs(steepness) <= ZERO)):
+        kind = CONE if is_cone else PLANE if isinstance(limit, HalfSpace) else SPHERE
+        kind = kind if scale.all() else CYLINDER
+        yield kind, origin / unit, steepness, axis, level / unit
+        return
+    # A right angle leaves a plane. A flat cone lies between two planes along x.
+    axis = axis * scale
+    across = steepness * np.cross([1.0, 0.0, 0.0], axis) if limit.flat else np.zeros(3)
+    along = float(axis @ axis) - steepness**2
+    for sign in (-1.0, 1.0) if along > 0.0 else ():
+        normal = math.sqrt(along) * axis + sign * across
+        normal /= float(np.linalg.norm(normal))
+        yield PLANE, np.zeros(3), 0.0, normal, float(normal @ origin) / unit
 
 
 def _stationary(first: FloatArray, second: FloatArray, n: FloatArray) -> FloatArray:
@@ -339,11 +326,9 @@ def _on_rulings(rulings: FloatArray, forms: FloatArray) -> FloatArray:
 
 
 def _along(lines: FloatArray, forms: FloatArray) -> FloatArray:
-    """Return the coefficients of forms along lines, highest power first, shape (3, m, k, n).
+    """Return the coefficients of forms (m, k, 4, 4) along lines, highest power first, (3, m, k, n).
 
-    Args:
-        lines: Points and directions in homogeneous coordinates, shape (m, 2, n, 4).
-        forms: Quadratic forms, shape (m, k, 4, 4).
+    Lines are points and directions in homogeneous coordinates, shape (m, 2, n, 4).
     """
     points, directions = lines[:, :1], lines[:, 1:]
     by_point, by_direction = points @ forms, directions @ forms
@@ -361,11 +346,7 @@ def _roots(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
 
 
 def _angles(values: FloatArray) -> FloatArray:
-    """Return angles at which trigonometric polynomials may be zero, shape (m, 8).
-
-    Args:
-        values: Values of the polynomials at `ANGLES`, shape (m, 9).
-    """
+    """Return angles (m, 8) at which polynomials with values (m, 9) at `ANGLES` may be zero."""
     # With z the tangent of half the angle from `far`, exp(iφ) = (1 + iz) / (1 - iz). The largest
     # value becomes the leading coefficient of the polynomial in z.
     far = ANGLES[np.abs(values).argmax(axis=1)] + math.pi

@@ -4,6 +4,9 @@ At a fixed orientation the ends of legs move no farther than the position does, 
 of two legs is Lipschitz in position with constant 1. In a cell of positions it is therefore
 bounded from below by its value at the centre less half the cell's diagonal. Cells are divided
 into eight until that bound is within the tolerance of the least distance attained.
+
+Measures at the nodes of a grid, the centres of the cells of a box about the workspace, take less
+time: its extent, margins and clearances. A least value at the nodes is an upper bound.
 """
 
 from __future__ import annotations
@@ -27,12 +30,11 @@ from explorer.legs.clearance import (
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
-from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.checks import whole
 from explorer.numerics.search import descend
-from explorer.workspace.limits.constraints import Cone, Constraint, constraints
-from explorer.workspace.limits.region import box_of
-from explorer.workspace.slices.volume import home_rotation
+from explorer.workspace.limits.constraints import Cone, Constraint, constraints, orientation_of
+from explorer.workspace.limits.region import box_of, mark_nodes, region_of
 
 # Tolerance of a least clearance, over the reach.
 DEFAULT_TOLERANCE = 1e-4
@@ -56,12 +58,9 @@ class LeastClearances(NamedTuple):
     within the limits is found, as in a workspace without volume.
 
     Attributes:
-        clearance: Least clearance attained, in design units, shape (6,); negative in
-            collision.
-        bound: Certified lower bound of the clearance in the workspace, in design units,
-            shape (6,).
-        position: Positions of b4 in the base frame at which the clearances are attained, in
-            design units, shape (6, 3); NaN where the clearance is infinite.
+        clearance: Least clearance attained, in design units, shape (6,); negative in collision.
+        bound: Certified lower bound of the clearance in the workspace, shape (6,).
+        position: Positions of b4 at which they are attained, (6, 3); NaN if infinite.
     """
 
     clearance: FloatArray
@@ -96,7 +95,7 @@ def least_clearances(
     Raises:
         InputError: Not a rotation.
     """
-    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    r = orientation_of(design, rotation)
     resolution = tolerance or DEFAULT_TOLERANCE * design.reach
     domain = _Domain(design, r, constraints(design, r), margin)
     radii, joined = radii_of_pairs(design), joined_pairs(design)
@@ -201,3 +200,77 @@ class _Domain:
         if not self.margin:
             return np.zeros((*p.shape[:-1], 0))
         return np.abs(margins(p, self.rotation)) - self.margin
+
+
+# Number of nodes on each axis: default, least and largest.
+DEFAULT_NODES = 20
+FEWEST_NODES, MOST_NODES = 2, 200
+
+
+@dataclass(frozen=True)
+class NodeMeasures:
+    """Measures of a workspace at the nodes of a grid, in design units.
+
+    Without any nodes, lengths are NaN and clearances infinite.
+
+    Attributes:
+        positions: Nodes within the limits, shape (n, 3).
+        extent: Distance between the lowest and the highest of them on each axis, shape (3,).
+        margins: Least |δ1|, |δ2|, |δ3| at the nodes, shape (3,).
+        mean_margin: Mean over the nodes of the smallest of |δ1|, |δ2|, |δ3|.
+        clearances: Least clearances at the nodes with every |δ| at least `clearance_margin`,
+            shape (6,), in the order of `PAIRS`; inf for a pair that shares a joint.
+        clear_share: Share of the nodes at which no legs collide; NaN without any nodes.
+    """
+
+    positions: FloatArray
+    extent: FloatArray
+    margins: FloatArray
+    mean_margin: float
+    clearances: FloatArray
+    clear_share: float
+
+
+def node_measures(
+    design: Design,
+    rotation: ArrayLike | None = None,
+    *,
+    nodes: int = DEFAULT_NODES,
+    clearance_margin: float = 0.0,
+) -> NodeMeasures:
+    """Measure the constant-orientation workspace at the nodes of a grid.
+
+    Args:
+        design: The manipulator; the radii of the legs are those of its limits.
+        rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
+        nodes: Number of nodes on each axis of a box about the workspace.
+        clearance_margin: Least |δ|, in design units, of nodes at which clearances count;
+            nearer to a singularity legs may have to meet.
+
+    Raises:
+        InputError: Not a rotation, or too few or too many nodes.
+    """
+    whole("the number of nodes on an axis", nodes, FEWEST_NODES, MOST_NODES)
+    r = orientation_of(design, rotation)
+    region = region_of(constraints(design, r))
+    lows, highs = region.box or (np.zeros(3), np.zeros(3))
+    step, within = (highs - lows) / nodes, np.zeros((nodes,) * 3, dtype=np.bool_)
+    if region.box is not None:
+        mark_nodes(nodes**3, *region.rows, lows + 0.5 * step, step, 0.0, within)
+    indices = np.argwhere(within)
+    if not len(indices):
+        none = np.full(3, np.nan)
+        clearances = np.full(len(PAIRS), math.inf)
+        return NodeMeasures(np.zeros((0, 3)), none, none, math.nan, clearances, math.nan)
+    at = Configuration(design, lows + (indices + 0.5) * step, r)
+    sizes, clearance = np.abs(at.margins), leg_clearances(at).clearance
+    smallest = sizes.min(axis=1)
+    off_planes = clearance[smallest >= clearance_margin]
+    return NodeMeasures(
+        positions=at.position,
+        extent=np.ptp(indices, axis=0) * step,
+        margins=sizes.min(axis=0),
+        mean_margin=float(smallest.mean()),
+        clearances=off_planes.min(axis=0, initial=math.inf),
+        clear_share=float((clearance > 0.0).all(axis=1).mean()),
+    )

@@ -16,10 +16,9 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.numerics.search import descend
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, reactions
-from explorer.workspace.accessible.nodes import make_grid
+from explorer.workspace.accessible.nodes import descend_towards, make_grid
 from explorer.workspace.carried_region import best_positions, positions_within
 from explorer.workspace.limits.constraints import Constraint, constraints, slacks
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
@@ -128,26 +127,21 @@ class _Search:
             return None
         starts = starts[self.distance(starts).argsort()[:BEGINNINGS]]
         # Clearances are no constraints of the descent, so that it may end where legs collide.
-        ends = np.vstack([starts, *map(self._settle, starts)])
+        ends = np.vstack([starts, *map(self._descend, starts)])
         ends = ends[self.allows(ends)]
         ends = ends[self.largest(ends)[0] <= 1.0]
         return ends[self.distance(ends).argmin()] if len(ends) else None
 
-    def _settle(self, start: FloatArray) -> FloatArray:
+    def _descend(self, start: FloatArray) -> FloatArray:
         """Return where a descent of the distance leads along the limits, shape (3,)."""
-        reach, here = self.loaded.design.reach, self.here
-
-        def distance(at: FloatArray) -> tuple[float, FloatArray]:
-            apart = at - here / reach
-            return float(apart @ apart), 2.0 * apart
+        reach = self.loaded.design.reach
 
         def spare(at: FloatArray) -> FloatArray:
             # Near a singular plane shares are infinite, and the descent turns back.
             shares = np.minimum(self._shares(reach * at), FAR)
             return np.concatenate([1.0 - KEPT - shares, slacks(self.limits, reach * at) / reach])
 
-        found = descend(distance, spare, start / reach)
-        return start if found is None else reach * found
+        return descend_towards(self.here, spare, start, reach)
 
     def _shares(self, positions: FloatArray) -> FloatArray:
         """Return the shares of the limits at positions (..., 3), shape (..., 12)."""

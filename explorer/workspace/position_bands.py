@@ -8,7 +8,6 @@ number.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,18 +19,8 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.singularity.colours import (
-    BAND_EDGES,
-    CLEAR,
-    FAR,
-    SINGULAR,
-    WARNED,
-    Rgb,
-    band_colours,
-    mix,
-    warning_condition,
-)
-from explorer.singularity.ellipsoids import inverse_condition, jacobian_of
+from explorer.singularity import colours
+from explorer.singularity.colours import CLEAR, FAR, SINGULAR, WARNED, Rgb, mix
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, deflection, is_elastic, stiffness_of
 from explorer.statics.load_cases import largest_shares, load_case
@@ -41,7 +30,6 @@ from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import box_of
 
 PositionMeasure = Literal["margin", "condition", "share", "force", "bending", "error", "deflection"]
-PartMeasure = Literal["share", "force", "bending"]
 
 MEASURE_WORDS: dict[PositionMeasure, tuple[str, str, float]] = {
     "share": ("largest share of a limit", "%", 100.0),
@@ -60,7 +48,7 @@ SHARES = (0.25, 0.5, 0.75, 1.0)
 """Ends of the bands of shares of a limit; the last one is the limit."""
 SHARE_COLOURS: tuple[Rgb, ...] = (FAR, mix(FAR, CLEAR, 0.5), CLEAR, WARNED, SINGULAR)
 
-STEPS = (1.0, 2.0, 5.0)
+STEPS = (1, 2, 5)
 """Ends of the bands of forces, moments and displacements, over powers of ten."""
 # Number of these ends. The lowest exceeds this share of the values within the limits.
 LEVELS, LEAST_SHARE = 6, 0.05
@@ -115,14 +103,23 @@ def position_bands(
     def measured(points: FloatArray) -> FloatArray:
         return measure_positions(design, rotation, measure, points, load)[0]
 
-    if measure not in ("margin", "condition"):
-        return _unbounded(design, rotation, measure, measured)
-    is_margin = measure == "margin"
-    unit = warn_below if is_margin else warning_condition(design.reach, warn_below)
-    levels = tuple(unit * edge for edge in BAND_EDGES)
-    return PositionBands(
-        measure, BAND_EDGES, band_colours(), levels, lambda points: measured(points) / unit
-    )
+    if measure in ("margin", "condition"):
+        is_margin = measure == "margin"
+        unit = warn_below if is_margin else colours.warning_condition(design.reach, warn_below)
+        edges, levels = colours.BAND_EDGES, tuple(unit * edge for edge in colours.BAND_EDGES)
+        own = colours.band_colours()
+        return PositionBands(measure, edges, own, levels, lambda points: measured(points) / unit)
+    if measure == "share":
+        levels, own = SHARES, SHARE_COLOURS
+    else:
+        levels, own = _round_levels(design, rotation, measured), STEP_COLOURS
+    highest = levels[-1]
+    edges = (0.0, *(highest / level for level in reversed(levels)))
+
+    def values(points: FloatArray) -> FloatArray:
+        return highest / np.maximum(measured(points), highest / (FARTHEST * edges[-1]))
+
+    return PositionBands(measure, edges, own[::-1], (math.inf, *reversed(levels)), values)
 
 
 def measure_positions(
@@ -146,8 +143,7 @@ def measure_positions(
             sizes = np.abs(at.margins)
             return sizes.min(axis=-1), sizes.argmin(axis=-1)
         case "condition":
-            rates = jacobian_of(at.with_tool(np.zeros(3)))
-            return inverse_condition(rates, design.reach), whole
+            return at.with_tool(np.zeros(3)).inverse_condition, whole
         case "error":
             moved = worst_errors(at, actuator_errors(design)).displacement
             return moved * design.unit_mm, whole
@@ -156,7 +152,13 @@ def measure_positions(
             moved = deflection(compliance_of(at, *stiffness_of(design)), wrench)[..., :3]
             return np.linalg.norm(moved, axis=-1) * design.unit_mm, whole
         case _:
-            loaded = load_case(design, rotation, w, measured_limits(design, measure))
+            # The share of a limit of one newton or one newton metre, in N × unit, is the value.
+            limits = None if measure == "share" else np.full((2, 10), np.inf)
+            if limits is not None and measure == "force":
+                limits[:, :6] = 1.0
+            elif limits is not None:
+                limits[:, 6:8] = 1e3 / design.unit_mm
+            loaded = load_case(design, rotation, w, limits)
             return largest_shares(loaded, rotation, positions)
 
 
@@ -177,46 +179,6 @@ def is_unstated(design: Design, measure: PositionMeasure) -> bool:
             return False
 
 
-def measured_limits(design: Design, measure: PartMeasure) -> FloatArray | None:
-    """Return the limits of which the largest share is the measure, shape (2, 10).
-
-    They are those of the design, as None, for a share, and else one newton or one newton metre, in
-    N × unit, of each part concerned.
-    """
-    if measure == "share":
-        return None
-    limits = np.full((2, 10), np.inf)
-    if measure == "force":
-        limits[:, :6] = 1.0
-    else:
-        limits[:, 6:8] = 1e3 / design.unit_mm
-    return limits
-
-
-def _unbounded(
-    design: Design,
-    rotation: FloatArray,
-    measure: PositionMeasure,
-    measured: Callable[[FloatArray], FloatArray],
-) -> PositionBands:
-    """Return the bands of what is infinite in singular positions.
-
-    The values of the bands are the highest level over what is measured at positions (n, 3).
-    """
-    if measure == "share":
-        levels, colours = SHARES, SHARE_COLOURS
-    else:
-        levels, colours = _round_levels(design, rotation, measured), STEP_COLOURS
-    highest = levels[-1]
-    edges = (0.0, *(highest / level for level in reversed(levels)))
-
-    def values(points: FloatArray) -> FloatArray:
-        return highest / np.maximum(measured(points), highest / (FARTHEST * edges[-1]))
-
-    ends = (math.inf, *reversed(levels))
-    return PositionBands(measure, edges, colours[::-1], ends, values)
-
-
 def _round_levels(
     design: Design, rotation: FloatArray, measured: Callable[[FloatArray], FloatArray]
 ) -> tuple[float, ...]:
@@ -230,11 +192,5 @@ def _round_levels(
     found = found[np.isfinite(found) & (found > 0.0)]
     least = float(np.quantile(found, LEAST_SHARE)) if len(found) else 1.0
     exponent = math.floor(math.log10(least))
-    # Division by a power of ten is exact where a product with a negative one is not.
-    steps = (
-        step * 10.0**power if power >= 0 else step / 10.0**-power
-        for power in itertools.count(exponent)
-        for step in STEPS
-    )
-    above = itertools.dropwhile(lambda step: step < least, steps)
-    return tuple(itertools.islice(above, LEVELS))
+    steps = [float(f"{step}e{exponent + k}") for k in range(4) for step in STEPS]
+    return tuple([step for step in steps if step >= least][:LEVELS])

@@ -19,11 +19,20 @@ from explorer.app.features.optimise.actions import (
     EndRun,
     StartRun,
 )
+from explorer.app.features.optimise.state import (
+    PLACE,
+    Comparison,
+    Optimisation,
+    OptimisationRequest,
+    SearchResult,
+    SearchRun,
+)
 from explorer.app.features.paths.actions import Go, Play, SetPathTime
 from explorer.app.features.studies.actions import BrushAxes
-from explorer.app.session.gestures import UserAction
-from explorer.app.state.action import Action
+from explorer.app.features.studies.state import Brush, Studies
+from explorer.app.session.history import UserAction
 from explorer.app.state.actions import (
+    Action,
     GoHome,
     Open,
     SetAngle,
@@ -36,22 +45,18 @@ from explorer.app.state.actions import (
 )
 from explorer.app.state.compared import Look
 from explorer.app.state.folds import SetFold
-from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
 from explorer.app.state.parts import value_at, with_value
-from explorer.app.state.state import Run, State, open_state
-from explorer.app.state.studies import Brush, Studies
+from explorer.app.state.state import State, open_state
 from explorer.app.state.view import PrecisionView, PrototypeView, SingularView, View, WorkspaceView
 from explorer.errors import ExplorerError
-from explorer.measures.catalogue import measures_in
+from explorer.measures.catalogue import measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import VARIABLES, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.tilt_torsion import TiltTorsion
-from explorer.optimise.outcome import Iterate, RunRecord
+from explorer.optimise.outcome import Iterate, Record, RunRecord, Settings, step_of
 from explorer.optimise.problem import YAW
-from explorer.optimise.record import Record, Settings, step_of
 
 OPTIMAL = PRESETS["paper-optimal"]
 MEASURED = measure_design(Case(OPTIMAL), measures_in("optimise"))
@@ -135,16 +140,16 @@ def _request(_: State, i: int, share: float) -> Action:
 
 
 def _end(state: State, count: int) -> Action:
-    run = state.optimisation.run
+    run = Optimisation.of(state).run
     new = iterates_of(state, count)
     shown = (() if run is None else run.iterates) + new
     best = shown[-1] if shown else None
     record = None if run is None or best is None else _record(run, shown, best)
-    verdict = SearchResult("stalled", "no step made it better", best, 2, 1, count, 0.1, record)
-    return EndRun(state.optimisation.count, verdict, new)
+    verdict = SearchResult("stalled", "no step made it better", best, 2, 1, 0.1, record)
+    return EndRun(Optimisation.of(state).count, verdict, new)
 
 
-def _record(run: Run, iterates: tuple[Iterate, ...], best: Iterate) -> Record:
+def _record(run: SearchRun, iterates: tuple[Iterate, ...], best: Iterate) -> Record:
     return Record(
         problem=run.problem,
         settings=Settings(starts=run.starts),
@@ -196,10 +201,10 @@ MAKERS: tuple[Make, ...] = (
     ),
     _request,
     lambda state, i, share: StartRun(),
-    lambda state, i, share: Advance(state.optimisation.count, iterates_of(state, i)),
+    lambda state, i, share: Advance(Optimisation.of(state).count, iterates_of(state, i)),
     lambda state, i, share: CancelRun(),
     lambda state, i, share: _end(state, i),
-    lambda state, i, share: Compare(state.optimisation.count, Comparison(MEASURED, MEASURED)),
+    lambda state, i, share: Compare(Optimisation.of(state).count, Comparison(MEASURED, MEASURED)),
     lambda state, i, share: Accept(),
     lambda state, i, share: Pin(state.design),
     lambda state, i, share: Unpin(i % 3),
@@ -227,7 +232,7 @@ def states_of(actions: list[Sample]) -> list[State]:
 
 def iterates_of(state: State, count: int) -> tuple[Iterate, ...]:
     """Return iterates of the run of a state, in two starts; none without a run."""
-    run = state.optimisation.run
+    run = Optimisation.of(state).run
     if run is None:
         return ()
     problem, iterates = run.problem, list[Iterate]()

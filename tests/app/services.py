@@ -11,8 +11,8 @@ import viser
 
 from explorer.app.browser.downloads import Downloads, File
 from explorer.app.features.feature import Services
-from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Session, Who
+from explorer.app.session.worker import Worker
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.buttons import Buttons
 
@@ -52,10 +52,8 @@ class StubWorker(Worker):
         done: Callable[[Any], None],
         failed: Callable[[str], None],
         receive: Callable[[Any], None] | None = None,
-        *,
-        is_drawing: bool = False,
     ) -> int:
-        del receive, is_drawing
+        del receive
         self.orders.append(StubOrder(key, task, arguments[0], done, failed))
         # Arguments and results cross the border of a process.
         self._waiting.append(lambda: done(_sent(task(*_sent(arguments)))))
@@ -63,7 +61,7 @@ class StubWorker(Worker):
             self.work()
         return len(self.orders)
 
-    def cancel(self, number: int, patience: float | None) -> None:
+    def cancel(self, number: int, patience: float | None = None, *, after: float = 0.0) -> None:
         """Leave an order as it is."""
 
     def work(self) -> None:
@@ -137,7 +135,6 @@ def services_for(
         theme=missing,
         cameras=missing,
         user_data=user_data,
-        studies=None,
         preferences=None,
     )
 

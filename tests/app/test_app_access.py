@@ -12,18 +12,20 @@ from http.client import HTTPConnection, HTTPResponse
 import pytest
 from client import PROTOCOL, Client
 from hypothesis import given, strategies as st
+from websockets.datastructures import Headers
 from websockets.exceptions import InvalidStatus
+from websockets.http11 import Request
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from explorer.app.security.access import Access, Head, Refusal, is_loopback
+from explorer.app.security import Access, Refusal, is_loopback
 from explorer.app.server import Running, start
 from explorer.errors import ServerError
 from explorer.mechanism.design_file import PRESETS
 
 PORT = 8080
 TOKEN = "a-token_of-16-or-more"
-OPEN = Access.to("127.0.0.1")
+OPEN = Access("127.0.0.1")
 CLOSED = Access("0.0.0.0", TOKEN)
 COOKIE = f"explorer-token-{PORT}={TOKEN}"
 HERE = f"127.0.0.1:{PORT}"
@@ -32,7 +34,7 @@ EVIL_HOSTS = (
     "evil.example", f"evil.example:{PORT}", f"127.0.0.1.evil.example:{PORT}", "127.0.0.1",
     "127.0.0.1:80", "127.0.0.1:8081", f"localhost.evil.example:{PORT}", "", ":8080",
     f"user@127.0.0.1:{PORT}", f"127.0.0.1:{PORT}/", f"127.0.0.1:{PORT} ", f"[::2]:{PORT}",
-    f"0x7f.1:{PORT}", f"2130706433:{PORT}", f"127.0.0.1:{PORT}\r\nX: 1", "[::1", f"127.1:{PORT}",
+    f"0x7f.1:{PORT}", f"2130706433:{PORT}", "[::1", f"127.1:{PORT}",
 )  # fmt: skip
 EVIL_ORIGINS = (
     "null", "http://evil.example", f"http://evil.example:{PORT}", "http://127.0.0.1:8081",
@@ -42,8 +44,12 @@ EVIL_ORIGINS = (
 )  # fmt: skip
 
 
-def page(host: str = HERE, target: str = "/", cookie: str | None = None) -> Head:
-    return Head(target, [host], [], [] if cookie is None else [cookie], upgrade=False)
+def request(target: str, **headers: list[str]) -> Request:
+    return Request(target, Headers((name, each) for name in headers for each in headers[name]))
+
+
+def page(host: str = HERE, target: str = "/", cookie: str | None = None) -> Request:
+    return request(target, host=[host], cookie=[] if cookie is None else [cookie])
 
 
 def websocket(
@@ -51,13 +57,13 @@ def websocket(
     origin: str | None = f"http://{HERE}",
     target: str = "/",
     cookie: str | None = None,
-) -> Head:
-    origins = [] if origin is None else [origin]
-    return Head(target, [host], origins, [] if cookie is None else [cookie], upgrade=True)
+) -> Request:
+    origins, cookies = [] if origin is None else [origin], [] if cookie is None else [cookie]
+    return request(target, host=[host], origin=origins, cookie=cookies, upgrade=["websocket"])
 
 
 def is_forbidden(refusal: Refusal | None) -> bool:
-    return refusal is not None and refusal.status == HTTPStatus.FORBIDDEN
+    return refusal is not None and refusal[0] == HTTPStatus.FORBIDDEN
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]", "LOCALHOST"])
@@ -80,8 +86,8 @@ def test_other_host_is_refused_on_loopback(host: str) -> None:
 def test_request_without_exactly_one_host_and_origin_is_refused(hosts: list[str]) -> None:
     origins = [f"http://{host}" for host in hosts]
     for access in (OPEN, CLOSED):
-        assert is_forbidden(access.judge(Head("/", hosts, [], [COOKIE], upgrade=False), PORT))
-        assert is_forbidden(access.judge(Head("/", [HERE], origins, [COOKIE], upgrade=True), PORT))
+        for headers in ({"host": hosts}, {"host": [HERE], "origin": origins, "upgrade": ["x"]}):
+            assert is_forbidden(access.judge(request("/", cookie=[COOKIE], **headers), PORT))
 
 
 @pytest.mark.parametrize("access", [OPEN, CLOSED])
@@ -91,23 +97,24 @@ def test_websocket_of_another_origin_is_refused(access: Access, origin: str) -> 
     assert is_forbidden(access.judge(websocket(origin=origin, cookie=COOKIE), PORT))
 
 
-@given(st.text(max_size=30) | st.from_regex(r"https?://[a-z0-9.:\[\]-]{1,30}", fullmatch=True))
+@given(
+    st.text(st.characters(codec="latin-1", exclude_categories=["Cc"]), max_size=30)
+    | st.from_regex(r"https?://[a-z0-9.:\[\]-]{1,30}", fullmatch=True)
+)
 def test_only_the_origin_of_the_host_passes_and_others_get_a_printable_line(origin: str) -> None:
     refusal = OPEN.judge(websocket(origin=origin), PORT)
     assert (refusal is None) == (origin.lower() in (f"http://{HERE}", f"https://{HERE}"))
     for each in (refusal, OPEN.judge(page(origin), PORT)):
-        assert each is None or each.reason.isprintable()
+        assert each is None or each[1].isprintable()
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "lab.example", "fe80::1"])
 def test_server_beyond_loopback_has_a_random_token(host: str) -> None:
-    first, second = Access.to(host), Access.to(host)
+    first, second = Access(host), Access(host)
     assert first.token is not None
     assert len(first.token) >= 32
     assert first.token != second.token
     assert f"?token={first.token}" in first.url(PORT)
-    with pytest.raises(ServerError, match=r"^[^\n]*needs a token[^\n]*$"):
-        Access(host)
 
 
 @pytest.mark.parametrize(
@@ -118,7 +125,7 @@ def test_server_beyond_loopback_has_a_random_token(host: str) -> None:
 def test_token_that_no_address_can_hold_is_refused_in_one_line(token: str) -> None:
     for host in ("127.0.0.1", "0.0.0.0"):
         with pytest.raises(ServerError, match=r"^[^\n]*16 to 128[^\n]*$"):
-            Access.to(host, token)
+            Access(host, token)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
@@ -144,15 +151,15 @@ def test_wrong_token_is_refused_without_naming_the_right_one(wrong: str) -> None
         # Another explorer's, on another port of the same machine.
         page(cookie=f"explorer-token-{PORT + 1}={TOKEN}"),
         page(cookie=f'explorer-token-{PORT}; "{TOKEN}'),
-        page(cookie=f"explorer-token-{PORT}=ü\udcff"),
+        page(cookie=f"explorer-token-{PORT}=ü\xff"),
         websocket(),
         websocket(cookie=f"explorer-token-{PORT}={wrong}"),
         websocket(target=f"/?token={wrong}"),
     ):
         refusal = CLOSED.judge(head, PORT)
         assert refusal is not None
-        assert refusal.status == HTTPStatus.UNAUTHORIZED
-        assert TOKEN not in refusal.reason
+        assert refusal[0] == HTTPStatus.UNAUTHORIZED
+        assert TOKEN not in refusal[1]
 
 
 def test_host_beyond_loopback_is_an_address_or_the_machines_name() -> None:
@@ -172,7 +179,7 @@ PROXY = "lab.example.org"
 def test_host_of_a_proxy_passes_with_its_own_origin_and_the_token(
     listening: str, scheme: str, host: str
 ) -> None:
-    access = Access.to(listening, TOKEN, [PROXY])
+    access = Access(listening, TOKEN, [PROXY])
     origin = f"{scheme}://{host}"
     assert access.judge(page(host, cookie=COOKIE), PORT) is None
     assert access.judge(websocket(host, origin, cookie=COOKIE), PORT) is None
@@ -183,15 +190,13 @@ def test_host_of_a_proxy_passes_with_its_own_origin_and_the_token(
         assert is_forbidden(access.judge(websocket(host, wrong, cookie=COOKIE), PORT))
     refusal = access.judge(websocket(host, origin), PORT)
     assert refusal is not None
-    assert refusal.status == HTTPStatus.UNAUTHORIZED
+    assert refusal[0] == HTTPStatus.UNAUTHORIZED
 
 
 def test_proxy_needs_a_token_on_loopback_too() -> None:
-    access = Access.to("127.0.0.1", names=[PROXY])
-    assert access.proxy_url(PROXY) == f"https://{PROXY}/?token={access.token}"
+    access = Access("127.0.0.1", names=[PROXY])
+    assert access.token is not None
     assert access.judge(page(), PORT) is not None
-    with pytest.raises(ServerError, match="needs a token"):
-        Access("127.0.0.1", None, (PROXY,))
 
 
 @pytest.mark.parametrize(
@@ -199,7 +204,7 @@ def test_proxy_needs_a_token_on_loopback_too() -> None:
 )
 def test_name_that_no_host_has_is_refused_in_one_line(name: str) -> None:
     with pytest.raises(ServerError, match=r"^[^\n]*such as lab.example.org[^\n]*$"):
-        Access.to("127.0.0.1", TOKEN, [name])
+        Access("127.0.0.1", TOKEN, [name])
 
 
 @pytest.mark.parametrize(
@@ -213,7 +218,7 @@ def test_query_with_another_address_is_refused(query: str) -> None:
 
 
 def test_policy_lets_the_page_connect_only_to_its_server() -> None:
-    headers = dict(OPEN.headers(page(), PORT))
+    headers = OPEN.headers(page(), PORT)
     policy = {
         words[0]: words[1:]
         for words in map(str.split, headers["Content-Security-Policy"].split(";"))
@@ -226,7 +231,7 @@ def test_policy_lets_the_page_connect_only_to_its_server() -> None:
 
 
 def test_cookie_is_bound_to_the_port_and_hidden_from_scripts_and_other_sites() -> None:
-    cookie = dict(CLOSED.headers(page(), PORT))["Set-Cookie"]
+    cookie = CLOSED.headers(page(), PORT)["Set-Cookie"]
     given_cookie, *flags = cookie.split("; ")
     assert given_cookie == COOKIE
     assert set(flags) == {"Path=/", "HttpOnly", "SameSite=Strict"}
@@ -263,7 +268,7 @@ def test_url_is_one_that_a_browser_on_this_machine_opens(host: str, url: str) ->
 def test_allowed_name_passes_with_usual_ports(
     allowed: str, host: str, origin: str, *, passes: bool
 ) -> None:
-    access = Access.to("127.0.0.1", TOKEN, [allowed])
+    access = Access("127.0.0.1", TOKEN, [allowed])
     assert (access.judge(websocket(host, origin, cookie=COOKIE), PORT) is None) == passes
 
 

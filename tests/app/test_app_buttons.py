@@ -22,16 +22,17 @@ from socket_tab import SocketTab
 from explorer.app import look
 from explorer.app.browser import viser_gaps
 from explorer.app.browser.viser_gaps import PLACE
-from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
+from explorer.app.features.mechanism.panel import JOINT_LABELS
 from explorer.app.features.optimise import runner
 from explorer.app.features.optimise.actions import SetRequest, StartRun
+from explorer.app.features.optimise.state import OptimisationRequest, SearchResult
 from explorer.app.features.paths.actions import Go, Play
+from explorer.app.features.studies.state import Studies
 from explorer.app.inputs.controls import MAIN
 from explorer.app.server import Running
 from explorer.app.session.session import UNDO, Session
 from explorer.app.state.actions import Open, Set, SetJoint, SetPosition
 from explorer.app.state.compared import SLOTS
-from explorer.app.state.optimisation import OptimisationRequest, SearchResult
 from explorer.app.widgets import assigning
 from explorer.app.widgets.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
 from explorer.app.widgets.buttons import Buttons, press_button
@@ -64,7 +65,7 @@ def test_press_of_a_client_is_one_step(running: Running, tab: SocketTab) -> None
     assert session.wait_until_idle()
     assert ("compare.open", SLOTS[0]) in presses_in(running)
     for _ in range(4):
-        session.travel(UNDO)
+        session.do(UNDO)
     assert session.wait_until_idle()
     assert session.state.compared.is_empty
 
@@ -97,7 +98,7 @@ def test_press_that_nothing_offers_does_nothing(running: Running, tab: SocketTab
     tab.update(*press_update(running, "compare.turn", "Outlines"))
     wait_for(lambda: session.state.compared.look.outlines)
     assert session.history.step.number == before + 1
-    session.travel(UNDO)
+    session.do(UNDO)
 
 
 def test_presses_of_one_client_are_handled_in_their_order(server: viser.ViserServer) -> None:
@@ -180,7 +181,7 @@ def test_each_tab_has_one_filled_button_at_most(running: Running) -> None:
     wait_for(lambda: not session.state.compared.is_empty)
     check_filled(running, "Compare")
     buttons.press("studies.start", "", CLIENT)
-    wait_for(lambda: session.state.studies.name is not None)
+    wait_for(lambda: Studies.of(session.state).name is not None)
     check_filled(running)
     session.do(Go())
     wait_for(lambda: session.state.journey is not None)
@@ -266,7 +267,7 @@ def test_value_that_crossed_with_the_user_is_sent_again_when_the_user_rests(
         nonlocal now
         now += seconds
         assigner.assign([(handle, name, np.array(value) if name in PLACE else value)])
-        return assigner.settle()
+        return assigner.resend_crossed()
 
     def use(value: object, seconds: float) -> None:
         nonlocal now

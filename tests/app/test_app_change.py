@@ -12,12 +12,11 @@ import viser
 from desk import Desk
 from services import StubWorker, services_for
 
-from explorer.app.features.history.change import OVER, ChangeCard, ChangeScene, DesignChange
+from explorer.app.features.history.feature import OVER, ChangeScene, DesignChange
 from explorer.app.features.workspace.feeds import VOLUME_FEED
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import REDO, UNDO
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, Set, SetPosition, SetVariable
+from explorer.app.state.actions import Action, Open, Set, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import Buttons
 from explorer.measures.snapshot import evaluate
@@ -37,7 +36,7 @@ class Watcher:
         services = services_for(server, desk.session, worker, buttons=buttons)
         self._volumes = services.get(VOLUME_FEED)
         self.change = services.get(DesignChange)
-        self.card = ChangeCard(services)
+        self.card = self.change.card
         self.scene = ChangeScene(services)
         self.follow()
 
@@ -99,8 +98,8 @@ def test_change_is_over_with_the_next_step_with_a_press_and_with_undo(
     for value, end in (
         (4.0, lambda: desk.session.do(SetPosition(0, 11.0))),
         (4.25, lambda: desk.press(buttons, OVER)),
-        (4.5, lambda: desk.session.travel(UNDO)),
-        (4.75, lambda: [desk.session.travel(move) for move in (UNDO, REDO)]),
+        (4.5, lambda: desk.session.do(UNDO)),
+        (4.75, lambda: [desk.session.do(move) for move in (UNDO, REDO)]),
     ):
         watcher.do(SetPosition(0, 10.0 + 0.1 * value))
         watcher.do(SetVariable("a3y", value))

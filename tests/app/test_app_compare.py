@@ -37,9 +37,10 @@ from explorer.app.features.compare.work import (
     draw_compared,
     drawing_in,
 )
-from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import COMPARED
 from explorer.app.state.actions import Open, Set, SetVariable
 from explorer.app.state.compared import Look, without_name
 from explorer.app.state.frame import Frame
@@ -49,12 +50,10 @@ from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.buttons import Buttons
-from explorer.app.widgets.colours import COMPARED
-from explorer.app.widgets.commands import NO_OPTION
+from explorer.app.widgets.palette import NO_OPTION
 from explorer.errors import InputError
-from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.measures.measurements import Measurements, measure_design
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Guide, Payload
@@ -207,13 +206,12 @@ def test_same_manipulator_in_other_units_has_the_same_values_and_a_note() -> Non
 def test_bars_are_as_long_as_their_values() -> None:
     found = columns(INITIAL, variant(2))
     html = bars(found, millimetres=False)
-    widths = [float(width) for width in re.findall(r'<rect[^>]* width="([\d.]+)"', html)]
+    widths = [float(width) for width in re.findall(r"--share:([\d.]+)%", html)]
     per_drawing = np.array(widths).reshape(len(DRAWN), len(found))
     for name, drawn in zip(DRAWN, per_drawing, strict=True):
         values = np.array([column.value(CATALOGUE[name]) for column in found], dtype=np.float64)
         if values.max() > 0.0:
-            expected = np.maximum(drawn.max() * values / values.max(), 0.8)
-            assert drawn == pytest.approx(expected, abs=0.02), name
+            assert drawn == pytest.approx(100.0 * values / values.max(), abs=0.01), name
 
 
 LIGHT = msgspec.structs.replace(
@@ -247,7 +245,7 @@ def test_table_compares_loads_of_the_designs_that_have_them() -> None:
     rows = cells(html)
     for design, place in ((LIGHT, 0), (HEAVY, 1)):
         pose = LoadedPose(design, design.home_pose)
-        moments = pose.held.bending + pose.held.spread[6:8]
+        moments = pose.reactions.bending + pose.reactions.spread[6:8]
         for name, expected in (
             ("load share at home %", 100.0 * pose.share),
             ("largest payload at home kg", pose.largest_payload),

@@ -11,8 +11,7 @@ import viser
 from desk import Desk
 from services import services_for
 
-from explorer.app.features.designs.feature import DesignsPanel
-from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import MarkSaved, Open, Set, SetName, SetVariable
@@ -128,7 +127,7 @@ def test_opened_design_is_a_step_that_is_undone(desk: Desk, saved: SavedDesigns)
     saved.open("mine")
     settle(desk, saved)
     assert desk.state.design.name == "mine"
-    desk.session.travel(UNDO)
+    desk.session.do(UNDO)
     assert desk.state.design.name == "paper-initial"
 
 
@@ -228,7 +227,7 @@ def test_list_shows_what_other_explorers_save_the_last_on_top(
     panel = DesignsPanel(services)
     for number in range(3):
         Library(library.folder).save(f"design {number}", OPTIMAL)
-    saved.refresh()
+    saved.open("design 0")
     markup_of_rows(desk, saved, panel)
     assert [row.name for row in panel.rows] == ["design 2", "design 1", "design 0", *PRESETS]
 

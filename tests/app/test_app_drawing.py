@@ -15,13 +15,8 @@ from hypothesis import given, strategies as st
 from limited_designs import scaled_design
 from strategies import designs
 
-from explorer.app.features.mechanism.sketch import (
-    FIGURE_WIDTH,
-    HEIGHT,
-    WIDTH,
-    figures,
-)
-from explorer.app.features.singularity.panel import measures_table
+from explorer.app.features.mechanism.sketch import FIGURE_WIDTH, HEIGHT, WIDTH, figures
+from explorer.app.features.singularity.feature import measures_table
 from explorer.app.look import read_stylesheet
 from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.scene.camera import (
@@ -249,7 +244,7 @@ class Browser:
         self.camera = Browser.Camera()
         self.puts: list[FloatArray] = []
 
-    def put(self, _: Any, eye: FloatArray, __: FloatArray) -> None:
+    def put(self, _: Any, eye: FloatArray, *__: Any) -> None:
         """Take note of where the camera is put; whether it goes there is another matter."""
         self.puts.append(eye)
 
@@ -259,14 +254,16 @@ class Browser:
 
 
 @pytest.fixture
-def browser() -> Any:
-    return Browser()
+def browser(monkeypatch: pytest.MonkeyPatch) -> Any:
+    made = Browser()
+    monkeypatch.setattr("explorer.app.scene.camera.put_camera", made.put)
+    return made
 
 
 @pytest.fixture
 def cameras(browser: Any) -> Cameras:
     first: Any = SimpleNamespace()
-    cameras = Cameras(first, lambda: POINTS, browser.put)
+    cameras = Cameras(first, lambda: POINTS)
     cameras.frame_first()
     assert np.allclose(first.position, FIRST)
     cameras.connected(browser)
@@ -316,7 +313,7 @@ def test_camera_is_put_last_for_the_shape_that_its_browser_told_last(browser: An
             others[-1].join(0.1)
         return POINTS
 
-    cameras = Cameras(cast("Any", SimpleNamespace()), points, browser.put)
+    cameras = Cameras(cast("Any", SimpleNamespace()), points)
     cameras.frame_first()
     cameras.connected(browser)
     browser.camera.aspect = 1.6
@@ -378,10 +375,12 @@ def test_camera_has_no_perspective_along_an_axis_alone(axis: FloatArray) -> None
     assert has_perspective(3.0 * (upright + 0.01 * np.array([0.3, 0.5, 0.8])))
 
 
-def test_camera_follows_what_leaves_its_picture_and_keeps_its_direction(browser: Any) -> None:
+def test_camera_follows_what_leaves_its_picture_and_keeps_its_direction(
+    browser: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     points, first = POINTS.copy(), SimpleNamespace()
 
-    def look(_: Any, eye: FloatArray, target: FloatArray) -> None:
+    def look(_: Any, eye: FloatArray, target: FloatArray, __: float) -> None:
         browser.puts.append(eye)
         browser.camera.look_at = target
         browser.tell(eye)
@@ -392,7 +391,8 @@ def test_camera_follows_what_leaves_its_picture_and_keeps_its_direction(browser:
         return len(browser.puts)
 
     browser.camera.fov = FIELD_OF_VIEW
-    cameras = Cameras(cast("Any", first), lambda: points, look)
+    cameras = Cameras(cast("Any", first), lambda: points)
+    monkeypatch.setattr("explorer.app.scene.camera.put_camera", look)
     cameras.frame_first()
     cameras.connected(browser)
     assert count_puts_with(1.0) == 1

@@ -20,30 +20,24 @@ import viser
 from desk import CLIENT
 
 import explorer.app
-from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
 from explorer.app.features.forces.loads import WEIGHTS_FEED, SetForce
-from explorer.app.features.listed import FEATURES
 from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
-from explorer.app.features.orientation.work import (
-    RANGE_FEED,
-    TILTS_FEED,
-    GoToTilt,
-    SetTiltTorsion,
-)
+from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
-from explorer.app.features.precision.budget import SetTolerances
+from explorer.app.features.precision.feature import SetTolerances
 from explorer.app.features.studies.actions import PickDesign
+from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.view.feature import CAMERA_HINTS
-from explorer.app.inputs.bindings import At, Bound
-from explorer.app.inputs.control import Control
+from explorer.app.inputs.control import At, Bound, Control
 from explorer.app.inputs.controls import Controls
-from explorer.app.page import Page
+from explorer.app.page import FEATURES, Page
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.server import Running, start
 from explorer.app.session.feed import Feed
-from explorer.app.session.gestures import UserAction
+from explorer.app.session.history import UserAction
 from explorer.app.session.session import UNDO, Session
 from explorer.app.state.actions import (
     MarkSaved,
@@ -60,14 +54,12 @@ from explorer.app.state.folds import SetFold
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.view import OrientationView
-from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.commands import CAMERA_KEYS, PALETTE_KEY, Key
-from explorer.app.widgets.palette import Command, Palette
+from explorer.app.widgets.palette import PALETTE_KEY, Command, Key, Palette
 from explorer.app.widgets.pieces import Widget, widgets
 from explorer.errors import ExplorerError
-from explorer.files.manual import read_page
+from explorer.files.packaged import read_page
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
 
@@ -169,7 +161,7 @@ def test_control_with_a_path_sets_the_value_there_and_no_other(
             assert session.history.at == 0, name
             session.do(Set("view", before.view))
         else:
-            session.travel(UNDO)
+            session.do(UNDO)
         assert page.wait_until_drawn()
         assert session.state == before, name
         assert handle.value == shown, name
@@ -371,7 +363,7 @@ def test_saved_design_is_opened_by_a_command_of_its_name(running: Running) -> No
         trigger(viser.CommandEvent(CLIENT, CLIENT.client_id, command))
     offered()
     assert session.state.design == design
-    session.travel(UNDO)
+    session.do(UNDO)
     saved.delete("mine")
     assert "Designs › Open mine" not in offered()
 
@@ -400,7 +392,7 @@ def test_every_key_belongs_to_a_command_and_not_to_browser_camera_or_palette(
     for key in itertools.chain.from_iterable(owned.values()):
         assert str(key) not in BROWSER_KEYS
         # viser's camera looks at the letter, whatever else is held down.
-        assert key.key not in CAMERA_KEYS
+        assert key.key not in "WASDQE"
         assert key != PALETTE_KEY
 
 

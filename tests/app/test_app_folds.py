@@ -24,8 +24,8 @@ from explorer.app.features.mechanism.folds import (
     fold_span,
     leaf_corners,
 )
-from explorer.app.features.mechanism.pose_panel import JOINT_LABELS, MovePanel
-from explorer.app.features.singularity.panel import fold_dial
+from explorer.app.features.mechanism.panel import JOINT_LABELS, MovePanel
+from explorer.app.features.singularity.feature import fold_dial
 from explorer.app.scene.placing import Placed
 from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO
@@ -175,7 +175,7 @@ def test_choice_shows_six_sliders_in_place_of_six_and_is_kept(
     by_position = list(shown(panel, desk))
     assert by_position == ["x", "y", "z", "yaw (°)", "pitch (°)", "roll (°)"]
     before = desk.state
-    desk.press(services.buttons, "pose.coordinates", "folds")
+    desk.press(services.buttons, "view.coordinates", "folds")
     after = desk.state
     assert after.view.coordinates == "folds"
     assert replace(after, view=before.view) == before
@@ -186,7 +186,7 @@ def test_choice_shows_six_sliders_in_place_of_six_and_is_kept(
     assert Open(PRESETS["paper-initial"]).apply(after).view.coordinates == "folds"
     saved = decode_session(encode_session(start_history(after)), "test")
     assert saved.step.state.view.coordinates == "folds"
-    desk.press(services.buttons, "pose.coordinates", "position")
+    desk.press(services.buttons, "view.coordinates", "position")
     assert list(shown(panel, desk)) == by_position
 
 
@@ -210,7 +210,7 @@ def test_slider_sets_a_fold_within_the_walls_of_the_mode_and_is_undone(
     desk.use(slider, -45.0)
     assert folds_of(desk.state)[4] == -45.0
     assert desk.session.history.step.words == "φ2 = −45°"
-    desk.session.travel(UNDO)
+    desk.session.do(UNDO)
     assert replace(desk.state, gesture=None) == replace(before, gesture=None)
     # A number that is typed may lie beyond the wall; the slider's ends are those of its mode.
     desk.use(shown(panel, desk)["φ2 (°)"], 45.0)
@@ -270,17 +270,6 @@ def test_dial_points_at_the_fold_in_the_half_of_its_sign(state: State) -> None:
         assert (top < -10.0) == (sign > 0)
         text = html.removesuffix("°</span>").rpartition(">")[2]
         assert number(text) == pytest.approx(fold, abs=0.06)
-
-
-def test_dial_says_where_its_fold_is_and_where_it_is_flat() -> None:
-    state = SetFold(3, -47.3).apply(HOME)
-    assert (
-        'title="Fold φ1 at the line b2b3: −47.3°; flat at 0° and −180°, with a1 on the platform '
-        'plane"'
-    ) in fold_dial(Frame(state), 0)
-    assert "Fold φ2 at the line a1b4" in fold_dial(Frame(state), 1)
-    assert "Fold φ3 at the guide" in fold_dial(Frame(state), 2)
-    assert "flat at 0° and 180°, with b4 on the base plane" in fold_dial(Frame(state), 2)
 
 
 # The leaves

@@ -20,7 +20,7 @@ from services import StubWorker, services_for
 
 from explorer import Actuators, Guide, Payload, Struts, Tolerances, Tool
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.feature import LoadFigure
+from explorer.app.features.forces.feature import GO, WORST, ForcesPanel, LoadFigure
 from explorer.app.features.forces.loads import (
     FITTING,
     WEIGHTS_FEED,
@@ -29,40 +29,39 @@ from explorer.app.features.forces.loads import (
     fitting_scale,
     nearest_feed,
 )
-from explorer.app.features.forces.panel import GO, WORST, ForcesPanel
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle, load_tip, tool_point
 from explorer.app.features.forces.tasks import load_of
-from explorer.app.features.precision.budget import (
+from explorer.app.features.precision.feature import (
     BUDGET_FEED,
     SET,
+    TYPICAL,
     BudgetPart,
+    PrecisionPanel,
     SetTolerances,
     budget_request,
 )
-from explorer.app.features.precision.panel import TYPICAL, PrecisionPanel
 from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene, drawn_times
 from explorer.app.features.precision.tasks import budget_of, budget_table
 from explorer.app.scene.placing import SCENE_REACH, Placed
-from explorer.app.scene.shapes import linear_colour
+from explorer.app.scene.shapes import GHOST, linear_colour
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import ForcesView, PrecisionView
 from explorer.app.widgets.blocks import render, share_colour
 from explorer.app.widgets.buttons import Buttons
-from explorer.app.widgets.colours import GHOST
 from explorer.errors import InputError, NoAnswerError
 from explorer.export.tables import TOLERANCE_COLUMNS
 from explorer.measures.blocks.block import Share
-from explorer.measures.blocks.budget import tolerance_budget
-from explorer.measures.blocks.forces import most_held, reaction_tables, verdict
+from explorer.measures.blocks.forces import largest_loads, reaction_tables, verdict
+from explorer.measures.blocks.precision import tolerance_budget
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS, typical_machine
 from explorer.mechanism.pose import Pose
 from explorer.singularity.colours import SINGULAR
-from explorer.statics.accuracy import SOURCES
-from explorer.statics.budget.costs import stated_tolerances
+from explorer.statics.accuracy import SOURCES, stated_tolerances
 from explorer.statics.forces import actuator_forces, strut_bending
+from explorer.statics.reactions import limited_parts
 
 OPTIMAL = PRESETS["paper-optimal"]
 LIMITED = msgspec.structs.replace(
@@ -135,10 +134,10 @@ def test_verdict_and_bar_name_the_largest_share(factor: float, title: str, look:
 def test_design_without_limits_shows_forces_and_no_shares() -> None:
     state = loaded_state(OPTIMAL)
     found = loaded_pose(state)
-    assert not found.limited.any()
+    assert not limited_parts(found.design).any()
     assert "No limits are given" in words_of(state)
     assert "%" not in words(render(reaction_tables(found)))
-    assert render([most_held(found)]).count("no limit") == 2
+    assert render([largest_loads(found)]).count("no limit") == 2
     assert services_for().get(LoadFigure)(Frame(state)) == ""
 
 
@@ -149,7 +148,7 @@ def test_singular_pose_shows_infinite_forces() -> None:
     assert "∞" in text
     assert "nan" not in text.lower()
     assert "pushes<" not in text
-    assert "worst direction" not in render([most_held(loaded_pose(state))])
+    assert "worst direction" not in render([largest_loads(loaded_pose(state))])
     assert "∞" in services_for().get(LoadFigure)(Frame(state))
 
 
@@ -158,7 +157,7 @@ def test_weights_are_those_that_are_chosen() -> None:
     services = services_for(worker=worker)
     loads = services.get(Loads)
     none, payload = (
-        loads.of(Frame(loaded_state(force=(0.0, 0.0, 0.0), weighed=each))).held.actuators
+        loads.of(Frame(loaded_state(force=(0.0, 0.0, 0.0), weighed=each))).reactions.actuators
         for each in ("none", "payload")
     )
     assert np.abs(none).max() == 0.0
@@ -171,7 +170,7 @@ def test_weights_are_those_that_are_chosen() -> None:
     own = loads.of(frame).own
     assert own is not None
     assert min(own.rods) > 0.0
-    assert np.abs(loads.of(frame).held.actuators - payload).max() > 1e-3
+    assert np.abs(loads.of(frame).reactions.actuators - payload).max() > 1e-3
 
 
 def test_nearest_position_that_holds_the_load_is_searched_and_gone_to(

@@ -15,28 +15,19 @@ from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.bodies import (
-    BASE_RADIUS,
-    PLATE_THICKNESS,
-    PLATE_TOP,
-    platform_plate,
-)
-from explorer.app.features.mechanism.gaps import (
+from explorer.app.features.mechanism import bodies, marks
+from explorer.app.features.mechanism.incidences import (
     DASHES,
+    FADE_FROM,
+    FARTHEST,
     INSET,
     Gaps,
     Tetrahedra,
+    approaches,
     gap_text,
     visible_gaps,
 )
-from explorer.app.features.mechanism.incidences import FADE_FROM, FARTHEST, Flags, approaches
-from explorer.app.features.mechanism.marks import (
-    CLEAR_HANDLE,
-    FAINT_HANDLE,
-    DragHandle,
-    hides_a_gap,
-)
-from explorer.app.features.singularity.panel import SingularityPanel, distance_table
+from explorer.app.features.singularity.feature import SingularityPanel, distance_table
 from explorer.app.features.singularity.work import GoToSingularity, GoToStratum
 from explorer.app.features.view.ground import TO_SUN, shadow_outlines
 from explorer.app.scene.placing import Placed
@@ -79,7 +70,7 @@ def scenes() -> list[Placed]:
     return [Placed(Frame(state)) for state in (*random_states(12, seed=5), *near, *singular)]
 
 
-def draw(part: Gaps | Tetrahedra | Flags, scene: State | Placed) -> Drawn:
+def draw(part: Gaps | Tetrahedra | bodies.Flags, scene: State | Placed) -> Drawn:
     placed = scene if isinstance(scene, Placed) else Placed(Frame(scene))
     return by_name(part.updates(placed))
 
@@ -198,7 +189,7 @@ def test_parallel_lines_are_told_and_nothing_is_drawn_far_away(
         for values in (node.get("points"), node.get("position"), node.get("batched_positions")):
             if values is not None:
                 assert np.abs(np.asarray(values)).max() <= longest, name
-    flags = draw(services.get(Flags), state)
+    flags = draw(services.get(bodies.Flags), state)
     for root in ("/base", "/platform"):
         line = flags[f"{root}/flag/line"]
         assert abs(line["position"][0]) + line["scale"][2] <= 2.0 * longest
@@ -325,13 +316,16 @@ def test_tetrahedron_that_fails_is_outlined_even_if_it_is_switched_off(
 
 
 def test_gizmo_is_small_and_faint_where_it_would_hide_a_gap(services: Services) -> None:
-    handle = services.get(DragHandle)
+    handle = services.get(marks.DragHandle)
     # At the last pose b4 is on the base plane.
-    for state, look in ((open_state(OPTIMAL), CLEAR_HANDLE), (approaching(3)[-1], FAINT_HANDLE)):
+    for state, look in (
+        (open_state(OPTIMAL), marks.CLEAR_HANDLE),
+        (approaching(3)[-1], marks.FAINT_HANDLE),
+    ):
         values = by_name(handle.updates(Placed(Frame(state))))["/handle"]
         assert (values["scale"], values["opacity"]) == look
     # a1 on the platform plane is far from b4.
-    assert not hides_a_gap(Placed(Frame(approaching(1)[-1])))
+    assert not marks.hides_a_gap(Placed(Frame(approaching(1)[-1])))
 
 
 # Colours
@@ -348,7 +342,7 @@ def test_linear_colours_are_those_of_the_srgb_standard(colour: tuple[int, int, i
 # The shadow on the ground
 
 
-GROUND = PLATE_TOP - PLATE_THICKNESS
+GROUND = bodies.PLATE_TOP - bodies.PLATE_THICKNESS
 POSES = (None, Pose.of_yaw_pitch_roll((9.0, 8.0, 7.5), (-38.0, 24.0, 8.0)))
 
 
@@ -367,9 +361,9 @@ def test_shadow_of_plates_is_their_projection(pose: Pose | None) -> None:
     scene = Placed(Frame(open_state(OPTIMAL, pose)))
     base, platform, *_ = shadow_outlines(scene, GROUND)
     corners = np.array([scene.points[name][:2] for name in ("a1", "a2", "a3")])
-    solid, _ = plate(corners, BASE_RADIUS, GROUND, PLATE_TOP)
+    solid, _ = plate(corners, bodies.BASE_RADIUS, GROUND, bodies.PLATE_TOP)
     assert area(base) == pytest.approx(area(on_ground(solid)), rel=0.01)
-    local, _ = platform_plate(scene)
+    local, _ = bodies.platform_plate(scene)
     rotation = scene.frame.snapshot.rotation
     projected = on_ground(scene.points["b4"] + local @ rotation.T)
     # The plate counts as a sheet, so that its shadow lacks the rim of its thickness.

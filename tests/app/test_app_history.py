@@ -18,16 +18,22 @@ from socket_tab import SocketTab
 
 import explorer.app
 from explorer.app.features.optimise.actions import CancelRun, EndRun, StartRun
+from explorer.app.features.optimise.state import Optimisation, SearchResult
 from explorer.app.features.paths.actions import Advance, CancelPlan, Go, Play, SetPathTime
 from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.server import Running
-from explorer.app.session import gestures, history
-from explorer.app.session.gestures import PAUSE_SECONDS, UserAction
-from explorer.app.session.history import restore, settle, start_history
-from explorer.app.session.session import REDO, UNDO
-from explorer.app.state.action import Action
+from explorer.app.session import history
+from explorer.app.session.history import (
+    PAUSE_SECONDS,
+    UserAction,
+    restore,
+    start_history,
+    state_of_step,
+)
+from explorer.app.session.session import REDO, UNDO, move_to
 from explorer.app.state.actions import (
+    Action,
     GoHome,
     Open,
     Reset,
@@ -39,7 +45,6 @@ from explorer.app.state.actions import (
     SetVariable,
 )
 from explorer.app.state.frame import Frame
-from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.presses import Press, Presses
 from explorer.app.state.state import Hold, State, open_state
 from explorer.errors import ExplorerError, InputError
@@ -113,7 +118,7 @@ def test_history_undoes_and_redoes_every_step_exactly(
         except ExplorerError:
             continue
         # The step holds the state that the page shows.
-        assert recorder.history.step.state == settle(recorder.state)
+        assert recorder.history.step.state == state_of_step(recorder.state)
         assert recorder.history.step.words
         assert recorder.history.at == len(recorder.history.steps) - 1
     before, steps = recorder.history, recorder.history.steps
@@ -123,7 +128,7 @@ def test_history_undoes_and_redoes_every_step_exactly(
     for step, expected, refusal in ((-1, states[-2::-1], "undo"), (1, states[1:], "redo")):
         for state in expected:
             recorder.move(step)
-            assert settle(recorder.state) == state
+            assert state_of_step(recorder.state) == state
         with pytest.raises(InputError, match=f"nothing to {refusal}"):
             recorder.move(step)
     for step in steps:
@@ -199,7 +204,7 @@ def test_playing_path_belongs_to_the_step_that_began_it(recorder: Recorder) -> N
     assert journey.at == pytest.approx(1.5)
     assert not journey.is_playing
     recorder.move(-1)
-    assert settle(recorder.state) == settle(open_state(OPTIMAL))
+    assert state_of_step(recorder.state) == state_of_step(open_state(OPTIMAL))
 
 
 def test_search_is_one_step_and_no_step_is_undone_meanwhile() -> None:
@@ -213,11 +218,12 @@ def test_search_is_one_step_and_no_step_is_undone_meanwhile() -> None:
         recorder.do(action)
     assert len(recorder.words) == 1
     recorder.move(-1)
-    assert recorder.state.optimisation.run is None
+    assert Optimisation.of(recorder.state).run is None
     # The next run gets a number of its own.
     again = StartRun().apply(recorder.state)
-    assert again.optimisation.run is not None
-    assert again.optimisation.run.number == 2
+    run = Optimisation.of(again).run
+    assert run is not None
+    assert run.number == 2
 
 
 def test_page_drawn_again_after_undo_leaves_what_can_be_redone(recorder: Recorder) -> None:
@@ -245,13 +251,13 @@ def test_session_undoes_and_redoes_exactly(desk: Desk) -> None:
         desk.session.do(SetVariable("a3x", value))
     last = desk.state
     for _ in range(4):
-        desk.session.travel(UNDO)
-    assert desk.state == settle(first)
+        desk.session.do(UNDO)
+    assert desk.state == state_of_step(first)
     assert desk.complaints == ["there is nothing to undo"]
     for _ in range(3):
-        desk.session.travel(REDO)
-    assert settle(desk.state) == settle(last)
-    desk.session.travel_to("slider", 1, stamp=None, who=None)
+        desk.session.do(REDO)
+    assert state_of_step(desk.state) == state_of_step(last)
+    desk.session.do(move_to(1))
     assert desk.state.design.variables[0] == 15.0
 
 
@@ -282,7 +288,7 @@ def test_what_is_shown_is_no_step_and_undo_leaves_it(done: list[Action | str]) -
         assert recorder.state.view == view
         assert recorder.history.step.state.view == view
         assert recorder.words == alone.words
-        assert settle(recorder.state) == settle(replace(alone.state, view=view))
+        assert state_of_step(recorder.state) == state_of_step(replace(alone.state, view=view))
 
 
 def test_every_action_has_words() -> None:
@@ -438,7 +444,7 @@ def test_changes_during_a_press_of_a_browser_are_one_step(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Every pause is too long.
-    monkeypatch.setattr(gestures, "PAUSE_SECONDS", -1.0)
+    monkeypatch.setattr(history, "PAUSE_SECONDS", -1.0)
     gui: Any = running.viser.gui
     handles: list[Any] = list(gui._gui_input_handle_from_uuid.values())
     slider = next(each for each in handles if each.label == "x")
@@ -460,6 +466,7 @@ def test_changes_during_a_press_of_a_browser_are_one_step(
             value = next(values)
             tab.update(slider._impl.uuid, value)
             wait_for(lambda: session.state.pose.position[0] == value)
+            assert session.wait_until_idle()
             return len(session.history.steps) - begun
 
         tab.update(inbox, 1)

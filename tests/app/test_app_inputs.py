@@ -14,19 +14,18 @@ from hypothesis import given, strategies as st
 
 from explorer.app.features.feature import Services
 from explorer.app.features.machine.feature import MachinePanel
-from explorer.app.features.mechanism.design_panel import DesignPanel
-from explorer.app.features.mechanism.pose_panel import MovePanel
+from explorer.app.features.mechanism.panel import DesignPanel, MovePanel
 from explorer.app.inputs.limits import limit_span, push_other_end
 from explorer.app.inputs.ranges import (
+    Span,
     coordinate_span,
     joint_span,
     length_span,
     position_span,
+    tint_marks,
     variable_span,
 )
-from explorer.app.inputs.tracks import Span, tint_marks
-from explorer.app.session.field_words import FIELD_WORDS, message_of
-from explorer.app.session.session import UNDO
+from explorer.app.session.session import FIELD_WORDS, UNDO, message_of
 from explorer.app.state.actions import Set, SetJoint, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
@@ -217,7 +216,7 @@ def test_refusals_of_the_page_hold_no_names_of_the_code(
         for value in values:
             desk.use(handle, value)
             if desk.state != start:
-                desk.session.travel(UNDO)
+                desk.session.do(UNDO)
                 start = desk.state
     words = {each for each in FIELD_WORDS.values() if any(each in said for said in desk.complaints)}
     assert len(words) > 20

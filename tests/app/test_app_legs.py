@@ -19,7 +19,8 @@ from hypothesis import given, strategies as st
 from services import StubWorker, services_for
 
 from explorer.app.features.feature import Feed, Services
-from explorer.app.features.legs.panel import (
+from explorer.app.features.legs.feature import (
+    RADIUS_FEED,
     LegsPanel,
     chart_columns,
     move_table,
@@ -27,30 +28,20 @@ from explorer.app.features.legs.panel import (
     volume_at,
 )
 from explorer.app.features.legs.scene import ClearanceScene, SweptTetrahedra
-from explorer.app.features.legs.work import RADIUS_FEED
 from explorer.app.features.mechanism.bodies import Legs
-from explorer.app.features.mechanism.design_panel import DesignPanel
-from explorer.app.features.workspace import regions
+from explorer.app.features.workspace import work
+from explorer.app.features.workspace.feature import WorkspacePanel
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
-from explorer.app.features.workspace.panel import WorkspacePanel
 from explorer.app.features.workspace.slice_map import SliceMap
-from explorer.app.features.workspace.tasks import (
-    PART_TOLERANCE,
-    STEP,
-    WorkspaceDrawing,
-    export_mesh,
-    file_words,
-)
 from explorer.app.features.workspace.words import drawing_words, nothing_words, workspace_details
-from explorer.app.inputs.ranges import radius_span
 from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.scene.placing import Placed
-from explorer.app.session.gestures import UserAction
+from explorer.app.scene.shapes import SWEPT, TUBE
+from explorer.app.session.history import UserAction
 from explorer.app.state.actions import Set, SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
 from explorer.app.widgets.blocks import render
-from explorer.app.widgets.colours import SWEPT, TUBE
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS, leg_axes, leg_clearances
 from explorer.legs.interference import step_overlaps, swept_tetrahedra
@@ -75,7 +66,7 @@ OPTIMAL = PRESETS["paper-optimal"]
 RADIUS = 0.2
 Followed = TypeVar("Followed", bound=Feed)
 # Rows of the rotation at home.
-LEVEL = regions.rows_of(open_state(OPTIMAL).pose.rotation)
+LEVEL = work.rows_of(open_state(OPTIMAL).pose.rotation)
 
 
 def rows_of(html: str) -> list[list[str]]:
@@ -128,7 +119,7 @@ def answer(worker: StubWorker) -> None:
         order.done(execute(order.task, order.request))
 
 
-def drawing_of(state: State) -> WorkspaceDrawing:
+def drawing_of(state: State) -> work.WorkspaceDrawing:
     drawing = follow(state, WORKSPACE_FEED)[0].drawing
     assert drawing is not None
     return drawing
@@ -151,7 +142,7 @@ THICK = show(thick(open_state(OPTIMAL), RADIUS))
 
 def test_drawing_has_the_numbers_of_the_library() -> None:
     drawing = drawing_of(THICK)
-    expected = accessible_workspace(THICK.design, tolerance=PART_TOLERANCE * OPTIMAL.reach)
+    expected = accessible_workspace(THICK.design, tolerance=work.PART_TOLERANCE * OPTIMAL.reach)
     assert drawing.part is not None
     assert drawing.trouble is None
     assert drawing.volume == expected.volume
@@ -174,7 +165,7 @@ def test_faces_where_legs_begin_to_collide_have_a_colour_of_their_own() -> None:
     plain = shells[PLAIN].vertices[shells[PLAIN].faces].mean(axis=1)
     limits = constraints(THICK.design, THICK.pose.rotation)
     on_limits = np.abs(slacks(limits, plain)).min(axis=-1)
-    assert float(on_limits.max()) < 2.0 * PART_TOLERANCE * OPTIMAL.reach
+    assert float(on_limits.max()) < 2.0 * work.PART_TOLERANCE * OPTIMAL.reach
     whole = drawing_of(show(THICK, region="limits"))
     assert [shell.colour for shell in whole.surface.shells] == [PLAIN]
 
@@ -235,7 +226,7 @@ def test_drawing_with_another_cut_colour_or_hull_computes_no_workspace_anew(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     drawing_of(THICK)
-    monkeypatch.setattr(regions, "accessible_workspace", pytest.fail)
+    monkeypatch.setattr(work, "accessible_workspace", pytest.fail)
     for changes in ({"cut": "x", "level": 3.0}, {"colour": "margin"}, {"hull": True}):
         assert drawing_of(show(THICK, **changes)).part is not None
 
@@ -362,21 +353,23 @@ def test_button_of_a_home_in_trouble_goes_to_the_nearest_start(
 @pytest.mark.parametrize("what", ["workspace", "hull"])
 def test_exported_mesh_has_the_volume_of_the_drawing(what: str) -> None:
     drawing = drawing_of(show(THICK, hull=True))
-    tolerance = PART_TOLERANCE * OPTIMAL.reach
-    data = export_mesh(regions.Selection(THICK.design, LEVEL, "accessible"), tolerance, what, "stl")
+    tolerance = work.PART_TOLERANCE * OPTIMAL.reach
+    data = work.export_mesh(
+        work.Selection(THICK.design, LEVEL, "accessible"), tolerance, what, "stl"
+    )
     mesh = untyped_trimesh.load_mesh(io.BytesIO(data), file_type="stl")
     expected = drawing.mesh_volume if what == "workspace" else drawing.hull_volume
     assert expected is not None
     assert mesh.volume == pytest.approx(expected * OPTIMAL.unit_mm**3, rel=1e-4)
-    assert file_words("accessible", what) == f"accessible {what}"
-    assert file_words("limits", what) == what
+    assert work.file_words("accessible", what) == f"accessible {what}"
+    assert work.file_words("limits", what) == what
 
 
 @pytest.mark.parametrize(
     ("limits", "file_format", "reason"),
     [
         ({"l4": (0.0, 12.5)}, "stl", "no position is accessible from"),
-        ({}, STEP, "begin to collide.*export it as 3mf, stl, glb"),
+        ({}, work.STEP, "begin to collide.*export it as 3mf, stl, glb"),
     ],
 )
 def test_file_that_cannot_be_written_is_refused_with_what_would_work(
@@ -384,7 +377,7 @@ def test_file_that_cannot_be_written_is_refused_with_what_would_work(
 ) -> None:
     design = with_limits(THICK, **limits).design
     with pytest.raises(InputError, match=reason):
-        export_mesh(regions.Selection(design, LEVEL, "accessible"), 0.1, "workspace", file_format)
+        work.export_mesh(work.Selection(design, LEVEL, "accessible"), 0.1, "workspace", file_format)
 
 
 # The curve of radii
@@ -532,9 +525,7 @@ def test_last_move_is_judged_by_both_tests(radius: float) -> None:
     state = thick(swept(open_state(OPTIMAL)), radius)
     home = open_state(OPTIMAL).pose
     exact = move_clearance(state.design, home, END)
-    overlaps = step_overlaps(
-        OPTIMAL, home.position, home.rotation, END.position, END.rotation
-    ).tolist()
+    overlaps = step_overlaps(*(Configuration.at(OPTIMAL, pose) for pose in (home, END))).tolist()
     html = move_table(Frame(state))
     rows = rows_of(html)
     assert [row[0] for row in rows] == [f"{i}–{j}" for i, j in PAIRS]
@@ -610,10 +601,8 @@ def test_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
     placed = Placed(Frame(state))
     drawn = by_name(SweptTetrahedra(services).updates(placed))
     assert all(each["visible"] is True for each in drawn.values())
-    bodies = placed.scale * swept_tetrahedra(
-        OPTIMAL, home.position, home.rotation, END.position, END.rotation
-    )
-    overlaps = step_overlaps(OPTIMAL, home.position, home.rotation, END.position, END.rotation)
+    ends = Configuration.at(OPTIMAL, home), Configuration.at(OPTIMAL, END)
+    bodies, overlaps = placed.scale * swept_tetrahedra(*ends), step_overlaps(*ends)
     beyond = [pair for pair, is_so in zip(PAIRS, overlaps, strict=True) if is_so]
     colours = [OUTLINE if any(leg in pair for pair in beyond) else SWEPT for leg in (1, 2, 3, 4)]
     # A move in which some overlap and some do not.
@@ -641,32 +630,3 @@ def test_clearances_capsules_and_tetrahedra_are_hidden_where_they_are_not_wanted
     for scene in (ClearanceScene(services), SweptTetrahedra(services)):
         drawn = by_name(scene.updates(Placed(Frame(state))))
         assert not any(values["visible"] for values in drawn.values())
-
-
-# The radii
-
-
-def test_each_radius_has_a_slider_that_sets_it_alone_and_refuses_what_cannot_be(
-    services: Services, desk: Desk
-) -> None:
-    sliders: dict[str, Any] = {}
-    for handle, name, value in DesignPanel(services).updates(Frame(desk.state)):
-        setattr(handle, name, value)
-        if isinstance(handle, viser.GuiSliderHandle):
-            sliders[handle.label] = handle
-    expected, span = [0.0] * 4, radius_span(desk.state)
-    for leg in range(4):
-        slider = sliders[f"leg {leg + 1}"]
-        assert (slider.min, slider.max, slider.value) == (0.0, span.high, 0.0)
-        expected[leg] = 0.1 * (leg + 1)
-        desk.use(slider, expected[leg])
-        assert desk.state.design.limits.leg_radii == pytest.approx(expected)
-    assert desk.complaints == []
-    before = desk.state
-    sums = [expected[i - 1] + expected[j - 1] for i, j in PAIRS]
-    np.testing.assert_allclose(clearances(before), clearances(open_state(OPTIMAL)) - sums)
-    # What no slider offers may still be typed, or sent by anyone.
-    for radius in (-0.5, float("nan")):
-        desk.use(sliders["leg 3"], radius)
-        assert desk.state == before
-        assert desk.complaints.pop().startswith("The radius of a leg must ")

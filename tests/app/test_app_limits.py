@@ -16,15 +16,14 @@ from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, Design, Limits, Pose, evaluate
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.design_panel import DesignPanel
+from explorer.app.features.mechanism.panel import DesignPanel
 from explorer.app.features.optimise.words import limit_rows
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.state.actions import Open
 from explorer.app.state.frame import Frame
 from explorer.workspace.limits.constraints import angle_between, constraints
-from explorer.workspace.limits.limit import Bound, Demand, Entry, Limit, LimitCase
-from explorer.workspace.limits.quantities import ANGLE
-from explorer.workspace.limits.table import LIMITS, angle_from_home
+from explorer.workspace.limits.quantities import ANGLE, Bound, Demand
+from explorer.workspace.limits.table import LIMITS, Entry, Limit, LimitCase, angle_from_home
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import poses_are_valid
 from explorer.workspace.solids.solids import workspace_solid

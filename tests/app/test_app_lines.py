@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.listed import FEATURES
+from explorer.app.page import FEATURES
 from explorer.app.scene.placing import Placed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state

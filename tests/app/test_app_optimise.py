@@ -33,12 +33,17 @@ from explorer.app.features.optimise.actions import (
     Revert,
     SetRequest,
     StartRun,
-    TakePaperBox,
 )
 from explorer.app.features.optimise.buttons import ACCEPT, CANCEL, HULL, LIFT, PAPER, REVERT, START
-from explorer.app.features.optimise.feature import edges_of, visible_box
-from explorer.app.features.optimise.panel import OptimisePanel, charted_iterates, data_of
-from explorer.app.features.optimise.runner import Optimiser
+from explorer.app.features.optimise.feature import (
+    EDGES,
+    OptimisePanel,
+    charted_iterates,
+    data_of,
+    visible_box,
+)
+from explorer.app.features.optimise.runner import Optimiser, result_of
+from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest, SearchRun
 from explorer.app.features.optimise.words import (
     comparison_table,
     limit_rows,
@@ -48,18 +53,17 @@ from explorer.app.features.optimise.words import (
 from explorer.app.features.optimise.work import (
     box_within,
     compare,
+    complete_request,
     find_refusals,
     liftable_limits,
     optimise,
     problem_of,
     requested_box,
-    requested_reach,
-    requested_volume,
 )
 from explorer.app.session.session import UNDO
 from explorer.app.session.worker import Channel
-from explorer.app.state.action import Action
 from explorer.app.state.actions import (
+    Action,
     Open,
     Reset,
     Set,
@@ -69,17 +73,15 @@ from explorer.app.state.actions import (
     SetVariable,
 )
 from explorer.app.state.frame import Frame
-from explorer.app.state.optimisation import PLACE, OptimisationRequest, killed_result, result_of
-from explorer.app.state.state import Run, State, open_state
+from explorer.app.state.state import State, open_state
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
-from explorer.measures.size import corners_of
+from explorer.measures.box import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
 from explorer.optimise.defaults import paper_problem, paper_start
-from explorer.optimise.outcome import Iterate
+from explorer.optimise.outcome import Iterate, curves_of
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
-from explorer.optimise.record import curves_of
 from explorer.optimise.search.sqp import Trail
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.table import GAP
@@ -119,16 +121,17 @@ def end(state: State, iterates: tuple[Iterate, ...] = ()) -> State:
     """Return the state after its run was ended by force, by default after three iterates."""
     iterates = iterates or iterates_of(state, 3)
     run = run_of(state)
-    return EndRun(run.number, killed_result(run.problem, iterates), iterates).apply(state)
+    result = result_of(run, "", iterates, is_cancelled=True)
+    return EndRun(run.number, result, iterates).apply(state)
 
 
-def run_of(state: State) -> Run:
-    run = state.optimisation.run
+def run_of(state: State) -> SearchRun:
+    run = Optimisation.of(state).run
     assert run is not None
     return run
 
 
-def best_of(run: Run) -> Iterate:
+def best_of(run: SearchRun) -> Iterate:
     assert run.best is not None
     return run.best
 
@@ -161,7 +164,8 @@ def found() -> State:
     state = start(replace(SMALL, clearance=0.2))
     run, iterates = run_of(state), list[Iterate]()
     outcome = optimise(run.problem, run.starts, Channel(iterates.append, lambda: False))
-    ended = EndRun(run.number, result_of(outcome, run.starts), tuple(iterates)).apply(state)
+    result = result_of(run, outcome, (), is_cancelled=False)
+    ended = EndRun(run.number, result, tuple(iterates)).apply(state)
     margin = run.problem.demands.clearance_margin
     comparison = compare(run.own.design, outcome.design, margin, (None, None))
     return Compare(run.number, comparison).apply(ended)
@@ -205,7 +209,7 @@ class Bench(Desk):
         assert process is not None
         return process
 
-    def wait_for_end(self) -> Run:
+    def wait_for_end(self) -> SearchRun:
         return run_of(self.wait(lambda state: not state.optimisation.is_on))
 
 
@@ -230,7 +234,7 @@ def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
     assert problem_of(asked) == paper_problem()
     assert filled_buttons(asked) == [START]
     bench.push(START)
-    run = run_of(bench.wait(lambda s: s.optimisation.run is not None and not s.optimisation.is_on))
+    run = run_of(bench.wait(lambda s: s.optimisation.own is not None and not s.optimisation.is_on))
     assert run.has_converged
     best = best_of(run)
     assert best.value <= 1e-6
@@ -255,9 +259,9 @@ def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
     assert {buttons_of(state)[name] for name in (REVERT, START, HULL)} == {"enabled"}
     assert result_words(state) in bench.markup
     for design in (asked.design, before.design):
-        bench.session.travel(UNDO)
+        bench.session.do(UNDO)
         assert bench.state.design == design
-    assert bench.state.optimisation.request == before.optimisation.request
+    assert Optimisation.of(bench.state).request == Optimisation.of(before).request
     assert bench.complaints == bench.reports == []
 
 
@@ -276,10 +280,11 @@ def test_cancel_ends_the_search_by_a_word_and_keeps_the_best_so_far(
     run = bench.wait_for_end()
     assert run.verdict is not None
     assert run.verdict.starts < 10_000
-    assert Trail(run.problem, None, None).rank(best_of(run))[0] == 0.0
+    assert Trail(run.problem).rank(best_of(run))[0] == 0.0
     assert run.best in run.iterates
     assert bench.state.design.variables == best_of(run).design.variables
-    phases = [s.optimisation.run.phase for s in bench.states if s.optimisation.run is not None]
+    runs = [Optimisation.of(s).run for s in bench.states]
+    phases = [run.phase for run in runs if run is not None]
     assert list(dict.fromkeys(phases)) == ["running", "cancelling", "ended"]
     bench.push(REVERT)
     assert bench.state.design == paper_start()
@@ -310,7 +315,7 @@ def test_cancel_ends_a_search_that_does_not_answer_by_force(bench: Bench) -> Non
     run = bench.wait_for_end()
     assert run.verdict is not None
     assert run.verdict.status == "cancelled"
-    assert run.best == min(run.iterates, key=Trail(run.problem, None, None).rank)
+    assert run.best == min(run.iterates, key=Trail(run.problem).rank)
     assert bench.state.design.variables == best_of(run).design.variables
     assert bench.reports == []
 
@@ -330,8 +335,8 @@ def test_revert_restores_design_and_pose_exactly_and_keeps_the_view(own: State) 
     after = Revert().apply(state)
     assert mechanism_of(after) == mechanism_of(own)
     assert (after.hold, after.view) == (own.hold, view)
-    assert after.optimisation.run is None
-    assert after.optimisation.request == SMALL
+    assert Optimisation.of(after).run is None
+    assert Optimisation.of(after).request == SMALL
     # There is nothing to return from any more.
     assert Revert().apply(after) == after
 
@@ -350,13 +355,13 @@ def test_accept_keeps_the_result_and_reset_returns_to_the_design_that_was_opened
     assert not {ACCEPT, REVERT} & {*buttons_of(after)}
     assert buttons_of(after)[HULL] == "enabled"
     assert "accepted" in result_words(after)
-    record = after.optimisation.record
+    record = Optimisation.of(after).record
     assert record is not None
     assert record.problem == run_of(after).problem
     assert record.design.variables == after.design.variables
     assert Revert().apply(after) == after
     again = Reset().apply(after)
-    assert (again.design, again.optimisation.record) == (paper_start(), None)
+    assert (again.design, Optimisation.of(again).record) == (paper_start(), None)
 
 
 def test_run_from_an_undecided_result_still_reverts_to_the_own_design() -> None:
@@ -378,7 +383,6 @@ def test_run_from_an_undecided_result_still_reverts_to_the_own_design() -> None:
         Open(OPTIMAL),
         Reset(),
         LiftLimit("box"),
-        TakePaperBox(),
     ],
 )
 def test_design_cannot_be_changed_while_a_run_goes_on(action: Action) -> None:
@@ -405,8 +409,8 @@ def test_platform_moves_freely_during_a_run_and_iterates_keep_its_position() -> 
 
 def test_opening_another_design_forgets_the_run_and_keeps_the_request() -> None:
     after = Open(OPTIMAL).apply(end(start()))
-    assert after.optimisation.run is None
-    assert after.optimisation.request == SMALL
+    assert Optimisation.of(after).run is None
+    assert Optimisation.of(after).request == SMALL
     assert run_of(StartRun().apply(after)).number == 2
 
 
@@ -431,7 +435,7 @@ def test_only_free_variables_change_and_those_of_margins_influence_them() -> Non
     last = iterates_of(state, 3)[-1]
     both = zip(VARIABLES, paper_start().variables, last.design.variables, strict=True)
     assert [name for name, old, new in both if old != new] == ["a3x", "b1y"]
-    assert {YAW, PLACE} <= {*ask(MARGIN, own_state()).optimisation.request.free}
+    assert {YAW, PLACE} <= {*Optimisation.of(ask(MARGIN, own_state())).request.free}
     assert {"shift-x", "shift-y", "shift-z", YAW} <= {*run_of(start(MARGIN)).problem.names}
 
 
@@ -440,10 +444,11 @@ def test_suggested_values_suit_the_design(name: str) -> None:
     state = open_state(PRESETS[name])
     design, home = state.design, state.design.home_pose
     volume = workspace_volume(design).volume
-    assert 1.05 * volume < requested_volume(state) < 2.3 * volume
+    asked = complete_request(state)
+    assert 1.05 * volume < (asked.volume or 0.0) < 2.3 * volume
+    assert asked.reach == design.reach
     same = ask(OptimisationRequest(objective="smallest-reach"), state)
-    assert requested_volume(same) == pytest.approx(volume, rel=1e-5)
-    assert requested_reach(state) == design.reach
+    assert complete_request(same).volume == pytest.approx(volume, rel=1e-5)
     box = requested_box(state)
     assert box == box_within(design)
     lows, highs = np.array(box)
@@ -491,14 +496,6 @@ def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
     assert after.design.home_pose == design.home_pose
 
 
-def test_paper_box_allows_the_search_and_keeps_the_home() -> None:
-    before = ask(SMALL, open_state(INITIAL))
-    after = TakePaperBox().apply(before)
-    assert find_refusals(before) != ()
-    assert find_refusals(after) == ()
-    assert after.design.home_pose == INITIAL.home_pose
-
-
 def test_tilt_is_demanded_over_the_required_box() -> None:
     state = SetRequest("optimisation.request.tilt", 20.0).apply(open_state(OPTIMAL))
     problem = problem_of(state)
@@ -542,7 +539,7 @@ def test_required_box_is_drawn_where_it_is() -> None:
     state = start(replace(MARGIN, free=(PLACE,)))
     box = requested_box(state)
     assert visible_box(state) == box
-    edges = edges_of(box)
+    edges = corners_of(box)[np.array(EDGES)]
     sides = np.ptp(np.array(box), axis=0)
     assert np.sort(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)) == pytest.approx(
         np.sort(np.repeat(sides, 4))

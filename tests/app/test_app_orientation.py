@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Generator
 from dataclasses import replace
@@ -15,35 +14,18 @@ import pytest
 from services import StubWorker, services_for
 
 from explorer.app.features.feature import Services
-from explorer.app.features.orientation import work
-from explorer.app.features.orientation.feature import ORIENTATION, nodes_beside_cut
-from explorer.app.features.orientation.maps import (
-    CENTRE,
-    LEFT,
-    RADIUS,
-    RIGHT,
-    colour_of,
-    edge_of,
-    legend,
-    polar_map,
-    tilt_at,
-    torsion_strip,
-)
-from explorer.app.features.orientation.panel import best_words, range_words, strip_words, summary
-from explorer.app.features.orientation.work import (
-    ORIENTATIONS,
-    POSITION_FEED,
-    RANGE_FEED,
-    TILTS_FEED,
-    GoToTilt,
-    RangeRequest,
-    SetTiltTorsion,
-    TiltsDrawing,
-    orientations_over,
+from explorer.app.features.orientation import maps, work
+from explorer.app.features.orientation.feature import (
+    ORIENTATION,
+    best_words,
+    nodes_beside_cut,
+    range_words,
+    strip_words,
+    summary,
 )
 from explorer.app.features.workspace.feeds import workspace_request
 from explorer.app.features.workspace.slice_map import AXES
-from explorer.app.features.workspace.tasks import draw_workspace
+from explorer.app.features.workspace.work import draw_workspace
 from explorer.app.state.actions import Set, SetAngle, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
@@ -52,10 +34,15 @@ from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_from_rotation, tilt_torsion_of
 from explorer.singularity.colours import css
-from explorer.workspace.orientations.sets import cone_of_directions
-from explorer.workspace.orientations.share import orientation_share
-from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap, greatest_tilt, tilt_map
-from explorer.workspace.orientations.torsions import TiltByTorsion, tilt_by_torsion
+from explorer.workspace.orientations.share import cone_of_directions, orientation_share
+from explorer.workspace.orientations.tilts import (
+    GreatestTilt,
+    TiltByTorsion,
+    TiltMap,
+    greatest_tilt,
+    tilt_by_torsion,
+    tilt_map,
+)
 from explorer.workspace.solids.solids import inclusive_solid, total_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
@@ -74,12 +61,12 @@ def facts_of(markup: str, name: str = "tilts") -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def tilts() -> Generator[TiltsDrawing]:
+def tilts() -> Generator[work.TiltsDrawing]:
     """The tilts over the workspace at fewer nodes than the page has."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(work, "NODES", 8)
         services, worker = services_and_worker()
-        feed = services.get(TILTS_FEED)
+        feed = services.get(work.TILTS_FEED)
         feed.follow(Frame(show(open_state(OPTIMAL), tilts=True)))
         worker.work()
         assert feed.drawing is not None
@@ -100,51 +87,61 @@ def services_and_worker() -> tuple[Services, StubWorker]:
 def test_angles_that_are_set_are_those_of_the_pose() -> None:
     state = open_state(OPTIMAL)
     for axis, value in ((1, 25.0), (0, -140.0), (2, -50.0)):
-        state = SetTiltTorsion(axis, value).apply(state)
+        state = work.SetTiltTorsion(axis, value).apply(state)
         assert tilt_torsion_of(state.pose.rotation)[axis] == pytest.approx(value, abs=1e-9)
     assert tilt_torsion_of(state.pose.rotation) == pytest.approx((-140.0, 25.0, -50.0), abs=1e-9)
     assert state.pose.position == OPTIMAL.home_pose.position
-    there = GoToTilt(30.0, 20.0).apply(state)
+    there = work.GoToTilt(30.0, 20.0).apply(state)
     assert tilt_torsion_of(there.pose.rotation) == pytest.approx((30.0, 20.0, -50.0), abs=1e-9)
-    assert SetTiltTorsion(1, 25.0).words() == "tilt = 25°"
-    assert GoToTilt(30.0, 20.0).words() == "Tilt 20° towards 30°"
+    assert work.SetTiltTorsion(1, 25.0).words() == "tilt = 25°"
+    assert work.GoToTilt(30.0, 20.0).words() == "Tilt 20° towards 30°"
 
 
 def test_map_draws_each_tilt_at_its_place_in_the_colour_of_its_limit() -> None:
     tilts = tilt_map(OPTIMAL, (10.0, 5.0, 9.0))
     here = TiltTorsion(40.0, 30.0, tilts.torsion)
     least = greatest_tilt(OPTIMAL, (10.0, 5.0, 9.0))
-    markup = polar_map(tilts, least, here, HOME)
+    markup = maps.polar_map(tilts, least, here, HOME)
     facts = facts_of(markup)
-    assert facts == {"centre": list(CENTRE), "radius": RADIUS, "edge": edge_of(tilts, here, HOME)}
+    assert facts == {
+        "centre": list(maps.CENTRE),
+        "radius": maps.RADIUS,
+        "edge": maps.edge_of(tilts, here, HOME),
+    }
     (pairs,) = re.findall(r'class="possible" points="([^"]+)"', markup)
     points = np.array([pair.split(",") for pair in pairs.split()], dtype=float)
-    distances, angles = RADIUS * tilts.tilts / facts["edge"], np.radians(tilts.azimuths)
-    expected = CENTRE + distances[:, None] * np.stack([np.cos(angles), -np.sin(angles)], axis=1)
+    distances, angles = maps.RADIUS * tilts.tilts / facts["edge"], np.radians(tilts.azimuths)
+    expected = maps.CENTRE + distances[:, None] * np.stack(
+        [np.cos(angles), -np.sin(angles)], axis=1
+    )
     np.testing.assert_allclose(points, expected, atol=0.06)
     # The border goes through every tilt, in the colour of what ends it.
     borders = re.findall(r'class="border" stroke="([^"]+)" d="M([^"]+)"', markup)
-    assert {stroke for stroke, _ in borders} == {css(colour_of(limit)) for limit in tilts.limits}
+    assert {stroke for stroke, _ in borders} == {
+        css(maps.colour_of(limit)) for limit in tilts.limits
+    }
     for pair, limit in zip(pairs.split(), tilts.limits, strict=True):
-        own = [path.split("L") for stroke, path in borders if stroke == css(colour_of(limit))]
+        own = [path.split("L") for stroke, path in borders if stroke == css(maps.colour_of(limit))]
         assert any(pair.replace(",", " ") in path for path in own)
     # Home is always drawn, dashed where its torsion is another one.
     assert 'class="home"' in markup
-    assert 'class="home is-other"' in polar_map(tilts, least, here._replace(torsion=0.0), HOME)
+    assert 'class="home is-other"' in maps.polar_map(tilts, least, here._replace(torsion=0.0), HOME)
 
 
 def test_map_without_any_tilt_is_drawn_too() -> None:
     nothing = TiltMap(0.0, np.arange(0.0, 360.0, 5.0), np.full(72, np.nan), ("l1 maximum",) * 72)
     level = TiltTorsion(0.0, 0.0, 0.0)
     none = GreatestTilt(0.0, np.nan, np.nan, "l1 maximum")
-    markup = polar_map(nothing, none, level, HOME)
+    markup = maps.polar_map(nothing, none, level, HOME)
     assert "nan" not in markup
     assert 'class="least"' not in markup
-    assert "l1 maximum" in legend(nothing)
+    assert "l1 maximum" in maps.legend(nothing)
     free = TiltMap(0.0, np.arange(0.0, 360.0, 5.0), np.full(72, 180.0), (None,) * 72)
-    assert edge_of(free, level, HOME) == 180.0
-    assert 'class="dot"' not in polar_map(free, GreatestTilt(0.0, 180.0, np.nan, None), level, HOME)
-    assert "no limit" in legend(free)
+    assert maps.edge_of(free, level, HOME) == 180.0
+    assert 'class="dot"' not in maps.polar_map(
+        free, GreatestTilt(0.0, 180.0, np.nan, None), level, HOME
+    )
+    assert "no limit" in maps.legend(free)
 
 
 def test_position_feed_computes_share_and_torsions() -> None:
@@ -155,13 +152,13 @@ def test_position_feed_computes_share_and_torsions() -> None:
     worker.work()
     # Nothing else is shown.
     assert [order.task.__name__ for order in worker.orders] == ["orientations_at"]
-    drawing = services.get(POSITION_FEED).drawing
+    drawing = services.get(work.POSITION_FEED).drawing
     assert drawing is not None
     assert drawing.share == orientation_share(OPTIMAL, state.pose.position)
     assert drawing.by_torsion.best == tilt_by_torsion(OPTIMAL, state.pose.position).best
 
 
-def test_tilts_over_positions_are_the_greatest_of_each(tilts: TiltsDrawing) -> None:
+def test_tilts_over_positions_are_the_greatest_of_each(tilts: work.TiltsDrawing) -> None:
     torsion = round(open_state(OPTIMAL).tilt_torsion.torsion, work.DIGITS)
     for index in np.random.default_rng(0).integers(len(tilts.tilts), size=20):
         expected = greatest_tilt(OPTIMAL, tilts.positions[index], torsion).tilt
@@ -179,7 +176,7 @@ def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
         ("inclusive", inclusive_solid, "at least "),
     ):
         services, worker = services_and_worker()
-        feed = services.get(RANGE_FEED)
+        feed = services.get(work.RANGE_FEED)
         feed.follow(Frame(show(open_state(OPTIMAL), over=over, range=15.0)))
         worker.work()
         assert feed.drawing is not None
@@ -191,9 +188,11 @@ def test_volume_over_a_range_of_tilts_is_a_bound_by_samples(
 
 def test_range_turns_the_tilted_orientations_either_way() -> None:
     home = OPTIMAL.home_pose
-    tilted = orientations_over(RangeRequest(OPTIMAL, 15.0, 0.0, "total"))
-    np.testing.assert_array_equal(tilted, cone_of_directions(home.rotation, 15.0, ORIENTATIONS))
-    turned = orientations_over(RangeRequest(OPTIMAL, 15.0, 10.0, "total"))
+    tilted = work.orientations_over(work.RangeRequest(OPTIMAL, 15.0, 0.0, "total"))
+    np.testing.assert_array_equal(
+        tilted, cone_of_directions(home.rotation, 15.0, work.ORIENTATIONS)
+    )
+    turned = work.orientations_over(work.RangeRequest(OPTIMAL, 15.0, 10.0, "total"))
     angles = tilt_torsion_from_rotation(home.rotation.T @ turned)
     assert angles[:, 1].max() == pytest.approx(15.0, abs=1e-9)
     torsions, counts = np.unique(angles[:, 2].round(6), return_counts=True)
@@ -216,18 +215,18 @@ def test_range_or_turn_beyond_half_a_turn_is_refused(changes: dict[str, Any], wo
 def test_strip_of_torsions_has_the_tilts_and_a_mark_at_the_torsion(
     by_torsion: TiltByTorsion,
 ) -> None:
-    markup = torsion_strip(by_torsion, -90.0, 0.0)
+    markup = maps.torsion_strip(by_torsion, -90.0, 0.0)
     assert facts_of(markup, "torsions")["tilts"] == [
         None if np.isnan(tilt) else pytest.approx(tilt, abs=0.05) for tilt in by_torsion.tilts
     ]
-    assert f'class="here" d="M{0.75 * LEFT + 0.25 * RIGHT:.1f} ' in markup
+    assert f'class="here" d="M{0.75 * maps.LEFT + 0.25 * maps.RIGHT:.1f} ' in markup
     best = by_torsion.best
     for tilt, count in ((best.tilt - 0.06, 1), (best.tilt - 0.04, 0), (np.nan, 1)):
-        assert torsion_strip(by_torsion, 0.0, tilt).count('class="dot"') == count
+        assert maps.torsion_strip(by_torsion, 0.0, tilt).count('class="dot"') == count
     assert best_words(best, best.tilt).endswith(", as here")
     assert "at" in best_words(best, best.tilt - 1.0).split()
     nowhere = tilt_by_torsion(OPTIMAL, (30.0, 5.0, 9.0))
-    empty = torsion_strip(nowhere, 0.0, np.nan)
+    empty = maps.torsion_strip(nowhere, 0.0, np.nan)
     assert not {"nan", "curve", "possible", "dot"} & {*re.findall(r"\w+", empty)}
     assert best_words(nowhere.best, np.nan) == "none"
 
@@ -235,32 +234,29 @@ def test_strip_of_torsions_has_the_tilts_and_a_mark_at_the_torsion(
 def test_tilt_at_any_torsion_is_between_those_of_its_neighbours(by_torsion: TiltByTorsion) -> None:
     middle = 0.5 * float(by_torsion.torsions[20] + by_torsion.torsions[21])
     between = by_torsion.tilts[20:22].mean()
-    assert tilt_at(by_torsion, middle) == pytest.approx(between, nan_ok=True)
-    assert tilt_at(by_torsion, 540.0) == pytest.approx(by_torsion.tilts[0], nan_ok=True)
-    for torsion in (1e308, -1e308):
-        same = tilt_at(by_torsion, math.remainder(torsion, 360.0))
-        assert tilt_at(by_torsion, torsion) == pytest.approx(same, nan_ok=True)
+    assert maps.tilt_at(by_torsion, middle) == pytest.approx(between, nan_ok=True)
+    assert maps.tilt_at(by_torsion, 540.0) == pytest.approx(by_torsion.tilts[0], nan_ok=True)
 
 
 def test_angles_stay_as_they_were_set_at_tilts_that_do_not_determine_them() -> None:
     state = open_state(OPTIMAL)
     for axis, value in ((0, 60.0), (1, 20.0), (2, -50.0)):
-        state = SetTiltTorsion(axis, value).apply(state)
+        state = work.SetTiltTorsion(axis, value).apply(state)
     for tilt in (0.0, 180.0):
-        at_end = SetTiltTorsion(1, tilt).apply(state)
+        at_end = work.SetTiltTorsion(1, tilt).apply(state)
         assert at_end.tilt_torsion == (60.0, tilt, -50.0)
-        back = SetTiltTorsion(1, 20.0).apply(SetPosition(2, 8.0).apply(at_end))
+        back = work.SetTiltTorsion(1, 20.0).apply(SetPosition(2, 8.0).apply(at_end))
         assert tilt_torsion_of(back.pose.rotation) == pytest.approx((60.0, 20.0, -50.0), abs=1e-9)
-        clicked = GoToTilt(30.0, 20.0).apply(at_end)
+        clicked = work.GoToTilt(30.0, 20.0).apply(at_end)
         assert clicked.tilt_torsion == (30.0, 20.0, -50.0)
     # Another rotation has angles of its own.
-    turned = SetAngle(0, 10.0).apply(SetTiltTorsion(1, 0.0).apply(state))
+    turned = SetAngle(0, 10.0).apply(work.SetTiltTorsion(1, 0.0).apply(state))
     assert turned.tilt_torsion == pytest.approx((0.0, 0.0, 10.0), abs=1e-9)
 
 
 def test_panel_marks_values_of_an_older_position_as_outdated_and_shows_a_failure() -> None:
     services, worker = services_and_worker()
-    state, feed = open_state(OPTIMAL), services.get(POSITION_FEED)
+    state, feed = open_state(OPTIMAL), services.get(work.POSITION_FEED)
 
     def text_at(state: State) -> str:
         here = state.tilt_torsion
@@ -282,7 +278,7 @@ def test_panel_marks_values_of_an_older_position_as_outdated_and_shows_a_failure
 
 @pytest.mark.parametrize(("axis", "flipped"), [(0, False), (1, True), (2, False)])
 def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side(
-    tilts: TiltsDrawing, axis: int, flipped: bool
+    tilts: work.TiltsDrawing, axis: int, flipped: bool
 ) -> None:
     assert nodes_beside_cut(tilts, WorkspaceView()).all()
     view = WorkspaceView(solid=True, cut=AXES[axis], level=6.0, flipped=flipped)

@@ -19,7 +19,7 @@ from services import StubDownloads, StubWorker, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.tasks import WeightsRequest, load_of, weights_of_parts
-from explorer.app.features.paths import runner
+from explorer.app.features.paths import feature
 from explorer.app.features.paths.actions import (
     Advance,
     CancelPlan,
@@ -30,7 +30,7 @@ from explorer.app.features.paths.actions import (
     ends_of,
     goal_of,
 )
-from explorer.app.features.paths.feature import PathScene
+from explorer.app.features.paths.feature import DIED, PathRunner, PathScene
 from explorer.app.features.paths.panel import (
     ENDS,
     MODES,
@@ -43,24 +43,20 @@ from explorer.app.features.paths.panel import (
 from explorer.app.features.paths.plots import (
     FOLDS,
     MARGINS,
-    IncidencePlot,
     PathShares,
     Quantity,
     crossing_time,
     crossing_words,
     incidence_columns,
 )
-from explorer.app.features.paths.runner import DIED, PathRunner
 from explorer.app.features.paths.work import plan
 from explorer.app.scene.placing import Placed
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Set, SetPose, SetPosition, SetVariable
+from explorer.app.state.actions import Action, Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import value_at
 from explorer.app.state.paths import STRAIGHT_SECONDS, End, Journey
 from explorer.app.state.state import State, angles_of, joints_of, open_state
 from explorer.app.widgets.assigning import Assigner
-from explorer.app.widgets.charts import ORANGE
 from explorer.app.widgets.pieces import widgets
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
@@ -71,7 +67,6 @@ from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.loads import path_loads
-from explorer.singularity.colours import css
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
 
@@ -282,20 +277,6 @@ def test_chart_shows_margins_or_folds_of_the_poses_over_time(
     assert x[np.isfinite(now)].tolist() == [journey.at, journey.at]
     low, high = now[np.isfinite(now)]
     assert low < min(shown.min(), *quantity.flat) < max(shown.max(), *quantity.flat) < high
-
-
-@pytest.mark.parametrize(("quantity", "flat"), [(MARGINS, (0.0,)), (FOLDS, (0.0, 180.0))])
-def test_flat_ends_are_lines_with_a_name_even_without_a_path(
-    services: Services, quantity: Quantity, flat: tuple[float, ...]
-) -> None:
-    plot = IncidencePlot(services.gui, quantity)
-    updates: Any = plot.updates(Frame(open_state(OPTIMAL)))
-    chart, scales = {name: (handle, value) for handle, name, value in updates}["scales"]
-    levels, (low, high) = chart.axes[-1], scales["y"]["range"]
-    assert levels["splits"] == flat
-    assert set(levels["values"]) == {"flat"}
-    assert levels["grid"]["stroke"] == css(ORANGE)
-    assert low < min(flat) <= max(flat) < high
 
 
 def test_path_and_its_crossings_are_drawn(services: Services) -> None:
@@ -516,7 +497,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
     def use_stub(*_: object, **__: object) -> StubWorker:
         return worker
 
-    monkeypatch.setattr(runner, "Worker", use_stub)
+    monkeypatch.setattr(feature, "Worker", use_stub)
     PathRunner(services_for()).follow(Frame(state))
     assert worker.orders[-1].request.tool == state.tool == PRESS.tool.position
     poses = plan(worker.orders[-1].request).poses

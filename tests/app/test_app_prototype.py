@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import replace
 from typing import Any
-from unittest.mock import Mock
 
 import msgspec
 import numpy as np
@@ -15,20 +14,17 @@ from part_gaps import least_gap
 from services import StubWorker
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.bodies import Bodies, Legs
-from explorer.app.features.mechanism.incidences import Flags
+from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs
 from explorer.app.features.mechanism.marks import DragHandle
-from explorer.app.features.prototype.feature import ASSEMBLIES
-from explorer.app.features.prototype.panel import FIT, PrototypePanel, trouble_of
+from explorer.app.features.prototype.feature import FIT, PrototypePanel, trouble_of
 from explorer.app.features.prototype.scene import PrototypeScene, places_of
 from explorer.app.features.prototype.work import (
     PARTS_FEED,
     Parts,
     PartsFeed,
     PartsRequest,
-    drawn_parts,
-    export_assembly,
     parts_drawing,
+    parts_to_draw,
     stock_of,
 )
 from explorer.app.scene.placing import Placed
@@ -38,11 +34,11 @@ from explorer.app.state.state import State, open_state
 from explorer.app.state.view import PrototypeView
 from explorer.app.widgets.assigning import Assigner
 from explorer.errors import InputError
-from explorer.export.assembly import FORMATS, assembly_bytes
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.chains import LEGS, ON_GUIDE, Places
+from explorer.prototype.fitting import broken_joint_limits
 from explorer.singularity.colours import OUTLINE
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -91,7 +87,7 @@ def placed_with_parts(services: Services, state: State) -> Placed:
     """Return the state as the page places it once its parts are made."""
     feed = services.get(PARTS_FEED)
     feed.follow(Frame(state))
-    return Placed(Frame(state), floor=parts.floor if (parts := drawn_parts(feed)) else None)
+    return Placed(Frame(state), floor=parts.floor if (parts := parts_to_draw(feed)) else None)
 
 
 def in_scene(nodes: dict[str, dict[str, Any]], path: str) -> np.ndarray[Any, Any]:
@@ -239,11 +235,11 @@ def test_parts_are_made_again_when_the_design_changes_and_not_else(
         count = len(orders)
         feed.follow(Frame(state))
         assert len(orders) == count + 1
-        drawn, expected = drawn_parts(feed), make_prototype(state.design)
+        drawn, expected = parts_to_draw(feed), make_prototype(state.design)
         assert drawn is not None
         assert np.array_equal(drawn.prototype.parts[0].vertices, expected.parts[0].vertices)
     feed.follow(Frame(viewed(with_prototype(), drawn_as="6-4 twin")))
-    assert drawn_parts(feed) is None
+    assert parts_to_draw(feed) is None
 
 
 def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed) -> None:
@@ -253,7 +249,7 @@ def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed
     frame = Frame(state)
     assert "Making the parts" in (trouble_of(frame, feed) or "")
     feed.follow(frame)
-    assert drawn_parts(feed) is None
+    assert parts_to_draw(feed) is None
     trouble = trouble_of(frame, feed) or ""
     assert str(refusal.value)[1:] in trouble
     assert "carriages 2 and 3" in trouble
@@ -261,10 +257,10 @@ def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed
     home = Pose.of_yaw_pitch_roll((10, 5, 9), (90, 0, 0))
     turned = Frame(with_prototype(open_state(msgspec.structs.replace(OPTIMAL, home=home))))
     feed.follow(turned)
-    assert drawn_parts(feed) is None
+    assert parts_to_draw(feed) is None
     assert FIT not in (trouble_of(turned, feed) or "")
     feed.follow(Frame(with_prototype()))
-    assert drawn_parts(feed) is not None
+    assert parts_to_draw(feed) is not None
     assert trouble_of(Frame(with_prototype()), feed) is None
 
 
@@ -276,14 +272,14 @@ def test_press_sets_the_unit_with_which_the_parts_fit(
     tight = msgspec.structs.replace(OPTIMAL, unit_mm=3.0)
     desk.session.do(Open(tight))
     feed.follow(Frame(desk.state))
-    assert drawn_parts(feed) is None
+    assert parts_to_draw(feed) is None
     words = " ".join(str(value) for _, _, value in panel.updates(Frame(desk.state)))
     desk.press(services.buttons, FIT)
     unit = desk.state.design.unit_mm
     assert unit > tight.unit_mm
     assert f"Set the unit to {unit:g} mm" in words
     feed.follow(Frame(desk.state))
-    assert drawn_parts(feed) is not None
+    assert parts_to_draw(feed) is not None
     # Without a refusal a late press does nothing.
     before = desk.state
     desk.press(services.buttons, FIT)
@@ -293,9 +289,11 @@ def test_press_sets_the_unit_with_which_the_parts_fit(
 def test_pose_beyond_the_joint_limits_of_the_parts_is_reported(feed: PartsFeed) -> None:
     state = SetPosition(2, 17.0).apply(with_prototype())
     feed.follow(Frame(state))
-    parts = drawn_parts(feed)
+    parts = parts_to_draw(feed)
     assert parts is not None
-    hindrances = parts.prototype.broken_joint_limits(state.pose.position, state.pose.rotation)
+    hindrances = broken_joint_limits(
+        parts.prototype.sizes, state.pose.position, state.pose.rotation
+    )
     assert hindrances
     trouble = trouble_of(Frame(state), feed) or ""
     assert "do not take this pose" in trouble
@@ -306,7 +304,7 @@ def test_pose_beyond_the_joint_limits_of_the_parts_is_reported(feed: PartsFeed) 
 
 
 def test_masses_and_counts_are_those_of_the_library(parts: Parts) -> None:
-    lines = parts.listed.lines
+    lines = parts.lines
     assert [line.name for line in lines if line.count > 1] == [
         "carriage 2, 3",
         "cross 1, 4",
@@ -315,7 +313,7 @@ def test_masses_and_counts_are_those_of_the_library(parts: Parts) -> None:
     for density in (PrototypeView().density, 7850.0):
         bill = bill_of_materials(parts.prototype, density)
         assert sum(line.count for line in lines) == len(bill.items) == PARTS
-        assert parts.listed.mass(density) == pytest.approx(1e3 * bill.mass, rel=1e-9)
+        assert sum(line.mass(density) for line in lines) == pytest.approx(1e3 * bill.mass, rel=1e-9)
         for line in lines:
             mass = pytest.approx(1e-3 * line.mass(density) / line.count)
             same = [i for i in bill.items if i.name.partition(" ")[0] == line.kind]
@@ -323,7 +321,7 @@ def test_masses_and_counts_are_those_of_the_library(parts: Parts) -> None:
     # Legs of other parts have lines of their own.
     mixed = parts_drawing(PartsRequest(thick(with_prototype(), 0.2, 0.25, 0.2, 0.15).design))
     assert isinstance(mixed, Parts)
-    names = [line.name for line in mixed.listed.lines]
+    names = [line.name for line in mixed.lines]
     assert {"carriage 2", "carriage 3", "cross 1", "cross 4", "ball 1, 3"} <= set(names)
 
 
@@ -340,20 +338,6 @@ def test_stock_holds_the_part(parts: Parts) -> None:
         assert length == pytest.approx(size[axis])
         across = np.delete(size, axis)
         assert across.max() * (1.0 - 1e-9) <= diameter <= np.hypot(*across)
-
-
-def test_files_of_the_assembly_are_those_of_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = assembly_bytes(make_prototype(OPTIMAL), "glb")
-    assert export_assembly(OPTIMAL, "glb") == expected
-    for file_format in ("glb", "step"):
-        with pytest.raises(InputError, match="too tight"):
-            export_assembly(thick(open_state(OPTIMAL), 0.4).design, file_format)
-    assert {file_format for file_format, _ in ASSEMBLIES.values()} == {*FORMATS, "step"}
-    write = Mock(return_value=b"ISO-10303-21")
-    monkeypatch.setattr("explorer.export.step.assembly_step", write)
-    assert export_assembly(OPTIMAL, "step") == b"ISO-10303-21"
-    ((sizes,), _) = write.call_args
-    assert sizes.strokes == make_prototype(OPTIMAL).sizes.strokes
 
 
 @pytest.mark.parametrize(

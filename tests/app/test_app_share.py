@@ -7,24 +7,21 @@ import datetime as dt
 import struct
 from dataclasses import dataclass
 from typing import Any
+from unittest.mock import Mock
 
 import msgspec
 import numpy as np
 import pytest
 import zstandard
-from hypothesis import given, strategies as st
 
-from explorer.app.features.sharing.scene_html import (
-    FileCamera,
-    caption_of,
-    scene_html,
-    visible_messages,
-)
-from explorer.app.features.sharing.view_picture import (
+from explorer.app.features.sharing.scene_files import (
     LEAST,
     MOST,
-    check_size,
-    on_background,
+    FileCamera,
+    caption_of,
+    picture_size,
+    scene_html,
+    visible_messages,
 )
 from explorer.app.server import Running
 from explorer.app.state.actions import Set
@@ -146,16 +143,6 @@ def test_caption_of_a_scene_page_has_names_as_text() -> None:
 )
 def test_picture_size_out_of_bounds_is_refused(width: float, height: float, named: str) -> None:
     with pytest.raises(InputError, match=rf"^the {named} of a picture is 16 to 4096 pixels; got"):
-        check_size(width, height)
-    assert check_size(LEAST, MOST) == (LEAST, MOST)
-    assert check_size(99.6, 100.2) == (100, 100)
-
-
-@given(st.integers(0, 2**32), st.integers(1, 300), st.integers(1, 40))
-def test_picture_on_a_background_is_mixed_exactly(seed: int, height: int, width: int) -> None:
-    rng = np.random.default_rng(seed)
-    pixels = rng.integers(0, 256, (height, width, 4), dtype=np.uint8)
-    colour = (255, 128, 3)
-    share = pixels[..., 3:] / 255.0
-    expected = pixels[..., :3] * share + np.array(colour) * (1.0 - share)
-    assert np.abs(on_background(pixels, colour) - expected).max() <= 0.5 + 1e-9
+        picture_size(Mock(), (width, height))
+    assert picture_size(Mock(), (LEAST, MOST)) == (LEAST, MOST)
+    assert picture_size(Mock(), (99.6, 100.2)) == (100, 100)

@@ -10,22 +10,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import server_clock
 from desk import CLIENT, Desk, by_name, number, random_states
 from hypothesis import given
 from services import StubWorker, services_for
 from strategies import Case, all_cases
 
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism import modes
 from explorer.app.features.mechanism.feature import limits_figure
-from explorer.app.features.mechanism.modes import (
-    MODES,
-    Ghosts,
-    ModesPanel,
-    ghost_points,
-    mode_hover,
-    modes_table,
-)
-from explorer.app.features.singularity.panel import (
+from explorer.app.features.singularity import work
+from explorer.app.features.singularity.feature import (
     SingularityPanel,
     distance_table,
     performance_table,
@@ -43,14 +38,6 @@ from explorer.app.features.singularity.scene import (
     show_button,
 )
 from explorer.app.features.singularity.strata import GOALS, StrataPanel, distances_of
-from explorer.app.features.singularity.work import (
-    STRATA_FEED,
-    GoToSingularity,
-    GoToStratum,
-    StrataRequest,
-    strata_distances,
-    stratum_name,
-)
 from explorer.app.scene.placing import Placed
 from explorer.app.session import clock
 from explorer.app.session.session import UNDO
@@ -76,7 +63,7 @@ BATCHED = ("batched_positions", "batched_scales")
 
 def singular_states() -> list[State]:
     """Return the home pose brought to each singular stratum."""
-    return [GoToStratum(w).apply(open_state(OPTIMAL)) for w in STRATA if w != GENERIC]
+    return [work.GoToStratum(w).apply(open_state(OPTIMAL)) for w in STRATA if w != GENERIC]
 
 
 def viewed(state: State, **changes: Any) -> State:
@@ -94,7 +81,7 @@ def plain(html: str) -> str:
 @pytest.mark.parametrize("stratum", [w for w in STRATA if w != GENERIC])
 def test_stratum_is_reached_by_the_shortest_way(stratum: tuple[int, ...]) -> None:
     for state in random_states(2):
-        after = GoToStratum(stratum).apply(state)
+        after = work.GoToStratum(stratum).apply(state)
         expected = nearest_in_stratum(OPTIMAL, state.pose, stratum)
         assert Frame(after).snapshot.stratum == expected.seen == stratum
         way = displacement(
@@ -109,15 +96,15 @@ def test_stratum_is_reached_by_the_shortest_way(stratum: tuple[int, ...]) -> Non
 
 @pytest.mark.parametrize("lower", [(2, 4, 3, 1), (1, 2, 3, 4)])
 def test_stratum_without_a_nearest_pose_is_refused(lower: tuple[int, ...]) -> None:
-    state = GoToStratum(lower).apply(open_state(OPTIMAL))
+    state = work.GoToStratum(lower).apply(open_state(OPTIMAL))
     for goal, words in (
         (GENERIC, "arbitrarily close to every pose"),
-        (lower, rf"lies in {re.escape(stratum_name(lower))} already"),
+        (lower, rf"lies in {re.escape(work.stratum_name(lower))} already"),
         ((3, 4, 2, 1), r"\(3, 4, 2, 1\) borders on"),
         ((1, 1, 2, 3), "permutation"),
     ):
         with pytest.raises(InputError, match=words):
-            GoToStratum(goal).apply(state)
+            work.GoToStratum(goal).apply(state)
 
 
 def test_diagram_has_a_node_for_each_stratum_and_is_made_only_while_it_is_open(
@@ -130,13 +117,13 @@ def test_diagram_has_a_node_for_each_stratum_and_is_made_only_while_it_is_open(
         return [str(value) for _, name, value in updates if name == "content"]
 
     desk.session.do(Set("view.singular.strata", value=False))
-    services.get(STRATA_FEED).follow(Frame(desk.state))
+    services.get(work.STRATA_FEED).follow(Frame(desk.state))
     assert worker.orders == []
     assert len(contents()) == 1
     desk.session.do(Set("view.singular.strata", value=True))
     (html,) = (content for content in contents() if "data-press" in content)
     goals = re.findall(r'data-press="strata.go" data-value="(\d{4})" title="(\([\d, ]+\))', html)
-    assert dict(goals) == {name: stratum_name(stratum) for name, stratum in GOALS.items()}
+    assert dict(goals) == {name: work.stratum_name(stratum) for name, stratum in GOALS.items()}
     assert len(goals) == len(STRATA) - 1
     desk.press(services.buttons, "strata.go", "3412")
     assert Frame(desk.state).snapshot.stratum == (3, 4, 1, 2)
@@ -144,10 +131,10 @@ def test_diagram_has_a_node_for_each_stratum_and_is_made_only_while_it_is_open(
 
 def test_distances_come_from_the_worker_but_those_of_one_incidence_at_once() -> None:
     state = viewed(random_states(1)[0], strata=True)
-    feed = STRATA_FEED(services_for())
+    feed = work.STRATA_FEED(services_for())
     known = distances_of(Frame(state), feed)
     assert set(known) == {GENERIC, *OF_INCIDENCES}
-    every = strata_distances(StrataRequest(state.design, state.pose))
+    every = work.strata_distances((state.design, state.pose))
     assert set(every) == set(STRATA)
     for stratum, distance in known.items():
         assert distance == pytest.approx(every[stratum], rel=1e-9, abs=1e-12)
@@ -202,7 +189,7 @@ def test_buttons_lead_to_the_nearest_pose_and_refuse_where_it_is_reached(
     )
     assert not any(each["visible"] for each in drawn.values())
     with pytest.raises(InputError, match="δ2 = 0 already: lines a1a2 and b2b3 meeting"):
-        GoToSingularity(2).apply(viewed(GoToStratum((2, 1, 4, 3)).apply(desk.state)))
+        work.GoToSingularity(2).apply(viewed(work.GoToStratum((2, 1, 4, 3)).apply(desk.state)))
 
 
 # Singular poses
@@ -245,7 +232,7 @@ def test_singular_pose_says_about_which_line_locked_actuators_let_the_platform_t
     incidence: int, line: str, through: str
 ) -> None:
     assert not list(freedoms(Frame(open_state(OPTIMAL)).snapshot))
-    frame = Frame(GoToSingularity(incidence).apply(random_states(1)[0]))
+    frame = Frame(work.GoToSingularity(incidence).apply(random_states(1)[0]))
     words = plain(render(freedoms(frame.snapshot), {f"show {incidence}": show_button(incidence)}))
     place, rotation = np.array(frame.state.pose.position), frame.state.pose.rotation
     found = re.fullmatch(
@@ -262,7 +249,7 @@ def test_singular_pose_says_about_which_line_locked_actuators_let_the_platform_t
 
 def test_pose_within_the_limits_looks_safe_unless_it_is_singular() -> None:
     regular = open_state(OPTIMAL)
-    singular = GoToSingularity(2).apply(regular)
+    singular = work.GoToSingularity(2).apply(regular)
     for state, kept, here in (
         (regular, "kept", "Within all limits"),
         (singular, "kept, but singular", "Limits kept"),
@@ -271,23 +258,23 @@ def test_pose_within_the_limits_looks_safe_unless_it_is_singular() -> None:
         assert not frame.snapshot.violations
         assert plain(limits_figure(frame)) == f"Limits {kept}"
         assert here in plain(summary(frame))
-        for html in (limits_figure(frame), summary(frame), modes_table(frame, "")):
+        for html in (limits_figure(frame), summary(frame), modes.modes_table(frame, "")):
             assert ("ex-within" in html) == (state == regular)
 
 
 @pytest.fixture
 def still_clock() -> Generator[None]:
     """A clock that stands all but still unless it is advanced."""
-    clock.set_pace(1e-6)
+    server_clock.set_pace(1e-6)
     yield
-    clock.set_pace(1.0)
+    server_clock.set_pace(1.0)
 
 
 @pytest.mark.usefixtures("still_clock")
 def test_motion_swings_a_ghost_by_a_share_of_the_reach_and_leaves_the_state_alone(
     services: Services, desk: Desk
 ) -> None:
-    desk.session.do(GoToSingularity(2))
+    desk.session.do(work.GoToSingularity(2))
     motion, before, steps = FreeMotion(services), desk.state, desk.session.history
     frames: list[Frame] = []
 
@@ -315,15 +302,15 @@ def test_motion_swings_a_ghost_by_a_share_of_the_reach_and_leaves_the_state_alon
         assert "turns about the line a1b4" in str(
             by_name(motion.updates(placed))["/freedom/label"]["text"]
         )
-        clock.advance(0.25 * PERIOD)
+        server_clock.advance(0.25 * PERIOD)
     sizes = [np.linalg.norm(way, axis=1).max() / placed.reach for way in ways]
     np.testing.assert_allclose(sizes, [0.0, AMPLITUDE, 0.0, AMPLITUDE], atol=2e-3)
     # To either side.
     assert float(np.sum(ways[1] * ways[3])) < 0.0
     drawn = len(frames)
-    clock.advance(FRAME_SECONDS)
+    server_clock.advance(FRAME_SECONDS)
     desk.wait(lambda _: len(frames) > drawn)
-    clock.advance(PERIODS * PERIOD)
+    server_clock.advance(PERIODS * PERIOD)
     assert clock.wait_until_quiet(60.0)
     assert tips() is None
     assert desk.state == before
@@ -332,7 +319,7 @@ def test_motion_swings_a_ghost_by_a_share_of_the_reach_and_leaves_the_state_alon
 
 @pytest.mark.usefixtures("still_clock")
 def test_motion_ends_once_the_platform_is_moved(services: Services, desk: Desk) -> None:
-    desk.session.do(GoToSingularity(3))
+    desk.session.do(work.GoToSingularity(3))
     motion = FreeMotion(services)
 
     def is_shown() -> bool:
@@ -344,9 +331,9 @@ def test_motion_ends_once_the_platform_is_moved(services: Services, desk: Desk) 
     assert is_shown()
     desk.session.do(SetPosition(0, 9.0))
     assert not is_shown()
-    desk.session.travel(UNDO)
+    desk.session.do(UNDO)
     assert not is_shown()
-    clock.advance(FRAME_SECONDS)
+    server_clock.advance(FRAME_SECONDS)
     assert clock.wait_until_quiet(60.0)
 
 
@@ -355,7 +342,7 @@ def test_motion_ends_once_the_platform_is_moved(services: Services, desk: Desk) 
 
 def rows_of_modes(frame: Frame) -> list[list[str]]:
     """Return the cells of each row of the table."""
-    buttons = re.findall(r"<button[^>]*modes\.go.*?</button>", modes_table(frame, ""))
+    buttons = re.findall(r"<button[^>]*modes\.go.*?</button>", modes.modes_table(frame, ""))
     cells = [re.findall(r"<(?:b|span)(?: [^>]*)?>([^<]*)", button) for button in buttons]
     return [[cell for cell in row if cell] for row in cells]
 
@@ -365,7 +352,7 @@ def test_table_has_the_eight_modes_with_b4_and_the_limits_that_each_breaks() -> 
     rows = rows_of_modes(frame)
     assert [row[0] for row in rows] == [str(mode) for mode in range(8)]
     for mode, row in enumerate(rows):
-        assert f"{row[0]}:  {row[1]}" == MODES[mode]
+        assert f"{row[0]}:  {row[1]}" == modes.MODES[mode]
         there = Frame(SetMode(mode).apply(frame.state))
         np.testing.assert_allclose(
             [number(cell) for cell in row[2:5]], there.state.pose.position, atol=0.06
@@ -376,7 +363,7 @@ def test_table_has_the_eight_modes_with_b4_and_the_limits_that_each_breaks() -> 
         assert (row[5] == "within") == (not broken)
         if broken:
             assert row[5].split(" +")[0] in broken[0].limit
-            assert str(broken[0]) in modes_table(frame, "").replace("&#x27;", "'")
+            assert str(broken[0]) in modes.modes_table(frame, "").replace("&#x27;", "'")
             assert row[5].endswith(f" +{len(broken) - 1}") == (len(broken) > 1)
 
 
@@ -396,7 +383,7 @@ def test_table_of_any_pose_has_eight_rows_or_says_that_they_do_not_close(case: C
 def test_press_on_a_row_goes_to_its_mode_and_one_in_the_head_switches_the_ghosts(
     services: Services, desk: Desk
 ) -> None:
-    ModesPanel(services)
+    modes.ModesPanel(services)
     desk.press(services.buttons, "modes.go", "6")
     assert desk.state.mode == 6
     desk.press(services.buttons, "modes.go", "8")
@@ -406,13 +393,13 @@ def test_press_on_a_row_goes_to_its_mode_and_one_in_the_head_switches_the_ghosts
         assert desk.state.view.ghosts is on
     labels = [command.label for command in services.buttons.commands]
     assert "Pose › Assembly mode › 3: − + +" in labels
-    assert len(labels) == len(MODES) + 1
+    assert len(labels) == len(modes.MODES) + 1
 
 
 def test_pointer_on_a_row_shows_one_ghost_with_its_number_and_leaves_no_step(
     services: Services, desk: Desk
 ) -> None:
-    ghosts = Ghosts(services)
+    ghosts = modes.Ghosts(services)
     before, steps = desk.state, desk.session.history
 
     def drawn() -> dict[str, dict[str, Any]]:
@@ -425,12 +412,12 @@ def test_pointer_on_a_row_shows_one_ghost_with_its_number_and_leaves_no_step(
     desk.press(services.buttons, "modes.hover", "6")
     assert sorted(visible()) == ["/ghosts/legs", "/ghosts/name/0", "/ghosts/platform/0"]
     scene = drawn()
-    assert scene["/ghosts/name/0"]["text"] == MODES[6]
+    assert scene["/ghosts/name/0"]["text"] == modes.MODES[6]
     there = SetMode(6).apply(before).pose
     points = Configuration(OPTIMAL, there.position, there.rotation).points
     placed = Placed(Frame(desk.state))
     expected = placed.scale * np.array([points.b1, points.b2, points.b3, points.b4])
-    np.testing.assert_allclose(ghost_points(placed, [6])[0], expected, atol=1e-9)
+    np.testing.assert_allclose(modes.ghost_points(placed, [6])[0], expected, atol=1e-9)
     # The present mode has no ghost, and none is left once the pointer has gone.
     for value in (str(before.mode), ""):
         desk.press(services.buttons, "modes.hover", value)
@@ -442,7 +429,7 @@ def test_pointer_on_a_row_shows_one_ghost_with_its_number_and_leaves_no_step(
 def test_pointer_is_on_a_mode_or_on_none_and_leaves_with_its_browser(
     services: Services, desk: Desk
 ) -> None:
-    hovered = services.get(mode_hover)
+    hovered = services.get(modes.mode_hover)
     for text, row in (("9", None), ("-1", None), ("x", None), ("2", 2)):
         desk.press(services.buttons, "modes.hover", text)
         assert hovered.row == row

@@ -16,8 +16,8 @@ from hypothesis import given, settings, strategies as st
 from strategies import designs
 
 from explorer.app.session.session import Session
-from explorer.app.state.action import Action
 from explorer.app.state.actions import (
+    Action,
     GoHome,
     Open,
     Reset,

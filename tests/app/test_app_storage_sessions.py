@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pytest
 from client import wait_for
 from desk import Desk
@@ -18,24 +17,23 @@ from killed import run_until_killed
 from sample_states import OPTIMAL, Sample, rich_state, samples, states_of
 
 from explorer.app.features.optimise.actions import StartRun
+from explorer.app.features.optimise.state import Optimisation, SearchRun
 from explorer.app.session.history import History, Step, start_history
 from explorer.app.session.session import REDO, UNDO, Session
 from explorer.app.state.actions import SetName, SetPosition
-from explorer.app.state.state import Run, State, open_state
-from explorer.app.storage.autosaver import Autosaver
+from explorer.app.state.state import State, open_state
+from explorer.app.storage import user_data
 from explorer.app.storage.folder import data_folder
 from explorer.app.storage.session_file import (
-    MOST_BYTES,
     MOST_ORPHANS,
     MOST_STEPS,
     SCHEMA,
     DamagedError,
-    Resumed,
     SessionFile,
     decode_session,
     encode_session,
 )
-from explorer.app.storage.user_data import open_user_data
+from explorer.app.storage.user_data import Autosaver, open_user_data
 from explorer.errors import StorageError
 
 DATA = Path(__file__).parents[1] / "data"
@@ -46,10 +44,10 @@ WHOLE = encode_session(History((Step(7, "Open", OPENED), Step(8, "All", RICH)), 
 def saved_part_of(state: State) -> State:
     """Return what a file holds of a state: all but what goes on or is computed again."""
     if state.optimisation.is_on:
-        run = state.optimisation.run
+        run = Optimisation.of(state).run
         assert run is not None
-        state = replace(run.own, optimisation=replace(state.optimisation, run=None))
-    paths, found = state.paths, state.optimisation
+        state = replace(run.own, optimisation=replace(Optimisation.of(state), run=None))
+    paths, found = state.paths, Optimisation.of(state)
     journey = None if paths.journey is None else replace(paths.journey, is_playing=False)
     paths = replace(paths, request=0, planning=None, problem=None, journey=journey)
     run = None if found.run is None else saved_run_of(found.run)
@@ -57,7 +55,7 @@ def saved_part_of(state: State) -> State:
     return replace(state, taken=None, gesture=None, paths=paths, optimisation=found)
 
 
-def saved_run_of(run: Run) -> Run:
+def saved_run_of(run: SearchRun) -> SearchRun:
     best = run.best
     shown = tuple(each for each in run.iterates if best is not None and each.run == best.run)
     return replace(run, own=saved_part_of(run.own), iterates=shown, comparison=None)
@@ -107,19 +105,10 @@ def test_session_after_any_actions_is_read_back_to_the_last_bit(actions: list[Sa
         assert found.state == saved_part_of(step.state)
 
 
-@pytest.mark.parametrize(
-    ("words", "least", "most"),
-    [("Step {}", MOST_STEPS, MOST_STEPS), ("x" * 20_000, 2, 20), ("x" * 2 * MOST_BYTES, 1, 1)],
-    ids=["long", "large", "huge"],
-)
-def test_long_and_large_histories_lose_steps_far_from_the_present_one(
-    words: str, least: int, most: int
-) -> None:
-    history = history_of(moves(open_state(OPTIMAL), 3 * MOST_STEPS), words)
-    data = encode_session(history)
-    read = decode_session(data, "file")
-    assert least <= len(read.steps) <= most
-    assert len(data) <= MOST_BYTES + 200 or len(read.steps) == 1
+def test_long_history_loses_steps_far_from_the_present_one() -> None:
+    history = history_of(moves(open_state(OPTIMAL), 3 * MOST_STEPS))
+    read = decode_session(encode_session(history), "file")
+    assert len(read.steps) == MOST_STEPS
     assert read.step.state == history.step.state
     assert read.step.number == history.step.number
 
@@ -149,30 +138,6 @@ def test_any_bytes_are_refused_in_one_line(data: bytes) -> None:
         assert "\n" not in str(refusal.value)
 
 
-NONSENSE: dict[str, Callable[[State], State]] = {
-    "a negative length": lambda state: replace(state, joints=(-5.0, *state.joints[1:])),
-    "joints of another pose": lambda state: replace(state, joints=(*state.joints[::-1],)),
-    "another design": lambda state: replace(
-        state, design=msgspec.structs.replace(state.design, b1=(1.0, 1.0))
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("nonsense", NONSENSE)
-@pytest.mark.parametrize("place", ["shown", "undone", "before a run"])
-def test_state_that_no_page_shows_is_refused_wherever_it_is(nonsense: str, place: str) -> None:
-    bad = NONSENSE[nonsense](OPENED)
-    if place == "before a run":
-        run = RICH.optimisation.run
-        assert run is not None
-        optimisation = replace(RICH.optimisation, run=replace(run, own=bad))
-        bad = replace(RICH, optimisation=optimisation)
-    states = [bad, OPENED] if place == "undone" else [OPENED, bad]
-    with pytest.raises(StorageError, match="file cannot be used") as refusal:
-        decode_session(encode_session(history_of(states)), "file")
-    assert str(refusal.value).isprintable()
-
-
 def test_file_of_this_version_opens_and_is_the_same_once_it_is_written_again() -> None:
     read = decode_session((DATA / "session.json").read_bytes(), "file")
     assert [step.words for step in read.steps] == ["Open é «one»", "All"]
@@ -194,6 +159,19 @@ def test_file_of_another_version_is_refused_in_one_sentence_whatever_it_holds(sc
 
 # Seconds that no test waits.
 NEVER = 1e6
+
+
+@pytest.fixture
+def saves_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A saver that waits neither before it saves nor before it tries again."""
+    monkeypatch.setattr(user_data, "DELAY_SECONDS", 0.0)
+    monkeypatch.setattr(user_data, "RETRY_SECONDS", 0.01)
+
+
+@pytest.fixture
+def saves_never(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A saver that does not save by itself."""
+    monkeypatch.setattr(user_data, "DELAY_SECONDS", NEVER)
 
 
 def numbered(number: int) -> History:
@@ -218,10 +196,10 @@ def leave_session(folder: Path, number: int) -> Path:
 def resume(folder: Path) -> float | None:
     """Return the session with which the next explorer starts, and leave it again."""
     store = SessionFile(folder)
-    resumed = store.resume()
+    history, messages = store.resume()
     store.close()
-    assert resumed.messages == ()
-    return number_of(resumed.history)
+    assert messages == ()
+    return number_of(history)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -239,7 +217,7 @@ def saved_numbers(folder: Path) -> list[float | None]:
 def test_next_explorer_continues_in_the_same_file(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "sessions"
     first = SessionFile(folder)
-    assert first.resume().history is None
+    assert first.resume()[0] is None
     assert first.path is None
     for number in range(5):
         first.save(numbered(number))
@@ -248,7 +226,7 @@ def test_next_explorer_continues_in_the_same_file(tmp_path: Path) -> None:
     path = first.path
     first.close()
     second = SessionFile(folder)
-    assert second.resume() == Resumed(numbered(4))
+    assert second.resume() == (numbered(4), ())
     assert second.path == path
     second.save(numbered(5))
     second.close()
@@ -261,8 +239,8 @@ def test_explorers_side_by_side_have_a_file_each_and_the_last_save_is_the_newest
 ) -> None:
     leave_session(tmp_path, 0)
     one, two, three = (SessionFile(tmp_path) for _ in range(3))
-    assert number_of(one.resume().history) == 0
-    assert two.resume().history is None
+    assert number_of(one.resume()[0]) == 0
+    assert two.resume()[0] is None
     # As with a design that is opened from a file, which resumes no session.
     three.save(numbered(30))
     for number in range(1, 10):
@@ -273,7 +251,7 @@ def test_explorers_side_by_side_have_a_file_each_and_the_last_save_is_the_newest
     for store in (one, two, three):
         store.close()
     stores = [SessionFile(tmp_path) for _ in range(4)]
-    assert [number_of(store.resume().history) for store in stores] == [10, 20, 30, None]
+    assert [number_of(store.resume()[0]) for store in stores] == [10, 20, 30, None]
     for store in stores:
         store.close()
 
@@ -284,7 +262,7 @@ def test_only_the_newest_sessions_are_kept_and_those_of_running_explorers(tmp_pa
     for number in range(MOST_ORPHANS + 5):
         leave_session(tmp_path, number)
     store = SessionFile(tmp_path)
-    assert number_of(store.resume().history) == MOST_ORPHANS + 4
+    assert number_of(store.resume()[0]) == MOST_ORPHANS + 4
     numbers = saved_numbers(tmp_path)
     assert sorted(n for n in numbers if n is not None) == [-1, *range(4, MOST_ORPHANS + 5)]
     living.save(numbered(-2))
@@ -312,11 +290,9 @@ def test_paths_that_are_no_sessions_are_ignored(
 
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "cut": lambda whole: whole[: len(whole) // 2],
-    "changed": lambda whole: whole.replace(b"[2.0", b"[3.0", 1),
+    "changed": lambda whole: whole.replace(b"[2.0", b"[true", 1),
     "empty": lambda _: b"",
     "other": lambda _: b'{"what": 1}\n',
-    # No page can show it.
-    "another design": lambda _: encode_session(history_of([NONSENSE["another design"](OPENED)])),
 }
 
 
@@ -329,10 +305,10 @@ def test_damaged_file_is_renamed_and_the_session_before_is_resumed(
     damaged = DAMAGES[damage](path.read_bytes())
     path.write_bytes(damaged)
     store = SessionFile(tmp_path)
-    resumed = store.resume()
+    history, messages = store.resume()
     store.close()
-    assert number_of(resumed.history) == 1
-    (message,) = resumed.messages
+    assert number_of(history) == 1
+    (message,) = messages
     assert "\n" not in message
     assert path.name in message
     assert message.endswith(f"; it is kept as {path.name + '.broken'!r}")
@@ -347,9 +323,9 @@ def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     other.write_bytes(b'{"schema": 99, "more": [1]}\n\xff')
     before = other.read_bytes()
     store = SessionFile(tmp_path)
-    resumed = store.resume()
-    assert number_of(resumed.history) == 1
-    (message,) = resumed.messages
+    history, messages = store.resume()
+    assert number_of(history) == 1
+    (message,) = messages
     assert "another version" in message
     assert message.endswith("; it is left as it is")
     assert other.read_bytes() == before
@@ -359,7 +335,7 @@ def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
 def test_folder_that_is_a_file_is_reported_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "data").write_bytes(b"")
     store = SessionFile(tmp_path / "data" / "sessions")
-    assert store.resume() == Resumed(None)
+    assert store.resume() == (None, ())
     with pytest.raises(StorageError, match="EXPLORER_DATA") as refusal:
         store.save(numbered(1))
     assert "\n" not in str(refusal.value)
@@ -389,7 +365,7 @@ def test_save_killed_between_any_two_writes_leaves_the_session_before_or_the_new
     number, writes, is_killed = 1, 0, True
     while is_killed:
         store = SessionFile(tmp_path)
-        before = number_of(store.resume().history)
+        before = number_of(store.resume()[0])
         number += 1
         is_killed = run_until_killed(partial(store.save, numbered(number)), writes)
         # The system releases the lock of a process that is killed.
@@ -399,11 +375,12 @@ def test_save_killed_between_any_two_writes_leaves_the_session_before_or_the_new
     assert writes > 1
 
 
+@pytest.mark.usefixtures("saves_at_once")
 def test_last_of_many_changes_is_saved_in_the_background_and_the_next_one_too(
     tmp_path: Path,
 ) -> None:
     messages: list[str] = []
-    saver = Autosaver(SessionFile(tmp_path), messages.append, delay=0.0)
+    saver = Autosaver(SessionFile(tmp_path), messages.append)
     for number in range(20):
         saver.follow(OPENED, numbered(number))
     wait_for(lambda: saved_numbers(tmp_path) == [19])
@@ -413,8 +390,9 @@ def test_last_of_many_changes_is_saved_in_the_background_and_the_next_one_too(
     assert messages == []
 
 
+@pytest.mark.usefixtures("saves_never")
 def test_change_is_saved_at_once_by_a_flush_and_when_the_explorer_stops(tmp_path: Path) -> None:
-    saver = Autosaver(SessionFile(tmp_path), print, delay=NEVER)
+    saver = Autosaver(SessionFile(tmp_path), print)
     saver.follow(OPENED, numbered(1))
     assert saved_numbers(tmp_path) == []
     assert saver.flush()
@@ -428,13 +406,14 @@ def test_change_is_saved_at_once_by_a_flush_and_when_the_explorer_stops(tmp_path
     assert resume(tmp_path) == 2
 
 
+@pytest.mark.usefixtures("saves_never")
 def test_failure_to_save_is_reported_once_and_so_is_its_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_bytes(b"")
     messages: list[str] = []
     store = SessionFile(tmp_path / "file")
-    saver = Autosaver(store, messages.append, delay=NEVER)
+    saver = Autosaver(store, messages.append)
     for number in range(3):
         saver.follow(OPENED, numbered(number))
         assert not saver.flush()
@@ -461,10 +440,11 @@ def test_failure_to_save_is_reported_once_and_so_is_its_end(
     assert resume(tmp_path / "file") == 3
 
 
+@pytest.mark.usefixtures("saves_at_once")
 def test_failed_save_is_tried_again_without_another_change(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
     messages: list[str] = []
-    saver = Autosaver(SessionFile(tmp_path / "file"), messages.append, delay=0.0, retry=0.01)
+    saver = Autosaver(SessionFile(tmp_path / "file"), messages.append)
     saver.follow(OPENED, numbered(1))
     wait_for(lambda: messages)
     (tmp_path / "file").unlink()
@@ -485,7 +465,7 @@ def test_resumed_session_is_undone_and_redone(desk: Desk, tmp_path: Path) -> Non
     assert desk.state.optimisation.is_on
     saver.stop()
 
-    history = SessionFile(tmp_path).resume().history
+    history = SessionFile(tmp_path).resume()[0]
     assert history is not None
     assert [(step.number, step.words, step.state) for step in history.steps] == [
         (step.number, step.words, step.state) for step in before.steps
@@ -495,7 +475,7 @@ def test_resumed_session_is_undone_and_redone(desk: Desk, tmp_path: Path) -> Non
     try:
         for travel, expected in ((UNDO, before.steps[0]), (REDO, before.steps[2])):
             for _ in range(2):
-                session.travel(travel)
+                session.do(travel)
             assert session.wait_until_idle()
             assert session.state == expected.state
     finally:

@@ -21,23 +21,18 @@ from desk import Desk
 from hypothesis import given, strategies as st
 
 from explorer.app.features.feature import Services
-from explorer.app.features.studies.actions import (
-    BrushAxes,
-    OpenStudy,
-    PickDesign,
-    free_axes,
-)
+from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
 from explorer.app.features.studies.feed import Request, StudyDrawing, StudyFeed
-from explorer.app.features.studies.figures import parallel, scatter
+from explorer.app.features.studies.figures import PlotRows, parallel, scatter, select_rows, thin_out
+from explorer.app.features.studies.folders import (
+    StudyFolders,
+    check_given,
+    keep_study,
+    study_folders,
+    study_in,
+)
 from explorer.app.features.studies.panel import PlotEvent, StudiesPanel, event_of
-from explorer.app.features.studies.plot_rows import PlotRows, select_rows, thin_out
-from explorer.app.features.studies.words import status
-from explorer.app.features.studies.work import StudyRunner
-from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Set, SetVariable
-from explorer.app.state.frame import Frame
-from explorer.app.state.state import open_state
-from explorer.app.state.studies import (
+from explorer.app.features.studies.state import (
     Brush,
     Studies,
     StudyPlan,
@@ -46,7 +41,12 @@ from explorer.app.state.studies import (
     study_around,
     within,
 )
-from explorer.app.storage.study_folders import StudyFolders, check_given, keep_study, study_in
+from explorer.app.features.studies.words import status
+from explorer.app.features.studies.work import StudyRunner
+from explorer.app.session.session import UNDO
+from explorer.app.state.actions import Set, SetVariable
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import open_state
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.measures.catalogue import measures_in
@@ -104,22 +104,22 @@ def test_axis_has_the_ranges_that_it_was_given_last(
     for axis, each in strokes:
         state = BrushAxes((Brush(axis, each),)).apply(state)
     last = dict(strokes)
-    assert {brush.axis: brush.ranges for brush in state.studies.brushes} == {
+    assert {brush.axis: brush.ranges for brush in Studies.of(state).brushes} == {
         axis: each for axis, each in last.items() if each
     }
-    assert all(state.studies.ranges_of(axis) == each for axis, each in last.items())
-    assert free_axes(state).apply(state).studies.brushes == ()
+    assert all(Studies.of(state).ranges_of(axis) == each for axis, each in last.items())
+    assert Studies.of(free_axes(state).apply(state)).brushes == ()
 
 
 def test_box_brushes_both_its_axes_and_frees_them_again() -> None:
     state = BrushAxes((Brush("b2", ((0.0, 1.0),)),)).apply(open_state(OPTIMAL))
     box = Brush("volume", ((1.0, 2.0),)), Brush("reach", ((3.0, 4.0),))
-    boxed = BrushAxes(box).apply(state).studies
+    boxed = Studies.of(BrushAxes(box).apply(state))
     ranges = [boxed.ranges_of(axis) for axis in ("volume", "reach", "b2")]
     assert ranges == [((1.0, 2.0),), ((3.0, 4.0),), ((0.0, 1.0),)]
     free = Brush("volume", ()), Brush("reach", ())
     freed = BrushAxes(free).apply(replace(state, studies=boxed))
-    assert [each.axis for each in freed.studies.brushes] == ["b2"]
+    assert [each.axis for each in Studies.of(freed).brushes] == ["b2"]
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ def test_study_that_is_opened_has_no_brushes_unless_it_was_open() -> None:
     state = Set("studies.plan", QUICK).apply(state)
     assert OpenStudy("one").apply(state) is state
     other = OpenStudy("two").apply(state)
-    assert other.studies == Studies(name="two", plan=QUICK)
+    assert Studies.of(other) == Studies(name="two", plan=QUICK)
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=80).map(np.array), st.integers(2, 30))
@@ -420,14 +420,14 @@ def test_plots_show_brushes_and_the_picked_design(feed: StudyFeed, home: Path) -
 
 def test_picked_design_is_live_and_one_step_to_undo(desk: Desk, feed: StudyFeed) -> None:
     desk.session.do(OpenStudy("some"))
-    drawing = draw_study(feed, desk.state.studies)
+    drawing = draw_study(feed, Studies.of(desk.state))
     index = int(drawing.results.columns["index"][drawing.front[0]])
     design = drawing.results.design_of_row(drawing.row_of(index))
     before = desk.state
     desk.session.do(PickDesign(design, index=index, study="some"))
-    assert (desk.state.design, desk.state.studies.picked) == (design, index)
-    desk.session.travel(UNDO)
-    assert (desk.state.design, desk.state.studies) == (before.design, before.studies)
+    assert (desk.state.design, Studies.of(desk.state).picked) == (design, index)
+    desk.session.do(UNDO)
+    assert (desk.state.design, Studies.of(desk.state)) == (before.design, Studies.of(before))
     desk.session.do(OpenStudy(None))
     desk.session.do(PickDesign(design, index=index, study="some"))
     assert desk.state.design == before.design
@@ -563,7 +563,7 @@ def test_study_that_was_cancelled_is_continued_with_the_rows_it_has(studio: Stud
     runner.cancel()
     assert runner.wait_until_idle(PATIENCE)
     assert desk.complaints == []
-    assert desk.state.studies.name == run.name
+    assert Studies.of(desk.state).name == run.name
     folder = studio.folders.folder(run.name)
     kept = bytes_of(folder)
     assert len(kept) < run.study.chunks
@@ -582,7 +582,7 @@ def test_study_that_was_cancelled_is_continued_with_the_rows_it_has(studio: Stud
         for name, value, live in zip(VARIABLES, design.variables, OPTIMAL.variables, strict=True):
             low, high = results.study.variables.get(name, (live, live))
             assert low <= value <= high
-    assert draw_study(studio.feed, desk.state.studies).is_complete
+    assert draw_study(studio.feed, Studies.of(desk.state)).is_complete
 
 
 def test_study_that_cannot_be_is_refused_and_leaves_nothing(studio: Studio) -> None:
@@ -609,7 +609,7 @@ def test_study_whose_process_dies_is_reported_and_keeps_what_is_finished(studio:
     assert studio.runner.wait_until_idle(PATIENCE)
     assert any("Continue starts it again" in each for each in studio.desk.complaints)
     assert studio.runner.run is None
-    name = studio.desk.state.studies.name
+    name = Studies.of(studio.desk.state).name
     assert name is not None
     assert load_results(studio.folders.folder(name)).count > 0
 
@@ -618,9 +618,11 @@ def test_buttons_of_the_front_pass_every_design_once(
     services: Services, desk: Desk, buttons: Buttons, home: Path
 ) -> None:
     theme: Any = SimpleNamespace(is_dark=False)
-    panel = StudiesPanel(replace(services, studies=StudyFolders(home), theme=theme))
+    shared = replace(services, theme=theme)
+    shared.give(study_folders, StudyFolders(home))
+    panel = StudiesPanel(shared)
     desk.session.do(OpenStudy("some"))
-    drawing = draw_study(panel.feed, desk.state.studies)
+    drawing = draw_study(panel.feed, Studies.of(desk.state))
     # Without a request the settings of a new study are not shown while one is open.
     updates = [*panel.updates(Frame(desk.state))]
     assert [v for h, n, v in updates if h is panel.form and n == "visible"] == [False]
@@ -628,7 +630,7 @@ def test_buttons_of_the_front_pass_every_design_once(
     walked: list[int | None] = []
     for step in [1] * (len(front) + 1) + [-1] * len(front):
         desk.press(buttons, "studies.along", step)
-        walked.append(desk.state.studies.picked)
+        walked.append(Studies.of(desk.state).picked)
     # At the ends it stays.
     assert walked == [*front, front[-1], *front[-2::-1], front[0]]
     desk.press(buttons, "studies.new", "on")

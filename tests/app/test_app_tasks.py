@@ -15,10 +15,8 @@ from typing import Any
 import pytest
 from client import wait_for
 
-from explorer.app.session import jobs
-from explorer.app.session.jobs import RESTARTED, Worker
-from explorer.app.session.log import NAME, log_error, start_log
-from explorer.app.session.worker import CANCELLED
+from explorer.app.server import LOG, start_log
+from explorer.app.session.worker import CANCELLED, DIED_TWICE, RESTARTED, Worker, log_error
 from tests.app import telling
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,7 +39,6 @@ class Requester:
         *arguments: Any,
         key: str = "task",
         sends: bool = True,
-        is_drawing: bool = False,
     ) -> None:
         self.number = self._worker.submit(
             key,
@@ -50,7 +47,6 @@ class Requester:
             lambda value: self._events.put(("done", value)),
             lambda problem: self._events.put(("failed", problem)),
             receive=(lambda value: self._events.put(("message", value))) if sends else None,
-            is_drawing=is_drawing,
         )
 
     def next(self) -> tuple[str, Any]:
@@ -72,7 +68,7 @@ class Requester:
 @pytest.fixture(scope="module")
 def shared() -> Iterator[tuple[Worker, list[str]]]:
     reports: list[str] = []
-    worker = Worker(reports.append, died="it died")
+    worker = Worker(reports.append)
     yield worker, reports
     worker.stop()
 
@@ -149,7 +145,7 @@ def test_task_that_does_not_end_when_cancelled_is_killed_without_a_report(
     assert requester.next() == ("message", 0)
     process = worker.process_id
     worker.cancel(requester.number, AT_ONCE)
-    assert requester.next() == ("failed", "it died")
+    assert requester.next() == ("failed", DIED_TWICE)
     assert not reports
     requester.assert_works()
     assert worker.process_id != process
@@ -168,19 +164,20 @@ def test_cancelled_task_that_waits_is_not_begun_and_those_before_it_are(
     worker.cancel(third.number, NEVER)
     worker.cancel(first.number, NEVER)
     assert second.next() == ("done", "still wanted")
-    assert third.next() == ("failed", "it died")
+    assert third.next() == ("failed", DIED_TWICE)
     assert worker.process_id == process
     assert not reports
 
 
-def test_long_drawing_ends_as_soon_as_a_newer_one_waits(
-    requester: Requester, worker: Worker, reports: list[str], monkeypatch: pytest.MonkeyPatch
+def test_task_that_is_cancelled_after_some_time_makes_room_for_the_next(
+    requester: Requester, worker: Worker, reports: list[str]
 ) -> None:
-    monkeypatch.setattr(jobs, "LONG_SECONDS", 0.0)
-    requester.request("count_until_cancelled", is_drawing=True)
+    requester.request("count_until_cancelled")
     assert requester.next() == ("message", 0)
     process = worker.process_id
-    requester.request("count", 3, is_drawing=True)
+    first = requester.number
+    requester.request("count", 3)
+    worker.cancel(first, after=0.05)
     messages, end = requester.all()
     # The first one ends for no other reason.
     assert end == ("done", len(messages) + 1)
@@ -190,25 +187,22 @@ def test_long_drawing_ends_as_soon_as_a_newer_one_waits(
 
 
 @pytest.mark.parametrize(
-    ("task", "is_drawing", "messages", "problem", "expected"),
+    ("task", "messages", "problem", "expected"),
     [
-        ("die", True, [0, 0], "it died", [RESTARTED, "it died"]),
-        ("fall", False, [], "it died", [RESTARTED, "it died"]),
-        # What sends messages cannot start anew, unless only its result counts.
-        ("die", False, [0], "it died", ["it died"]),
-        ("refuse", False, [0], "refused on purpose", []),
+        ("die", [0, 0], DIED_TWICE, [RESTARTED, DIED_TWICE]),
+        ("fall", [], DIED_TWICE, [RESTARTED, DIED_TWICE]),
+        ("refuse", [0], "refused on purpose", []),
     ],
 )
 def test_task_that_refuses_or_kills_its_process_is_reported(
     requester: Requester,
     reports: list[str],
     task: str,
-    is_drawing: bool,
     messages: list[int],
     problem: str,
     expected: list[str],
 ) -> None:
-    requester.request(task, sends=task != "fall", is_drawing=is_drawing)
+    requester.request(task, sends=task != "fall")
     assert requester.all() == (messages, ("failed", problem))
     requester.assert_works()
     assert reports == expected
@@ -275,7 +269,7 @@ def test_stopped_worker_ends_its_process_whatever_it_does() -> None:
 def test_worker_process_ends_when_its_parent_is_gone() -> None:
     code = """
 import os, sys
-from explorer.app.session.jobs import Worker
+from explorer.app.session.worker import Worker
 from tests.app import telling
 worker = Worker(print)
 def receive(value):
@@ -311,7 +305,7 @@ def log(tmp_path: Path) -> Iterator[Path]:
     root = logging.getLogger()
     before = [*root.handlers]
     start_log(tmp_path / "new")
-    yield tmp_path / "new" / NAME
+    yield tmp_path / "new" / LOG
     for handler in {*root.handlers} - {*before}:
         root.removeHandler(handler)
         handler.close()
@@ -327,7 +321,8 @@ def log(tmp_path: Path) -> Iterator[Path]:
             [PROBLEM],
             ["ValueError", "telling.fail", "('a', 'b')"],
         ),
-        ("fall", (), "it died", [RESTARTED, "it died"], ["it died", "telling.fall"]),
+        # With a message of its own no task is done again.
+        ("fall", (), "it died", ["it died"], ["it died", "telling.fall"]),
         ("refuse", (), "refused on purpose", [], []),
     ],
 )

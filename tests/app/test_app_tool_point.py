@@ -27,28 +27,31 @@ from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
-from explorer.app.features.mechanism.pose_panel import MovePanel
-from explorer.app.features.orientation.feature import OrientationScene
-from explorer.app.features.orientation.panel import OrientationPanel
+from explorer.app.features.mechanism.panel import MovePanel
+from explorer.app.features.orientation.feature import OrientationPanel, OrientationScene
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.feature import PathScene
 from explorer.app.features.paths.panel import TYPED, PathsPanel, end_numbers
-from explorer.app.features.sharing.scene_html import caption_of
-from explorer.app.features.singularity.panel import performance_table
+from explorer.app.features.sharing.scene_files import caption_of
+from explorer.app.features.singularity.feature import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene
-from explorer.app.features.workspace.feature import send_workspace
+from explorer.app.features.workspace.feature import WorkspacePanel
 from explorer.app.features.workspace.feeds import (
     WORKSPACE_FEED,
+    send_workspace,
     workspace_pose,
     workspace_request,
     workspace_start,
 )
-from explorer.app.features.workspace.panel import WorkspacePanel
-from explorer.app.features.workspace.regions import Selection, rows_of as matrix_rows
 from explorer.app.features.workspace.scene import WorkspaceScene
-from explorer.app.features.workspace.tasks import WorkspaceDrawing, export_mesh
 from explorer.app.features.workspace.words import workspace_details
+from explorer.app.features.workspace.work import (
+    Selection,
+    WorkspaceDrawing,
+    export_mesh,
+    rows_of as matrix_rows,
+)
 from explorer.app.inputs.ranges import position_span
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.session.history import start_history
@@ -63,11 +66,11 @@ from explorer.app.widgets.pieces import widgets
 from explorer.mechanism.configuration import Point
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.kinematics import jacobian
 from explorer.mechanism.machine import Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.ellipsoids import jacobian
 from explorer.workspace.limits.constraints import constraints
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -132,13 +135,13 @@ def test_choice_of_the_point_is_one_step_that_can_be_undone(desk: Desk, services
     def has_tool_disabled() -> bool:
         updates = panel.updates(Frame(desk.state))
         markup = "".join(str(v) for _, name, v in updates if name == "content")
-        return "disabled" in re.findall(r"<button[^>]*pose\.point.*?</button>", markup)[1]
+        return "disabled" in re.findall(r"<button[^>]*view\.at.*?</button>", markup)[1]
 
     assert has_tool_disabled()
     desk.session.do(Set("design", with_tool(OPTIMAL)))
     assert not has_tool_disabled()
     before = desk.state
-    desk.press(services.buttons, "pose.point", "tool")
+    desk.press(services.buttons, "view.at", "tool")
     after = desk.state
     assert replace(after, view=before.view) == before
     assert desk.session.history.step.words == "Position of: tool point"
@@ -329,7 +332,7 @@ def test_undo_leads_back_to_the_point_of_each_step_and_leaves_the_rest_of_the_vi
         desk.session.do(action)
     for at in ("b4", "tool", "tool", "b4"):
         assert (desk.state.view.at, desk.state.view.grid) == (at, False)
-        desk.session.travel(UNDO)
+        desk.session.do(UNDO)
 
 
 # The workspace

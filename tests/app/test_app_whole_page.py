@@ -17,10 +17,9 @@ from sample_states import Sample, samples
 
 from explorer.app.features.compare.feature import Pin
 from explorer.app.features.optimise.actions import Accept, SetRequest, StartRun
+from explorer.app.features.optimise.state import Optimisation, OptimisationRequest
 from explorer.app.server import Running
-from explorer.app.state.action import Action
-from explorer.app.state.actions import GoHome, Open, Set, SetAngle, SetPose, SetPosition
-from explorer.app.state.optimisation import OptimisationRequest
+from explorer.app.state.actions import Action, GoHome, Open, Set, SetAngle, SetPose, SetPosition
 from explorer.app.state.state import State
 from explorer.app.state.view import View
 from explorer.errors import ExplorerError
@@ -144,7 +143,7 @@ def values_by_name(running: Running) -> dict[str, set[str]]:
 
 
 def is_compared(state: State) -> bool:
-    run = state.optimisation.run
+    run = Optimisation.of(state).run
     return run is not None and run.comparison is not None
 
 

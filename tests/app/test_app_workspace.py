@@ -22,18 +22,11 @@ from services import StubDownloads, services_for
 from workspace_feeds import drawing_of, follow
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.feature import FORMATS, send_workspace
-from explorer.app.features.workspace.feeds import (
-    VOLUME_FEED,
-    WORKSPACE_FEED,
-    workspace_request,
-    workspace_rotation,
-)
-from explorer.app.features.workspace.panel import SHOWN, WorkspacePanel
-from explorer.app.features.workspace.regions import Selection
+from explorer.app.features.workspace import feeds
+from explorer.app.features.workspace.feature import WorkspacePanel
 from explorer.app.features.workspace.slice_map import map_picture
-from explorer.app.features.workspace.tasks import STEP, WorkspaceDrawing, export_mesh
 from explorer.app.features.workspace.words import drawing_words, volume_headline, volume_text
+from explorer.app.features.workspace.work import STEP, Selection, WorkspaceDrawing, export_mesh
 from explorer.app.scene.bands import AT_LIMIT, PLAIN
 from explorer.app.state.actions import Open, Set, SetAngle, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
@@ -44,11 +37,10 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
-from explorer.mechanism.margins import margins
+from explorer.mechanism.margins import margins, planes_of_singularity
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.singularity.ellipsoids import inverse_condition, jacobian, planes_of_singularity
 from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.reactions import limit_shares, reactions
@@ -74,7 +66,7 @@ def with_workspace(state: State, **changes: Any) -> State:
 
 def test_volume_is_known_while_the_solid_is_not_shown() -> None:
     services, first = services_for(), open_state(OPTIMAL)
-    feed = services.get(VOLUME_FEED)
+    feed = services.get(feeds.VOLUME_FEED)
     assert volume_text(feed.drawing) == "–"
     assert "computing" in volume_headline(Frame(first), feed)
     for state in (first, SetVariable("a3x", 17.0).apply(first)):
@@ -82,7 +74,7 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
         assert not feed.is_current
         follow(services, state)
         expected = workspace_volume(state.design, state.pose.rotation)
-        assert services.get(WORKSPACE_FEED).drawing is None
+        assert services.get(feeds.WORKSPACE_FEED).drawing is None
         assert feed.is_current
         assert volume_text(feed.drawing) == f"{format_number(expected.volume, 6)} units³"
         words = volume_headline(Frame(state), feed)
@@ -98,8 +90,8 @@ def test_volume_is_that_of_the_orientation_that_is_chosen() -> None:
     for orientation, words in (("pose", "present"), ("home", "home")):
         chosen = with_workspace(state, orientation=orientation)
         follow(services, chosen)
-        feed = services.get(VOLUME_FEED)
-        expected = workspace_volume(OPTIMAL, workspace_rotation(Frame(chosen))).volume
+        feed = services.get(feeds.VOLUME_FEED)
+        expected = workspace_volume(OPTIMAL, feeds.workspace_pose(Frame(chosen)).rotation).volume
         assert volume_text(feed.drawing) == f"{format_number(expected, 6)} units³"
         assert f"in the {words} orientation" in volume_headline(Frame(chosen), feed)
 
@@ -117,27 +109,13 @@ def test_empty_workspace_names_what_empties_it_instead_of_a_volume() -> None:
     limits = msgspec.structs.replace(OPTIMAL.limits, l1=(0.0, 1.0), box=((10.0,) * 3, (11.0,) * 3))
     services, state = services_for(), Set("design.limits", limits).apply(open_state(OPTIMAL))
     follow(services, state)
-    words = volume_headline(Frame(state), services.get(VOLUME_FEED))
+    words = volume_headline(Frame(state), services.get(feeds.VOLUME_FEED))
     assert "The workspace is empty" in words
     assert "l1 maximum" in words
     assert drawing_of(with_workspace(state, solid=True, cut="x")).slice_map is None
 
 
 # What is shown
-
-
-@pytest.mark.parametrize("name", list(SHOWN))
-def test_chip_switches_what_is_shown_on_and_off(services: Services, desk: Desk, name: str) -> None:
-    panel = WorkspacePanel(services)
-    before = desk.state.view.workspace
-    desk.press(services.buttons, "workspace.show", name)
-    assert desk.state.view.workspace == replace(before, **{name: not getattr(before, name)})
-    pressed = f'data-value="{name}"[^>]*aria-pressed="true"'
-    content = [str(v) for _, n, v in panel.updates(Frame(desk.state)) if n == "content"]
-    is_on = not getattr(before, name)
-    assert any(re.search(pressed, each) for each in content) is is_on
-    desk.press(services.buttons, "workspace.show", name)
-    assert desk.state.view.workspace == before
 
 
 def test_region_sets_the_start_of_the_paths(services: Services, desk: Desk) -> None:
@@ -294,32 +272,22 @@ def test_b4_is_a_cross_where_it_is_and_faint_beside_the_slice() -> None:
     assert "ex-here" not in map_picture(drawn, away.position, OPTIMAL.reach)
 
 
-@pytest.mark.parametrize(
-    "text", ["", "[1,2]", "[1,2,3,4]", '["1",2,3]', "[1e999,2,3]", "[NaN,1,2]", "{}", "[1,2,1e13]"]
-)
-def test_press_without_a_position_goes_nowhere(services: Services, desk: Desk, text: str) -> None:
-    WorkspacePanel(services)
-    before = desk.state
-    desk.press(services.buttons, "workspace.go", text)
-    assert desk.state is before
-
-
 # Files
 
 
 def test_files_are_sent_in_the_format_that_is_asked_for(services: Services, desk: Desk) -> None:
     downloads = services.downloads
     assert isinstance(downloads, StubDownloads)
-    for what, file_format in itertools.product(("workspace", "hull"), FORMATS):
-        send_workspace(services, what, file_format, CLIENT.client_id)
+    for what, file_format in itertools.product(("workspace", "hull"), feeds.FORMATS):
+        feeds.send_workspace(services, what, file_format, CLIENT.client_id)
         assert downloads.sent[-1] == (CLIENT.client_id, f"paper-optimal-{what}.{file_format}")
     desk.session.do(Set("view.workspace.region", "accessible"))
-    send_workspace(services, "hull", "stl", CLIENT.client_id)
+    feeds.send_workspace(services, "hull", "stl", CLIENT.client_id)
     assert downloads.sent[-1][1] == "paper-optimal-accessible-hull.stl"
     desk.session.do(Set("view.workspace.region", "held"))
-    send_workspace(services, "workspace", "3mf", CLIENT.client_id)
+    feeds.send_workspace(services, "workspace", "3mf", CLIENT.client_id)
     assert downloads.sent[-1][1] == "paper-optimal-workspace-that-holds-the-load.3mf"
-    send_workspace(services, "hull", "3mf", CLIENT.client_id, at_home=True)
+    feeds.send_workspace(services, "hull", "3mf", CLIENT.client_id, at_home=True)
     assert downloads.sent[-1][1] == "paper-optimal-hull.3mf"
 
 
@@ -363,7 +331,7 @@ def measured(design: Design, colour: str, points: FloatArray, rotation: FloatArr
     if colour == "plain":
         return np.asarray(np.abs(margins(points, rotation)).min(axis=-1))
     if colour == "condition":
-        return inverse_condition(jacobian(design, points, rotation), design.reach)
+        return Configuration(design, points, rotation).inverse_condition
     if colour == "share":
         return shares_at(design, points, rotation)
     if colour == "error":
@@ -492,7 +460,7 @@ def test_map_is_read_to_the_browser_that_asks(services: Services) -> None:
     for text in ("[12.5,5]", "[NaN,1,2]", place):
         services.buttons.press("workspace.read", text, client)
     (script,) = asking.scripts
-    drawing = services.get(WORKSPACE_FEED).drawing
+    drawing = services.get(feeds.WORKSPACE_FEED).drawing
     assert drawing is not None
     assert drawing.slice_map is not None
     words = drawing.slice_map.words_at((12.5, 5.0, 7.25))
@@ -513,8 +481,8 @@ def test_load_that_is_not_shown_changes_no_request() -> None:
         ({"region": "held"}, True),
     )
     for changes, is_loaded in cases:
-        request = workspace_request(Frame(load_state(limited, **changes)))
-        changed = workspace_request(Frame(load_state(limited, forces=other, **changes)))
+        request = feeds.workspace_request(Frame(load_state(limited, **changes)))
+        changed = feeds.workspace_request(Frame(load_state(limited, forces=other, **changes)))
         assert request is not None
         assert (request != changed) is is_loaded
         if is_loaded:
@@ -523,10 +491,10 @@ def test_load_that_is_not_shown_changes_no_request() -> None:
 
 def test_payload_without_a_weight_loads_nothing_but_its_force() -> None:
     weightless = replace(FORCES, weighed="none")
-    request = workspace_request(Frame(load_state(forces=weightless, region="held")))
+    request = feeds.workspace_request(Frame(load_state(forces=weightless, region="held")))
     assert request is not None
     assert request.design.payload == Payload(0.0, (1.0, 0.0, 1.0), 5.0)
-    weighty = workspace_request(Frame(load_state(region="held")))
+    weighty = feeds.workspace_request(Frame(load_state(region="held")))
     assert weighty is not None
     assert weighty.design.payload == LOADED.payload
 
@@ -545,7 +513,7 @@ def test_colour_that_a_design_states_nothing_of_asks_for_what_it_needs(
     desk.session.do(Open(OPTIMAL))
     desk.session.do(Set("view", load_state(OPTIMAL, colour=colour).view))
     panel = WorkspacePanel(services)
-    request = workspace_request(Frame(desk.state))
+    request = feeds.workspace_request(Frame(desk.state))
     assert request is not None
     assert request.colour == "plain"
     assert words in panel_text(panel, desk.state)
@@ -561,7 +529,7 @@ def feed() -> Any:
     """The feed after it has drawn the part that holds the load."""
     services = services_for()
     follow(services, load_state(region="held"))
-    return services.get(WORKSPACE_FEED)
+    return services.get(feeds.WORKSPACE_FEED)
 
 
 @pytest.fixture(scope="module")
@@ -595,7 +563,7 @@ def test_load_that_nothing_holds_names_the_part(services: Services) -> None:
     weak = msgspec.structs.replace(LOADED, actuators=Actuators(push_n=(2, 2, 2, 2, 2, 2)))
     state = load_state(weak, region="held")
     follow(services, state)
-    drawing = services.get(WORKSPACE_FEED).drawing
+    drawing = services.get(feeds.WORKSPACE_FEED).drawing
     assert drawing is not None
     assert drawing.trouble is not None
     assert re.search(r"payload; actuator \w+ is at its limit there", drawing.trouble.reason)

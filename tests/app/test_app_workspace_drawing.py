@@ -16,21 +16,14 @@ import pytest
 from desk import viewed
 from services import StubWorker, services_for
 
-from explorer.app.features.legs.work import RadiusRequest, draw_radius_curve
+from explorer.app.features.workspace import work
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED, surface_of
-from explorer.app.features.workspace.regions import MOST_LIVE_NODES
-from explorer.app.features.workspace.tasks import (
-    WorkspaceRequest,
-    WorkspaceSurface,
-    draw_workspace,
-)
 from explorer.app.features.workspace.words import drawing_words
-from explorer.app.scene.bands import COLOURED_EDGE, MOST_COLOURED, Colouring, Shell
+from explorer.app.scene.bands import MOST_COLOURED, Colouring, Shell
 from explorer.app.scene.creases import creased_faces
 from explorer.app.session import feed as session_feed
 from explorer.app.session.feed import Stage
-from explorer.app.session.jobs import Worker
-from explorer.app.session.worker import CancelledError, Channel
+from explorer.app.session.worker import CancelledError, Channel, Worker
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
@@ -50,8 +43,8 @@ HOME_ROWS = tuple(tuple(row) for row in OPTIMAL.home_pose.rotation.tolist())
 PATIENCE = 120.0
 
 
-def a_request(**changes: Any) -> WorkspaceRequest:
-    plain = WorkspaceRequest(
+def a_request(**changes: Any) -> work.WorkspaceRequest:
+    plain = work.WorkspaceRequest(
         design=OPTIMAL,
         rotation=HOME_ROWS,
         region="limits",
@@ -121,15 +114,11 @@ def test_workspace_large_beside_the_reach_has_a_bounded_number_of_facets() -> No
     long: Any = (0.0, 20.0)
     limits = msgspec.structs.replace(OPTIMAL.limits, l1=long, d2=long, d4=long, l4=long)
     design = msgspec.structs.replace(OPTIMAL, a3=(1.2, 1.6), limits=limits, node_step=None)
-    plain = draw_workspace(a_request(design=design)).surface.shells
-    drawing = draw_workspace(a_request(design=design, colour="condition"))
+    plain = work.draw_workspace(a_request(design=design)).surface.shells
+    drawing = work.draw_workspace(a_request(design=design, colour="condition"))
     # A facet that lies in several bands is split between them.
     assert sum(len(shell.faces) for shell in drawing.surface.shells) < 1.5 * MOST_COLOURED
     assert area(drawing.surface.shells) == pytest.approx(area(plain), rel=1e-9)
-    # The colours are coarser than usual, which is reported; margins need no small facets.
-    assert drawing.surface.coarse_edge is not None
-    assert drawing.surface.coarse_edge > COLOURED_EDGE * design.reach
-    assert draw_workspace(a_request(design=design, colour="margin")).surface.coarse_edge is None
 
 
 ORIENTATIONS = (
@@ -149,8 +138,7 @@ def test_bands_of_margins_contain_the_values_of_their_colour(
     """Also within facets, which margins cross linearly and their minimum does not."""
     solid = workspace_solid(OPTIMAL, rotation, 0.3)
     colouring = Colouring(OPTIMAL, rotation, "margin", warn_below)
-    shells, coarse_edge = colouring.shells(creased_faces(solid))
-    assert coarse_edge is None
+    shells = colouring.shells(creased_faces(solid))
     rng = np.random.default_rng(3)
     for shell in shells:
         index = band_colours().index(shell.colour)
@@ -164,7 +152,7 @@ def test_bands_of_margins_contain_the_values_of_their_colour(
 
 @pytest.mark.parametrize(("colour", "cut"), [("margin", None), ("margin", "x"), ("condition", "z")])
 def test_bands_meet_where_the_measure_is_their_level(colour: Any, cut: Any) -> None:
-    drawing = draw_workspace(a_request(colour=colour, cut=cut, level=None))
+    drawing = work.draw_workspace(a_request(colour=colour, cut=cut, level=None))
     request = drawing.request
     colouring = Colouring(
         request.design, np.array(request.rotation), request.colour, request.warn_below
@@ -182,24 +170,11 @@ def test_bands_meet_where_the_measure_is_their_level(colour: Any, cut: Any) -> N
     assert met > 100
 
 
-def test_cut_shows_the_slice_at_its_level() -> None:
-    drawing = draw_workspace(a_request(cut="z", level=5.0, hull=True))
-    assert drawing.extent is not None
-    assert drawing.extent[1][2] == pytest.approx(18.0, abs=1e-6)
-    highest = max(float(shell.vertices[:, 2].max()) for shell in drawing.surface.shells)
-    assert highest == pytest.approx(5.0, abs=1e-6)
-    assert drawing.slice_map is not None
-    assert drawing.slice_map.plane == (0, 1)
-    assert drawing.slice_map.level == 5.0
-    assert drawing.hull_volume is not None
-    assert drawing.hull_volume >= drawing.mesh_volume * (1.0 - 1e-12)
-
-
 THICK = with_radius(OPTIMAL, 0.3)
 """With these radii several pairs of legs collide within the limits."""
 
 
-def accessible_request(design: Design, **changes: Any) -> WorkspaceRequest:
+def accessible_request(design: Design, **changes: Any) -> work.WorkspaceRequest:
     return a_request(**{"design": design, "region": "accessible", "tolerance": 0.5, **changes})
 
 
@@ -208,10 +183,10 @@ class Watched:
 
     def __init__(self, last: int | None = None) -> None:
         self.stages: list[Stage] = []
-        self.surfaces: list[WorkspaceSurface] = []
+        self.surfaces: list[work.WorkspaceSurface] = []
         self.line = Channel(self._keep, lambda: len(self.stages) == last)
 
-    def _keep(self, value: Stage | WorkspaceSurface) -> None:
+    def _keep(self, value: Stage | work.WorkspaceSurface) -> None:
         if isinstance(value, Stage):
             self.stages.append(value)
         else:
@@ -220,7 +195,7 @@ class Watched:
 
 def test_accessible_workspace_sends_a_stage_for_each_pair_of_legs_that_it_carves() -> None:
     watched = Watched()
-    drawing = draw_workspace(accessible_request(THICK, level=1.0), watched.line)
+    drawing = work.draw_workspace(accessible_request(THICK, level=1.0), watched.line)
     assert drawing.part is not None
     blocking = [pair.legs for pair in drawing.part.pairs if pair.blocked_volume > 0.0]
     assert len(blocking) > 1
@@ -239,22 +214,22 @@ def test_cancelled_drawing_ends_at_the_next_stage_and_keeps_nothing_of_it(last: 
     request = accessible_request(THICK, tolerance=0.51)
     watched = Watched(last)
     with pytest.raises(CancelledError):
-        draw_workspace(request, watched.line)
+        work.draw_workspace(request, watched.line)
     assert len(watched.stages) == last
     curve = Watched(last)
     with pytest.raises(CancelledError):
-        draw_radius_curve(RadiusRequest(THICK, HOME_ROWS, None), curve.line)
+        work.draw_radius_curve(work.Selection(THICK, HOME_ROWS), curve.line)
     assert len(curve.stages) == last
 
 
 def test_grid_too_fine_for_live_nodes_leaves_the_rest_of_the_drawing() -> None:
     design = msgspec.structs.replace(OPTIMAL, node_step=0.25)
-    assert workspace_nodes(design).count > MOST_LIVE_NODES
-    drawing = draw_workspace(accessible_request(design))
+    assert workspace_nodes(design).count > work.MOST_LIVE_NODES
+    drawing = work.draw_workspace(accessible_request(design))
     assert drawing.trouble is None
     assert drawing.part is not None
     assert drawing.part.node_count is None
-    same = draw_workspace(accessible_request(OPTIMAL)).part
+    same = work.draw_workspace(accessible_request(OPTIMAL)).part
     assert same is not None
     assert same.node_count is not None
     assert drawing.part.volume == same.volume
@@ -265,7 +240,7 @@ def test_cancelled_drawing_leaves_none_of_an_older_design() -> None:
     feed = WORKSPACE_FEED(services_for(worker=worker))
     state = viewed(open_state(THICK), workspace=WorkspaceView(solid=True))
     feed.follow(Frame(state))
-    drawing = draw_workspace(worker.orders[0].request)
+    drawing = work.draw_workspace(worker.orders[0].request)
     worker.orders[0].done(drawing)
     assert feed.drawing is drawing
     feed.follow(Frame(SetVariable("a3x", 18.0).apply(state)))

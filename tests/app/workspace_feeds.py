@@ -10,7 +10,7 @@ from services import StubWorker, services_for
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feature import WORKSPACE
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
-from explorer.app.features.workspace.tasks import WorkspaceDrawing
+from explorer.app.features.workspace.work import WorkspaceDrawing
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State

@@ -22,7 +22,7 @@ from explorer.optimise.problem import Problem
 from explorer.optimise.search.model import Evaluation, Model, reported_objective
 from explorer.optimise.search.starts import more_starts
 from explorer.optimise.solver import optimise_design
-from explorer.reproduce.search import STARTS
+from explorer.reproduce.optima import STARTS
 
 ROUNDS = 5
 # The other solver ends once it has what ours has, or after this many evaluations.

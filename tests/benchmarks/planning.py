@@ -19,10 +19,7 @@ from explorer.paths.proofs import Proofs
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.quantities import DELTA1, DELTA2, DELTA3, QUANTITY
 from explorer.workspace.limits.valid_moves import moves_are_valid
-from explorer.workspace.limits.valid_poses import (
-    Rules,
-    poses_are_valid,
-)
+from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 MARGINS = (DELTA1, DELTA2, DELTA3)
 LINES, PAIRS, MODE = 10_000, 8_805, 5

@@ -21,7 +21,7 @@ from explorer import Design, leg_clearances, margins, poses_are_valid, run_study
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.compiled import warm
 from explorer.sweep import rows, run as runs
-from explorer.sweep.sampling import samples
+from explorer.sweep.rows import samples
 from explorer.sweep.study import STUDIES, Sampling, Study, encode_study
 from explorer.sweep.workers import LocalWorkers, Workers
 

@@ -24,9 +24,8 @@ from explorer.numerics.compiled import warm
 from explorer.statics.load_cases import largest_shares, load_case
 from explorer.workspace.carried_region import carried_region
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints, slacks
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.nodes import mark_nodes
-from explorer.workspace.slices.volume import home_rotation, workspace_volume
+from explorer.workspace.limits.region import mark_nodes, region_of
+from explorer.workspace.slices.volume import workspace_volume
 from explorer.workspace.solids.solids import workspace_solid
 
 ROUNDS = 10
@@ -69,7 +68,7 @@ def _exact_volume() -> Row:
 
 def _voxels() -> tuple[float, float]:
     """Return the volume by voxels whose centre is inside, and how long counting takes."""
-    region = region_of(constraints(DESIGN, home_rotation(DESIGN)))
+    region = region_of(constraints(DESIGN, DESIGN.home_pose.rotation))
     lows, highs = region.ends
     step = float((highs - lows).max()) / VOXELS
     counts = np.ceil((highs - lows) / step).astype(np.int64)
@@ -102,7 +101,7 @@ def _through_trimesh(exact: float) -> tuple[float, int, float]:
     """Return how long trimesh takes from plain primitives to an error of 0.1 % or less."""
     creation: Any = trimesh.creation
     boolean: Any = trimesh.boolean
-    limits = constraints(DESIGN, home_rotation(DESIGN))
+    limits = constraints(DESIGN, DESIGN.home_pose.rotation)
 
     def box_of(planes: list[HalfSpace]) -> tuple[FloatArray, FloatArray]:
         lows, highs = np.full(3, -100.0), np.full(3, 100.0)

@@ -14,13 +14,13 @@ from kept_tab import KeptTab, OpenTab
 from playwright.sync_api import Browser, expect
 from tab import Tab
 
-from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.designs.feature import SavedDesigns
+from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.server import Running, start
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
-from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import UserData
 from explorer.mechanism.design_file import PRESETS
 

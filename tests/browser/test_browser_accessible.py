@@ -11,7 +11,7 @@ from likeness import decoded
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
+from explorer.app.features.mechanism.panel import JOINT_LABELS
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
 from explorer.app.state.actions import Set

@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 from tab import Tab
 
 from explorer.mechanism.design_file import PRESETS, decode_design
-from explorer.optimise.record import decode_record
+from explorer.optimise.outcome import decode_record
 from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]

@@ -20,7 +20,6 @@ from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import (
     SCENE_ALONE,
     open_page,
-    picture,
     settle,
     stable_picture,
     take,
@@ -84,7 +83,7 @@ def test_picture_is_that_of_a_page_which_draws_every_frame(browser: Browser) -> 
         settle(page, client)
         running.page.point_cameras("isometric")
         settle(page, client)
-        got = picture(browser, DESIGN, None, view="isometric", size=size)
+        got = draw(browser, SCENES["home"])
         assert_alike("every-frame", stable_picture(page), got, SCENE_LIMIT)
     finally:
         page.close()
@@ -201,8 +200,7 @@ def test_likeness_of_an_altered_scene_is_beyond_the_limit(
     def alter(running: Running) -> None:
         ALTERATIONS[alteration](running, monkeypatch)
 
-    size = SCENES["home"].size
-    got = picture(browser, DESIGN, None, view="isometric", size=size, prepare=alter)
+    got = draw(browser, SCENES["home"], alter)
     expected = decoded((FOLDER / "home.png").read_bytes())
     measured = likeness(expected, decoded(got))
     assert not measured.is_within(SCENE_LIMIT), measured

@@ -7,7 +7,7 @@ from tab import TRACK, Tab
 
 from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.scene.placing import Placed
-from explorer.app.session.gestures import PAUSE_SECONDS
+from explorer.app.session.history import PAUSE_SECONDS
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
 

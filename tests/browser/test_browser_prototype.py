@@ -8,7 +8,7 @@ from likeness import decoded, likeness
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.features.prototype.work import PARTS_FEED, drawn_parts, export_simulation
+from explorer.app.features.prototype.work import PARTS_FEED, export_simulation, parts_to_draw
 from explorer.app.state.actions import Set, SetPosition
 
 # A difference of two pictures that the eye cannot miss.
@@ -32,7 +32,7 @@ def test_prototype_replaces_the_schematic_moves_with_it_and_is_drawn_exploded(ta
     tab.label("Exploded").wait_for()
     together = tab.picture()
     assert difference(schematic, together) > PLAIN_TO_SEE
-    parts = drawn_parts(page.services.get(PARTS_FEED))
+    parts = parts_to_draw(page.services.get(PARTS_FEED))
     home = tab.state.pose.position
     session.do(SetPosition(2, home[2] - 2.0))
     assert difference(together, tab.picture()) > PLAIN_TO_SEE
@@ -41,7 +41,7 @@ def test_prototype_replaces_the_schematic_moves_with_it_and_is_drawn_exploded(ta
     goal = tab.drag("Exploded", 0.5)
     tab.wait_for(lambda: abs(tab.state.view.prototype.exploded - goal) < 0.05, "parts apart")
     assert difference(together, tab.picture()) > PLAIN_TO_SEE
-    assert drawn_parts(page.services.get(PARTS_FEED)) is parts
+    assert parts_to_draw(page.services.get(PARTS_FEED)) is parts
     for file_format, name in (("GLB", "mechanism.glb"), ("STL (zip)", "parts-stl.zip")):
         download = tab.export("Mechanism", file_format)
         assert download.suggested_filename == f"paper-optimal-{name}"

@@ -19,7 +19,6 @@ from playwright.sync_api import Browser, Download, Locator, Page, expect
 from tab import Tab
 
 import explorer
-from explorer.app.features.sharing.view_picture import Pixels
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS
 from explorer.app.state.actions import Set
 from explorer.app.state.view import View
@@ -38,7 +37,7 @@ INSIDE = ("file:", "blob:", "data:")
 
 def as_html(shown: Any) -> str:
     """Return what a notebook displays."""
-    return shown._repr_mimebundle_()["text/html"]
+    return shown._repr_html_()
 
 
 def wait_until_drawn(page: Page, canvas: Locator, is_drawn: Callable[[FloatArray], bool]) -> None:
@@ -49,11 +48,11 @@ def wait_until_drawn(page: Page, canvas: Locator, is_drawn: Callable[[FloatArray
         page.wait_for_timeout(50)
 
 
-def pixels_of(download: Download) -> Pixels:
+def pixels_of(download: Download) -> NDArray[np.uint8]:
     return untyped.imread(download.path().read_bytes(), extension=".png")
 
 
-def take_picture(tab: Tab, *, transparent: bool) -> Pixels:
+def take_picture(tab: Tab, *, transparent: bool) -> NDArray[np.uint8]:
     tab.switch("Transparent", on=transparent)
     with tab.drawing(), tab.page.expect_download() as download:
         tab.push("Download picture")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from tab import Tab
 
 from explorer.app.features.studies.feed import NO_PLAN, PlotJson
 from explorer.app.features.studies.panel import StudiesPanel
+from explorer.app.features.studies.state import Studies
 from explorer.app.session.session import UNDO
 from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.parts import write_part
@@ -82,7 +82,7 @@ def wait_for_plots(tab: Tab) -> None:
     feed = panel_of(tab).feed
 
     def plots() -> tuple[PlotJson, PlotJson] | None:
-        drawing, studies = feed.drawing, replace(tab.state.studies, plan=NO_PLAN)
+        drawing, studies = feed.drawing, replace(Studies.of(tab.state), plan=NO_PLAN)
         is_new = drawing is not None and drawing.request.studies == studies and feed.is_current
         return drawing.plots if drawing is not None and is_new else None
 
@@ -107,8 +107,8 @@ def revision_in(text: str) -> int:
     return int(text.partition('"uirevision":')[2].partition("}")[0])
 
 
-def studies_of(tab: Tab) -> Any:
-    return tab.state.studies
+def studies_of(tab: Tab) -> Studies:
+    return Studies.of(tab.state)
 
 
 def test_design_is_picked_and_brushed_by_clicks_and_drags_in_the_plots(
@@ -143,7 +143,7 @@ def test_design_is_picked_and_brushed_by_clicks_and_drags_in_the_plots(
     assert row not in tab.page.evaluate(LEFT_OUT)
 
     # What is undone is gone from the plots too.
-    tab.running.page.session.travel(UNDO)
+    tab.running.page.session.do(UNDO)
     tab.wait_for(lambda: not studies_of(tab).brushes, "no brush")
     wait_for_plots(tab)
     assert tab.page.evaluate(LEFT_OUT) == []

@@ -12,13 +12,12 @@ from playwright.sync_api import Locator, expect
 from tab import Tab
 
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, Set, SetAngle
+from explorer.app.state.actions import Action, Open, Set, SetAngle
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Actuators, Tool
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.ellipsoids import inverse_condition, jacobian
 from explorer.statics.accuracy import worst_error
 from explorer.statics.compliance import compliance, deflection
 from explorer.statics.load_cases import largest_shares, load_case
@@ -148,7 +147,7 @@ def test_reading_follows_the_mechanism_while_the_pointer_rests(tab: Tab) -> None
         found = words.match(reading.inner_text())
         assert found is not None
         at, rotation = (number(found[1]), 6.0, number(found[2])), tab.state.pose.rotation
-        expected = inverse_condition(jacobian(OPTIMAL, at, rotation), OPTIMAL.reach)
+        expected = Configuration(OPTIMAL, at, rotation).inverse_condition
         return number(found[3]) == pytest.approx(float(expected), abs=5e-6 + 1e-9)
 
     assert is_of_the_state()

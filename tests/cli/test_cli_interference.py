@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 from command_line import CommandLine
@@ -31,8 +30,7 @@ def column(found: dict[str, Any], key: str) -> list[Any]:
 
 
 def with_radii(radii: tuple[float, float, float, float]) -> explorer.Design:
-    limits = msgspec.structs.replace(OPTIMAL.limits, leg_radii=radii)
-    return msgspec.structs.replace(OPTIMAL, limits=limits)
+    return OPTIMAL.with_limits(leg_radii=radii)
 
 
 @pytest.fixture

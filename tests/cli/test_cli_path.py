@@ -99,6 +99,8 @@ def test_path_without_solution_has_status_1_and_reason(cli: CommandLine) -> None
         (["--to", "12", "8", "7", "--seconds", "0"], "--seconds must be a positive number"),
         (["--to", "12", "8", "7", "--samples", "1"], "--samples must lie within"),
         (["--to", "12", "8", "7", "--out", "/nowhere/path.csv"], "there is no folder"),
+        (["--to", "12", "8", "7", "--load", "1", "2"], "and may go on with a moment"),
+        (["--to", "12", "8", "7", "--load", "0", "0", "-1"], "limits neither its actuators"),
         (["--form", "12", "8", "7"], "did you mean --from?"),
     ],
 )
@@ -155,25 +157,3 @@ def test_path_with_load_holds_it_and_tells_the_largest_share(
     assert f"load        held, with {share} % of a limit at " in text
     bound = f"{100.0 * straight['largest_share_bound']:.1f}"
     assert f" samples and {bound} % at most between them: " in text
-
-
-def test_path_end_that_does_not_hold_the_load_has_status_2(
-    cli: CommandLine, press: tuple[str, str]
-) -> None:
-    words = (*press, *LOW, "--load", "0", "0", "-70")
-    assert "the start does not hold the load: actuator d2 at 143.2 %" in cli.refusal(*words)
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--load", "1", "2"], "--load needs a force fx fy fz, and may go on with a moment"),
-        (["--load", "1", "2", "x"], "--load"),
-        (["--load", "0", "0", "nan"], "--load"),
-        (["--load", "0", "0", "-1"], "limits neither its actuators nor its struts nor its guide"),
-    ],
-)
-def test_path_bad_load_is_one_line_and_status_2(
-    cli: CommandLine, words: list[str], message: str
-) -> None:
-    assert message in cli.refusal("--to", "12", "8", "7", *words)

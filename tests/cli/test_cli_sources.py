@@ -37,10 +37,10 @@ def test_source_of_forces_gives_the_forces(cli: CommandLine, weighs_payload: boo
     source = load_source("forces", loaded)
     found = values_of(source.python)["loaded"]
     assert isinstance(found, LoadedPose)
-    assert_allclose(found.held.actuators, loaded.held.actuators)
+    assert_allclose(found.reactions.actuators, loaded.reactions.actuators)
     cli.capsys.readouterr()
     answer = cli.answer(*arguments(source.command))
-    assert_allclose(answer["actuator_forces"], loaded.held.actuators)
+    assert_allclose(answer["actuator_forces"], loaded.reactions.actuators)
     assert "--density 1240 --parts" in load_source("forces", loaded, 1240.0).command
     assert "own" in values_of(load_source("accuracy", loaded, 1240.0).python)
 

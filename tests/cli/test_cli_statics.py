@@ -11,7 +11,7 @@ from command_line import CommandLine
 from numpy.testing import assert_allclose
 
 import explorer
-from explorer.measures.size import positions_over
+from explorer.measures.box import positions_over
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import typical_machine
 from explorer.prototype.assembly import make_prototype
@@ -23,8 +23,9 @@ from explorer.statics.accuracy import (
     largest_error,
     rms_of_sources,
     source_errors,
+    stated_tolerances,
 )
-from explorer.statics.budget.costs import source_costs, stated_tolerances
+from explorer.statics.budget import source_costs
 from explorer.statics.compliance import deflection, stiffness_of
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.weights import carry, payload_wrench
@@ -139,7 +140,7 @@ def test_forces_json_has_what_the_process_may_add(cli: CommandLine, tmp_path: Pa
     path.write_bytes(explorer.encode_design(design))
     found = cli.answer("forces", *POSE, "--design", path)
     loaded = LoadedPose(design, explorer.Pose.of(*AT), point=(0.0, 0.0, 0.0))
-    assert_allclose(list(found["process"].values())[:6], loaded.held.spread[:6])
+    assert_allclose(list(found["process"].values())[:6], loaded.reactions.spread[:6])
     assert_allclose(list(found["shares"].values()), loaded.shares)
     assert "payload's force, ± N" in cli.text("forces", *POSE, "--design", path)
     assert not any(cli.answer("forces", *POSE)["process"].values())
@@ -191,11 +192,9 @@ def test_statics_of_singular_pose_have_no_answer(cli: CommandLine, command: str)
     ("argv", "words"),
     [
         (["forces", "--load", "1", "2"], "--load needs a force fx fy fz"),
-        (["forces", "--load", "1", "2", "nan"], "fz must be a finite number"),
         (["forces", "--payload", "-1"], "--payload must be a number of at least 0; got -1"),
-        (["forces", "--most", "0"], "six positive numbers"),
+        (["forces", "--most", "0"], "6 positive numbers"),
         (["forces", "--at", "b2"], "--at"),
-        (["forces", "--density", "0"], "--density must be a positive number"),
         (["accuracy", "--errors", "-1"], "actuators.error_mm must not be negative; got -1"),
         (["accuracy", "--stiffness", "0"], "actuators.stiffness_n_mm must be positive; got 0"),
     ],
@@ -229,7 +228,7 @@ def stated(tmp_path: Path) -> Path:
 
 def test_budget_without_wanted_precision_ranks_the_costs(cli: CommandLine, stated: Path) -> None:
     found = cli.answer("budget", "--design", stated, *OVER_BOX, "--at", "tool")
-    costs = source_costs(STATED, POSITIONS, HOME.rotation, STATED.tool.position)
+    costs = source_costs(Configuration(STATED, POSITIONS, HOME.rotation, STATED.tool.position))
     assert found["count"] == 729
     assert found["ranking"] == [SOURCES[k] for k in costs.ranking]
     assert_allclose(found["displacement"], costs.displacement)
@@ -255,7 +254,7 @@ def test_budget_writes_the_design_that_keeps_what_is_wanted(
     better = explorer.load_design(str(out))
     assert found["out"] == str(out)
     assert_allclose(stated_tolerances(better), found["tolerances"])
-    costs = source_costs(better, POSITIONS, HOME.rotation)
+    costs = source_costs(Configuration(better, POSITIONS, HOME.rotation))
     assert found["worst_displacement"] == costs.worst_displacement <= 0.05
     assert found["worst_turn"] == costs.worst_turn <= 0.04
     assert found["effort"] >= found["least_effort"] > 0.0
@@ -287,7 +286,7 @@ def test_typical_values_are_told(cli: CommandLine, stated: Path) -> None:
         # Stated values stay.
         own = cli.answer(command, "--typical", "--design", stated)["assumed"]
         assert len(own) == 2
-    costs = source_costs(typical, [HOME.position], HOME.rotation)
+    costs = source_costs(Configuration(typical, [HOME.position], HOME.rotation))
     found = cli.answer("budget", "--typical")
     assert found["worst_displacement"] == pytest.approx(costs.worst_displacement)
     # Given errors are not assumed.

@@ -18,13 +18,12 @@ from limited_designs import scaled_design
 from mesh_files import glb_json, mesh_of, metadata_of, read_3mf
 
 from explorer import PRESETS, Design, ExplorerError, InputError, NoAnswerError, decode_design
-from explorer.export.assembly import COLOURS, FORMATS as ASSEMBLY_FORMATS, assembly_bytes
+from explorer.export.assembly import COLOURS, assembly_bytes
 from explorer.export.mesh import FORMATS, colour_of, mesh_bytes
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import CHAIN_JOINTS
-from explorer.workspace.solids.booleans import convex_hull
-from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solid import Solid, convex_hull
 from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = msgspec.structs.replace(PRESETS["paper-optimal"], unit_mm=7.5)
@@ -237,9 +236,10 @@ transformations: Any = trimesh.transformations
 ASSEMBLED = msgspec.structs.replace(PRESETS["paper-optimal"], unit_mm=12.5)
 PROTOTYPE = make_prototype(ASSEMBLED)
 HOME = ASSEMBLED.home_pose
+MESH_FORMATS = ("3mf", "glb", "stl-zip")
 PARTS = [part.name for part in PROTOTYPE.parts]
 AT_HOME = dict(zip(PARTS, PROTOTYPE.at(HOME.position, HOME.rotation), strict=True))
-DATA = {file_format: assembly_bytes(PROTOTYPE, file_format) for file_format in ASSEMBLY_FORMATS}
+DATA = {file_format: assembly_bytes(PROTOTYPE, file_format) for file_format in MESH_FORMATS}
 
 
 def matrix_of(transform: Any) -> FloatArray:
@@ -369,7 +369,7 @@ def test_stl_zip_holds_a_closed_mesh_per_part() -> None:
             assert float(shape.volume) == pytest.approx(volume, rel=SINGLE_PRECISION)
 
 
-@pytest.mark.parametrize("file_format", ASSEMBLY_FORMATS)
+@pytest.mark.parametrize("file_format", MESH_FORMATS)
 def test_assembly_bytes_equal_designs_give_equal_files(file_format: str) -> None:
     again = assembly_bytes(make_prototype(ASSEMBLED), file_format)
     if file_format == "3mf":
@@ -384,5 +384,5 @@ def test_assembly_bytes_huge_parts_and_unknown_formats_are_refused() -> None:
     huge = make_prototype(msgspec.structs.replace(scaled_design(ASSEMBLED, 1e4), unit_mm=1e6))
     with pytest.raises(InputError, match="smaller unit"):
         assembly_bytes(huge, "3mf")
-    with pytest.raises(InputError, match="3mf, glb, stl-zip"):
+    with pytest.raises(InputError, match="3mf, glb, stl-zip, step"):
         assembly_bytes(PROTOTYPE, "dwg")

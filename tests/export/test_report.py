@@ -20,27 +20,27 @@ from limited_designs import limited, ordinary_case, troubled_case
 from report_page import Node, read, table_of
 
 import explorer
-from explorer import Design, Pose, __version__
+from explorer import Design, ExplorerError, Pose, __version__
 from explorer.app.features.sharing.reporting import make_report
 from explorer.export.drawings.markup import as_html, element, number
-from explorer.export.drawings.projection import ViewName, fit_view
+from explorer.export.drawings.mechanism import ViewName, fit_view
 from explorer.export.drawings.slices import Slices
-from explorer.export.report.data import Missing, gather_report_data
+from explorer.export.report.data import ReportData
 from explorer.export.report.document import report_html
 from explorer.legs.clearance import PAIRS, pair_name
 from explorer.mechanism.design import JOINTS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.optimise.defaults import paper_problem
-from explorer.optimise.record import Record, Settings, record_of
+from explorer.optimise.outcome import Record, Settings, record_of
 from explorer.optimise.solver import optimise_design
 from explorer.prototype.assembly import bill_of_materials, make_prototype
-from explorer.singularity.ellipsoids import certified_radius, performance, singularity_free_ball
+from explorer.singularity.ellipsoids import performance, singularity_free_ball
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.accessible.workspace import accessible_workspace
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.slices.outline import slice_outline
 from explorer.workspace.slices.volume import workspace_nodes
-from explorer.workspace.solids.booleans import convex_hull
+from explorer.workspace.solids.solid import convex_hull
 from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
@@ -188,7 +188,7 @@ def test_report_singularity_and_leg_tables_hold_snapshot(seed: int) -> None:
     radius = singularity_free_ball(home).radius
     ball = around["singularity-free radius"]
     assert ball.values == [radius, radius * unit]
-    certified = certified_radius(design, home)
+    certified = min(each.bound for each in snapshot.nearest)
     regular = around["regular within"]
     assert regular.values == [certified, certified * unit]
     nearest = table_of(page, "Nearest singular poses")
@@ -293,7 +293,7 @@ def test_report_hostile_record_stays_text() -> None:
     run = msgspec.structs.replace(record.runs[0], message=bad, holding=bad)
     versions = {"python": bad, bad: "1"}
     hostile = msgspec.structs.replace(record, runs=(run,), versions=versions)
-    html = report_html(gather_report_data(record.design, record=hostile), DAY)
+    html = report_html(ReportData(record.design, record=hostile), DAY)
     page = in_order(html)
     assert "<script>alert(1)</script>" in page.text
     assert "\x00" not in html
@@ -347,12 +347,12 @@ def test_report_singular_home_says_so() -> None:
 def test_report_missing_values_give_reasons_in_their_place() -> None:
     fine = page_of(msgspec.structs.replace(OPTIMAL, node_step=1e-6))
     assert "are counted" in table_of(fine, "Volumes")["node volume"].text
-    tight = gather_report_data(limited(OPTIMAL, leg_radii=(0.5, 0.5, 0.5, 0.5)))
-    assert isinstance(tight.bill, Missing)
+    tight = ReportData(limited(OPTIMAL, leg_radii=(0.5, 0.5, 0.5, 0.5)))
+    assert isinstance(tight.bill, ExplorerError)
     page = in_order(report_html(tight, DAY))
     assert "Its parts cannot be made" in page.text
     # Nor are there commands that would only tell so again.
-    assert isinstance(tight.accessible, Missing)
+    assert isinstance(tight.accessible, ExplorerError)
     commands = page.one(id="commands").text
     assert "export mechanism" not in commands
     assert "--interference" not in commands
@@ -377,7 +377,7 @@ def test_report_troubled_designs_have_one(seed: int) -> None:
 def test_fit_view_random_points_lie_in_the_frame_upright(name: ViewName) -> None:
     rng = np.random.default_rng(4)
     points = rng.normal(size=(40, 3)) * rng.uniform(0.1, 10.0, 3)
-    view = fit_view(name, points, (10.0, 20.0, 300.0, 200.0))
+    view = fit_view(name, points, (10.0, 20.0, 310.0, 220.0))
     flat = view.to(points)
     assert (flat.min(axis=0) >= [10.0 - 1e-9, 20.0 - 1e-9]).all()
     assert (flat.max(axis=0) <= [310.0 + 1e-9, 220.0 + 1e-9]).all()

@@ -14,8 +14,8 @@ from report_page import Node, read, table_of
 import explorer
 from explorer import Actuators, Design, Guide, Payload, Pose, Struts, Tool
 from explorer.app.features.sharing.reporting import make_report
-from explorer.export.report.data import gather_report_data
-from explorer.export.report.loads import worst_payload_force
+from explorer.export.report.data import ReportData
+from explorer.export.report.workspace import worst_payload_force
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.machine import Triple
 from explorer.statics.reactions import Reactions, limit_shares
@@ -112,7 +112,7 @@ def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
             found = parts[place + k].values
             assert found == [weight, force, limit, 100.0 * float(shares[index])]
             assert f" {k + 2}" in parts[place + k].text
-    worst = worst_payload_force(gather_report_data(design))
+    worst = worst_payload_force(ReportData(design))
     assert worst.share == pytest.approx(float(shares.max()), rel=1e-9)
 
 
@@ -153,7 +153,7 @@ def test_report_of_limits_or_a_payload_alone_tells_what_follows_from_it() -> Non
 
 def test_report_without_a_machine_has_neither_loads_nor_precision() -> None:
     for design in (OPTIMAL, msgspec.structs.replace(OPTIMAL, gravity=(1.0, 0.0, 0.0))):
-        data = gather_report_data(design)
+        data = ReportData(design)
         assert not data.has_machine
         assert data.precision is None
         page = page_of(design)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import msgspec
 import numpy as np
@@ -27,7 +26,6 @@ from explorer import (
     actuator_forces,
     tool_position,
 )
-from explorer.export.imperfect import ImperfectMachine
 from explorer.export.simulation import DENSITY, SimulationModel, simulation_mjcf
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DOWN, LENGTHS, Swing
@@ -35,6 +33,7 @@ from explorer.mechanism.design_file import typical_machine
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import ACTUATED
+from explorer.prototype.imperfect import ImperfectMachine
 from explorer.prototype.weights import bar_masses, machine_weights
 from explorer.statics.accuracy import SOURCES
 from explorer.statics.weights import carry
@@ -335,25 +334,6 @@ def test_model_lists_what_it_leaves_out() -> None:
     assert SimulationModel(ImperfectMachine.draw(typical, 0)).left_out == always
     exceeded = limited(free, gap=9.0)
     assert SimulationModel(exceeded).left_out == (*always, "limits that the home pose exceeds")
-
-
-def test_model_has_no_setting_of_the_whole_scene() -> None:
-    for given in (PRESS, loaded(1), ImperfectMachine.draw(typical_machine(PRESS)[0], 1)):
-        root = ET.fromstring(simulation_mjcf(given))
-        found = {element.tag for element in root}
-        assert found <= {"default", "worldbody", "equality", "tendon", "actuator", "keyframe"}
-        (default,) = root.findall("default")
-        assert [child.tag for child in default] == ["default"]
-        assert default[0].get("class")
-        (world,) = root.findall("worldbody")
-        (base,) = world.findall(".//body[@name='base']")
-        assert base in [*world, *world.findall("frame/body")]
-        for connect in root.findall("equality/connect"):
-            assert {"body1", "body2", "anchor"} <= set(connect.keys())
-        # Drake refuses bodies without mass.
-        assert all(float(each.get("mass", "0")) > 0.0 for each in root.iter("inertial"))
-        names = [element.get("name", "") for element in root.iter()]
-        assert not any(" " in name for name in names)
 
 
 def test_model_of_a_singular_home_is_refused() -> None:

@@ -21,15 +21,10 @@ from explorer import (
     make_prototype,
     workspace_volume,
 )
+from explorer.export.assembly import assembly_bytes, exact_parts
 from explorer.export.mesh import colour_of
 from explorer.export.opencascade import coordinates, faces_of, occ, volume_of
-from explorer.export.step import (
-    assembly_step,
-    exact_parts,
-    exact_workspace,
-    step_bytes,
-    workspace_step,
-)
+from explorer.export.step import exact_workspace, step_bytes
 from explorer.mechanism.design import Swing
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
@@ -152,12 +147,6 @@ def test_step_any_name_is_written_as_the_standard_says(name: str, tmp_path: Path
     assert [each.Name().ToCString() for each in products] == [kept]
 
 
-def test_step_assembly_of_any_name_reads_back() -> None:
-    name = "d'où \\ 😀"
-    design = msgspec.structs.replace(OPTIMAL, name=name)
-    assert f"mechanism of {name}" in strings(assembly_step(make_prototype(design).sizes))
-
-
 def test_step_workspace_shifted_to_the_tool_keeps_faces_and_volume() -> None:
     solid = exact_workspace(OPTIMAL)
     offset = np.array([31.0, -17.5, 120.0])
@@ -176,13 +165,13 @@ def test_step_workspace_shifted_to_the_tool_keeps_faces_and_volume() -> None:
 
 def test_step_empty_or_oversized_workspace_is_refused() -> None:
     with pytest.raises(NoAnswerError, match=r"empty: margin δ2"):
-        workspace_step(OPTIMAL, np.eye(3))
+        exact_workspace(OPTIMAL, np.eye(3))
     for unit in (1e-4, 1e6):
         with pytest.raises(InputError, match="choose another unit"):
-            workspace_step(msgspec.structs.replace(OPTIMAL, unit_mm=unit))
+            exact_workspace(msgspec.structs.replace(OPTIMAL, unit_mm=unit))
     thin: Any = {"box": ((0.0, -12.0, 5.0), (20.0, 22.0, 5.0 + 1e-7))}
     with pytest.raises(ExplorerError, match=r"too thin|cannot combine"):
-        workspace_step(limited(OPTIMAL, **thin))
+        exact_workspace(limited(OPTIMAL, **thin))
 
 
 @pytest.mark.parametrize("below", [False, True])
@@ -208,7 +197,7 @@ def test_exact_parts_volumes_match_the_meshes(below: bool) -> None:
 def test_step_assembly_reads_back_the_places_of_parts(tmp_path: Path) -> None:
     prototype = make_prototype(OPTIMAL)
     path = tmp_path / "mechanism.step"
-    data = assembly_step(prototype.sizes)
+    data = assembly_bytes(prototype, "step")
     path.write_bytes(data)
     assert b"AP242" in data[:600]
     for part in prototype.parts:

@@ -17,8 +17,14 @@ from refusals import refusal
 from explorer import PRESETS, decode_design, encode_design, load_design
 from explorer.files.json_text import LONGEST_LINE
 from explorer.optimise.defaults import paper_problem
-from explorer.optimise.outcome import Outcome
-from explorer.optimise.record import Settings, decode_record, encode_record, load_record, record_of
+from explorer.optimise.outcome import (
+    Outcome,
+    Settings,
+    decode_record,
+    encode_record,
+    load_record,
+    record_of,
+)
 from explorer.optimise.solver import optimise_design
 from explorer.sweep.study import STUDIES, decode_study, encode_study, load_study
 

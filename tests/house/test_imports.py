@@ -52,7 +52,6 @@ APP_ROOMS = (
     "scene",
     "features.feature",
     "features",
-    "features.listed",
     "bar",
     "layout",
     "page",
@@ -200,6 +199,15 @@ def test_modules_and_features_import_themselves_in_no_circle() -> None:
     for graph in (modules_graph, features):
         # A circle raises an error that names its members.
         assert len(tuple(TopologicalSorter(graph).static_order())) >= len(graph)
+
+
+def test_state_of_the_page_needs_neither_the_optimiser_nor_studies() -> None:
+    """What belongs to these lies in the folders of their features, which no state imports."""
+    above = ("optimise", "sweep", "prototype", "reproduce", "export")
+    modules_of_state = [module for module in MODULES if belongs_to(module, ("app.state",))]
+    reached = {name for module in modules_of_state for name in own_imports(module)}
+    assert "mechanism.design" in reached
+    assert not [name for name in sorted(reached) if belongs_to(name, above)]
 
 
 def test_libraries_are_imported_only_where_they_may_be() -> None:

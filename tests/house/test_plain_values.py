@@ -20,9 +20,7 @@ from explorer.sweep.study import Objective, Polish, Sampling, Study, decode_stud
 
 OPTIMAL = PRESETS["paper-optimal"]
 BOX = ((8.0, 3.0, 6.0), (12.0, 7.0, 10.0))
-LIMITED = msgspec.structs.replace(
-    OPTIMAL, limits=msgspec.structs.replace(OPTIMAL.limits, swing=Swing(*[30.0] * 6))
-)
+LIMITED = OPTIMAL.with_limits(swing=Swing(*[30.0] * 6))
 PROBLEM = Problem(
     start=OPTIMAL,
     objective="largest-margin",

@@ -11,9 +11,17 @@ import pytest
 from hypothesis import assume, given, strategies as st
 from limited_designs import limited
 from numpy.typing import ArrayLike
+from reference import read_reference
 from refusals import refusal
 from scipy.spatial.transform import Rotation
-from strategies import ordinary_designs, positions, rotations
+from strategies import (
+    Case,
+    ordinary_cases,
+    ordinary_designs,
+    positions,
+    rotations,
+    uniform_rotations,
+)
 from tool_moves import tool_move
 
 from explorer import (
@@ -25,7 +33,7 @@ from explorer import (
     rotation_from_yaw_pitch_roll,
     tetrahedra_overlap,
 )
-from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes
+from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes, pair_rows
 from explorer.legs.interference import step_overlaps, swept_tetrahedra
 from explorer.legs.moves import move_clearance, move_clearances, pairs_are_clear, poses_between
 from explorer.mechanism.configuration import Configuration
@@ -72,12 +80,13 @@ def test_swept_tetrahedra_constant_orientation_hold_the_legs(
 ) -> None:
     design, start, end = move
     end = Pose(end.position, start.quaternion)
-    swept = swept_tetrahedra(design, *arrays(start, end))
+    ends = Configuration.at(design, start), Configuration.at(design, end)
+    swept = swept_tetrahedra(*ends)
     assert swept.shape == (4, 4, 3)
     axes = leg_axes(Configuration(design, *poses_between(start, end, share)))
     points = axes[:, 0] + along * (axes[:, 1] - axes[:, 0])
     assert tetrahedra_overlap(swept, np.repeat(points[:, None], 4, axis=1)).all()
-    overlaps = step_overlaps(design, *arrays(start, end))
+    overlaps = step_overlaps(*ends)
     # Legs within disjoint tetrahedra are apart.
     poses = poses_between(start, end, np.linspace(0.0, 1.0, 101))
     assert (
@@ -122,7 +131,7 @@ def test_move_clearance_legs_that_cross_fail_both_tests() -> None:
     assert found.bound[pair] == pytest.approx(0.0, abs=1e-15)
     assert found.share[pair] == pytest.approx(0.5, abs=1e-4)
     assert not pairs_are_clear(design, *arrays(start, end)).all()
-    assert step_overlaps(design, *arrays(start, end)).any()
+    assert step_overlaps(*(Configuration.at(design, pose) for pose in (start, end))).any()
 
 
 @given(moves(), st.sampled_from((None, 1e-2, 1e-6)), st.none() | positions())
@@ -208,3 +217,112 @@ def test_move_clearance_no_length_is_refused() -> None:
 def test_move_clearance_unusable_option_is_refused(options: dict[str, Any], words: str) -> None:
     end = Pose((9, 5, 9), HOME.quaternion)
     assert words in refusal(partial(move_clearance, **options), OPTIMAL, HOME, end)
+
+
+def closest_points(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return distances (n,) and closest points (n, 2, 3) of segments as axes of legs 1 and 2."""
+    axes = np.zeros((len(a), 4, 2, 3))
+    axes[:, 0], axes[:, 1] = a, b
+    distance, points = np.empty((len(a), 6)), np.empty((len(a), 6, 2, 3))
+    pair_rows(len(a), axes, distance, points)
+    return distance[:, 0], points[:, 0]
+
+
+def random_segments(seed: int, count: int = 2000) -> tuple[FloatArray, FloatArray]:
+    """Return pairs of segments: general, parallel, of no length, collinear, flat, meeting."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(-1.0, 1.0, (2, count, 2, 3))
+    kind = np.arange(count) % 8
+    along = a[:, 1] - a[:, 0]
+    share = rng.uniform(-1.0, 2.0, (count, 1))
+    parallel = b[:, 0] + share * along
+    b[kind == 1, 1] = parallel[kind == 1]
+    b[kind == 2, 1] = b[kind == 2, 0]
+    both = kind == 3
+    a[both, 1], b[both, 1] = a[both, 0], b[both, 0]
+    collinear = a[:, :1] + rng.uniform(-2.0, 2.0, (count, 2, 1)) * along[:, None, :]
+    b[kind == 4] = collinear[kind == 4]
+    a[kind == 5, :, 2] = b[kind == 5, :, 2] = 0.0
+    # Nearly parallel: an angle of 1e-1 to 1e-12.
+    tilt = 10.0 ** -rng.integers(1, 13, (count, 1)) * rng.uniform(-1.0, 1.0, (count, 3))
+    b[kind == 6, 1] = (parallel + tilt)[kind == 6]
+    on_a = a[:, 0] + rng.uniform(0.0, 1.0, (count, 1)) * along
+    b[kind == 7, 0] = on_a[kind == 7]
+    return a, b
+
+
+def test_closest_points_reference_segments_have_its_distances() -> None:
+    cases = read_reference("interference")["segments"]
+    assert len(cases) == 200
+    a, b = (np.array([case[key] for case in cases]) for key in "ab")
+    expected = np.array([case["distance"] for case in cases])
+    np.testing.assert_allclose(closest_points(a, b)[0], expected, rtol=1e-9)
+
+
+def test_closest_points_any_segments_lie_on_them_with_nothing_closer() -> None:
+    a, b = random_segments(2)
+    distance, points = closest_points(a, b)
+    x, y = points[:, 0], points[:, 1]
+    np.testing.assert_allclose(np.linalg.norm(x - y, axis=-1), distance, atol=1e-14)
+    # The points lie on the segments, and no end lies farther towards the other point.
+    for point, ends in ((x, a), (y, b)):
+        np.testing.assert_allclose(
+            closest_points(np.stack([point, point], axis=1), ends)[0], 0.0, atol=1e-14
+        )
+    off = y - x
+    for ends, point, sign in ((a, x, 1.0), (b, y, -1.0)):
+        nearer = sign * np.einsum("ni,nki->nk", off, ends - point[:, None])
+        assert nearer.max() < 1e-9
+
+
+@pytest.mark.parametrize("size", [1e-8, 1e-5])
+def test_closest_points_nearly_parallel_crossing_segments_meet(size: float) -> None:
+    a = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    for share in np.linspace(-0.9, 0.9, 7):
+        b = np.array([[-1.0, size * (-1.0 - share), 0.0], [1.0, size * (1.0 - share), 0.0]])
+        assert closest_points(a[None], b[None])[0] < 1e-15
+
+
+@given(ordinary_cases())
+def test_leg_axes_any_pose_run_from_base_ends_to_platform_ends(case: Case) -> None:
+    axes = leg_axes(Configuration(case.design, case.position, case.rotation))
+    ends = case.position + case.design.platform_points @ case.rotation.T
+    np.testing.assert_allclose(axes[:, 1], ends, atol=1e-12 * case.size)
+    a3 = [*case.design.a3, 0.0]
+    base = [[0.0, 0.0, 0.0], [ends[1, 0], 0.0, 0.0], [ends[2, 0], 0.0, 0.0], a3]
+    np.testing.assert_allclose(axes[:, 0], base, atol=1e-12 * case.size)
+
+
+@given(ordinary_cases())
+def test_leg_clearances_any_pose_are_axis_distances_less_radii(case: Case) -> None:
+    radii = (0.1, 0.2, 0.4, 0.8)
+    design = limited(case.design, leg_radii=radii)
+    axes = leg_axes(Configuration(design, case.position, case.rotation))
+    found = leg_clearances(Configuration(design, case.position, case.rotation))
+    for index, (i, j) in enumerate(PAIRS):
+        if joined_pairs(design)[index]:
+            continue
+        distance, points = closest_points(axes[i - 1][None], axes[j - 1][None])
+        assert found.distance[index] == pytest.approx(distance[0], abs=1e-12)
+        np.testing.assert_allclose(found.points[index], points[0], atol=1e-12)
+        expected = distance[0] - radii[i - 1] - radii[j - 1]
+        assert found.clearance[index] == pytest.approx(expected, abs=1e-12)
+    assert found.clearance[found.closest] == found.clearance.min()
+
+
+@given(uniform_rotations(), st.sampled_from((0.0, 1e-14)))
+def test_leg_clearances_pair_with_a_shared_joint_is_infinite(
+    rotation: FloatArray, least: float
+) -> None:
+    position = np.array([1.0, 2.0, 3.0])
+    second = leg_clearances(
+        Configuration(Design(a3=(10, 4), b1=(4, -1), b2=least, b3=2), position, rotation)
+    )
+    third = leg_clearances(
+        Configuration(Design(a3=(10, 4), b1=(4, -1), b2=2, b3=-least), position, rotation)
+    )
+    for found, pair in ((second, (2, 4)), (third, (3, 4))):
+        infinite = [PAIRS[k] for k in range(6) if math.isinf(found.clearance[k])]
+        assert infinite == [pair]
+        np.testing.assert_allclose(found.points[PAIRS.index(pair)], [position] * 2)
+        assert PAIRS[int(found.closest)] != pair

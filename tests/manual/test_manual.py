@@ -26,7 +26,7 @@ from explorer import __version__
 from explorer.cli import COMMANDS, run
 from explorer.cli.parsing import load_command, parse
 from explorer.errors import InputError
-from explorer.files.manual import list_pages, read_page
+from explorer.files.packaged import list_pages, read_page
 from explorer.optimise.problem import OBJECTIVES
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -10,9 +10,9 @@ import pytest
 
 from explorer import Guide, Payload, Pose, Struts, Tool, evaluate
 from explorer.app.widgets.blocks import render
-from explorer.export.report.blocks import elements
+from explorer.export.drawings.markup import elements
 from explorer.measures.blocks.block import Block, Facts, Share
-from explorer.measures.blocks.forces import most_held, reaction_tables, verdict
+from explorer.measures.blocks.forces import largest_loads, reaction_tables, verdict
 from explorer.measures.blocks.precision import deflections, tool_errors
 from explorer.measures.blocks.singularity import (
     conditioning,
@@ -41,7 +41,7 @@ SINGULAR = Pose((10.0, 5.0, 0.0), MACHINE.home_pose.quaternion)
 
 def forces_of(pose: Pose) -> Iterable[Block]:
     loaded = LoadedPose(MACHINE, pose, (1.0, 2.0, -10.0, 0.0, 3.0, 0.0))
-    return verdict(loaded), *reaction_tables(loaded), most_held(loaded)
+    return verdict(loaded), *reaction_tables(loaded), largest_loads(loaded)
 
 
 def precision_of(pose: Pose) -> Iterable[Block]:

@@ -11,18 +11,16 @@ from limited_designs import limited, ordinary_case, scaled_design, troubled_case
 
 from explorer import Actuators, Payload, Struts
 from explorer.legs.clearance import PAIRS, leg_clearances
-from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.measures.measurements import Measurements, measure_design
-from explorer.measures.size import clearance_beyond, clearance_margin_of
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.optimise.defaults import make_problem
+from explorer.optimise.outcome import GOALS
 from explorer.optimise.problem import OBJECTIVES, OVER_BOX, YAW, ObjectiveName
-from explorer.optimise.record import GOALS
 from explorer.optimise.search.model import Model, reported_objective
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.least_clearance import least_clearances
@@ -107,12 +105,13 @@ def test_least_clearance_alone_equals_that_of_all_pairs(seed: int) -> None:
 
 
 def test_clearance_beyond_counts_off_singular_planes_only() -> None:
-    margin = clearance_margin_of(OPTIMAL)
-    clearance, pair = clearance_beyond(OPTIMAL, margin)
-    full = least_clearances(limited(OPTIMAL, margin=margin))
+    case = Case(OPTIMAL, margin=0.05 * OPTIMAL.reach)
+    clearance, pair = case.clearance
+    assert Case(OPTIMAL).clearance == case.clearance
+    full = least_clearances(limited(OPTIMAL, margin=case.margin))
     assert clearance == pytest.approx(full.clearance.min(), abs=1e-3 * OPTIMAL.reach)
     assert pair == PAIRS[int(full.clearance.argmin())]
-    assert np.isnan(clearance_beyond(OPTIMAL, 100.0)[0])
+    assert np.isnan(Case(OPTIMAL, margin=100.0).clearance[0])
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e3])

@@ -10,10 +10,9 @@ from hypothesis import assume, given
 from numpy.testing import assert_allclose
 from strategies import Case, all_cases, ordinary_cases, singular_cases, uniform_rotations
 
+from explorer.measures.catalogue import measure_design
 from explorer.measures.measure import Case as MeasuredCase
-from explorer.measures.measurements import measure_design
 from explorer.measures.snapshot import PoseIndices, evaluate
-from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
@@ -22,12 +21,12 @@ OPTIMAL = PRESETS["paper-optimal"]
 
 
 def indices_of(case: Case) -> PoseIndices:
-    return PoseIndices(Configuration(case.design, case.position, case.rotation))
+    return PoseIndices(case.design, case.position, case.rotation)
 
 
 def wrenches_of(case: Case, turn: FloatArray, origin: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the points and the unit forces of the six actuators in another frame, each (6, 3)."""
-    points = Configuration(case.design, case.position, case.rotation).points
+    points = case.at.points
     a1, guide = np.zeros(3), np.array([1.0, 0.0, 0.0])
     struts = [b - (b @ guide) * guide for b in (points.b2, points.b3)]
     forces = [points.b1 - a1, guide, struts[0], guide, struts[1], points.b4 - points.a3]

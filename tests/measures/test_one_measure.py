@@ -12,17 +12,15 @@ from report_page import read
 
 from explorer.app.features.compare.table import Column, table
 from explorer.app.features.compare.work import ComparedRequest, draw_compared
-from explorer.app.features.optimise.words import measure_rows
 from explorer.app.features.optimise.work import compare
 from explorer.app.features.sharing.reporting import make_report
+from explorer.app.features.studies.state import StudyPlan, label_of, study_around, title_of
 from explorer.app.features.studies.words import chips
 from explorer.app.state.compared import without_name
-from explorer.app.state.studies import StudyPlan, label_of, study_around, title_of
 from explorer.cli.commands.optimise import measure_rows as measure_rows_of_command
-from explorer.export.report.data import gather_report_data
-from explorer.measures.catalogue import CATALOGUE, Measure, measures_in
+from explorer.export.report.data import ReportData
+from explorer.measures.catalogue import CATALOGUE, Measure, measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, encode_design
 from explorer.optimise.defaults import make_problem, paper_start
@@ -64,10 +62,7 @@ def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture
     measured = CommandLine(capsys).answer("workspace", "--design", path)
     return {
         "Compare": {CATALOGUE[name].label: value for name, value in compared.values.items()},
-        "Optimise": {
-            row.name.removesuffix(", units³").removesuffix(", units"): row.after
-            for row in measure_rows(paper, both.before, both.after)
-        },
+        "Optimise": {CATALOGUE[name].label: both.after.value(name) for name in both.after.values},
         "explorer optimise": {
             label: after for label, (_, after) in measure_rows_of_command(both.before, both.after)
         },
@@ -79,7 +74,7 @@ def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture
         },
         "report": {
             CATALOGUE[name].label: value
-            for name, value in gather_report_data(design).measured.values.items()
+            for name, value in ReportData(design).measured.values.items()
         },
     }
 
@@ -100,22 +95,13 @@ def test_measures_of_one_label_have_one_value(
         assert others == pytest.approx([first] * len(others), rel=1e-9), (name, values)
 
 
-def test_optimised_design_lists_its_demanded_clearance_beside_its_own() -> None:
-    paper = problem()
-    both = compare(paper.start, found(), paper.demands.clearance_margin, (None, None))
-    rows = {row.name: row for row in measure_rows(paper, both.before, both.after)}
-    demanded, own = rows["demanded clearance, |δ| ≥ 0.539"], rows["clearance, units"]
-    assert demanded.after == both.after["demanded_clearance"]
-    assert own.after == both.after["least_clearance"]
-    # It was demanded nearer to the singular planes than where the design's own counts.
-    assert demanded.after is not None
-    assert own.after is not None
-    assert own.after > demanded.after
-    free = msgspec.structs.replace(
-        paper, demands=msgspec.structs.replace(paper.demands, clearance=None)
-    )
-    names = [row.name for row in measure_rows(free, both.before, both.after)]
-    assert [name for name in names if "clearance" in name] == ["clearance, units"]
+def test_demanded_clearance_of_an_optimised_design_counts_nearer_to_singular_planes() -> None:
+    margin = problem().demands.clearance_margin
+    after = compare(paper_start(), found(), margin, (None, None)).after
+    demanded, own = after["demanded_clearance"], after["least_clearance"]
+    assert demanded is not None
+    assert own is not None
+    assert own > demanded
 
 
 DESIGN = PRESETS["paper-optimal"]
@@ -149,10 +135,8 @@ def test_compare_lists_a_new_measure() -> None:
 
 
 def test_optimiser_table_lists_a_new_measure() -> None:
-    both = compare(DESIGN, DESIGN, None, (None, None))
-    problem = make_problem(DESIGN, "largest-volume")
-    rows = {row.name: row for row in measure_rows(problem, both.before, both.after)}
-    assert rows[f"{NEW.label}, units²"].after == AREA
+    after = compare(DESIGN, DESIGN, None, (None, None)).after
+    assert after[NEW.name] == AREA
 
 
 def test_study_accepts_a_new_measure() -> None:

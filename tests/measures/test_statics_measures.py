@@ -21,9 +21,8 @@ from explorer import (
     deflection,
     reactions,
 )
-from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in, reason_for_missing
 from explorer.measures.measure import Case
-from explorer.measures.measurements import measure_design, reason_for_missing
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
 from explorer.statics.accuracy import actuator_errors, worst_errors

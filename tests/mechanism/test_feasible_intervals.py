@@ -19,8 +19,6 @@ from explorer.mechanism.feasible_intervals import (
     feasible_intervals,
     nearest_feasible,
     possible_ranges,
-    without_box,
-    without_guide,
 )
 from explorer.mechanism.kinematics import discriminants
 from explorer.mechanism.pose import Pose
@@ -209,7 +207,7 @@ def test_joints_and_position_within_the_limits_lie_within_the_possible_ranges(ca
     assert (low - slack <= values).all()
     assert (values <= high + slack).all()
     # Without a limit the ranges are no narrower.
-    for free in (without_box(case.design), without_guide(case.design)):
+    for free in (case.design.with_limits(box=None), case.design.with_limits(guide=None)):
         wider = possible_ranges(free)
         lowest, highest = np.array((*wider.joints, *wider.position)).T
         assert (lowest <= low).all()
@@ -228,7 +226,7 @@ def test_ranges_of_the_papers_optimum_are_its_box_and_its_lengths() -> None:
 
 
 def test_ranges_of_a_home_below_the_base_have_heights_below_it() -> None:
-    design = without_box(PRESETS["paper-optimal"])
+    design = PRESETS["paper-optimal"].with_limits(box=None)
     assert design.home is not None
     x, y, z = design.home.position
     below = msgspec.structs.replace(design, home=Pose((x, y, -z), design.home.quaternion))

@@ -210,4 +210,4 @@ def test_joints_near_walls_that_are_told_to_close_are_those_of_the_poses(name: s
 def test_unusable_folds_are_refused() -> None:
     assert "shape" in refusal(from_folds, [1.0, 2.0])
     assert "finite" in refusal(from_folds, [1.0, 1.0, 1.0, math.nan, 1.0, 1.0])
-    assert "r is a distance" in refusal(from_folds, [-1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    assert "distance r must not be negative" in refusal(from_folds, [-1.0, 1.0, 1.0, 1.0, 1.0, 1.0])

@@ -26,13 +26,8 @@ from explorer import (
 )
 from explorer.measures.snapshot import PoseIndices
 from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.kinematics import determinant, tetrahedron_volumes
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.ellipsoids import (
-    determinant,
-    inverse_condition,
-    singular_plane_distances,
-    tetrahedron_volumes,
-)
 from explorer.singularity.nearest import nearest_singular_poses
 
 EYE = np.eye(3)
@@ -59,24 +54,14 @@ FUNCTIONS = (
     PoseFunction("inverse", inverse, (6,), 1),
     PoseFunction("margins", lambda _, p, r: margins(p, r), (3,), 1),
     PoseFunction("jacobian", homogeneous_jacobian, (6, 6), 0),
-    PoseFunction(
-        "inverse_condition",
-        lambda d, p, r: inverse_condition(jacobian(d, p, r), d.reach),
-        (),
-        0,
-    ),
-    PoseFunction(
-        "transmissions", lambda d, p, r: PoseIndices(Configuration(d, p, r)).transmissions, (6,), 0
-    ),
-    PoseFunction(
-        "manipulability", lambda d, p, r: PoseIndices(Configuration(d, p, r)).manipulability, (), 0
-    ),
+    PoseFunction("condition", lambda d, p, r: Configuration(d, p, r).inverse_condition, (), 0),
+    PoseFunction("transmissions", lambda d, p, r: PoseIndices(d, p, r).transmissions, (6,), 0),
+    PoseFunction("manipulability", lambda d, p, r: PoseIndices(d, p, r).manipulability, (), 0),
     PoseFunction(
         "determinant", lambda d, p, r: determinant(d, inverse(d, p, r), margins(p, r)), (), 3
     ),
     PoseFunction("volumes", lambda d, p, r: tetrahedron_volumes(d, margins(p, r)), (3,), 3),
     PoseFunction("stratum", lambda _, p, r: stratum(p, r), (4,), 0),
-    PoseFunction("plane_distances", lambda _, p, r: singular_plane_distances(p, r), (3,), 1),
     PoseFunction(
         "nearest", lambda d, p, r: nearest_singular_poses(Configuration(d, p, r)).distance, (3,), 1
     ),

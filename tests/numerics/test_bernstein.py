@@ -9,13 +9,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.bernstein import (
-    MOST_DEGREE,
-    NOWHERE,
-    STACK,
-    first_negative,
-    single_root,
-)
+from explorer.numerics.bernstein import MOST_DEGREE, NOWHERE, STACK, first_negative, single_root
 
 
 def values(b: FloatArray, x: FloatArray) -> FloatArray:

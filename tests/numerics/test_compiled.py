@@ -19,8 +19,7 @@ import pytest
 from explorer.files.packaged import SOURCES
 from explorer.legs import clearance
 from explorer.numerics.compiled import KERNELS
-from explorer.numerics.kernel_cache import DIGEST, PACKAGED, fingerprint_of
-from explorer.numerics.object_code import processor
+from explorer.numerics.object_code import DIGEST, PACKAGED, fingerprint_of, processor
 
 # The processors for which object code is packaged.
 COMMON = "linux-x86-64-v3"

@@ -8,15 +8,15 @@ import msgspec
 import numpy as np
 import pytest
 
-from explorer import PRESETS, Actuators, Payload, Struts
+from explorer import PRESETS, Actuators, Configuration, Payload, Struts, forward
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import KERNELS, warm
+from explorer.singularity.nearest import nearest_singular_poses
 from explorer.statics.forces import actuator_forces
 from explorer.statics.load_cases import largest_shares, limit_values, load_case, settle_on_limit
 from explorer.statics.slopes import twist_slopes
 from explorer.workspace.orientations.share import orientation_share
-from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map
-from explorer.workspace.orientations.torsions import torsion_range
+from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map, torsion_range
 
 OPTIMAL = PRESETS["paper-optimal"]
 ROTATION = OPTIMAL.home_pose.rotation
@@ -31,6 +31,10 @@ LOADED = msgspec.structs.replace(
 
 def positions() -> FloatArray:
     return np.random.default_rng(3).uniform((4.0, 1.0, 4.0), (16.0, 9.0, 14.0), (12, 3))
+
+
+def joints() -> FloatArray:
+    return Configuration(OPTIMAL, positions(), ROTATION).joints
 
 
 def tilts() -> FloatArray:
@@ -50,18 +54,14 @@ def regions() -> FloatArray:
     return np.concatenate([shares, parts.astype(np.float64), values.ravel(), settled.ravel()])
 
 
-def forces_beyond_all_numbers() -> FloatArray:
-    loads = np.random.default_rng(4).uniform(-1.0, 1.0, (12, 6))
-    scales = 10.0 ** np.linspace(290.0, 308.0, 12)
-    return actuator_forces(OPTIMAL, positions(), ROTATION, scales[:, None] * loads)
-
-
 CASES: dict[str, Callable[[], FloatArray]] = {
     "tilts": tilts,
     "greatest tilts": lambda: greatest_tilts(OPTIMAL, positions()[:2], azimuths=5),
     "share": lambda: np.array([orientation_share(OPTIMAL, POSITION, 200).share]),
     "regions": regions,
-    "forces": forces_beyond_all_numbers,
+    "forward": lambda: forward(OPTIMAL, joints()).position,
+    "nearest": lambda: nearest_singular_poses(Configuration(OPTIMAL, positions(), ROTATION))[0],
+    "forces": lambda: actuator_forces(OPTIMAL, positions(), ROTATION, np.arange(1.0, 7.0)),
     "slopes": lambda: twist_slopes(LOADED, positions(), ROTATION).by,
 }
 

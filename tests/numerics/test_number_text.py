@@ -8,11 +8,11 @@ import re
 import pytest
 from hypothesis import given, strategies as st
 
-from explorer.app.features.singularity.panel import distance_table, measures_table, summary
+from explorer.app.features.singularity.feature import distance_table, measures_table, summary
 from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
-from explorer.cli.commands.singularity import Singularity
+from explorer.cli.commands.kinematics import Singularity
 from explorer.cli.output import degrees, figures
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose

@@ -11,7 +11,7 @@ import pytest
 from limited_designs import limited
 
 from explorer import InputError, workspace_volume
-from explorer.measures.size import corners_of
+from explorer.measures.box import corners_of
 from explorer.mechanism.design import JOINTS, Design, DesignError, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import inverse

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from strategies import WAYS, Case, cases, singular_cases
 from tool_moves import tool_move
 
-from explorer import PRESETS, Design, InputError, Pose, forward, inverse, margins
+from explorer import PRESETS, Design, Pose, forward, inverse, margins
 from explorer.legs.moves import poses_between
 from explorer.mechanism.margins import mode_of
 from explorer.paths.crossings import path_margins
@@ -151,8 +151,3 @@ def test_path_margins_two_close_crossings_are_both_present(gap: float) -> None:
     lone, pair = sorted(counts, key=len)
     assert len(pair) - len(lone) == 2
     assert float(np.diff(pair).min()) < 20.0 * gap
-
-
-def test_path_margins_single_pose_is_refused() -> None:
-    with pytest.raises(InputError, match="two poses"):
-        path_margins([HOME])

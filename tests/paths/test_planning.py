@@ -31,10 +31,9 @@ from explorer import (
 )
 from explorer.legs.moves import move_clearances, poses_between
 from explorer.paths.crossings import path_margins
-from explorer.paths.planning import EndError, NoPathError, PlannedPath, plan_path
+from explorer.paths.planning import NoPathError, PlannedPath, plan_path
 from explorer.paths.proofs import Proofs, positions_and_rotations
-from explorer.paths.smoothing import Smoother, lengths_of_moves
-from explorer.paths.tree_search import load_ompl
+from explorer.paths.search import lengths_of_moves, load_ompl, smooth
 from explorer.singularity.nearest import displacement
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
@@ -129,7 +128,7 @@ def test_smooth_detour_in_free_space_becomes_straight() -> None:
     corner = Pose((x, y + 2.0, z), HOME.quaternion)
     end = Pose((x + 2.0, y + 2.0, z), HOME.quaternion)
     assert PROOFS.are_valid([(HOME, end)]) == [True]
-    assert Smoother(PROOFS).smooth([HOME, corner, end]) == (HOME, end)
+    assert smooth(PROOFS, [HOME, corner, end]) == (HOME, end)
 
 
 @pytest.mark.parametrize("moves", [2, 3])
@@ -201,10 +200,8 @@ def test_plan_path_end_outside_limits_names_them() -> None:
     x, y, z = HOME.position
     far = Pose((40.0, y, z), HOME.quaternion)
     broken = [str(each) for each in evaluate(DESIGN, far).violations]
-    with pytest.raises(EndError, match="the goal is outside the limits") as caught:
+    with pytest.raises(InputError, match="the goal is outside the limits") as caught:
         plan_path(DESIGN, HOME, far)
-    assert isinstance(caught.value, InputError)
-    assert caught.value.reason == "outside limits"
     assert len(broken) >= 2
     assert all(each in str(caught.value) for each in broken)
     with pytest.raises(InputError, match="the start is outside the limits"):
@@ -218,9 +215,8 @@ def test_plan_path_singular_end_names_its_incidence() -> None:
     x, y, _ = HOME.position
     singular = Pose.of_yaw_pitch_roll((x, y, 0.0), (-70.0, 20.0, 30.0))
     for ends in ((singular, HOME), (HOME, singular)):
-        with pytest.raises(EndError, match="b4 on the base plane") as caught:
+        with pytest.raises(InputError, match="b4 on the base plane"):
             plan_path(DESIGN, *ends)
-        assert caught.value.reason == "singular"
 
 
 def test_plan_path_mode_other_than_the_home_has_a_path() -> None:

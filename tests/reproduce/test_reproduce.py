@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, InputError, from_folds, to_folds
-from explorer.files.manual import read_page
-from explorer.files.packaged import packaged_file
+from explorer.files.packaged import packaged_file, read_page
 from explorer.legs.clearance import write_closest
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.folds import FOLDS
@@ -109,7 +108,7 @@ def test_folds_are_regular_where_the_six_motions_made_once_are_no_chart(
         return (np.asarray(position) + corners @ rotation.T).ravel()
 
     def by_motion(k: int, amount: float) -> FloatArray:
-        after = UNCOUPLED[k].moved(pose, amount)
+        after = UNCOUPLED[k].move(pose, amount)
         return points(after.position, after.rotation)
 
     def by_fold(k: int, amount: float) -> FloatArray:

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from explorer.app.widgets.colours import COMPARED
+from explorer.app.scene.shapes import COMPARED
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import (
     FAR_WARNINGS,

@@ -8,7 +8,7 @@ from hypothesis import given
 from numpy.testing import assert_allclose
 from strategies import Case, all_cases
 
-from explorer import PRESETS, Pose, inverse, margins
+from explorer import PRESETS, Configuration, Pose, inverse, margins
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.freedoms import Freedoms, FreeTurn, freedoms
 from explorer.singularity.nearest_stratum import nearest_in_stratum
@@ -41,7 +41,7 @@ def test_turn_changes_joints_by_the_square_of_its_angle_or_not_at_all(
     stratum: tuple[int, ...],
 ) -> None:
     for pose in poses_in(stratum):
-        found = freedoms(DESIGN, pose)
+        found = freedoms(Configuration.at(DESIGN, pose))
         assert 1 <= len(found.turns) <= found.count
         for turn in found.turns:
             assert turn.incidence in incidences(stratum)
@@ -63,7 +63,7 @@ def test_one_incidence_leaves_one_turn_about_its_own_line_through_its_points(
     stratum: tuple[int, ...], line: str
 ) -> None:
     for pose in poses_in(stratum):
-        found = freedoms(DESIGN, pose)
+        found = freedoms(Configuration.at(DESIGN, pose))
         (turn,) = found.turns
         assert found.count == 1
         assert turn.line_name.endswith(line)
@@ -97,14 +97,17 @@ def test_freedoms_are_as_many_as_finite_differences_of_the_joints_lose_in_rank(
                 (one - other) / (2.0 * step * DESIGN.reach) for one, other in (shifts, turns)
             ]
         rank = np.linalg.matrix_rank(np.array(columns), 1e-6)
-        assert freedoms(DESIGN, pose).count == 6 - rank
+        assert freedoms(Configuration.at(DESIGN, pose)).count == 6 - rank
 
 
 def test_turn_is_finite_where_a_point_of_one_flag_lies_on_the_line_of_the_other() -> None:
     for stratum in SINGULAR:
         described = set(conditions(stratum))
         for pose in poses_in(stratum, 1):
-            is_finite = {turn.incidence: turn.is_finite for turn in freedoms(DESIGN, pose).turns}
+            is_finite = {
+                turn.incidence: turn.is_finite
+                for turn in freedoms(Configuration.at(DESIGN, pose)).turns
+            }
             if described == {A1_ON_LINE}:
                 assert is_finite == {1: True}
             elif described == {B4_ON_GUIDE}:
@@ -127,14 +130,14 @@ def test_leg_without_length_holds_its_end_and_leaves_no_freedom(
     rotation = Pose.of_yaw_pitch_roll((0.0, 0.0, 0.0), (40.0, 30.0, 20.0)).rotation
     pose = Pose.of(np.array(held) - rotation @ np.array(end), rotation)
     assert np.abs(inverse(DESIGN, pose.position, pose.rotation)).min() < 1e-12
-    assert freedoms(DESIGN, pose) == Freedoms(0, ())
+    assert freedoms(Configuration.at(DESIGN, pose)) == Freedoms(0, ())
 
 
 @given(all_cases())
 def test_any_pose_has_freedoms_only_if_it_is_singular_and_turns_about_unit_vectors(
     case: Case,
 ) -> None:
-    found = freedoms(case.design, case.pose)
+    found = freedoms(case.at)
     assert len(found.turns) <= found.count <= 6
     if case.regularity > 1e-6:
         assert found.count == 0

@@ -29,7 +29,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 from explorer.singularity.nearest import PlatformPoints, displacement, nearest_singular_poses
 from explorer.singularity.nearest_lines import Constants, bound_over, terms_at, value_at
-from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_stratum, seen_stratum
+from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_stratum
 from explorer.singularity.strata import (
     COVERED,
     GENERIC,
@@ -38,6 +38,7 @@ from explorer.singularity.strata import (
     Stratum,
     conditions,
     is_below,
+    stratum_of,
 )
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -66,7 +67,7 @@ def test_nearest_poses_are_as_near_as_those_of_slsqp_from_many_starts(seed: int)
 @given(all_cases())
 @example(Case(OPTIMAL, np.zeros(3), np.eye(3)))
 def test_nearest_poses_lie_on_the_singular_set_at_their_distance(case: Case) -> None:
-    nearest = nearest_singular_poses(Configuration(case.design, case.position, case.rotation))
+    nearest = nearest_singular_poses(case.at)
     span = max(case.size, float(np.abs(nearest.position).max()))
     gram = nearest.rotation @ np.swapaxes(nearest.rotation, -1, -2)
     assert_allclose(gram, np.broadcast_to(np.eye(3), (3, 3, 3)), atol=1e-12)
@@ -120,7 +121,7 @@ def test_bound_of_a_box_is_below_its_values_and_close_to_them() -> None:
 
 @given(singular_cases())
 def test_nearest_pose_of_a_singular_pose_is_itself(case: Case) -> None:
-    nearest = nearest_singular_poses(Configuration(case.design, case.position, case.rotation))
+    nearest = nearest_singular_poses(case.at)
     vanishing = np.abs(case.margins) <= 8.0 * EPSILON * case.size
     length = PlatformPoints.of(case.design).length
     assert vanishing.any()
@@ -152,7 +153,7 @@ def test_nearest_pose_lies_in_the_stratum_of_its_incidence() -> None:
 @given(ordinary_cases())
 def test_distances_of_mirror_images_and_turns_about_the_guide_are_equal(case: Case) -> None:
     assume(case.design.b2 * case.design.b3 != 0.0)
-    here = nearest_singular_poses(Configuration(case.design, case.position, case.rotation)).distance
+    here = nearest_singular_poses(case.at).distance
     # Mirrored in the plane y = 0, platform too: b1 comes to the other side of its x-axis.
     mirror = np.diag([1.0, -1.0, 1.0])
     x = case.design.variables
@@ -191,21 +192,6 @@ def test_poses_with_nearly_coinciding_lines_are_nearly_singular(
     assert np.isfinite(nearest.position).all()
     assert nearest.distance[1] <= 20.0 * share
     assert (nearest.bound <= nearest.distance).all()
-
-
-def test_nearest_poses_of_a_compiled_batch_equal_interpreted_ones() -> None:
-    p, r = random_poses(4, MANY_ROWS)
-    many = nearest_singular_poses(
-        Configuration(OPTIMAL, p.reshape(-1, 4, 3), r.reshape(-1, 4, 3, 3))
-    )
-    assert many.distance.shape == (MANY_ROWS // 4, 4, 3)
-    assert many.position.shape == (MANY_ROWS // 4, 4, 3, 3)
-    assert many.rotation.shape == (MANY_ROWS // 4, 4, 3, 3, 3)
-    for index in range(0, MANY_ROWS, 61):
-        alone = nearest_singularities(OPTIMAL, Pose.of(p[index], r[index]))
-        assert [each.incidence for each in alone] == [1, 2, 3]
-        distances = [each.distance for each in alone]
-        assert_allclose(distances, many.distance.reshape(-1, 3)[index], atol=1e-12)
 
 
 SQUARE = Design(a3=(10.0, 10.0), b1=(0.0, 10.0), b2=0.0, b3=10.0)
@@ -253,7 +239,7 @@ def test_nearest_pose_in_a_closure_lies_in_it_and_no_nearer_than_in_the_closures
     reach, nearest = case.design.reach, nearest_in_strata(case.design, case.pose)
     for w, found in nearest.items():
         assert found.stratum == w
-        seen = seen_stratum(case.design, found.pose)
+        seen = stratum_of(Configuration.at(case.design, found.pose))
         place = Case(case.design, np.array(found.pose.position), found.pose.rotation)
         if is_below(seen, w) or is_clear_cut(place, reach):
             assert found.seen == seen

@@ -21,31 +21,19 @@ from strategies import (
     singular_cases,
 )
 
-from explorer import (
-    PRESETS,
-    evaluate,
-    inverse,
-    jacobian,
-    margins,
-    rotation_from_quaternion,
-)
-from explorer.mechanism.configuration import Configuration
-from explorer.mechanism.margins import TETRAHEDRA, mode_of, signs_of
+from explorer import PRESETS, evaluate, inverse, jacobian, margins, rotation_from_quaternion
+from explorer.mechanism.kinematics import determinant, tetrahedron_volumes
+from explorer.mechanism.margins import TETRAHEDRA
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.ellipsoids import determinant, inverse_condition, tetrahedron_volumes
 
 
 def shortest_length(case: Case) -> float:
     return float(case.joints[[0, 2, 4, 5]].min())
 
 
-def jacobian_of(case: Case) -> FloatArray:
-    return jacobian(case.design, case.position, case.rotation)
-
-
 def condition_of(case: Case) -> float:
-    return float(inverse_condition(jacobian_of(case), case.design.reach))
+    return float(case.at.inverse_condition)
 
 
 def determinant_of(case: Case) -> float:
@@ -54,7 +42,7 @@ def determinant_of(case: Case) -> float:
 
 def incidence_distances(case: Case) -> FloatArray:
     """Return |δ1|, |δ2| and |δ3| from the pose's points alone."""
-    points = Configuration(case.design, case.position, case.rotation).points
+    points = case.at.points
     sine = math.hypot(case.rotation[1, 0], case.rotation[2, 0])
     return np.array(
         [
@@ -71,7 +59,7 @@ def test_jacobian_is_the_derivative_of_inverse(case: Case) -> None:
     assume(shortest_length(case) > 0.05 * case.size)
     p, r = case.position, case.rotation
     assert_is_jacobian(
-        lambda p, r: inverse(case.design, p, r), jacobian_of(case), p, r, case.size, tolerance=1e-6
+        lambda p, r: inverse(case.design, p, r), case.at.jacobian, p, r, case.size, tolerance=1e-6
     )
 
 
@@ -88,7 +76,7 @@ def test_jacobian_at_the_tool_is_the_derivative_of_inverse_by_its_twists(
 
     matrix = jacobian(case.design, p, r, tool)
     assert_is_jacobian(joints_of, matrix, p + r @ tool, r, case.size, tolerance=2e-6)
-    at_b4 = jacobian_of(case)
+    at_b4 = case.at.jacobian
     # The rows are forces at b4 and their moments about the tool; the moments alone differ.
     assert_array_equal(matrix[:, :3], at_b4[:, :3])
     # In a singular pose there is no logarithm of the determinant.
@@ -120,7 +108,7 @@ def test_determinant_is_that_of_the_jacobian_by_lu(case: Case) -> None:
     assume(shortest_length(case) > 1e-3 * size)
     # Divided by the size, so that LU has numbers near one.
     lengths = np.array([1.0, 1.0, 1.0, size, size, size])
-    expected = float(np.linalg.det(jacobian_of(case) / lengths))
+    expected = float(np.linalg.det(case.at.jacobian / lengths))
     error = 1000.0 * EPSILON * (size / shortest_length(case))
     assert_allclose(determinant_of(case) / size**3, expected, rtol=1e-9, atol=error)
 
@@ -144,7 +132,7 @@ def test_errors_and_loads_grow_at_most_by_the_smallest_singular_value(
     snapshot = evaluate(case.design, Pose.of(case.position, case.rotation))
     least, size = snapshot.smallest_singular_value, case.design.reach
     scale = np.array([1.0, 1.0, 1.0, size, size, size])
-    j, changes = jacobian_of(case), np.random.default_rng(seed).normal(size=6)
+    j, changes = case.at.jacobian, np.random.default_rng(seed).normal(size=6)
     length = np.linalg.norm(changes) * (1.0 + 1e-6)
     assert np.linalg.norm(scale * np.linalg.solve(j, changes)) <= length / least
     assert np.linalg.norm(np.linalg.solve(j.T, scale * changes)) <= length / least
@@ -167,7 +155,7 @@ def test_determinant_where_a_margin_is_zero_is_exactly_zero() -> None:
 
 @given(all_cases())
 def test_volumes_are_those_of_the_four_points(case: Case) -> None:
-    points = Configuration(case.design, case.position, case.rotation).points._asdict()
+    points = case.at.points._asdict()
     size = max(case.size, case.design.a2x)
     volumes = tetrahedron_volumes(case.design, case.margins).tolist()
     for names, volume in zip(TETRAHEDRA, volumes, strict=True):
@@ -184,7 +172,7 @@ def test_margins_are_the_incidence_distances(case: Case) -> None:
 
 @given(all_cases() | collapsed_cases())
 def test_jacobian_of_any_pose_is_finite_with_a_condition_from_zero_to_one(case: Case) -> None:
-    assert np.isfinite(jacobian_of(case)).all()
+    assert np.isfinite(case.at.jacobian).all()
     assert np.isfinite(determinant_of(case))
     assert np.isfinite(tetrahedron_volumes(case.design, case.margins)).all()
     assert 0.0 <= condition_of(case) <= 1.0
@@ -197,24 +185,6 @@ def test_jacobian_of_any_pose_is_finite_with_a_condition_from_zero_to_one(case: 
 def test_jacobian_row_of_a_leg_of_no_length_is_zero(position: list[float], row: int) -> None:
     case = Case(PRESETS["paper-initial"], np.array(position), np.eye(3))
     assert case.joints[row] == 0.0
-    assert_array_equal(jacobian_of(case)[row], 0.0)
+    assert_array_equal(case.at.jacobian[row], 0.0)
     assert condition_of(case) == 0.0
     assert determinant_of(case) == 0.0
-
-
-@given(all_cases())
-def test_snapshot_of_any_pose_equals_its_parts(case: Case) -> None:
-    pose = case.pose
-    snapshot = evaluate(case.design, pose)
-    joints = inverse(case.design, pose.position, pose.rotation)
-    margin = margins(pose.position, pose.rotation)
-    assert_array_equal(snapshot.joints, joints)
-    assert_array_equal(snapshot.margins, margin)
-    assert snapshot.mode == int(mode_of(margin))
-    assert snapshot.signs == signs_of(snapshot.mode)
-    assert snapshot.proximity == np.abs(margin).min() / case.design.reach
-    assert snapshot.determinant == float(determinant(case.design, joints, margin))
-    assert snapshot.stratum_dimension in range(7)
-    assert snapshot.modes.feasible
-    assert len(snapshot.intervals) == 6
-    assert_array_equal(snapshot.volumes, tetrahedron_volumes(case.design, margin))

@@ -17,13 +17,12 @@ from explorer import (
     PRESETS,
     Actuators,
     Design,
-    InputError,
     NoAnswerError,
     Tolerances,
     decode_design,
     encode_design,
 )
-from explorer.measures.size import positions_over
+from explorer.measures.box import positions_over
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
@@ -33,14 +32,14 @@ from explorer.statics.accuracy import (
     largest_error,
     rms_of_sources,
     source_errors,
+    stated_tolerances,
 )
-from explorer.statics.budget.allocation import tolerance_budget
-from explorer.statics.budget.costs import (
+from explorer.statics.budget import (
     IS_TILT,
     error_lengths,
     source_costs,
     source_influences,
-    stated_tolerances,
+    tolerance_budget,
     with_tolerances,
 )
 
@@ -68,7 +67,7 @@ def as_errors(design: Design, tolerances: FloatArray) -> FloatArray:
 
 def test_costs_are_those_of_the_worst_position_in_mm_and_degrees() -> None:
     positions = box_positions()
-    costs = source_costs(STATED, positions, HOME.rotation, TOOL)
+    costs = source_costs(Configuration(STATED, positions, HOME.rotation, TOOL))
     by_source = error_by_source(Configuration(STATED, positions, HOME.rotation, TOOL))
     bounds = source_errors(STATED)
     worst, rms = largest_error(by_source, bounds), rms_of_sources(by_source, bounds)
@@ -92,7 +91,7 @@ def test_costs_are_those_of_the_worst_position_in_mm_and_degrees() -> None:
     ranked = costs.displacement_within[costs.ranking]
     assert (np.diff(ranked) <= 0.0).all()
     assert sorted(costs.ranking) == list(range(29))
-    ideal = source_costs(OPTIMAL, positions, HOME.rotation, TOOL)
+    ideal = source_costs(Configuration(OPTIMAL, positions, HOME.rotation, TOOL))
     assert (ideal.worst_displacement, ideal.worst_turn, ideal.rms_turn) == (0.0, 0.0, 0.0)
     assert not ideal.shares.any()
     assert not ideal.displacement_within.any()
@@ -110,7 +109,7 @@ def test_found_tolerances_keep_what_is_wanted_for_all_errors(
     )
     positions = box_positions()
     given = design, positions, HOME.rotation
-    found = tolerance_budget(*given, 0.05, wanted_turn, tool=TOOL, keep_actuators=keep)
+    found = tolerance_budget(Configuration(*given, TOOL), 0.05, wanted_turn, keep_actuators=keep)
     by_source = error_by_source(Configuration(*given, TOOL))
     bounds = as_errors(design, found.tolerances)
     worst = largest_error(by_source, bounds)
@@ -178,8 +177,8 @@ def test_least_effort_is_that_of_slsqp_over_all_vertices(
 ) -> None:
     positions, rotations = random_poses(OPTIMAL, 3, seed)
     given = OPTIMAL, positions[:1], rotations[0]
-    found = tolerance_budget(*given, 0.05, wanted_turn, tool=TOOL)
-    influences = source_influences(*given, TOOL)[0]
+    found = tolerance_budget(Configuration(*given, TOOL), 0.05, wanted_turn)
+    influences = source_influences(Configuration(*given, TOOL))[0]
     shares = influences / np.repeat([0.05, wanted_turn or np.inf], 3)[:, None]
     rng = np.random.default_rng(seed)
     signs = [vertices_of(half, rng) for half in (influences[:3], influences[3:])]
@@ -191,8 +190,8 @@ def test_least_effort_is_that_of_slsqp_over_all_vertices(
 
 def test_no_other_tolerances_over_the_box_take_less_effort() -> None:
     positions = box_positions()
-    found = tolerance_budget(OPTIMAL, positions, HOME.rotation, 0.05, 0.05)
-    shares = source_influences(OPTIMAL, positions, HOME.rotation, None)
+    found = tolerance_budget(Configuration(OPTIMAL, positions, HOME.rotation), 0.05, 0.05)
+    shares = source_influences(Configuration(OPTIMAL, positions, HOME.rotation))
     shares = shares / np.repeat([0.05, 0.05], 3)[:, None]
     lengths, rng = error_lengths(OPTIMAL), np.random.default_rng(1)
     least: list[float] = []
@@ -214,8 +213,9 @@ def test_tolerances_grow_with_the_machine_and_do_not_depend_on_its_unit(
         home=None,
     )
     positions = box_positions()
-    found = tolerance_budget(design, unit * positions, HOME.rotation, 0.05 * larger, 0.05)
-    expected = tolerance_budget(OPTIMAL, positions, HOME.rotation, 0.05, 0.05)
+    at = Configuration(design, unit * positions, HOME.rotation)
+    found = tolerance_budget(at, 0.05 * larger, 0.05)
+    expected = tolerance_budget(Configuration(OPTIMAL, positions, HOME.rotation), 0.05, 0.05)
     sizes = np.where(IS_TILT, 1.0, larger)
     assert_allclose(found.tolerances, expected.tolerances * sizes, rtol=0.1)
     assert found.least_effort == pytest.approx(expected.least_effort / larger, rel=2e-6)
@@ -230,7 +230,8 @@ def test_effort_is_near_its_lower_bound_for_any_design_in_any_pose(seed: int) ->
     # Many of these are near a singular plane.
     position = design.reach * rng.normal(size=(1, 3)) * np.power(10.0, rng.uniform(-8.0, 1.0, 3))
     wanted, turn = 10.0 ** rng.uniform(-6.0, 6.0, 2)
-    found = tolerance_budget(design, position, rotation, wanted, turn if seed % 2 else None)
+    at = Configuration(design, position, rotation)
+    found = tolerance_budget(at, wanted, turn if seed % 2 else None)
     assert found.costs.worst_displacement <= wanted
     assert seed % 2 == 0 or found.costs.worst_turn <= turn
     # Rounding down to two digits takes less than a tenth of each tolerance.
@@ -240,7 +241,7 @@ def test_effort_is_near_its_lower_bound_for_any_design_in_any_pose(seed: int) ->
 def test_source_that_moves_nothing_takes_any_tolerance() -> None:
     # Leg 4 is perpendicular to an offset of a3 along y.
     position = np.array([[10.0, OPTIMAL.a3[1], 9.0]])
-    found = tolerance_budget(STATED, position, HOME.rotation, 0.05)
+    found = tolerance_budget(Configuration(STATED, position, HOME.rotation), 0.05)
     any_one = np.flatnonzero(np.isinf(found.tolerances))
     # Without a wanted turn those of leg 1, which b4 does not depend on, are free too.
     leg_1 = ("l1", "a1x", "a1y", "a1z", "b1x", "b1y", "b1z")
@@ -249,28 +250,27 @@ def test_source_that_moves_nothing_takes_any_tolerance() -> None:
     assert kept.tolerances.a3[1] == STATED.tolerances.a3[1]
     assert np.isfinite(found.effort)
     assert {*found.costs.ranking[-8:]} == {*any_one}
-    worst = source_costs(kept, position, HOME.rotation).worst_displacement
+    worst = source_costs(Configuration(kept, position, HOME.rotation)).worst_displacement
     assert 0.045 < worst <= 0.05
 
 
 def test_errors_of_kept_actuators_beyond_what_is_wanted_are_refused() -> None:
     given = STATED, box_positions(), HOME.rotation
-    alone = source_costs(
-        msgspec.structs.replace(STATED, tolerances=Tolerances()), *given[1:]
-    ).worst_displacement
+    of_actuators = msgspec.structs.replace(STATED, tolerances=Tolerances())
+    alone = source_costs(Configuration(of_actuators, *given[1:])).worst_displacement
     with pytest.raises(NoAnswerError, match=rf"up to {alone:.4g} mm.*{alone - 0.05:.3g} mm more"):
-        tolerance_budget(*given, 0.05, keep_actuators=True)
+        tolerance_budget(Configuration(*given), 0.05, keep_actuators=True)
     with pytest.raises(NoAnswerError, match="turn the tool by up to"):
-        tolerance_budget(*given, 10.0, 0.001, keep_actuators=True)
+        tolerance_budget(Configuration(*given), 10.0, 0.001, keep_actuators=True)
     # A little more than the actuators' own part leaves a little for the dimensions.
-    found = tolerance_budget(*given, alone * (1.0 + 1e-6), keep_actuators=True)
+    found = tolerance_budget(Configuration(*given), alone * (1.0 + 1e-6), keep_actuators=True)
     assert found.costs.worst_displacement <= alone * (1.0 + 1e-6)
     assert (found.tolerances > 0.0).all()
     # Exact actuators that are kept cost nothing.
     exact = msgspec.structs.replace(STATED, actuators=Actuators()), *given[1:]
-    kept = tolerance_budget(*exact, 0.05, keep_actuators=True)
+    kept = tolerance_budget(Configuration(*exact), 0.05, keep_actuators=True)
     assert not kept.tolerances[:6].any()
-    assert kept.effort < tolerance_budget(*exact, 0.05).effort
+    assert kept.effort < tolerance_budget(Configuration(*exact), 0.05).effort
 
 
 def test_positions_about_a_singularity_have_no_budget() -> None:
@@ -278,48 +278,45 @@ def test_positions_about_a_singularity_have_no_budget() -> None:
         positions = [[10.0, 5.0, 9.0], [10.0, 5.0, z]]
         words = "of the 2 positions .*δ3 = 0: b4 on the base plane"
         with pytest.raises(NoAnswerError, match=words):
-            source_costs(STATED, positions, HOME.rotation)
+            source_costs(Configuration(STATED, positions, HOME.rotation))
         with pytest.raises(NoAnswerError, match=words):
-            tolerance_budget(STATED, positions, HOME.rotation, 1.0)
+            tolerance_budget(Configuration(STATED, positions, HOME.rotation), 1.0)
     with pytest.raises(NoAnswerError, match="the pose is singular"):
-        source_costs(STATED, [10.0, 5.0, 0.0], HOME.rotation)
+        source_costs(Configuration(STATED, [10.0, 5.0, 0.0], HOME.rotation))
     near = [[10.0, 5.0, 1e-9]]
-    found = tolerance_budget(STATED, near, HOME.rotation, 0.05)
+    found = tolerance_budget(Configuration(STATED, near, HOME.rotation), 0.05)
     assert found.costs.worst_displacement <= 0.05
 
 
 @pytest.mark.parametrize("wanted", [0.0, -1.0, np.nan, np.inf, 1e-300, 1e308])
 def test_unusable_wanted_precision_is_refused(wanted: float) -> None:
-    given = OPTIMAL, [HOME.position], HOME.rotation
-    message = refusal(tolerance_budget, *given, wanted, kind=InputError)
+    given = Configuration.at(OPTIMAL, HOME)
+    message = refusal(tolerance_budget, given, wanted)
     assert "displacement must" in message
-    message = refusal(tolerance_budget, *given, 1.0, wanted, kind=InputError)
+    message = refusal(tolerance_budget, given, 1.0, wanted)
     assert "turn must" in message
-    none = OPTIMAL, np.empty((0, 3)), HOME.rotation
-    assert "at least one" in refusal(source_costs, *none, kind=InputError)
+    none = Configuration(OPTIMAL, np.empty((0, 3)), HOME.rotation)
+    assert "at least one" in refusal(source_costs, none)
 
 
 def test_design_with_found_tolerances_keeps_what_is_wanted_after_its_file_is_read() -> None:
-    found = tolerance_budget(STATED, box_positions(), HOME.rotation, 0.05, 0.05)
+    found = tolerance_budget(Configuration(STATED, box_positions(), HOME.rotation), 0.05, 0.05)
     written = encode_design(with_tolerances(STATED, found.tolerances))
     design = decode_design(written, "the file")
     assert_allclose(stated_tolerances(design), found.tolerances, rtol=0.0)
-    costs = source_costs(design, box_positions(), HOME.rotation)
+    costs = source_costs(Configuration(design, box_positions(), HOME.rotation))
     assert costs.worst_displacement == found.costs.worst_displacement
     assert costs.worst_displacement <= 0.05
     assert costs.worst_turn <= 0.05
 
 
 def test_budget_over_the_workspace_holds_at_its_nodes() -> None:
-    design = msgspec.structs.replace(
-        OPTIMAL, limits=msgspec.structs.replace(OPTIMAL.limits, margin=2.0)
-    )
+    design = OPTIMAL.with_limits(margin=2.0)
     positions = positions_over(design, "workspace", HOME, None)
-    found = tolerance_budget(design, positions, HOME.rotation, 0.1)
+    found = tolerance_budget(Configuration(design, positions, HOME.rotation), 0.1)
     assert len(positions) > 100
     assert 0.09 < found.costs.worst_displacement <= 0.1
-    limits = msgspec.structs.replace(design.limits, margin=1e3)
-    empty = msgspec.structs.replace(design, limits=limits)
+    empty = design.with_limits(margin=1e3)
     with pytest.raises(NoAnswerError, match="no position"):
         positions_over(empty, "workspace", HOME, None)
-    assert "need a box" in refusal(positions_over, design, "box", HOME, None, kind=InputError)
+    assert "need a box" in refusal(positions_over, design, "box", HOME, None)

@@ -257,11 +257,12 @@ def test_forces_of_singular_pose_are_infinite(
 def test_forces_of_unusable_arguments_are_refused() -> None:
     home = OPTIMAL.home_pose
     given = OPTIMAL, home.position, home.rotation
-    assert "load (FX FY FZ MX MY MZ)" in refusal(actuator_forces, *given, [1, 2], kind=InputError)
-    refusal(actuator_forces, *given, [np.nan] * 6, kind=InputError)
-    refusal(actuator_forces, *given, np.zeros(6), [1.0, 2.0], kind=InputError)
+    assert "load (FX FY FZ MX MY MZ)" in refusal(actuator_forces, *given, [1, 2])
+    for number in (np.nan, 1e308):
+        refusal(actuator_forces, *given, [number] * 6)
+    refusal(actuator_forces, *given, np.zeros(6), [1.0, 2.0])
     for most in ([0.0] * 6, [1.0] * 5, [np.nan] * 6):
-        assert "six positive" in refusal(largest_force, *given, most, kind=InputError)
+        assert "6 positive" in refusal(largest_force, *given, most)
     positions, rotations = random_poses(OPTIMAL, 4)
     loads = np.zeros((3, 6))
     assert "broadcast" in refusal(

@@ -21,14 +21,13 @@ from explorer import (
 )
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
-from explorer.mechanism.margins import margins
+from explorer.mechanism.margins import margins, planes_of_singularity
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.forces import actuator_forces
 from explorer.statics.load_cases import largest_shares, limit_values, load_case
 from explorer.statics.loaded import LoadedPose, ToolPrecision
-from explorer.statics.reactions import limit_shares, part_limits, reactions
+from explorer.statics.reactions import limit_shares, limited_parts, part_limits, reactions
 from explorer.statics.weights import Weights, design_weights
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -82,33 +81,33 @@ def test_no_sampled_direction_uses_a_larger_share_than_the_worst(limits: str) ->
 def test_largest_force_takes_a_part_to_its_limit_in_its_worst_direction() -> None:
     rng = np.random.default_rng(6)
     for loaded in loaded_poses(limited(), 5):
-        newton = loaded.newton
-        force = 1.0 / newton.share
+        unit_force = loaded.unit_force
+        force = 1.0 / unit_force.share
         # Neither load nor payload act besides.
         bare = limited(payload=Payload())
         for direction in rng.normal(size=(50, 3)):
             unit = direction / np.linalg.norm(direction)
             other = LoadedPose(bare, loaded.pose, six([*(force * unit), 0.0, 0.0, 0.0]))
             assert other.share <= 1.0 + 1e-9
-        load = np.array([*(force * newton.direction), 0.0, 0.0, 0.0])
+        load = np.array([*(force * unit_force.direction), 0.0, 0.0, 0.0])
         there = LoadedPose(bare, loaded.pose, six(load))
         assert there.share == pytest.approx(1.0, rel=1e-12)
-        assert there.worst == newton.part
+        assert there.worst == unit_force.part
 
 
 def test_loaded_pose_that_weighs_no_payload_has_no_forces() -> None:
     design = limited()
     with_weight = LoadedPose(design, HOME)
     without = LoadedPose(design, HOME, weighs_payload=False)
-    assert_allclose(without.held.actuators, 0.0, atol=1e-12)
-    assert np.abs(with_weight.held.actuators).max() > 1.0
+    assert_allclose(without.reactions.actuators, 0.0, atol=1e-12)
+    assert np.abs(with_weight.reactions.actuators).max() > 1.0
 
 
 def test_loaded_pose_without_limits_uses_no_share_and_has_no_worst_direction() -> None:
     loaded = LoadedPose(OPTIMAL, HOME, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
     assert loaded.share == 0.0
     assert np.isinf(loaded.largest_payload)
-    assert loaded.newton.share == 0.0
+    assert loaded.unit_force.share == 0.0
     worst = loaded.worst_force(10.0)
     assert worst.share == 0.0
     assert np.isnan(worst.direction).all()
@@ -119,7 +118,7 @@ def test_loaded_pose_that_is_singular_holds_no_load() -> None:
     loaded = LoadedPose(limited(), pose, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
     assert not loaded.is_regular
     assert np.isinf(loaded.share)
-    assert (loaded.largest_payload, loaded.newton.share) == (0.0, np.inf)
+    assert (loaded.largest_payload, loaded.unit_force.share) == (0.0, np.inf)
     worst = loaded.worst_force(10.0)
     assert np.isinf(worst.share)
     assert np.isnan(worst.direction).all()
@@ -131,8 +130,8 @@ def test_parts_with_a_limit_are_those_whose_share_a_load_changes() -> None:
         none = {"actuators": Actuators(), "struts": Struts(), "guide": Guide()}
         kept = getattr(limited(), change)
         loaded = LoadedPose(limited(**(none | {change: kept})), HOME, six(load))
-        assert (loaded.limited == (loaded.shares > 0.0)).all()
-        assert loaded.limited.any()
+        assert (limited_parts(loaded.design) == (loaded.shares > 0.0)).all()
+        assert limited_parts(loaded.design).any()
 
 
 ROTATION = OPTIMAL.home_pose.rotation
@@ -239,7 +238,12 @@ def test_forces_and_precision_of_extreme_designs_and_poses_are_numbers(seed: int
     loaded = LoadedPose(design, pose, six)
     precision = ToolPrecision(loaded)
     numbers = [
-        *(loaded.share, loaded.largest_payload, loaded.newton.share, loaded.worst_force(1.0).share),
+        *(
+            loaded.share,
+            loaded.largest_payload,
+            loaded.unit_force.share,
+            loaded.worst_force(1.0).share,
+        ),
         *(precision.largest_displacement, *precision.worst()[:2], *precision.rms()),
         *np.ravel(precision.deflection).tolist(),
         *np.ravel(precision.principal.displacement).tolist(),

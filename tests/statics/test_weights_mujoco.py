@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import msgspec
-import mujoco  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 import pytest
+from mujoco_models import engine, joints_of
 from numpy.testing import assert_allclose
 from statics_cases import random_poses
 
 from explorer import PRESETS, Design, Payload, actuator_forces
-from explorer.export.simulation import DENSITY, simulation_joints, simulation_mjcf
+from explorer.export.simulation import DENSITY, simulation_mjcf
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import DOWN, VARIABLES
 from explorer.mechanism.machine import STANDARD_GRAVITY
@@ -21,7 +21,6 @@ from explorer.prototype.chains import ACTUATED
 from explorer.prototype.weights import bar_masses, machine_weights
 from explorer.statics.weights import carry
 
-engine: Any = mujoco
 OPTIMAL = PRESETS["paper-optimal"]
 THICK = msgspec.structs.replace(
     OPTIMAL,
@@ -79,7 +78,7 @@ def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design)
     data = engine.MjData(model)
     positions, rotations = random_poses(design, 10, seed=2)
     for position, rotation in zip(positions, rotations, strict=True):
-        data.qpos[:] = simulation_joints(design, position, rotation)
+        data.qpos[:] = joints_of(design, position, rotation)
         data.qvel[:] = 0.0
         engine.mj_forward(model, data)
         apply_load(design, model, data)

@@ -28,7 +28,7 @@ MINIMA = (0.1, 0.5, 0.9, 0.999, 1.0 - 1e-6)
 
 def limited(design: Design, **limits: Any) -> Design:
     """Return a design with some of its limits changed."""
-    return msgspec.structs.replace(design, limits=msgspec.structs.replace(design.limits, **limits))
+    return design.with_limits(**limits)
 
 
 def scaled_design(design: Design, factor: float) -> Design:

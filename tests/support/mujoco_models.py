@@ -7,7 +7,10 @@ from typing import Any
 import mujoco  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 
+from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
+from explorer.prototype.chains import BODIES, CHAIN_JOINTS, Chains
 
 engine: Any = mujoco
 
@@ -32,3 +35,27 @@ def loops_of(model: Any, data: Any) -> tuple[FloatArray, FloatArray]:
     else:
         dense[:] = np.array(data.efc_J).reshape(dense.shape)
     return np.array(data.efc_pos)[own], dense[own]
+
+
+def joints_of(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return the joint values of the model in a pose (MuJoCo's `qpos`), shape (..., 16).
+
+    The values are the joints of the four chains, in the order of `SIMULATION_JOINTS`: actuated
+    ones are lengths in metres, the others angles from home. Then comes the quaternion (w, x, y, z)
+    of the platform's ball joint, its rotation from home.
+
+    Args:
+        design: The manipulator.
+        position: Position of b4 in the base frame, shape (..., 3), in design units.
+        rotation: Rotation from platform to base, shape (..., 3, 3).
+    """
+    chains, home = Chains.of(design), design.home_pose
+    values_at_home = chains.joints(home.position, home.rotation)
+    joints = chains.joints(position, rotation)
+    is_actuated = np.isin(CHAIN_JOINTS, JOINTS)
+    values = np.where(is_actuated, 1e-3 * design.unit_mm * joints, joints - values_at_home)
+    holder = BODIES.index("rod 4")
+    start = chains.places(values_at_home, home.position, home.rotation).rotation[holder]
+    rod = chains.places(joints, position, rotation).rotation[..., holder, :, :]
+    ball = home.rotation.T @ start @ np.swapaxes(rod, -1, -2) @ rotation
+    return np.concatenate([values, quaternion_from_rotation(ball)], axis=-1)

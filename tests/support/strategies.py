@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from hypothesis import strategies as st
 
-from explorer import Design, Pose, inverse, margins, rotation_from_quaternion
+from explorer import Design, Pose, rotation_from_quaternion
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 
 EPSILON = 2.0**-52
@@ -38,6 +39,11 @@ class Case:
     rotation: FloatArray
 
     @property
+    def at(self) -> Configuration:
+        """The design in the pose."""
+        return Configuration(self.design, self.position, self.rotation)
+
+    @property
     def size(self) -> float:
         """The largest length of the computation, to which rounding errors are relative."""
         return max(*map(abs, self.design.variables), float(np.abs(self.position).max()))
@@ -50,12 +56,12 @@ class Case:
     @property
     def joints(self) -> FloatArray:
         """The joints, shape (6,)."""
-        return inverse(self.design, self.position, self.rotation)
+        return self.at.joints
 
     @property
     def margins(self) -> FloatArray:
         """The margins (δ1, δ2, δ3), shape (3,)."""
-        return margins(self.position, self.rotation)
+        return self.at.margins
 
     @property
     def regularity(self) -> float:

@@ -21,18 +21,14 @@ class HereWorkers(Workers):
     """
 
     def __init__(self, _: int | None = None) -> None:
-        self.tasks: list[list[range]] = []
-
-    @property
-    def pieces(self) -> list[range]:
-        return [piece for task in self.tasks for piece in task]
+        self.pieces: list[range] = []
 
     @property
     def size(self) -> int:
         return 1
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        self.tasks.append(args[2])
+        self.pieces.append(range(*args[1:]))
         future: Future[Any] = Future()
         try:
             future.set_result(fn(*args, **kwargs))

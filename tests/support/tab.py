@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+import server_clock
 import viser
 from playwright.sync_api import Browser, ConsoleMessage, Download, Locator, expect
 
@@ -25,7 +26,6 @@ from explorer.app.screenshot import (
     settle,
 )
 from explorer.app.server import Running
-from explorer.app.session import clock
 from explorer.app.session.history import start_history
 from explorer.app.session.session import HistoryMove
 from explorer.app.state.actions import Set
@@ -144,10 +144,10 @@ class Tab:
         self.page.evaluate(CLOSE_NOTICES)
         # A move through the history leaves what is shown as it is.
         session.do(Set("view", View()))
-        session.travel(HistoryMove(lambda _: start_history(open_state(PRESETS["paper-optimal"]))))
+        session.do(HistoryMove(lambda _: start_history(open_state(PRESETS["paper-optimal"]))))
         page.panels.work.minimize()
         # Cameras follow what has changed, and the scene has its size, before this one is put.
-        assert page.settle(PATIENCE_SECONDS), "the explorer is never at rest"
+        assert server_clock.settle(page, PATIENCE_SECONDS), "the explorer is never at rest"
         settle(self.page, self.client)
         page.point_cameras("isometric")
         self.settle()
@@ -174,11 +174,15 @@ class Tab:
         """Wait until server and page have come to rest: nothing waits, and no pause is pending."""
         deadline = time.monotonic() + PATIENCE_SECONDS
         while True:
-            assert self.running.page.settle(PATIENCE_SECONDS), "the explorer is never at rest"
+            assert server_clock.settle(self.running.page, PATIENCE_SECONDS), (
+                "the explorer is never at rest"
+            )
             sent = self._sent_messages()
             settle(self.page, self.client)
             self._hear()
-            assert self.running.page.settle(PATIENCE_SECONDS), "the explorer is never at rest"
+            assert server_clock.settle(self.running.page, PATIENCE_SECONDS), (
+                "the explorer is never at rest"
+            )
             # What the page had to say before may have changed something.
             if self._sent_messages() == sent + OWN_MESSAGES:
                 return
@@ -189,7 +193,7 @@ class Tab:
         self._hear()
         self.page.evaluate("pause => window.explorer.clock.advance(pause)", 1000.0 * seconds)
         self._hear()
-        clock.advance(seconds)
+        server_clock.advance(seconds)
 
     @contextmanager
     def slow_time(self) -> Generator[None]:
@@ -202,11 +206,11 @@ class Tab:
             yield
         finally:
             # The clock is that of other explorers in this process too.
-            clock.set_pace(1.0)
+            server_clock.set_pace(1.0)
         self._set_pace(1.0)
 
     def _set_pace(self, pace: float) -> None:
-        clock.set_pace(pace)
+        server_clock.set_pace(pace)
         self.page.evaluate("pace => window.explorer.clock.setPace(pace)", pace)
 
     def _hear(self) -> None:

@@ -22,18 +22,15 @@ from explorer import (
     margins,
     workspace_volume,
 )
-from explorer.files.json_text import LONGEST_LINE
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.machine import Actuators, Tool
 from explorer.mechanism.pose import Pose
-from explorer.singularity.ellipsoids import inverse_condition, jacobian
 from explorer.statics.loaded import LoadedPose
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.results import front, undominated_rows
-from explorer.sweep.rows import Value, check_study, design_of, evaluate
-from explorer.sweep.sampling import samples
+from explorer.sweep.rows import Value, check_study, design_of, evaluate, samples
 from explorer.sweep.study import (
     NAMES,
     STUDIES,
@@ -47,8 +44,8 @@ from explorer.sweep.study import (
     load_study,
     study_hash,
 )
+from explorer.workspace.least_clearance import node_measures
 from explorer.workspace.limits.valid_poses import violations
-from explorer.workspace.node_measures import node_measures
 
 MEASURES = measures_in("studies")
 OPTIMAL = PRESETS["paper-optimal"]
@@ -77,7 +74,7 @@ def test_study_encoded_and_decoded_is_unchanged() -> None:
     study = decoded(polish={"objective": "largest-volume"}, clearance_margin=0.5)
     again = decode_study(encode_study(study), "again")
     assert again == study
-    assert study_hash(again) == study_hash(study)
+    assert study_hash(again) == study_hash(study) != study_hash(decoded(chunk=65))
     assert study.base.home == OPTIMAL.home_pose
     assert study.varied == ("a3y", "yaw", "radius")
     # So it is of one that is made in Python, whose design is checked too.
@@ -90,19 +87,6 @@ def test_study_encoded_and_decoded_is_unchanged() -> None:
     assert decode_study(encode_study(made), "it") == made
     with pytest.raises(InputError, match="no preset"):
         Study(design="nothing", variables={"b2": (1.0, 2.0)}, sampling=Sampling(count=4))
-
-
-def test_study_hash_differs_for_every_change() -> None:
-    changes: list[dict[str, Any]] = [
-        {},
-        {"design": "paper-initial"},
-        {"variables": {"a3y": [4, 8.5], "yaw": [-80, -60], "radius": [0, 0.3]}},
-        {"sampling": {"method": "sobol", "count": 40, "seed": 3}},
-        {"measures": ["volume", "clearance", "reach"]},
-        {"nodes": 21},
-        {"chunk": 65},
-    ]
-    assert len({study_hash(decoded(**each)) for each in changes}) == len(changes)
 
 
 def test_packaged_studies_can_be_run_and_no_variable_is_a_measure() -> None:
@@ -161,25 +145,6 @@ def test_study_with_bad_field_is_refused_in_one_line(changes: dict[str, Any], wo
 def test_data_of_no_study_are_refused_in_one_line(data: bytes) -> None:
     with pytest.raises(InputError, match=r"^study: [^\n]+$"):
         decode_study(data, "study")
-
-
-@pytest.mark.parametrize(
-    ("inserted", "words"),
-    [
-        ('"name": "again",', "the field 'name' is given twice"),
-        ('"\\u001b]0;owned\\u0007": 1,', "unknown field"),
-        (f'"{900_000 * "a"}": 1,', "unknown field"),
-        (f'"chunk": {5000 * "9"},', "chunk"),
-    ],
-)
-def test_refusal_of_a_study_is_short_and_printable(inserted: str, words: str) -> None:
-    data = b"{" + inserted.encode() + encode_study(STUDIES["trade-off"]).lstrip()[1:]
-    with pytest.raises(InputError) as caught:
-        decode_study(data, "study.json")
-    message = str(caught.value)
-    assert words in message
-    assert message.isprintable()
-    assert len(message) <= LONGEST_LINE + 1
 
 
 def test_study_without_any_valid_design_is_refused() -> None:
@@ -284,9 +249,7 @@ def nodes_of(design: Any, rotation: Any, count: int) -> Any:
 @pytest.mark.parametrize("seed", range(4))
 def test_node_measures_match_each_position(seed: int) -> None:
     design, rotation = ordinary_case(seed)
-    design = msgspec.structs.replace(
-        design, limits=msgspec.structs.replace(design.limits, leg_radii=(0.3, 0.2, 0.1, 0.4))
-    )
+    design = design.with_limits(leg_radii=(0.3, 0.2, 0.1, 0.4))
     margin = 0.5
     found = node_measures(design, rotation, nodes=9, clearance_margin=margin)
     kept = np.array(
@@ -327,10 +290,10 @@ def test_measures_of_a_row_match_the_public_functions() -> None:
     assert found["margin_2"] == nodes.margins[1]
     assert found["worst_margin"] == min(nodes.margins)
     assert found["extent_z"] == nodes.extent[2]
-    at_nodes = inverse_condition(jacobian(design, nodes.positions, home.rotation), design.reach)
+    at_nodes = Configuration(design, nodes.positions, home.rotation).inverse_condition
     assert found["worst_inverse_condition"] == pytest.approx(at_nodes.min())
     assert found["mean_inverse_condition"] == pytest.approx(at_nodes.mean())
-    at_home = inverse_condition(jacobian(design, home.position, home.rotation), design.reach)
+    at_home = Configuration(design, home.position, home.rotation).inverse_condition
     assert found["inverse_condition"] == pytest.approx(float(at_home))
     assert found["accessible_volume"] == accessible_workspace(design).accessible_volume
     # The nodes see no less than there is.

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from explorer.app.session.gestures import UserAction, check_drawable
+from explorer.app.session.history import UserAction, check_drawable
 from explorer.app.state.actions import Open
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state

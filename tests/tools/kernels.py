@@ -9,8 +9,7 @@ import importlib
 
 from explorer.files.packaged import SOURCES
 from explorer.numerics.compiled import KERNELS
-from explorer.numerics.kernel_cache import PACKAGED, write_code
-from explorer.numerics.object_code import processor
+from explorer.numerics.object_code import PACKAGED, processor, write_code
 
 FOLDER = SOURCES / "assets" / PACKAGED / processor()
 

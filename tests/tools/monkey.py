@@ -28,11 +28,10 @@ from client import press_update, presses_in
 from page_props import differences, shown_by
 from socket_tab import SocketTab
 
-from explorer.app.features.designs.feature import DesignsPanel
-from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start
-from explorer.app.session.jobs import RESTARTED
+from explorer.app.session.worker import RESTARTED
 from explorer.app.state.actions import Open
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
@@ -173,7 +172,7 @@ class Monkey:
             is_on = journey is not None and journey.is_playing
             if not is_on and not page.session.state.paths.is_planning:
                 time.sleep(0.1)
-                if not page.session.has_more:
+                if page.session.wait_until_idle(0.0):
                     return
             time.sleep(0.05)
         raise AssertionError("the page does not come to rest")

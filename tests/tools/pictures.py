@@ -25,17 +25,17 @@ from playwright.sync_api import Browser, FloatRect, Page
 from explorer.app.browser.headless import headless_browser
 from explorer.app.features.compare.feature import Pin
 from explorer.app.features.optimise.actions import SetRequest, StartRun
+from explorer.app.features.optimise.state import OptimisationRequest
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign
+from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.studies.panel import StudiesPanel
+from explorer.app.features.studies.state import Brush, within
 from explorer.app.scene.camera import ViewName
-from explorer.app.screenshot import open_page, picture, settle, stable_picture
+from explorer.app.screenshot import draw_page, open_page, settle, stable_picture
 from explorer.app.server import Running, start
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, Set, SetJoint, SetPosition, SetVariable
+from explorer.app.state.actions import Action, Open, Set, SetJoint, SetPosition, SetVariable
 from explorer.app.state.compared import Look
-from explorer.app.state.optimisation import OptimisationRequest
-from explorer.app.state.studies import Brush, within
 from explorer.app.state.view import (
     ForcesView,
     OrientationView,
@@ -45,7 +45,6 @@ from explorer.app.state.view import (
     View,
     WorkspaceView,
 )
-from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS, typical_machine
 from explorer.mechanism.folds import pose_of_folds
@@ -246,23 +245,26 @@ SCENES = {
 }
 
 
-def draw(browser: Browser, scene: Scene) -> bytes:
-    """Return the picture of a scene as PNG."""
-
-    def prepare(running: Running) -> None:
+def draw(
+    browser: Browser, scene: Scene, alter: Callable[[Running], None] = lambda _: None
+) -> bytes:
+    """Return the picture of a scene as PNG, of an explorer that is altered before."""
+    running = start(DESIGN, scene.pose, view=View(handle=True), port=0, panels=scene.panels)
+    try:
+        alter(running)
         for action in scene.actions:
             running.page.session.do(action)
-
-    return picture(
-        browser,
-        DESIGN,
-        scene.pose,
-        view=scene.view,
-        size=scene.size,
-        panels=scene.panels,
-        tab=scene.tab,
-        prepare=prepare,
-    )
+        assert running.page.wait_until_drawn(60.0), "the explorer does not come to rest"
+        return draw_page(
+            browser,
+            running,
+            view=scene.view,
+            size=scene.size,
+            panels=scene.panels,
+            tab=scene.tab,
+        )
+    finally:
+        running.stop()
 
 
 def draw_report(browser: Browser) -> bytes:

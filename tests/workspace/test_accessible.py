@@ -33,7 +33,7 @@ from explorer.workspace.accessible.nodes import Grid, check_start, nearest_clear
 from explorer.workspace.accessible.radii import radius_curve, with_radius
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks
-from explorer.workspace.slices.volume import home_rotation, workspace_nodes
+from explorer.workspace.slices.volume import workspace_nodes
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
 ROWS = (OPTIMAL, INITIAL)
@@ -67,7 +67,7 @@ def test_accessible_workspace_with_thin_legs_loses_nodes_of_the_base_plane_alone
     nodes = workspace_nodes(design)
     assert found.node_count == nodes.count
     # What the paper's grid loses are the nodes of z = 0 where axes cross.
-    r, step = home_rotation(design), nodes.step
+    r, step = design.home_pose.rotation, nodes.step
     flat = np.stack(np.meshgrid(*[np.arange(-20, 21)] * 2, [0], indexing="ij"), -1) * step
     within = (slacks(constraints(design, r), flat) >= -1e-9 * design.reach).all(axis=-1)
     near = 1e-9 * design.reach
@@ -81,7 +81,7 @@ def test_accessible_workspace_with_thin_legs_loses_nodes_of_the_base_plane_alone
 def test_accessible_solid_of_random_designs_holds_the_ends_of_clear_moves_alone(
     design: Design,
 ) -> None:
-    found, r = accessible_workspace(design, nodes=20), home_rotation(design)
+    found, r = accessible_workspace(design, nodes=20), design.home_pose.rotation
     solid = found.solid
     assert solid.is_watertight
     assert 0.0 < found.accessible_volume <= found.volume
@@ -105,7 +105,7 @@ def test_accessible_solid_of_random_designs_holds_the_ends_of_clear_moves_alone(
 
 @pytest.mark.parametrize(("design", "radius"), [(OPTIMAL, 0.01), (INITIAL, 0.0025)])
 def test_accessible_volume_agrees_with_random_positions(design: Design, radius: float) -> None:
-    design, r = thick(design, radius), home_rotation(design)
+    design, r = thick(design, radius), design.home_pose.rotation
     found = accessible_workspace(design)
     rng = np.random.default_rng(5)
     lows, highs = design.limits.box or (-design.reach, design.reach)
@@ -121,7 +121,7 @@ def test_accessible_solid_faces_name_their_limit_or_pair() -> None:
     design = thick(OPTIMAL, 0.01)
     solid = accessible_workspace(design, nodes=30).solid
     centres = solid.vertices[solid.faces].mean(axis=1)
-    clearance = leg_clearances(Configuration(design, centres, home_rotation(design))).clearance
+    clearance = leg_clearances(Configuration(design, centres, design.home_pose.rotation)).clearance
     seen: set[str] = {solid.limits[index] for index in solid.limit_of_face.tolist()}
     offs: FloatArray = np.zeros(0)
     for pair, (i, j) in enumerate(PAIRS):
@@ -171,13 +171,13 @@ def test_accessible_workspace_from_an_invalid_home_names_cause_and_remedy(
     radii: tuple[float, ...], home: tuple[float, float, float], words: str
 ) -> None:
     design = limited(OPTIMAL, leg_radii=radii)
-    design = msgspec.structs.replace(design, home=Pose.of(home, home_rotation(OPTIMAL)))
+    design = msgspec.structs.replace(design, home=Pose.of(home, OPTIMAL.home_pose.rotation))
     with pytest.raises(InputError, match=words):
         accessible_workspace(design)
 
 
 def test_nearest_clear_position_has_no_nearer_one() -> None:
-    r = home_rotation(OPTIMAL)
+    r = OPTIMAL.home_pose.rotation
     above = np.array([10.0, 5.0, 19.0])
     assert nearest_clear_position(OPTIMAL, r, above) == pytest.approx([10.0, 5.0, 18.0], abs=1e-4)
     design, low = thick(OPTIMAL, 0.01), np.array([10.0, -8.0, 0.3])
@@ -196,14 +196,14 @@ def test_nearest_clear_position_has_no_nearer_one() -> None:
 
 @pytest.mark.parametrize("nodes", [7, 161])
 def test_accessible_workspace_with_a_grid_out_of_range_is_refused(nodes: int) -> None:
-    with pytest.raises(InputError, match=f"from 8 to 160; got {nodes}"):
+    with pytest.raises(InputError, match=f"within 8 to 160; got {nodes}"):
         accessible_workspace(OPTIMAL, nodes=nodes)
     with pytest.raises(InputError, match="at most"):
         accessible_workspace(OPTIMAL, node_step=1e-3)
 
 
 def test_accessible_nodes_are_a_component_of_clear_steps() -> None:
-    design, r = thick(INITIAL, 0.02), home_rotation(INITIAL)
+    design, r = thick(INITIAL, 0.02), INITIAL.home_pose.rotation
     home = np.array(design.home_pose.position)
     grid = Grid(home - 4.5, np.full(3, 1.5), (7, 7, 7))
     found = survey(design, r, grid)
@@ -235,7 +235,7 @@ def test_least_clearances_below_a_demand_are_those_of_all_positions(seed: int) -
 @pytest.mark.parametrize(("design", "margin"), [(OPTIMAL, 0.0), (INITIAL, 0.5)])
 def test_least_clearances_at_random_positions_hold(design: Design, margin: float) -> None:
     design = limited(design, margin=margin, leg_radii=(0.1, 0.2, 0.3, 0.4))
-    r = home_rotation(design)
+    r = design.home_pose.rotation
     found = least_clearances(design)
     assert (found.bound <= found.clearance).all()
     limits = constraints(design, r)

@@ -28,8 +28,8 @@ from explorer import Design, Limits, Pose
 from explorer.measures.measure import Case
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.design_file import decode_design
+from explorer.mechanism.margins import planes_of_singularity
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.extremes import extent_of, extreme_positions, least_margins
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,

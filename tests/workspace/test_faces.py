@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 
-import msgspec
 import numpy as np
 import pytest
 from limited_designs import ordinary_case, thin_case
@@ -20,8 +19,7 @@ from explorer.workspace.limits.constraints import (
     HalfSpace,
     constraints,
 )
-from explorer.workspace.solids.booleans import cut_solid
-from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solid import Solid, cut_solid
 from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -30,8 +28,7 @@ PIXELS = 800.0
 
 
 def coned() -> Design:
-    limits = msgspec.structs.replace(OPTIMAL.limits, swing=Swing(a1=70.0, b2=60.0, b4=50.0))
-    return msgspec.structs.replace(OPTIMAL, limits=limits)
+    return OPTIMAL.with_limits(swing=Swing(a1=70.0, b2=60.0, b4=50.0))
 
 
 def at_home(design: Design) -> tuple[Design, FloatArray]:

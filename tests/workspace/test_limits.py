@@ -1,4 +1,4 @@
-"""Violations of limits are those of a plain comparison, and a pose on a limit violates none."""
+"""Violations are those of a plain comparison, and valid moves have valid poses all along."""
 
 from __future__ import annotations
 
@@ -8,23 +8,21 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from clear_moves import moves_are_clear
 from hypothesis import given, strategies as st
-from limited_designs import (
-    limited as with_limits,
-    ordinary_case,
-    shell_case,
-    thin_case,
-    troubled_case,
-)
+from limited_designs import limited, ordinary_case, shell_case, thin_case, troubled_case
 from scipy.spatial.transform import Rotation
 from strategies import Case, ordinary_cases
+from tool_moves import tool_move
 
-from explorer import JOINTS, PRESETS, Design, Limits, inverse, margins
+from explorer import JOINTS, PRESETS, Design, InputError, Limits, Pose, evaluate, inverse, margins
+from explorer.legs.moves import poses_between
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.margins import signs_of
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.workspace.limits.constraints import Cone, constraints, slacks
+from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import Rules, Violation, poses_are_valid, violations
 
 Signs = tuple[int, int, int]
@@ -32,7 +30,7 @@ ANY: dict[str, Any] = dict.fromkeys(LENGTHS, (0.0, 1e6))
 FREE = Limits(**ANY, carriage_order="any", margin=None)
 
 
-def limited(design: Design, **limits: Any) -> Design:
+def with_only(design: Design, **limits: Any) -> Design:
     """Return the design with these limits and no others."""
     return msgspec.structs.replace(design, limits=msgspec.structs.replace(FREE, **limits))
 
@@ -63,7 +61,7 @@ def test_length_carriage_or_coordinate_outside_its_range_is_a_violation(
 ) -> None:
     lows, highs = zip(*sides, strict=True)
     limits: dict[str, Any] = dict(zip(LENGTHS, lengths, strict=True))
-    design = limited(case.design, **limits, guide=guide, box=(lows, highs))
+    design = with_only(case.design, **limits, guide=guide, box=(lows, highs))
     joints = dict(zip(JOINTS, inverse(design, case.position, case.rotation).tolist(), strict=True))
     found = {v.limit: v for v in broken(design, case.position, case.rotation)}
     values = joints | dict(zip(("box x", "box y", "box z"), case.position.tolist(), strict=True))
@@ -84,7 +82,7 @@ def test_length_carriage_or_coordinate_outside_its_range_is_a_violation(
 
 @given(ordinary_cases())
 def test_maximum_of_none_is_the_reach_and_a_margin_of_none_demands_nothing(case: Case) -> None:
-    design = limited(case.design, l1=(0.0, None))
+    design = with_only(case.design, l1=(0.0, None))
     reach = math.hypot(*case.design.a3)
     l1 = float(inverse(design, case.position, case.rotation)[0])
     found = broken(design, case.position, case.rotation)
@@ -94,7 +92,7 @@ def test_maximum_of_none_is_the_reach_and_a_margin_of_none_demands_nothing(case:
 
 @given(ordinary_cases(), st.floats(0.0, 20.0))
 def test_carriages_closer_than_the_gap_are_a_violation(case: Case, gap: float) -> None:
-    design = limited(case.design, gap=gap)
+    design = with_only(case.design, gap=gap)
     joints = inverse(design, case.position, case.rotation)
     apart = abs(float(joints[1]) - float(joints[3]))
     found = broken(design, case.position, case.rotation)
@@ -110,7 +108,7 @@ def test_carriages_closer_than_the_gap_are_a_violation(case: Case, gap: float) -
 def test_margin_of_another_sign_or_too_small_is_a_violation(
     case: Case, least: float, mode: int
 ) -> None:
-    design = limited(case.design, margin=least)
+    design = with_only(case.design, margin=least)
     signs = signs_of(mode)
     found = {v.limit: v for v in broken(design, case.position, case.rotation, signs)}
     margin = margins(case.position, case.rotation).tolist()
@@ -125,7 +123,7 @@ def test_margin_of_another_sign_or_too_small_is_a_violation(
 
 
 def test_violations_are_in_the_order_of_the_design_file() -> None:
-    design = limited(
+    design = with_only(
         PRESETS["paper-initial"],
         **dict.fromkeys(LENGTHS, (0.0, 0.0)),
         guide=(100.0, 101.0),
@@ -148,7 +146,7 @@ def test_violated_limits_are_those_of_the_solids_and_of_validity(seed: int) -> N
     case = (ordinary_case, shell_case, thin_case, troubled_case)[seed % 4]
     design = case(seed)[0]
     angles = {name: float(rng.uniform(1.0, 180.0)) for name in ("a1", "a3", "b2", "b4")}
-    design = with_limits(design, swing=Swing(**angles), gap=0.1 * design.reach)
+    design = limited(design, swing=Swing(**angles), gap=0.1 * design.reach)
     home = design.home_pose
     spread = float(rng.choice([1e-9, 1e-3, 0.1, 1.0]))
     turn = Rotation.from_rotvec(spread * rng.normal(size=3)).as_matrix()
@@ -164,3 +162,159 @@ def test_violated_limits_are_those_of_the_solids_and_of_validity(seed: int) -> N
     assert {violation.demand.end_names()[int(violation.above)] for violation in found} == beyond
     rules = Rules.of(design).without_clearances()
     assert poses_are_valid(design, position, rotation, rules=rules) == (not found)
+
+
+OPTIMAL = PRESETS["paper-optimal"]
+RADIUS = 0.2
+THICK = limited(OPTIMAL, leg_radii=(RADIUS,) * 4)
+
+
+def verdict_of(design: Design, pose: Pose) -> tuple[bool, float]:
+    """Return whether a pose has no violation and no collision, and its smallest |clearance|."""
+    snapshot = evaluate(design, pose)
+    is_valid = not snapshot.violations and bool((snapshot.clearances.clearance > 0.0).all())
+    return is_valid, float(np.abs(snapshot.clearances.clearance).min())
+
+
+def poses_about(design: Design, seed: int, count: int) -> list[Pose]:
+    """Return random poses at distances from near the home to far from it."""
+    rng = np.random.default_rng(seed)
+    home, size = design.home_pose, design.reach
+    spread = rng.choice([1e-3, 0.1, 0.5], (count, 1))
+    places = np.array(home.position) + size * spread * rng.uniform(-1.0, 1.0, (count, 3))
+    turns = Rotation.from_rotvec(spread * rng.normal(size=(count, 3))).as_matrix()
+    return [Pose.of(p, turn @ home.rotation) for p, turn in zip(places, turns, strict=True)]
+
+
+def arrays_of(poses: list[Pose]) -> tuple[FloatArray, FloatArray]:
+    return np.array([each.position for each in poses]), np.array([p.rotation for p in poses])
+
+
+def with_swing(design: Design, seed: int) -> Design:
+    rng = np.random.default_rng(seed)
+    angles = {name: float(rng.uniform(20.0, 180.0)) for name in ("a1", "a3", "b1", "b2", "b3")}
+    radii = tuple((0.02 * design.reach * rng.uniform(0.0, 1.0, 4)).tolist())
+    return limited(design, swing=Swing(**angles), leg_radii=radii, gap=0.01 * design.reach)
+
+
+@given(st.integers(0, 2**32))
+def test_pose_without_violations_or_collisions_is_valid(seed: int) -> None:
+    ordinary = ordinary_case(seed)[0]
+    designs = troubled_case(seed)[0], ordinary, with_swing(ordinary, seed), THICK
+    design = designs[seed % 4]
+    poses = poses_about(design, seed, 6)
+    found = poses_are_valid(design, *arrays_of(poses))
+    for pose, valid in zip(poses, found.tolist(), strict=True):
+        expected, nearness = verdict_of(design, pose)
+        if nearness > 1e-12 * design.reach:
+            assert valid == expected, (design, pose)
+
+
+def test_leg_without_a_direction_at_home_violates_its_cone() -> None:
+    home = Pose((*OPTIMAL.a3, 0.0), OPTIMAL.home_pose.quaternion)
+    free = limited(OPTIMAL, box=None, margin=None)
+    design = msgspec.structs.replace(limited(free, swing=Swing(a3=90.0)), home=home)
+    pose = OPTIMAL.home_pose
+    assert poses_are_valid(free, pose.position, pose.rotation)
+    assert not poses_are_valid(design, pose.position, pose.rotation)
+    assert not verdict_of(design, pose)[0]
+    assert not moves_are_valid(design, pose.position, pose.rotation, pose.position, pose.rotation)
+
+
+def random_moves(seed: int, count: int, share: float) -> tuple[FloatArray, ...]:
+    """Return moves between valid poses, or a share of each."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform([0, -12, 0], [20, 22, 18], (60 * count, 3))
+    rotations = Rotation.random(60 * count, random_state=rng).as_matrix()
+    valid = poses_are_valid(THICK, places, rotations)
+    p, r = places[valid][: count + 1], rotations[valid][: count + 1]
+    turn = Rotation.from_matrix(r[1:] @ np.swapaxes(r[:-1], -1, -2)).as_rotvec()
+    end_rotations = Rotation.from_rotvec(share * turn).as_matrix() @ r[:-1]
+    return p[:-1], r[:-1], p[:-1] + share * (p[1:] - p[:-1]), end_rotations
+
+
+@pytest.mark.parametrize("share", [1.0, 0.2])
+@pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (3.0, -2.0, -1.0), (0.0, 0.0, 30.0)])
+def test_move_valid_has_valid_poses_all_along(
+    tool: tuple[float, float, float], share: float
+) -> None:
+    """Moves are those of a tool, at b4 or elsewhere, between valid poses or a share of each."""
+    point = np.array(tool)
+    starts = random_moves(7, 60, 1.0)
+    moves: list[tuple[FloatArray, ...]] = []
+    for p, r, q, s in zip(*starts, strict=True):
+        position, rotation = tool_move(Pose.of(p, r), Pose.of(q, s), share, point)
+        moves.append((p, r, position[0], rotation[0]))
+    arrays = [np.array(column) for column in zip(*moves, strict=True)]
+    found = moves_are_valid(THICK, *arrays, tool=tool)
+    agree = 0
+    for valid, (p, r, q, s) in zip(found.tolist(), moves, strict=True):
+        poses = tool_move(Pose.of(p, r), Pose.of(q, s), np.linspace(0.0, 1.0, 100), point)
+        along = poses_are_valid(THICK, *poses)
+        # Limits have a tolerance on the way, which random moves do not come into.
+        assert along.all() or not valid
+        agree += int(along.all()) == valid
+    # What is refused for being too near to a collision or a singularity is rare.
+    assert agree >= 0.96 * len(found)
+    assert found.any()
+    assert moves_are_clear(THICK, *arrays, tool=tool)[found].all()
+    # The move of b4 between the same poses is another one, unless the tool is at b4.
+    differs = (moves_are_valid(THICK, *arrays) != found).any()
+    assert differs == point.any() or share < 1.0
+
+
+def test_move_along_a_limit_is_valid_to_the_tolerance() -> None:
+    home = OPTIMAL.home_pose
+    top = limited(OPTIMAL, box=((0, -12, 0), (20, 22, home.position[2])))
+    x, y, z = home.position
+    # On the face of the box all the way.
+    assert moves_are_valid(top, (x, y, z), home.rotation, (x + 1, y - 1, z), home.rotation)
+    # About b4 leg 1 turns: on the way it is shorter than at both ends.
+    start, end = (
+        Pose.of_yaw_pitch_roll(home.position, (yaw, 0.0, 0.0)) for yaw in (-100.0, -125.0)
+    )
+    ways = [start.position, start.rotation, end.position, end.rotation]
+    lengths = [
+        float(evaluate(OPTIMAL, Pose.of(home.position, r)).joints[0])
+        for r in poses_between(start, end, np.linspace(0.0, 1.0, 101))[1]
+    ]
+    ends, least = min(lengths[0], lengths[-1]), min(lengths)
+    assert least < ends - 1e-2
+    # The carriages have another order there than at home.
+    turned = limited(OPTIMAL, carriage_order="any")
+    bounded = limited(turned, l1=(ends, 50.0))
+    assert moves_are_valid(limited(turned, l1=(least, 50.0)), *ways)
+    assert not moves_are_valid(bounded, *ways)
+    assert not moves_are_valid(bounded, *ways, tolerance=0.5 * (ends - least))
+    assert moves_are_valid(bounded, *ways, tolerance=2.5 * (ends - least))
+
+
+def test_move_to_another_mode_is_invalid() -> None:
+    home = OPTIMAL.home_pose
+    free = limited(OPTIMAL, box=None)
+    x, y, z = home.position
+    assert not moves_are_valid(free, (x, y, z), home.rotation, (x, y, -z), home.rotation)
+
+
+def test_move_of_half_a_turn_which_has_no_shorter_way_is_invalid() -> None:
+    rng, count = np.random.default_rng(0), 40_000
+    free = limited(OPTIMAL, box=None, carriage_order="any")
+    start = 10.0 * rng.normal(size=(count, 3))
+    end = start + 3.0 * rng.normal(size=(count, 3))
+    first = Rotation.from_quat(rng.normal(size=(count, 4)))
+    axis = rng.normal(size=(count, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+
+    def is_valid(angle: float) -> BoolArray:
+        last = Rotation.from_rotvec(angle * axis) * first
+        return moves_are_valid(free, start, first.as_matrix(), end, last.as_matrix())
+
+    assert is_valid(math.pi - 1e-6).any()
+    assert not is_valid(math.pi).any()
+
+
+def test_poses_not_finite_are_refused() -> None:
+    with pytest.raises(InputError, match="position"):
+        poses_are_valid(OPTIMAL, [0.0, math.nan, 1.0], np.eye(3))
+    with pytest.raises(InputError, match="end position"):
+        moves_are_valid(OPTIMAL, [0.0, 1.0, 1.0], np.eye(3), [0.0, math.nan, 1.0], np.eye(3))

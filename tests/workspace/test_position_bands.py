@@ -12,9 +12,9 @@ from machines import FULL, six
 from explorer import PRESETS, Actuators, Design, Payload, Struts, Tool, inverse, reactions
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
+from explorer.mechanism.margins import planes_of_singularity
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.reactions import limit_shares
 from explorer.statics.weights import design_weights
 from explorer.workspace.position_bands import (

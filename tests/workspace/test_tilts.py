@@ -18,8 +18,14 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.table import CARRIAGE_ORDER
 from explorer.workspace.orientations.share import orientation_capability, orientations_within
-from explorer.workspace.orientations.tilts import greatest_tilt, greatest_tilts, tilt_map
-from explorer.workspace.orientations.torsions import is_connected, tilt_by_torsion, torsion_range
+from explorer.workspace.orientations.tilts import (
+    greatest_tilt,
+    greatest_tilts,
+    is_connected,
+    tilt_by_torsion,
+    tilt_map,
+    torsion_range,
+)
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -157,7 +163,7 @@ def test_greatest_tilts_take_torsions_beside_positions() -> None:
     np.testing.assert_allclose(found, each, atol=1e-6)
     assert 0 < np.isnan(found).sum() < found.size
     assert greatest_tilts(design, np.zeros((0, 3))).shape == (0,)
-    with pytest.raises(InputError, match="do not go with torsions"):
+    with pytest.raises(InputError, match="do not broadcast"):
         greatest_tilts(design, positions[:, 0], torsions)
 
 

@@ -6,23 +6,42 @@ columns of another kernel (good to about 1e-4) and with random positions.
 
 from __future__ import annotations
 
+import itertools
+import json
 import math
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
-from limited_designs import REFERENCE, limited, ordinary_case, reference_case
+from hypothesis import settings
+from limited_designs import (
+    REFERENCE,
+    limited,
+    ordinary_case,
+    reference_case,
+    shell_case,
+    troubled_case,
+)
 from long_cases import long_after
+from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, Design, InputError
 from explorer.mechanism.design import LENGTHS, VARIABLES, Swing
+from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import YAW, constraints
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.nodes import column_lengths
-from explorer.workspace.slices.volume import home_rotation, workspace_nodes, workspace_volume
+from explorer.workspace.limits.region import column_lengths, region_of
+from explorer.workspace.slices.integration import (
+    RESULTS,
+    TOTAL,
+    TOTAL_ERROR,
+    integrate_slices,
+    quadrature,
+)
+from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -143,7 +162,7 @@ def test_workspace_of_parallel_lines_is_empty_unless_no_margin_is_demanded() -> 
 
 
 def test_balls_that_are_equal_count_once() -> None:
-    rotation = home_rotation(OPTIMAL)
+    rotation = OPTIMAL.home_pose.rotation
     # The centre of l1 is -R b1: put a3 there, and the balls of l1 and l4 are one.
     b1x, b1y = (-(rotation.T @ [*OPTIMAL.a3, 0.0]))[:2].tolist()
     design = msgspec.structs.replace(OPTIMAL, b1=(b1x, b1y), home=OPTIMAL.home_pose)
@@ -158,3 +177,75 @@ def test_nodes_with_an_unusable_step_or_rotation_are_refused(step: float) -> Non
     for measure in (workspace_volume, workspace_nodes):
         with pytest.raises(InputError, match="rotation"):
             measure(OPTIMAL, 2.0 * np.eye(3))
+
+
+DEFECTS: list[dict[str, Any]] = read_reference("defects_volume")["workspaces"]
+# A part of them each day, all with all tests.
+SEEDS = min(40, settings().max_examples // 3)
+PARTS = 150
+# The rounding of the sum of the parts, as a share of it.
+ROUNDING = 1e-13
+
+
+def unbounded(design: Design, rotation: FloatArray | None) -> tuple[Design, FloatArray]:
+    """Return the design without cones, which have no exact slices, and its rotation."""
+    return limited(
+        design, swing=Swing()
+    ), design.home_pose.rotation if rotation is None else rotation
+
+
+def troubled_without_cones(seed: int) -> tuple[Design, FloatArray]:
+    """Return a troubled case without its cones."""
+    return unbounded(*troubled_case(seed))
+
+
+CASES: dict[str, Callable[[int], tuple[Design, FloatArray]]] = {
+    "ordinary": ordinary_case,
+    "shell": shell_case,
+    "troubled": troubled_without_cones,
+}
+
+
+def volume_in_parts(design: Design, rotation: FloatArray) -> tuple[float, float]:
+    """Return the volume as the sum of many parts along x, and the sum of their errors."""
+    region = region_of(constraints(design, rotation))
+    if region.box is None:
+        return 0.0, 0.0
+    rates = np.zeros((len(region.circles) + len(region.planes), 4))
+    result, total, error = np.zeros(RESULTS), 0.0, 0.0
+    ends = np.linspace(region.low, region.high, PARTS + 1).tolist()
+    for low, high in itertools.pairwise(ends):
+        rows = region.circles, region.planes, low, high
+        integrate_slices(1, *rows, quadrature(), result, rates)
+        total += float(result[TOTAL])
+        error += float(result[TOTAL_ERROR])
+    return total, error
+
+
+def decoded(case: dict[str, Any]) -> tuple[Design, FloatArray]:
+    """Return the design and rotation of a case in the data."""
+    return decode_design(json.dumps(case["design"]).encode(), "case"), np.array(case["rotation"])
+
+
+@pytest.mark.parametrize("case", DEFECTS)
+def test_volume_with_breaks_between_nodes_is_the_reference_one(case: dict[str, Any]) -> None:
+    design, rotation = decoded(case)
+    found = workspace_volume(design, rotation)
+    assert found.volume == pytest.approx(case["volume"], rel=1e-7)
+    volume, _ = volume_in_parts(design, rotation)
+    assert found.volume == pytest.approx(volume, rel=1e-12, abs=found.error)
+    assert found.error <= 1e-10 * found.volume
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_volume_in_parts_sums_to_the_whole_within_its_error(kind: str) -> None:
+    off: list[tuple[int, float]] = []
+    for seed in range(SEEDS):
+        design, rotation = CASES[kind](seed)
+        found = workspace_volume(design, rotation, explain=False)
+        volume, error = volume_in_parts(design, rotation)
+        room = found.error + min(error, found.error) + ROUNDING * volume
+        assert kind != "ordinary" or found.error <= 1e-11 * found.volume
+        if abs(found.volume - volume) > room:
+            off.append((seed, found.volume / volume - 1.0))
+    assert not off

@@ -5,15 +5,14 @@ The worker makes files that need computing; a thread here waits for those that a
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import viser
 
-from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Who
+from explorer.app.session.worker import Worker
 from explorer.errors import ExplorerError
 
 # Number of browsers that are waited for at the same time.
@@ -39,8 +38,6 @@ class Downloads:
         self._worker = worker
         self._complain = complain
         self._threads = ThreadPoolExecutor(MOST_WAITED_FOR, thread_name_prefix="downloads")
-        self._lock = threading.Lock()
-        self._busy: set[int] = set()
 
     def stop(self) -> None:
         """Start no further file."""
@@ -93,7 +90,7 @@ class Downloads:
         self._worker.submit(key, task, arguments, done, failed)
 
     def make(self, who: Who, doing: str, make: Callable[[viser.ClientHandle], File]) -> None:
-        """Send a file made on a thread with the browser; each browser has one made at a time.
+        """Send a file that a thread makes with the browser.
 
         Args:
             who: The browser.
@@ -102,12 +99,6 @@ class Downloads:
         """
         client = self._client(who)
         if client is None:
-            return
-        with self._lock:
-            is_busy = client.client_id in self._busy
-            self._busy.add(client.client_id)
-        if is_busy:
-            self._complain("the last file is still being made; wait for it", who)
             return
 
         def work() -> None:
@@ -119,8 +110,6 @@ class Downloads:
                 self._complain(str(error), who)
             finally:
                 notice.remove()
-                with self._lock:
-                    self._busy.discard(client.client_id)
 
         self._threads.submit(work)
 

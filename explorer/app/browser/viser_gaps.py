@@ -1,8 +1,4 @@
-"""Features of viser's scene and controls without a public name.
-
-Each use of a private name of viser stands beside the gap in viser that it fills; further ones are
-in `viser_server` beside this module, and in `explorer.app.widgets.pieces`.
-"""
+"""Features of viser's scene and controls without a public name, each beside the gap it fills."""
 
 from __future__ import annotations
 
@@ -106,7 +102,7 @@ def show_value(control: Any, value: object) -> None:
 
 
 def resend(handle: Any, name: str) -> None:
-    """Send browsers a property of a control, or a node's place, that viser holds for sent."""
+    """Send browsers a property of a control, or a node's place. Gap: viser sends none twice."""
     state = handle._impl
     if name in PLACE:
         kind = SetPositionMessage if name == "position" else SetOrientationMessage
@@ -139,7 +135,7 @@ def mark_broadcasts(client: viser.ClientHandle, number: int) -> None:
     sent to one browser alone takes a way of its own and may arrive earlier.
     """
 
-    # The type of a message is the name of its class.
+    # Gap: viser has no such mark. The type of a message is the name of its class.
     class Mark(RunJavascriptMessage):
         def redundancy_key(self) -> str:
             return "mark"
@@ -165,6 +161,7 @@ def _send_to_all(server: Any, message: object) -> None:
 
 
 def _send_to(client: Any, message: object) -> None:
+    # Gap: nor one for a single browser.
     client._websock_connection.queue_message(message)
 
 

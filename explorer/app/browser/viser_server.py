@@ -1,7 +1,4 @@
-"""viser's server: started and stopped quietly and guarded, with what upstream lacks for that.
-
-Each use of a private name of viser stands beside the gap in viser that it fills.
-"""
+"""viser's server: started and stopped quietly and guarded, with what upstream lacks for that."""
 
 from __future__ import annotations
 
@@ -23,7 +20,7 @@ from viser._messages import (
 )
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-from explorer.app.security.guard import Serve
+from explorer.app.security import Serve
 from explorer.errors import ServerError
 
 # Size in bytes beyond which no upload is read; no purpose of the page needs as much.
@@ -84,12 +81,12 @@ def _serve_through(guarded: Callable[[Serve], Serve] | None) -> Generator[Callab
     """Let viser serve through `guarded`; yield a function that returns whether it did."""
     websockets_server: Any = websockets.asyncio.server
     plain = websockets_server.serve
-    used: list[Serve] = []
+    chosen = plain if guarded is None else guarded(plain)
+    used: list[bool] = []
 
     def serve(*args: Any, **options: Any) -> Any:
-        # viser tries port after port; each time it is the same guard.
-        used[:] = used or [plain if guarded is None else guarded(plain)]
-        return used[0](*args, **options)
+        used.append(True)
+        return chosen(*args, **options)
 
     websockets_server.serve = serve
     try:
@@ -109,14 +106,13 @@ def stop_viser(server: viser.ViserServer) -> None:
 
 def protect(server: viser.ViserServer) -> None:
     """Refuse public tunnels and giant files, and report an upload to its sender alone."""
-    internals: Any = server
     gui: Any = server.gui
+    interface = gui._websock_interface
     # Gap: viser opens a public tunnel for any client that asks.
-    for kind in (ShareUrlRequest, ShareUrlDisconnect):
-        internals._websock_server.unregister_handler(kind)
+    for kind in (ShareUrlRequest, ShareUrlDisconnect, FileTransferStartUpload):
+        interface.unregister_handler(kind)
     # Gap: viser stores uploads of any size, and reports their progress to all browsers, also later
     # ones, which then show a file without a name.
-    interface = gui._websock_interface
     queue_for_all, start_upload = interface.queue_message, gui._handle_file_transfer_start
 
     def queue_message(message: Any) -> None:
@@ -133,5 +129,4 @@ def protect(server: viser.ViserServer) -> None:
             start_upload(client_id, message)
 
     interface.queue_message = queue_message
-    interface.unregister_handler(FileTransferStartUpload)
     interface.register_handler(FileTransferStartUpload, start_small_upload)

@@ -1,7 +1,7 @@
 """The declaration of a feature, and the services that the page offers to features.
 
 A feature is a folder beside this module. It declares all that it adds to the page in one
-`Feature`, which stands in the list of `explorer.app.features.listed`.
+`Feature`, which stands in the list of `explorer.app.page`.
 """
 
 from __future__ import annotations
@@ -16,18 +16,15 @@ import viser
 from explorer.app.browser.downloads import Downloads
 from explorer.app.scene.camera import Cameras
 from explorer.app.scene.placing import ScenePart
-from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Session, Who
-from explorer.app.state.action import Action
+from explorer.app.session.worker import Worker
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.storage.autosaver import Autosaver
-from explorer.app.storage.study_folders import StudyFolders
-from explorer.app.storage.user_data import PreferenceFile, UserData
+from explorer.app.storage.user_data import Autosaver, PreferenceFile, UserData
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons
-from explorer.app.widgets.commands import Key
-from explorer.app.widgets.palette import Command
+from explorer.app.widgets.palette import Command, Key
 from explorer.app.widgets.theme import Theme
 from explorer.errors import StorageError
 
@@ -51,7 +48,6 @@ class Services:
         theme: Theme of the page, light or dark.
         cameras: Cameras of the browsers; they frame all that the features draw.
         user_data: The user's designs and session; None to save nothing.
-        studies: Folders of design studies; None to offer none.
         preferences: File that remembers theme and tour; None to remember nothing.
         autosaver: Saver of the session; None to save nothing.
         commands: Function that returns the commands of the palette.
@@ -69,7 +65,6 @@ class Services:
     theme: Theme
     cameras: Cameras
     user_data: UserData | None
-    studies: StudyFolders | None
     preferences: PreferenceFile | None
     autosaver: Autosaver | None = None
     commands: Callable[[], tuple[Command, ...]] = tuple
@@ -94,6 +89,10 @@ class Services:
             self._shared[kind] = kind(self)
         return self._shared[kind]
 
+    def give(self, kind: Callable[[Services], Shared], value: Shared) -> None:
+        """Share an object that the page has already as the one of its class."""
+        self._shared[kind] = value
+
     def has(self, kind: Callable[[Services], object]) -> bool:
         """Whether the one object of a class has been made."""
         return kind in self._shared
@@ -107,14 +106,12 @@ class Services:
         while self._ends:
             self._ends.pop()()
 
-    def remember(
-        self, who: Who, *, dark: bool | None = None, tour_seen: bool | None = None
-    ) -> None:
-        """Remember a preference of the user, if preferences are kept."""
+    def remember(self, who: Who, **chosen: bool) -> None:
+        """Remember preferences of the user by name, if preferences are kept."""
         if self.preferences is None:
             return
         try:
-            self.preferences.choose(dark=dark, tour_seen=tour_seen)
+            self.preferences.choose(**chosen)
         except StorageError as error:
             self.complain(str(error), who)
 
@@ -233,10 +230,6 @@ class StateCommand:
         )
 
 
-def _always(_: Services) -> bool:
-    return True
-
-
 @dataclass(frozen=True)
 class Feature:
     """All that a feature adds to the page.
@@ -280,4 +273,4 @@ class Feature:
     keys: Mapping[str, tuple[Key, ...]] = field(default_factory=dict[str, tuple[Key, ...]])
     lists: tuple[str, ...] = ()
     floor: Callable[[Services], float | None] | None = None
-    is_offered: Callable[[Services], bool] = _always
+    is_offered: Callable[[Services], bool] = lambda _: True

@@ -1,28 +1,103 @@
 """One control bound to the state: it reads its value from a frame and turns changes into actions.
 
-A control posts only that it was changed; its value is read when the session handles the change. A
-value is assigned to a control only if it differs from the one that the user just set, so that a
-slider never moves under the pointer.
+A binding says where a control's value is read, and what sets it. A control posts only that it was
+changed; its value is read when the session handles the change. A value is assigned to a control
+only if it differs from the one that the user just set, so that a slider never moves under the
+pointer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any, Generic, cast
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeAlias, TypeVar, cast
 
 import viser
 
 from explorer.app.browser.viser_gaps import MARKS, slider_marks
-from explorer.app.inputs.bindings import Bound, Value
-from explorer.app.inputs.tracks import Intervals, Span, Track, decimals, tint_marks
+from explorer.app.inputs.ranges import Intervals, Span, Track, decimals, tint_marks
 from explorer.app.session.session import Session
-from explorer.app.state.action import Action
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.markup import colour_strip
 from explorer.mechanism.design import Pair
+from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import snap_to_decimals
+
+Value = TypeVar("Value", float, bool, str, Pair, Triple)
+
+
+@dataclass(frozen=True)
+class Bound(Generic[Value]):
+    """The binding of a control to the state.
+
+    Attributes:
+        read: Function that returns the control's value in a frame.
+        write: Function that returns the action for a new value.
+    """
+
+    read: Callable[[Frame], Value]
+    write: Callable[[State, Value], Action]
+
+
+def item(
+    values: Callable[[Frame], Sequence[float]], index: int, action: Callable[[int, float], Action]
+) -> Bound[float]:
+    """Return the binding to one of several values, which an action sets by its index."""
+    return Bound(lambda frame: values(frame)[index], lambda _, value: action(index, value))
+
+
+@dataclass(frozen=True)
+class At:
+    """A plain value of the state, shown and set by a control.
+
+    Attributes:
+        path: Path of the value, such as "view.warn_below".
+        default: Function that returns the control's value where the state has None.
+        convert: Function from the control's value to that of the state.
+        action: Class of the action that sets the value.
+    """
+
+    path: str
+    default: Callable[[State], Any] | None = None
+    convert: Callable[[Any], Any] = lambda value: value
+    action: type[Set] = Set
+
+    def bound(self, name: str, options: Mapping[str, object] | None = None) -> Bound[Any]:
+        """Return the binding.
+
+        Args:
+            name: Name of the value in the history, such as the label of its control.
+            options: Values by the words of a list; None if the control holds the value itself.
+        """
+        if options is not None:
+            texts = {value: text for text, value in options.items()}
+            return Bound(
+                lambda frame: texts[self._read(frame)],
+                lambda _, text: self.action(self.path, options[text], name, text),
+            )
+        return Bound(self._read, lambda _, value: self.action(self.path, self.convert(value), name))
+
+    def _read(self, frame: Frame) -> Any:
+        value = value_at(frame.state, self.path)
+        return self.default(frame.state) if value is None and self.default else value
+
+
+Source: TypeAlias = str | At | Bound[Value]
+"""The source of a control's value; a text is the path of a plain value."""
+
+
+def bound_to(
+    at: Source[Value], name: str, options: Mapping[str, object] | None = None
+) -> Bound[Value]:
+    """Return a binding itself, or the binding to the value at a path."""
+    if isinstance(at, Bound):
+        return at
+    return (At(at) if isinstance(at, str) else at).bound(name, options)
+
 
 Condition = Callable[[State], bool]
 """A function that tells whether a condition holds in a state."""

@@ -7,11 +7,19 @@ from typing import Any, Literal
 
 import viser
 
-from explorer.app.inputs.bindings import Bound, Source, Value, bound_to
-from explorer.app.inputs.control import Condition, Control, Slider, Thumbs
-from explorer.app.inputs.tracks import Intervals, Span
+from explorer.app.inputs.control import (
+    Bound,
+    Condition,
+    Control,
+    Slider,
+    Source,
+    Thumbs,
+    Value,
+    bound_to,
+)
+from explorer.app.inputs.ranges import Intervals, Span
 from explorer.app.session.session import Session
-from explorer.app.state.action import Action
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update

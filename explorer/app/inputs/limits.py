@@ -5,15 +5,13 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from explorer.app.inputs.bindings import Bound
-from explorer.app.inputs.ranges import span_around
-from explorer.app.inputs.tracks import Span
+from explorer.app.inputs.control import Bound
+from explorer.app.inputs.ranges import Span, span_around
 from explorer.app.state.actions import Set
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design, Pair
-from explorer.workspace.limits.limit import Entry, Limit, Switch
-from explorer.workspace.limits.table import LIMITS
+from explorer.workspace.limits.table import LIMITS, Entry, Limit, Switch
 
 ANGLE_STEP = 0.5
 

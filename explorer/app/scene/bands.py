@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explorer.mechanism.design import Design
+from explorer.mechanism.margins import planes_of_singularity
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.singularity.colours import OUTLINE, SINGULAR, WARNED, Rgb, mix
-from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.workspace import PAIR_NAMES
-from explorer.workspace.faces.divide import divide, find_roots
-from explorer.workspace.faces.faces import Faces
+from explorer.workspace.faces.faces import Faces, divide, find_roots
 from explorer.workspace.position_bands import PositionBands, PositionMeasure, position_bands
 
 Measure = Literal["plain"] | PositionMeasure
@@ -83,28 +82,21 @@ class Colouring:
             self.design, self.rotation, self.banded, warn_below=self.warn_below, load=self.load
         )
 
-    def shells(
-        self, faces: Faces, *, holds: bool = False
-    ) -> tuple[tuple[Shell, ...], float | None]:
-        """Return the parts of a surface, one for each colour, and its longest edge.
+    def shells(self, faces: Faces, *, holds: bool = False) -> tuple[Shell, ...]:
+        """Return the parts of a surface, one for each colour.
 
         If the surface is known to hold the load, no share on it counts as above the limit, which
         rounding and the flatness of facets would exceed.
-
-        The longest edge of a triangle whose measure is not linear, in design units, is given if it
-        is longer than usual, because the surface is large beside the reach; it is None otherwise.
         """
         if not len(faces.triangles):
-            return (), None
+            return ()
         if self.measure == "plain":
-            return _by_cause(faces), None
-        bands, coarse_edge, is_linear = self.bands, None, self.measure == "margin"
+            return _by_cause(faces)
+        bands, is_linear = self.bands, self.measure == "margin"
         vertices, triangles = faces.vertices, faces.triangles
         if not is_linear:
-            usual = COLOURED_EDGE * self.design.reach
-            vertices, triangles = cut_to_size(vertices, triangles, usual)
-            longest = float(edge_lengths(vertices, triangles).max())
-            coarse_edge = longest if longest > usual else None
+            longest = COLOURED_EDGE * self.design.reach
+            vertices, triangles = cut_to_size(vertices, triangles, longest)
         vertices, triangles = self._split_at_folds(vertices, triangles)
         least = bands.edges[1] if holds and self.measure == "share" else 0.0
 
@@ -115,7 +107,7 @@ class Colouring:
         parts = _Bands(vertices, triangles, values, None if is_linear else value)
         for edge in bands.edges[1:]:
             parts.split(edge)
-        return parts.shells(bands), coarse_edge
+        return parts.shells(bands)
 
     def _split_at_folds(
         self, vertices: FloatArray, triangles: IntArray

@@ -114,20 +114,15 @@ def _axes(direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 @dataclass(frozen=True)
 class _Placement:
-    """The positions at which the explorer put a browser's camera.
-
-    Attributes:
-        view: View that the camera shows.
-        aspect: Width over height for which the camera was put.
-        first: Eyes before the camera was put; a slow browser reports them for long.
-        eyes: Eyes where the camera was put, the newest last; a browser may report an earlier one.
-        target: Target of the newest eye.
-    """
+    """The positions at which the explorer put a browser's camera, for an aspect ratio."""
 
     view: ViewName | FloatArray
     aspect: float
+    # Eyes before the camera was put, which a slow browser reports for long.
     first: tuple[FloatArray, ...]
+    # Eyes where it was put, the newest last; a browser may report an earlier one.
     eyes: tuple[FloatArray, ...]
+    # Target of the newest eye.
     target: FloatArray
 
     def has(self, client: viser.ClientHandle) -> bool:
@@ -154,18 +149,11 @@ class Cameras:
     Args:
         first: First camera of a new browser.
         points: Function that returns the points to frame, shape (n, 3).
-        put: Function that sends a browser eye and target of its camera, and has it report them.
     """
 
-    def __init__(
-        self,
-        first: viser.InitialCameraConfig,
-        points: Callable[[], FloatArray],
-        put: Callable[[viser.ClientHandle, FloatArray, FloatArray], None] | None = None,
-    ) -> None:
+    def __init__(self, first: viser.InitialCameraConfig, points: Callable[[], FloatArray]) -> None:
         self._first = first
         self._points = points
-        self._send = _put_camera if put is None else put
         self._placements: dict[int, _Placement] = {}
         # The points that cameras followed last, and the browsers that show all of them.
         self._followed: FloatArray | None = None
@@ -178,16 +166,12 @@ class Cameras:
         first = self._first
         first.position, first.look_at = framing(self._points(), "isometric", FIRST_ASPECT)
 
-    def point(self, client: viser.ClientHandle, view: ViewName) -> None:
-        """Show the mechanism in one browser from a view."""
-        self._put(client, view)
-
     def fit(self, client: viser.ClientHandle) -> None:
         """Show the whole mechanism in one browser from the present direction of its camera."""
         towards = np.asarray(client.camera.position) - np.asarray(client.camera.look_at)
         # A browser never makes its camera vertical, but a script may have.
         if np.linalg.norm(towards[:2]) > 1e-6 * np.linalg.norm(towards):
-            self._put(client, towards)
+            self.point(client, towards)
 
     def connected(self, client: viser.ClientHandle) -> None:
         """Point a new browser's camera, and keep it framed until its user moves it."""
@@ -221,9 +205,9 @@ class Cameras:
             if placement is None or not placement.has(client):
                 return
             if client.camera.aspect == placement.aspect:
-                self._send(client, placement.eyes[-1], placement.target)
+                put_camera(client, placement.eyes[-1], placement.target, FIELD_OF_VIEW)
             else:
-                self._put(client, placement.view)
+                self.point(client, placement.view)
 
     def stands(self, client: viser.ClientHandle) -> bool:
         """Whether a browser's camera is where it was put last, or where its user moved it.
@@ -249,7 +233,8 @@ class Cameras:
             if has_new_shape or not placement.is_at(client, placement.eyes[-1]):
                 self.look_again(client)
 
-    def _put(self, client: viser.ClientHandle, view: ViewName | FloatArray) -> None:
+    def point(self, client: viser.ClientHandle, view: ViewName | FloatArray) -> None:
+        """Show the mechanism in one browser from a view, or from a direction (3,)."""
         with self._lock:
             reported = client.camera.aspect
             aspect = reported if math.isfinite(reported) and reported > 0.0 else 1.0
@@ -262,7 +247,7 @@ class Cameras:
             self._placements[client.client_id] = _Placement(
                 view, reported, first, (*before, eye), target
             )
-            self._send(client, eye, target)
+            put_camera(client, eye, target, FIELD_OF_VIEW)
 
 
 def _shows(client: viser.ClientHandle, points: FloatArray) -> bool:
@@ -270,7 +255,3 @@ def _shows(client: viser.ClientHandle, points: FloatArray) -> bool:
     camera = client.camera
     eye, target = np.asarray(camera.position), np.asarray(camera.look_at)
     return are_in_picture(points, eye, target, camera.fov, camera.aspect)
-
-
-def _put_camera(client: viser.ClientHandle, eye: FloatArray, target: FloatArray) -> None:
-    put_camera(client, eye, target, FIELD_OF_VIEW)

@@ -17,10 +17,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import distance
 
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.measures.size import corners_of
+from explorer.measures.box import corners_of
 from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 
 # Approximate reach of a design in scene units.
 SCENE_REACH = 10.0
-# Indices of every two of the platform's points.
-POINT_PAIRS = np.triu_indices(4, 1)
 
 
 def round_step(length: float) -> float:
@@ -96,14 +95,8 @@ class Placed:
     @cached_property
     def platform_points(self) -> dict[str, FloatArray]:
         """Points b1 … b4 in the platform frame, in scene units, each (3,)."""
-        design = self.frame.state.design
-        local = {
-            "b1": (*design.b1, 0.0),
-            "b2": (design.b2, 0.0, 0.0),
-            "b3": (design.b3, 0.0, 0.0),
-            "b4": (0.0, 0.0, 0.0),
-        }
-        return {name: self.scale * np.array(point) for name, point in local.items()}
+        local = self.scale * self.frame.state.design.platform_points
+        return dict(zip(("b1", "b2", "b3", "b4"), local, strict=True))
 
     @cached_property
     def point(self) -> FloatArray:
@@ -135,8 +128,7 @@ class Placed:
     @cached_property
     def thickness(self) -> float:
         """The scale of thicknesses: 1, and less if the platform's points are close."""
-        points = np.array(list(self.platform_points.values()))
-        gaps = np.linalg.norm(points[POINT_PAIRS[0]] - points[POINT_PAIRS[1]], axis=1)
+        gaps = distance.pdist(np.array(list(self.platform_points.values())))
         # b4 and b2 or b3 may coincide; the legs then simply share a joint.
         apart = gaps[gaps > 0.05]
         return float(np.clip(apart.min(initial=1.2) / 1.2, 0.3, 1.0))

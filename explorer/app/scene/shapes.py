@@ -1,4 +1,4 @@
-"""Primitive meshes, and nodes of many copies that move in one message.
+"""Primitive meshes and colours, and nodes of many copies that move in one message.
 
 viser is slow with many nodes and fast with one instanced node, so all rods are one node, and all
 balls, and all boxes.
@@ -17,8 +17,25 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.charts import NEUTRAL
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.singularity.colours import Rgb
+from explorer.singularity.colours import Rgb, linear
+
+# Colours of the scene, besides those of `explorer.singularity.colours`.
+TUBE: Rgb = (84, 96, 114)
+ROD: Rgb = (188, 197, 209)
+JOINT: Rgb = (52, 60, 72)
+BALL: Rgb = (232, 235, 240)
+BASE_BODY: Rgb = (214, 219, 226)
+PLATFORM_BODY: Rgb = (150, 160, 176)
+RAIL: Rgb = (128, 138, 152)
+CARRIAGE: Rgb = (104, 115, 132)
+GHOST: Rgb = NEUTRAL
+LEAVES: tuple[Rgb, Rgb] = ((176, 156, 112), (96, 140, 136))
+SWEPT: Rgb = (92, 60, 156)
+# Colours of the live design and of the pinned ones: distinct for every common colour-vision
+# deficiency, from the scale of proximity, and from light and dark pages.
+COMPARED: tuple[Rgb, ...] = ((0, 158, 115), (120, 70, 200), (225, 110, 190), (170, 150, 20))
 
 Mesh: TypeAlias = tuple[FloatArray, IntArray]
 
@@ -129,9 +146,11 @@ class Instances:
         )
 
     def place(
-        self, positions: FloatArray, wxyzs: FloatArray, scales: FloatArray
+        self, positions: FloatArray, wxyzs: FloatArray | None, scales: FloatArray
     ) -> Iterator[Update]:
-        """Yield the updates that place the copies; shapes (n, 3), (n, 4), (n, 3)."""
+        """Yield the updates that place the copies (n, 3), (n, 4), (n, 3); upright with None."""
+        if wxyzs is None:
+            wxyzs = np.tile([1.0, 0.0, 0.0, 0.0], (len(positions), 1))
         yield self.handle, "batched_positions", positions.astype(np.float32)
         yield self.handle, "batched_wxyzs", wxyzs.astype(np.float32)
         yield self.handle, "batched_scales", scales.astype(np.float32)
@@ -171,8 +190,7 @@ class Balls(Instances):
 
     def at(self, centres: FloatArray, radii: FloatArray) -> Iterator[Update]:
         """Yield the updates that put the spheres at centres (n, 3)."""
-        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(centres), 1))
-        yield from self.place(centres, upright, np.repeat(radii[:, None], 3, axis=1))
+        yield from self.place(centres, None, np.repeat(radii[:, None], 3, axis=1))
 
 
 class Boxes(Instances):
@@ -183,8 +201,7 @@ class Boxes(Instances):
 
     def span(self, lows: FloatArray, highs: FloatArray) -> Iterator[Update]:
         """Yield the updates that span the boxes from lows (n, 3) to highs (n, 3)."""
-        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(lows), 1))
-        yield from self.place(0.5 * (lows + highs), upright, highs - lows)
+        yield from self.place(0.5 * (lows + highs), None, highs - lows)
 
 
 class Patch:
@@ -216,10 +233,7 @@ def linear_colour(colour: Rgb) -> Rgb:
 
     viser's client takes the colours of copies and of the ends of segments for linear ones.
     """
-    red, green, blue = (
-        round(255.0 * (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4))
-        for c in (value / 255.0 for value in colour)
-    )
+    red, green, blue = (round(255.0 * linear(channel)) for channel in colour)
     return red, green, blue
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
-from explorer.app.session.clock import Timer, now
-from explorer.app.session.jobs import LONG_SECONDS, Worker
-from explorer.app.session.session import Session
-from explorer.app.session.worker import CANCELLED, Channel
+from explorer.app.session.clock import Pause, now
+from explorer.app.session.worker import CANCELLED, Channel, Worker
 from explorer.app.state.frame import Frame
 from explorer.numerics.search import Watch, ignore_stage
 
+# Seconds after which a drawing is cancelled as soon as a newer one waits, and its stage is shown.
+LONG_SECONDS = 1.0
 # Seconds after which a drawing that the user cancelled ends with its process.
 CANCEL_SECONDS = 2.0
 
@@ -87,7 +87,7 @@ class Feed(Generic[Request, Drawing]):
         self._part: object = None
         self._stage: Stage | None = None
         # Shows the first stage of a drawing that takes long.
-        self._stage_timer: Timer | None = None
+        self._stage_pause = Pause(LONG_SECONDS, redraw)
         # Number of the newest request, its time, and its number in the worker.
         self._count, self._submitted, self._order = 0, 0.0, -1
 
@@ -128,8 +128,8 @@ class Feed(Generic[Request, Drawing]):
         with self._lock:
             if request == self.request:
                 return
-            if request is None:
-                self._cancel_order(None)
+            if request is None and self._has_stages:
+                self._worker.cancel(self._order)
             self.problem, self.request = None, request
             self._submit()
 
@@ -138,7 +138,7 @@ class Feed(Generic[Request, Drawing]):
         with self._lock:
             if not self._has_stages or self.is_settled:
                 return
-            self._cancel_order(CANCEL_SECONDS)
+            self._worker.cancel(self._order, CANCEL_SECONDS)
             self.problem = CANCELLED
         self._redraw()
 
@@ -166,6 +166,7 @@ class Feed(Generic[Request, Drawing]):
                 self._part = value
                 self._redraw()
 
+        before = self._order
         self._order = self._worker.submit(
             self._key,
             self._task,
@@ -173,12 +174,9 @@ class Feed(Generic[Request, Drawing]):
             lambda drawing: self._show_drawing(request, drawing),
             lambda problem: self._show_problem(count, problem),
             receive if self._has_stages else None,
-            is_drawing=self._has_stages,
         )
-
-    def _cancel_order(self, patience: float | None) -> None:
-        if self._has_stages and not self.is_settled:
-            self._worker.cancel(self._order, patience)
+        if self._has_stages:
+            self._worker.cancel(before, after=LONG_SECONDS)
 
     def _receive_stage(self, count: int, stage: Stage) -> None:
         with self._lock:
@@ -188,12 +186,7 @@ class Feed(Generic[Request, Drawing]):
         if self.stage is not None:
             self._redraw()
         elif is_first:
-            self._stage_timer = Timer(LONG_SECONDS, self._show_stage, count)
-
-    def _show_stage(self, count: int) -> None:
-        # The stage of a drawing that is done by then is not shown.
-        if count == self._count and not self.is_settled:
-            self._redraw()
+            self._stage_pause.begin()
 
     def _show_drawing(self, request: Request, drawing: Drawing) -> None:
         with self._lock:
@@ -201,7 +194,7 @@ class Feed(Generic[Request, Drawing]):
             self._drawing, self._answered, self._part = drawing, request, None
             if self.is_current:
                 self.problem = None
-                self._stop_timer()
+                self._stage_pause.cancel()
         self._redraw()
 
     def _show_problem(self, count: int, problem: str) -> None:
@@ -209,20 +202,8 @@ class Feed(Generic[Request, Drawing]):
             if count != self._count or self.request is None or self.is_cancelled:
                 return
             self._drawing, self._part, self.problem = None, None, problem
-            self._stop_timer()
+            self._stage_pause.cancel()
         self._redraw()
-
-    def _stop_timer(self) -> None:
-        if self._stage_timer is not None:
-            self._stage_timer.cancel()
-
-
-class _Page(Protocol):
-    @property
-    def worker(self) -> Worker: ...
-
-    @property
-    def session(self) -> Session: ...
 
 
 def feed_of(
@@ -230,10 +211,8 @@ def feed_of(
     request_of: Callable[[Frame], Request | None],
     *,
     has_stages: bool = False,
-) -> Callable[[_Page], Feed[Request, Drawing]]:
-    """Declare a feed, which a page makes once; see `Feed` for the arguments."""
-
-    def make(page: _Page) -> Feed[Request, Drawing]:
-        return Feed(page.worker, task, request_of, page.session.redraw, has_stages=has_stages)
-
-    return make
+) -> Callable[[Any], Feed[Request, Drawing]]:
+    """Return the function that makes a feed with the services of a page; see `Feed`."""
+    return lambda services: Feed(
+        services.worker, task, request_of, services.session.redraw, has_stages=has_stages
+    )

@@ -1,7 +1,8 @@
 """The history: steps that can be undone, redone and gone back to.
 
 A step is one gesture with one control, from press to release, so that a drag of many events is
-one step; without a press, as with keys, a pause ends it. A change that happens by itself, such as
+one step and one move, from the pose where it began; without a press, as with keys, a pause ends it.
+No event leads to a length that cannot be drawn. A change that happens by itself, such as
 a path that plays on, belongs to the step before it, and so does what is shown and how: undo leaves
 it as it is, but for the point whose position is shown and set. Steps hold whole states, which share
 all that did not change.
@@ -11,14 +12,75 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from explorer.app.session.gestures import UserAction
+from explorer.app.state.actions import Action, Open, Reset, SetMode
 from explorer.app.state.presses import Press
-from explorer.app.state.state import State
+from explorer.app.state.state import Gesture, State
 from explorer.app.state.view import View
 from explorer.errors import InputError
+from explorer.mechanism.design import JOINTS, VARIABLES
+from explorer.numerics.number_text import format_number
 
 # Number of steps beyond which the oldest are dropped.
 MOST_STEPS = 1000
+# Seconds without an event of a control after which the next one begins a new gesture, where no
+# press is known.
+PAUSE_SECONDS = 1.0
+# Largest length over the reach of the design as it was opened: browsers draw in single precision.
+LARGEST_SHARE = 1e6
+
+
+@dataclass(frozen=True)
+class UserAction:
+    """An action with its origin, which makes the events of one drag one gesture.
+
+    Attributes:
+        action: The action.
+        source: The control that it came from; a new object for an event that is part of no drag.
+        time: Time of the event, in seconds.
+        press: The press during which it happened; None for keys, and where none is known.
+    """
+
+    action: Action
+    source: object
+    time: float
+    press: Press | None = None
+
+    def continues(self, source: object, last: float, press: Press | None) -> bool:
+        """Whether this continues an earlier gesture with the same control.
+
+        Args:
+            source: The control of the earlier gesture.
+            last: Time of its last event, in seconds.
+            press: Its last press, if any.
+        """
+        if self.source != source:
+            return False
+        if self.press is not None and press is not None and self.press.client == press.client:
+            return self.press == press
+        return self.time - last <= PAUSE_SECONDS
+
+    def apply(self, state: State) -> State:
+        """Return the next state, with the gesture that led to its pose.
+
+        Raises:
+            ExplorerError: The change is not possible, or its result cannot be drawn.
+        """
+        after = self.action.apply(state)
+        check_drawable(after)
+        return replace(after, gesture=self._gesture(state, after))
+
+    def _gesture(self, before: State, after: State) -> Gesture | None:
+        is_jump = isinstance(self.action, Open | Reset | SetMode)
+        if is_jump or after.design.variables != before.design.variables:
+            # The legs did not move from one pose to the other.
+            return None
+        gesture = before.gesture
+        if gesture is not None and self.continues(gesture.source, gesture.last, gesture.press):
+            last = max(gesture.last, self.time)
+            return replace(gesture, last=last, press=self.press or gesture.press)
+        if after.pose == before.pose:
+            return gesture
+        return Gesture(before.pose, self.source, self.time, self.press)
 
 
 @dataclass(frozen=True)
@@ -66,23 +128,23 @@ class History:
 
         A search for a better design is one step, made when it ends.
         """
-        present, settled = self.step, settle(state)
-        if state.optimisation.is_on or settled == present.state:
+        present, after = self.step, state_of_step(state)
+        if state.optimisation.is_on or after == present.state:
             return self
         earlier = self.steps[: self.at]
-        shown = replace(settled, view=_with_point_of(present.state.view, settled.view))
+        shown = replace(after, view=_with_point_of(present.state.view, after.view))
         if event.action.continues or shown == present.state:
-            return self.with_state(settled)
+            return self.with_state(after)
         if self.is_open and event.continues(present.source, present.last, present.press):
-            if earlier and earlier[-1].state == settled:
+            if earlier and earlier[-1].state == after:
                 # The gesture ended where it began, so that its step is dropped.
                 return History(earlier, self.at - 1)
             before = earlier[-1].state if earlier else present.state
-            words, press = event.action.describe(before, settled), event.press or present.press
-            step = Step(present.number, words, settled, present.source, event.time, press)
+            words, press = event.action.describe(before, after), event.press or present.press
+            step = Step(present.number, words, after, present.source, event.time, press)
             return History((*earlier, step), self.at, is_open=True)
-        words = event.action.describe(present.state, settled)
-        step = Step(present.number + 1, words, settled, event.source, event.time, event.press)
+        words = event.action.describe(present.state, after)
+        step = Step(present.number + 1, words, after, event.source, event.time, event.press)
         steps = (*earlier, present, step)[-MOST_STEPS:]
         return History(steps, len(steps) - 1, is_open=True)
 
@@ -118,11 +180,11 @@ class History:
 
 def start_history(state: State) -> History:
     """Return the history of a design that has just been opened."""
-    return History((Step(0, f"Open {state.design.name}", settle(state)),))
+    return History((Step(0, f"Open {state.design.name}", state_of_step(state)),))
 
 
-def settle(state: State) -> State:
-    """Return the state that a step holds: without gesture, planning and playing."""
+def state_of_step(state: State) -> State:
+    """Return the state of a step: without gesture, planning and playing."""
     paths = state.paths
     journey = paths.journey
     if journey is not None and journey.is_playing:
@@ -148,11 +210,10 @@ def restore(history: History, present: State) -> tuple[State, History]:
     state = replace(step, view=_with_point_of(present.view, step.view))
     # No number of a request is used twice.
     request = max(state.paths.request, present.paths.request)
-    count = max(state.optimisation.count, present.optimisation.count)
     restored = replace(
         state,
         paths=replace(state.paths, request=request),
-        optimisation=replace(state.optimisation, count=count),
+        optimisation=state.optimisation.continue_numbers(present.optimisation),
     )
     return restored, history.with_state(restored)
 
@@ -160,3 +221,25 @@ def restore(history: History, present: State) -> tuple[State, History]:
 def _with_point_of(view: View, other: View) -> View:
     """Return a view with the point whose position is shown and set in another one."""
     return view if view.at == other.at else replace(view, at=other.at)
+
+
+def check_drawable(state: State) -> None:
+    """Check that every length of a state can be drawn at the scale that it was opened in.
+
+    Raises:
+        InputError: A design variable, a coordinate or a joint is too long.
+    """
+    reach = state.base.reach
+    for names, values in (
+        (VARIABLES, state.design.variables),
+        ("xyz", state.pose.position),
+        (JOINTS, state.joints),
+    ):
+        for name, value in zip(names, values, strict=True):
+            # Also where it is no number.
+            if not abs(value) <= LARGEST_SHARE * reach:
+                most = format_number(LARGEST_SHARE * reach)
+                raise InputError(
+                    f"{name} = {format_number(value)} is too far to be drawn; "
+                    f"{most}, a million times the reach, is the most"
+                )

@@ -20,6 +20,9 @@ class LatestWins(Generic[Item]):
         handle: Called with all items that wait, in the order of their stamps. An exception
             from it ends the thread, so it must not raise any.
         name: Name of the thread.
+
+    Attributes:
+        is_stopped: Whether the thread has been told to end.
     """
 
     def __init__(self, handle: Callable[[Sequence[Item]], None], name: str) -> None:
@@ -27,7 +30,7 @@ class LatestWins(Generic[Item]):
         self._waiting: dict[object, tuple[float, Item]] = {}
         self._condition = threading.Condition()
         self._busy = False
-        self._stopped = False
+        self.is_stopped = False
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
@@ -65,7 +68,7 @@ class LatestWins(Generic[Item]):
     def stop(self) -> None:
         """Drop the items that wait and end the thread."""
         with self._condition:
-            self._stopped = True
+            self.is_stopped = True
             self._waiting.clear()
             self._condition.notify_all()
         if threading.current_thread() is not self._thread:
@@ -76,8 +79,8 @@ class LatestWins(Generic[Item]):
             with self._condition:
                 self._busy = False
                 self._condition.notify_all()
-                self._condition.wait_for(lambda: self._waiting or self._stopped)
-                if self._stopped:
+                self._condition.wait_for(lambda: self._waiting or self.is_stopped)
+                if self.is_stopped:
                     return
                 items = [item for _, item in sorted(self._waiting.values(), key=lambda w: w[0])]
                 self._waiting.clear()

@@ -12,20 +12,50 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from explorer.app.session.clock import moment_of
-from explorer.app.session.field_words import message_of
-from explorer.app.session.gestures import UserAction
-from explorer.app.session.history import History, restore, start_history
+from explorer.app.session.history import History, UserAction, restore, start_history
 from explorer.app.session.latest import LatestWins
-from explorer.app.state.action import Action
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Press
 from explorer.app.state.state import State
-from explorer.errors import ExplorerError
+from explorer.errors import DesignError, ExplorerError
+from explorer.mechanism.machine import Tolerances
+from explorer.workspace.limits.table import LIMITS
 
-# Seconds after which changes that are not made are waited for no more.
-SETTLED_SECONDS = 10.0
+# Seconds after which a thread that waits for changes looks whether the session has ended.
+WAKE_SECONDS = 1.0
 # Key of requests to draw the present state again.
 REDRAW = "redraw"
+
+# Names of the fields of a design file in the words of the page.
+FIELD_WORDS = {
+    "unit_mm": "The unit",
+    "node_step": "The step of the nodes",
+    "limits.leg_radii": "The radius of a leg",
+    "tool.position": "The tool point",
+    "payload.mass_kg": "The mass of the payload",
+    "payload.centre": "The centre of the payload",
+    "payload.force_n": "The force on the tool",
+    "gravity": "The direction of gravity",
+    "actuators.push_n": "The push of an actuator",
+    "actuators.pull_n": "The pull of an actuator",
+    "actuators.error_mm": "The error of an actuator",
+    "actuators.stiffness_n_mm": "The stiffness of an actuator",
+    **{f"tolerances.{name}": "A tolerance" for name in Tolerances.__struct_fields__},
+    "struts.outer_mm": "The outer diameter of the struts",
+    "struts.inner_mm": "The inner diameter of the struts",
+    "struts.modulus_gpa": "Young's modulus of the struts",
+    "struts.stress_mpa": "The largest stress of the struts",
+    "struts.moment_nm": "The largest moment of the struts",
+    "guide.force_n": "The largest force on the guide",
+    "guide.moment_nm": "The largest moment on the guide",
+    **{
+        f"limits.{limit.path}{part}": words
+        for limit in LIMITS
+        for part, words in limit.subjects.items()
+    },
+}
+"""Name of each field at the beginning of a sentence."""
 
 Change = Callable[[State], Action | None]
 """Function from the present state to an action; None for none."""
@@ -35,17 +65,18 @@ Who = int | None
 
 @dataclass(frozen=True)
 class HistoryMove:
-    """A move through the history.
-
-    Attributes:
-        move: Function from the present history to the one at another step.
-    """
+    """A move through the history, a function from the present one to that at another step."""
 
     move: Callable[[History], History]
 
 
 UNDO = HistoryMove(lambda history: history.move(-1))
 REDO = HistoryMove(lambda history: history.move(1))
+
+
+def move_to(number: int) -> HistoryMove:
+    """Return the move to the step with a number."""
+    return HistoryMove(lambda history: history.move_to(number))
 
 
 @dataclass(frozen=True)
@@ -116,21 +147,9 @@ class Session:
         at = moment_of(time.time() if stamp is None else stamp)
         self._jobs.post(key, at, _Posted(change, key, at, who))
 
-    def do(self, action: Action | Change, *, who: Who = None) -> None:
-        """Queue an action, or the function that makes it, which no other may replace."""
-
-        def change(state: State) -> Action | None:
-            return action if isinstance(action, Action) else action(state)
-
-        self.post(object(), change, who=who)
-
-    def travel(self, travel: HistoryMove, *, who: Who = None) -> None:
-        """Queue a move through the history that no other may replace."""
-        self.post(object(), travel, who=who)
-
-    def travel_to(self, key: object, number: int, *, stamp: float | None, who: Who) -> None:
-        """Queue a move to the step with a number, in place of one with the same key."""
-        self.post(key, HistoryMove(lambda each: each.move_to(number)), stamp=stamp, who=who)
+    def do(self, change: Action | Change | HistoryMove, *, who: Who = None) -> None:
+        """Queue an action, the function that makes it, or a move, which no other may replace."""
+        self.post(object(), (lambda _: change) if isinstance(change, Action) else change, who=who)
 
     def latest_state(self) -> State:
         """Return the state once all changes are made that were posted before.
@@ -138,19 +157,14 @@ class Session:
         A press that reads the state needs this, since it may follow a typed value at once.
         """
         made = threading.Event()
-
         self.post(object(), lambda _: made.set())
-        made.wait(SETTLED_SECONDS)
+        while not (made.wait(WAKE_SECONDS) or self._jobs.is_stopped):
+            pass
         return self._state
 
     def is_waiting(self, key: object) -> bool:
         """Whether a change with this key waits."""
         return self._jobs.is_waiting(key)
-
-    @property
-    def has_more(self) -> bool:
-        """Whether anything waits, so that another frame follows at once."""
-        return bool(self._jobs.waiting)
 
     @property
     def has_changes(self) -> bool:
@@ -193,3 +207,10 @@ class Session:
         event = UserAction(action, item.key, item.stamp, press)
         self._state = event.apply(self._state)
         self._history = self._history.record(event, self._state)
+
+
+def message_of(error: ExplorerError) -> str:
+    """Return the message of an error in the words of the page."""
+    if isinstance(error, DesignError) and error.field in FIELD_WORDS:
+        return error.message_about(FIELD_WORDS[error.field])
+    return str(error)

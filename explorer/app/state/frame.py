@@ -11,12 +11,7 @@ from explorer.errors import InputError
 from explorer.legs.moves import MoveClearance, move_clearance
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.measures.verdict import Verdict, verdict
-from explorer.singularity.ellipsoids import (
-    Performance,
-    SingularityFreeBall,
-    performance,
-    singularity_free_ball,
-)
+from explorer.singularity import ellipsoids
 
 
 @dataclass(frozen=True)
@@ -41,14 +36,14 @@ class Frame:
         return verdict(self.snapshot, self.state.warn_below)
 
     @cached_property
-    def performance(self) -> Performance:
+    def performance(self) -> ellipsoids.Performance:
         """How fast and how strong the platform is in its pose, at the point that is shown."""
-        return performance(self.state.design, self.state.pose, self.state.tool)
+        return ellipsoids.performance(self.state.design, self.state.pose, self.state.tool)
 
     @cached_property
-    def free_ball(self) -> SingularityFreeBall:
+    def free_ball(self) -> ellipsoids.SingularityFreeBall:
         """The largest ball of positions about the pose without a singular one."""
-        return singularity_free_ball(self.state.pose)
+        return ellipsoids.singularity_free_ball(self.state.pose)
 
     @cached_property
     def last_move(self) -> MoveClearance | None:

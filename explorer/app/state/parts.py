@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import Field, fields, replace
-from typing import Any, TypeVar, cast
+from typing import Any, Self, TypeVar, cast
 
 import msgspec
 
@@ -27,6 +27,34 @@ STAYS: Mapping[str, Any] = {"on_open": _identity}
 
 Another function as `on_open` takes the value and returns what stays of it.
 """
+
+
+class FeaturePart:
+    """A part of the state whose class stands in the folder of a feature.
+
+    The state knows a base that inherits from this class, with what others need of the part. The
+    feature's own class, a frozen dataclass, inherits from that base.
+    """
+
+    def __init_subclass__(cls) -> None:
+        """Register the class of a feature."""
+        (base,) = cls.__bases__
+        if base is not FeaturePart:
+            FEATURE_PARTS[base] = cls
+
+    @classmethod
+    def new(cls) -> Self:
+        """Return the part of a new state; the base itself where the feature is not loaded."""
+        return cast("Self", FEATURE_PARTS.get(cls, cls)())
+
+    @classmethod
+    def of(cls, state: object) -> Self:
+        """Return this part of a state."""
+        return next(part for part in vars(state).values() if isinstance(part, cls))
+
+
+FEATURE_PARTS: dict[type[FeaturePart], type[FeaturePart]] = {}
+"""The classes of the features by the bases that the state knows."""
 
 
 def saved_fields(kind: Any) -> tuple[Field[Any], ...]:

@@ -7,20 +7,18 @@ There is one state for the whole server, shared by every tab. It changes only th
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
+from operator import methodcaller
+from typing import Annotated, Literal, Self
 
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.app.state.compared import Compared
-from explorer.app.state.optimisation import Comparison, OptimisationRequest, SearchResult
-from explorer.app.state.parts import STAYS, TRANSIENT
+from explorer.app.state.parts import STAYS, TRANSIENT, FeaturePart
 from explorer.app.state.paths import Journey, Mode, Paths
 from explorer.app.state.presses import Press
-from explorer.app.state.studies import Studies
 from explorer.app.state.view import View
-from explorer.errors import InputError
 from explorer.mechanism.configuration import Point, offset_of, point_of, pose_with, position_of
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.kinematics import inverse
@@ -38,9 +36,6 @@ from explorer.mechanism.tilt_torsion import (
 )
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.optimise.outcome import Iterate
-from explorer.optimise.problem import Problem
-from explorer.optimise.record import Record
 from explorer.singularity.colours import WARN_SHARE
 
 Joints = tuple[float, float, float, float, float, float]
@@ -50,8 +45,6 @@ Hold = Literal["pose", "legs"]
 SAME_ROTATION = 1e-12
 POINTS: dict[Point, str] = {"b4": "b4", "tool": "the tool"}
 """Words for the point whose position is meant."""
-
-Count = Annotated[int, msgspec.Meta(ge=0)]
 
 
 @dataclass(frozen=True)
@@ -126,91 +119,31 @@ class Gesture:
     press: Press | None = None
 
 
-@dataclass(frozen=True)
-class Run:
-    """A run of the optimiser.
-
-    Attributes:
-        number: Number of the run, from 1.
-        problem: The problem that it solves.
-        starts: Number of designs to start from.
-        own: The state before the run, to which cancelling returns.
-        phase: Whether it is running, was told to end, or has ended.
-        iterates: The iterates shown so far; the last one is drawn.
-        verdict: How it ended; None until then.
-        comparison: Measures of the own and the optimised design; None until they are known.
-        accepted: Whether the result was accepted.
-
-    Raises:
-        InputError: A run within the state before it, or one that has ended without a verdict.
-    """
-
-    number: Count
-    problem: Problem
-    starts: Count
-    own: State
-    phase: Literal["running", "cancelling", "ended"] = "running"
-    iterates: tuple[Iterate, ...] = ()
-    verdict: SearchResult | None = None
-    comparison: Comparison | None = field(default=None, metadata=TRANSIENT)
-    accepted: bool = False
-
-    def __post_init__(self) -> None:
-        if self.own.optimisation.run is not None:
-            raise InputError("the state before a run has none itself")
-        if self.phase == "ended" and self.verdict is None:
-            raise InputError(f"run {self.number} has ended without a verdict")
-
-    def for_file(self) -> Run:
-        """Return the run as a file holds it: only with the iterates of the best start."""
-        best = self.best
-        iterates = () if best is None else tuple(i for i in self.iterates if i.run == best.run)
-        return replace(self, iterates=iterates)
-
-    @property
-    def is_undecided(self) -> bool:
-        """Whether there is a result that was neither accepted nor given up."""
-        return self.best is not None and not self.accepted
-
-    @property
-    def has_converged(self) -> bool:
-        """Whether its result is an optimum that keeps all demands."""
-        return self.verdict is not None and self.verdict.status == "converged"
-
-    @property
-    def best(self) -> Iterate | None:
-        """The best iterate; None until the run has ended, or if there is none."""
-        return None if self.verdict is None else self.verdict.best
-
-
-@dataclass(frozen=True)
-class Optimisation:
-    """The request for an optimisation, and its last run.
-
-    Attributes:
-        request: What the user requests.
-        run: The last run; None if there is none of this design.
-        count: Number of runs so far.
-    """
-
-    request: OptimisationRequest = field(default_factory=OptimisationRequest)
-    run: Run | None = None
-    count: Count = 0
+class OptimisationPart(FeaturePart):
+    """The optimiser's part of the state as others see it: without a run unless it says so."""
 
     @property
     def is_on(self) -> bool:
         """Whether a run has not ended yet."""
-        return self.run is not None and self.run.phase != "ended"
-
-    def without_run(self) -> Optimisation:
-        """Return what stays when another design is opened: the request and the count of runs."""
-        return replace(self, run=None)
+        return False
 
     @property
-    def record(self) -> Record | None:
-        """The record of the search that ended last; None where there is none to repeat."""
-        verdict = None if self.run is None else self.run.verdict
-        return None if verdict is None else verdict.record
+    def own(self) -> State | None:
+        """The state before the run; None without a run."""
+        return None
+
+    def without_run(self) -> Self:
+        """Return what stays when another design is opened."""
+        return self
+
+    def continue_numbers(self, other: OptimisationPart) -> Self:
+        """Return this part whose next run has a number above those of another part, too."""
+        del other
+        return self
+
+
+class StudiesPart(FeaturePart):
+    """The part of the state on studies of designs, of which others need nothing."""
 
 
 @dataclass(frozen=True)
@@ -253,11 +186,11 @@ class State:
     taken: Substituted | None = field(default=None, compare=False, metadata=TRANSIENT)
     gesture: Gesture | None = field(default=None, metadata=TRANSIENT)
     paths: Paths = field(default_factory=Paths)
-    optimisation: Optimisation = field(
-        default_factory=Optimisation, metadata={"on_open": Optimisation.without_run}
+    optimisation: OptimisationPart = field(
+        default_factory=OptimisationPart.new, metadata={"on_open": methodcaller("without_run")}
     )
     compared: Compared = field(default_factory=Compared, metadata=STAYS)
-    studies: Studies = field(default_factory=Studies, metadata=STAYS)
+    studies: StudiesPart = field(default_factory=StudiesPart.new, metadata=STAYS)
     set_tilt_torsion: TiltTorsion | None = None
     set_tool_angles: Triple | None = None
     set_folds: GivenFolds | None = None
@@ -265,9 +198,9 @@ class State:
     def for_file(self) -> State:
         """Return the state as a file holds it: while a run goes on, the state before the run."""
         optimisation = self.optimisation
-        if optimisation.run is None or not optimisation.is_on:
+        if optimisation.own is None or not optimisation.is_on:
             return self
-        return replace(optimisation.run.own, optimisation=optimisation.without_run())
+        return replace(optimisation.own, optimisation=optimisation.without_run())
 
     @property
     def tilt_torsion(self) -> TiltTorsion:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from explorer.errors import InputError
-from explorer.measures.size import PositionSet
+from explorer.measures.box import PositionSet
 from explorer.mechanism.configuration import Point
 from explorer.mechanism.pose import Triple
 from explorer.numerics.checks import STIFFEST, numbers, positive
@@ -73,9 +73,8 @@ class OrientationView:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.range <= 180.0:
-            raise InputError(
-                f"the tilts must be above 0° and up to 180°; got {format_number(self.range)}°"
-            )
+            got = format_number(self.range)
+            raise InputError(f"the tilts must be above 0° and up to 180°; got {got}°")
         if not 0.0 <= self.turn <= 180.0:
             raise InputError(f"the turns must be 0° to 180°; got {format_number(self.turn)}°")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import unicodedata
 from pathlib import Path
@@ -50,13 +51,23 @@ def make_data_folder(folder: Path) -> Path:
     return folder
 
 
+def newest_first(folder: Path) -> list[Path]:
+    """Return the JSON files of a folder, the one changed last first."""
+    files: list[tuple[int, Path]] = []
+    # Another explorer may remove one meanwhile, and the folder need not be there.
+    for path in folder.glob("[!.]*.json"):
+        with contextlib.suppress(OSError):
+            files.append((-path.lstat().st_mtime_ns, path))
+    return [path for _, path in sorted(files)]
+
+
 def try_lock(path: Path) -> FileLock | None:
     """Lock a file until the lock is released or this process ends; None if it is locked already.
 
     Raises:
-        StorageError: It can be neither opened nor made.
+        StorageError: The file of the lock beside it can be neither opened nor made.
     """
-    lock = FileLock(path, thread_local=False)
+    lock = FileLock(path.with_suffix(".lock"), thread_local=False)
     try:
         lock.acquire(blocking=False)
     except Timeout:

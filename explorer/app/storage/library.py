@@ -19,23 +19,18 @@ from pathlib import Path
 
 import msgspec
 
-from explorer.app.storage.folder import data_folder, make_data_folder, plain_words
+from explorer.app.storage.folder import data_folder, make_data_folder, newest_first, plain_words
 from explorer.errors import InputError
 from explorer.files.writing import make_folder, move, read_at_most, write_whole
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, decode_design, encode_design
 
-DESIGNS = "designs"
-"""Name of the folder of designs in the user's data folder."""
-
-TRASH = "trash"
-"""Name of the folder in the folder of designs that keeps those deleted or replaced."""
-
+# Names of the folder of designs in the user's data folder, and of the folder in it that keeps those
+# deleted or replaced.
+DESIGNS, TRASH = "designs", "trash"
 LONGEST_NAME = 100
-
 # Number of characters of a design's name in its file's name, and of digits of the hash.
 _SLUG, _DIGITS = 40, 12
-
 # Suffix of the name of a copy.
 _COPY = re.compile(r" copy( \d+)?$")
 
@@ -72,7 +67,7 @@ class Library:
         """Return all entries: the design saved last first, unusable files last."""
         entries: list[Entry] = []
         names: set[str] = set()
-        for path in _newest_first(self.folder):
+        for path in newest_first(self.folder):
             entry = _read(path)
             if entry.design is not None and entry.name in names:
                 problem = f"another file has the name {entry.name!r} too; change it in one of them"
@@ -125,7 +120,7 @@ class Library:
                 raise InputError(f"there is a design called {renamed.name!r} already")
             # A process killed in between leaves the design under both names, never under none.
             self.save(new, renamed)
-            _remove(self.folder / entry.file)
+            (self.folder / entry.file).unlink(missing_ok=True)
         return renamed
 
     def delete(self, name: str) -> None:
@@ -143,7 +138,7 @@ class Library:
     @property
     def last_deleted(self) -> str | None:
         """Name of the design that was deleted or replaced last; None if the trash is empty."""
-        paths = _newest_first(self._trash)
+        paths = newest_first(self._trash)
         return _read(paths[0]).name if paths else None
 
     def restore(self) -> None:
@@ -153,13 +148,13 @@ class Library:
             InputError: The trash is empty, or another file lies in its place.
             StorageError: It cannot be moved.
         """
-        path = next(iter(_newest_first(self._trash)), None)
+        path = next(iter(newest_first(self._trash)), None)
         if path is None:
             raise InputError("nothing has been deleted")
         entry, designs = _read(path), self._designs()
         if entry.design is not None and entry.name in designs:
             self.save(copy_name(entry.name, {*designs}), entry.design)
-            _remove(path)
+            path.unlink(missing_ok=True)
         elif (self.folder / path.name).exists():
             raise InputError(f"a file {path.name!r} lies in {str(self.folder)!r}; rename it")
         else:
@@ -179,10 +174,10 @@ class Library:
         for entry in entries:
             if entry.name in (name, _tidy(name)):
                 return entry
-        names = [_quote(each.name) for each in entries if each.design is not None]
-        known = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
+        names = [repr(each.name) for each in entries if each.design is not None]
+        known = ", ".join(names[:4]) + (", …" if len(names) > 4 else "")
         raise InputError(
-            f"no design is called {_quote(name)}; "
+            f"no design is called {name!r}; "
             + (f"there are {known}" if names else "none has been saved yet")
         )
 
@@ -211,7 +206,7 @@ def _with_name(design: Design, name: str) -> Design:
     tidy = _tidy(name)
     if not tidy or len(tidy) > LONGEST_NAME or not tidy.isprintable():
         raise InputError(
-            f"a name is one printable line of 1 to {LONGEST_NAME} characters; got {_quote(name)}"
+            f"a name is one printable line of 1 to {LONGEST_NAME} characters; got {name!r}"
         )
     return msgspec.structs.replace(design, name=tidy)
 
@@ -221,22 +216,6 @@ def _date(path: Path) -> None:
     now = time.time_ns()
     with contextlib.suppress(OSError):
         os.utime(path, ns=(now, now))
-
-
-def _remove(path: Path) -> None:
-    # A file that stays is listed, and can be deleted again.
-    with contextlib.suppress(OSError):
-        path.unlink()
-
-
-def _newest_first(folder: Path) -> list[Path]:
-    """Return the files of designs in a folder, the one changed last first."""
-    files: list[tuple[int, Path]] = []
-    for path in folder.glob("[!.]*.json"):
-        # Another explorer may remove it meanwhile.
-        with contextlib.suppress(OSError):
-            files.append((-path.lstat().st_mtime_ns, path))
-    return [path for _, path in sorted(files)]
 
 
 def _read(path: Path) -> Entry:
@@ -250,7 +229,3 @@ def _read(path: Path) -> Entry:
         problem = f"{printable!r}: the design has no name; give it one"
         return Entry(printable, path.name, None, problem)
     return Entry(name, path.name, design)
-
-
-def _quote(name: str) -> str:
-    return repr(name if len(name) <= 40 else f"{name[:39]}…")

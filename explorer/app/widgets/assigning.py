@@ -7,7 +7,7 @@ so the last value of each property is remembered here.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any, TypeAlias, TypeGuard, cast
 
 import numpy as np
@@ -19,6 +19,9 @@ from explorer.numerics.arrays import FloatArray
 
 Update: TypeAlias = tuple[Any, str, object]
 """A handle, the property to assign, and its value; all updates are computed before any is made."""
+
+Updates: TypeAlias = Iterator[Update]
+"""The updates that make a panel or a part of the scene show a frame."""
 
 # On a slow connection a user may not have seen a value that was sent at most so long before.
 CROSSING_SECONDS = 5.0
@@ -74,12 +77,8 @@ class Assigner:
                 assign_properties(node, values)
         return new
 
-    def settle(self, *, has_paused: bool = False) -> bool:
-        """Send again what may have crossed, once the user pauses; return whether any wait.
-
-        Args:
-            has_paused: Whether it is known that the user pauses, which else follows from the time.
-        """
+    def resend_crossed(self) -> bool:
+        """Send again what may have crossed, once the user pauses; return whether any wait."""
         waits = False
         now = time.time()
         for key, (handle, sent) in tuple(self._sent.items()):
@@ -88,7 +87,7 @@ class Assigner:
             if not has_crossed:
                 if not sent <= now <= sent + CROSSING_SECONDS:
                     del self._sent[key]
-            elif changed <= now < changed + QUIET_SECONDS and not has_paused:
+            elif changed <= now < changed + QUIET_SECONDS:
                 waits = True
             else:
                 resend(handle, key[1])

@@ -6,30 +6,14 @@ import bisect
 from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 
-from explorer.app.widgets.charts import BLUE, ORANGE, TEAL, VIOLET
-from explorer.app.widgets.colours import GHOST
+from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, TEAL, VIOLET
 from explorer.app.widgets.markup import box, caption, dim, meter, row, swatch, table
-from explorer.measures.blocks.block import (
-    Bars,
-    Block,
-    Column,
-    Facts,
-    Kind,
-    Names,
-    Number,
-    Share,
-    Shares,
-    Split,
-    Statement,
-    Table,
-    Vector,
-    Words,
-)
+from explorer.measures.blocks import block as kinds
 from explorer.numerics.number_text import format_decimals
 from explorer.singularity.colours import Rgb, css
 from explorer.workspace.position_bands import SHARE_COLOURS, SHARES
 
-KIND_COLOURS: dict[Kind, Rgb] = {"actuator": BLUE, "dimension": ORANGE}
+KIND_COLOURS: dict[kinds.Kind, Rgb] = {"actuator": BLUE, "dimension": ORANGE}
 # Between the components of a vector, which stay on one line.
 COMMA = ",\N{NO-BREAK SPACE}"
 # Colours of the parts of a whole.
@@ -37,7 +21,7 @@ PART_COLOURS = TEAL, VIOLET, BLUE
 
 
 def render(
-    blocks: Iterable[Block], acts: Mapping[str, str] | None = None, *, corner: str = ""
+    blocks: Iterable[kinds.Block], acts: Mapping[str, str] | None = None, *, corner: str = ""
 ) -> str:
     """Return blocks as the box of a panel.
 
@@ -49,12 +33,12 @@ def render(
     return box(corner, *(content_of(block, acts or {}) for block in blocks))
 
 
-def content_of(block: Block, acts: Mapping[str, str]) -> str:
+def content_of(block: kinds.Block, acts: Mapping[str, str]) -> str:
     """Return one block as HTML."""
     match block:
-        case Statement():
+        case kinds.Statement():
             return "".join(_statement(block, acts))
-        case Facts():
+        case kinds.Facts():
             rows = [
                 row(
                     dim(escape(fact.name)),
@@ -66,39 +50,39 @@ def content_of(block: Block, acts: Mapping[str, str]) -> str:
                 if not fact.wide
             ]
             return caption(block.title, block.hint) + table(rows)
-        case Table():
+        case kinds.Table():
             return caption(block.title, block.hint) + table(*_table(block))
-        case Split():
+        case kinds.Split():
             return _split(block)
 
 
-def words_html(words: Words) -> str:
+def words_html(words: kinds.Words) -> str:
     """Return words with the numbers in them as HTML."""
     if isinstance(words, str):
         return escape(words)
     return "".join(map(_part, words))
 
 
-def _part(part: str | Number | Vector | Share) -> str:
+def _part(part: str | kinds.Number | kinds.Vector | kinds.Share) -> str:
     match part:
         case str():
             return escape(part)
-        case Number():
+        case kinds.Number():
             return f"{part.text}{part.unit}"
-        case Vector():
+        case kinds.Vector():
             return f"{COMMA.join(part.texts)}{part.unit}"
-        case Share():
+        case kinds.Share():
             return part.text()
 
 
 def share_colour(share: float | None) -> Rgb:
     """Return the colour of a share of a limit; grey without a limit."""
     if share is None:
-        return GHOST
+        return NEUTRAL
     return SHARE_COLOURS[bisect.bisect_left(SHARES, share)]
 
 
-def _statement(block: Statement, acts: Mapping[str, str]) -> Iterator[str]:
+def _statement(block: kinds.Statement, acts: Mapping[str, str]) -> Iterator[str]:
     look = f" ex-{block.look}" if block.look else ""
     if block.title:
         yield f'<div class="ex-status{look}">{words_html(block.title)}</div>'
@@ -108,19 +92,19 @@ def _statement(block: Statement, acts: Mapping[str, str]) -> Iterator[str]:
         yield f"<div{title}>{words if block.title else dim(words)}</div>"
 
 
-def _table(block: Table) -> tuple[list[str], list[str]]:
+def _table(block: kinds.Table) -> tuple[list[str], list[str]]:
     """Return the rows of a table, and its heads if a number has no unit."""
     cells: list[list[str]] = []
     heads: list[str] = []
     has_heads = False
     for column in block.columns:
         match column:
-            case Names(head, words, wide):
+            case kinds.Names(head, words, wide):
                 if not wide:
                     texts = map(words_html, words)
                     cells.append([*texts] if cells else [dim(text) for text in texts])
                     heads.append(head)
-            case Column():
+            case kinds.Column():
                 if not column.wide:
                     cells.append(
                         [
@@ -132,15 +116,15 @@ def _table(block: Table) -> tuple[list[str], list[str]]:
                     )
                     heads.append(column.head)
                     has_heads = has_heads or not column.unit
-            case Shares(head, values):
+            case kinds.Shares(head, values):
                 pairs = [_share(value) for value in values]
                 cells += [bar for bar, _ in pairs], [text for _, text in pairs]
                 heads += "", head
-            case Bars(lengths, kinds):
+            case kinds.Bars(lengths, bar_kinds):
                 cells.append(
                     [
                         meter(100.0 * length, KIND_COLOURS[kind])
-                        for length, kind in zip(lengths, kinds, strict=True)
+                        for length, kind in zip(lengths, bar_kinds, strict=True)
                     ]
                 )
                 heads.append("")
@@ -151,14 +135,14 @@ def _table(block: Table) -> tuple[list[str], list[str]]:
 
 def _share(share: float | None) -> tuple[str, str]:
     """Return the bar of a share of a limit, and its words."""
-    words = Share(share).text()
+    words = kinds.Share(share).text()
     if share is None:
         return "", dim(words)
     bar = meter(min(100.0, 100.0 * share), share_colour(share))
-    return bar, f'<span class="ex-{Share(share).look}">{words}</span>'
+    return bar, f'<span class="ex-{kinds.Share(share).look}">{words}</span>'
 
 
-def _split(block: Split) -> str:
+def _split(block: kinds.Split) -> str:
     parts = list(zip(block.names, PART_COLOURS, block.shares, strict=True))
     bars = "".join(
         f'<span style="--share:{100.0 * share:.2f}%;--colour:{css(colour)}"></span>'

@@ -9,7 +9,7 @@ dropped.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container
 from concurrent.futures import Future, ThreadPoolExecutor
 from html import escape
 
@@ -19,9 +19,8 @@ import viser
 from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import element_id, run_script, run_script_in
 from explorer.app.look import read_script
-from explorer.app.widgets.commands import Key
 from explorer.app.widgets.markup import meter
-from explorer.app.widgets.palette import Command
+from explorer.app.widgets.palette import Command, Key
 from explorer.measures.blocks.source import Source
 
 PressHandler = Callable[[str, viser.ClientHandle], None]
@@ -29,13 +28,7 @@ PressHandler = Callable[[str, viser.ClientHandle], None]
 
 
 class _Press(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A press as the script sends it.
-
-    Attributes:
-        name: Name of the button.
-        value: Value of the button; "" without one.
-        count: Another number for each press, so that the text differs.
-    """
+    """A press as the script sends it; another number for each makes the text differ."""
 
     name: str
     value: str
@@ -148,13 +141,14 @@ def press_button(
     label: str = "",
     class_name: str = "",
     hover: str = "",
+    opens: str = "",
     is_on: bool | None = None,
     is_disabled: bool = False,
 ) -> str:
     """Return a button as HTML, whose presses go to the function registered under a name.
 
     Args:
-        name: The name that was given to `Buttons.on`.
+        name: The name that was given to `Buttons.on`; none if "".
         value: The value that its function receives.
         content: The visible content, HTML.
         hint: Words on what a press does, shown when a pointer rests on the button.
@@ -162,11 +156,13 @@ def press_button(
         class_name: The classes of the stylesheet.
         hover: The name under which a function is registered that receives the value while the
             pointer rests on the button, and "" once it has left; none if "".
+        opens: Title of the tab or dialog that it opens; "commands" opens the palette.
         is_on: Whether a switch is on; None if the button is no switch.
         is_disabled: Whether the button cannot be pressed.
     """
     attributes = {
         "class": class_name,
+        "data-opens": opens,
         "data-press": name,
         "data-value": str(value),
         "data-hover": hover,
@@ -174,7 +170,9 @@ def press_button(
         "aria-label": label,
         "aria-pressed": "" if is_on is None else str(is_on).lower(),
     }
-    return _button(attributes, content, is_disabled=is_disabled)
+    given = "".join(f' {key}="{escape(text)}"' for key, text in attributes.items() if text)
+    disabled = " disabled" if is_disabled else ""
+    return f'<button type="button"{given}{disabled}>{content}</button>'
 
 
 def open_button(
@@ -186,30 +184,10 @@ def open_button(
     label: str = "",
     class_name: str = "",
 ) -> str:
-    """Return a button as HTML that opens a tab or a dialog; "commands" opens the palette.
-
-    Args:
-        title: Title of the tab.
-        content: The visible content, HTML.
-        press: Name of the function of `Buttons.on` that handles the press too; none if "".
-        hint: Words on what it opens, shown when a pointer rests on the button.
-        label: The name for screen readers; the content if "".
-        class_name: The classes of the stylesheet.
-    """
-    attributes = {
-        "class": class_name,
-        "data-opens": title,
-        "data-press": press,
-        "title": hint,
-        "aria-label": label,
-    }
-    return _button(attributes, content)
-
-
-def _button(attributes: Mapping[str, str], content: str, *, is_disabled: bool = False) -> str:
-    given = "".join(f' {key}="{escape(text)}"' for key, text in attributes.items() if text)
-    disabled = " disabled" if is_disabled else ""
-    return f'<button type="button"{given}{disabled}>{content}</button>'
+    """Return a button as HTML that opens the tab or the dialog with a title."""
+    return press_button(
+        press, "", content, hint=hint, label=label, class_name=class_name, opens=title
+    )
 
 
 def figure(opens: str, name: str, value: str, *, hint: str, look: str = "") -> str:

@@ -6,7 +6,6 @@ import numpy as np
 import viser
 from viser import uplot
 
-from explorer.app.widgets.colours import GHOST
 from explorer.singularity.colours import Rgb, css
 
 FONT = "11px system-ui, sans-serif"
@@ -17,7 +16,7 @@ BLUE: Rgb = (46, 116, 208)
 TEAL: Rgb = (30, 150, 135)
 VIOLET: Rgb = (150, 120, 190)
 ORANGE: Rgb = (214, 74, 24)
-NEUTRAL: Rgb = GHOST
+NEUTRAL: Rgb = (120, 134, 156)
 
 BLANK = np.zeros(2)
 """A column to begin with: no chart of viser is without data."""

@@ -10,16 +10,11 @@ from dataclasses import dataclass
 from html import escape
 
 from explorer.app.session.session import Session
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Set
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import Buttons, press_button
-from explorer.app.widgets.commands import Key, with_keys
-
-
-def _always(_: State) -> bool:
-    return True
+from explorer.app.widgets.palette import Key, with_keys
 
 
 @dataclass(frozen=True)
@@ -77,8 +72,8 @@ class Chip:
     command: str
     hint: str
     effect: Effect
-    is_ready: Callable[[State], bool] = _always
-    is_visible: Callable[[State], bool] = _always
+    is_ready: Callable[[State], bool] = lambda _: True
+    is_visible: Callable[[State], bool] = lambda _: True
     keys: tuple[Key, ...] = ()
     label: str = ""
 

@@ -1,19 +1,71 @@
 """The command palette: all commands of the page, by name and by key.
 
 It offers every button, switch and list of the page; features add commands that have no control.
+Keys are those of other 3D programs: 0, 1, 3 and 7 for the views, F to fit, H for home, letters for
+visible parts. None is a key of the browser, and W, A, S, D, Q, E and the arrows move the camera.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import viser
 
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.commands import NAMED_WITH_FOLDER, NO_OPTION, PAGE, STEP, Key, with_keys
 from explorer.app.widgets.pieces import Widget, widgets
+
+# Separator of the parts of a command's name, from the tab to the option.
+STEP = " › "
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key with its modifiers.
+
+    Attributes:
+        key: Name of the key in viser.
+        modifier: Keys that are held down with it, such as "cmd/ctrl+shift"; None without any.
+    """
+
+    key: str
+    modifier: str | None = None
+
+    def __str__(self) -> str:
+        parts = [] if self.modifier is None else self.modifier.split("+")
+        modifiers = [MODIFIER_NAMES.get(part, part.capitalize()) for part in parts]
+        return "+".join([*modifiers, self.key if len(self.key) == 1 else self.key.capitalize()])
+
+
+MODIFIER_NAMES = {"cmd/ctrl": "Ctrl"}
+"""Names of modifiers on the page; on a Mac the Command key does the same as Ctrl."""
+
+PALETTE_KEY = Key("K", "cmd/ctrl")
+"""The key that opens the palette, in viser."""
+
+
+def shift(key: str) -> Key:
+    """Return a key with Shift held down."""
+    return Key(key, "shift")
+
+
+PAGE = "Page"
+"""First part of the names of commands of the whole page."""
+
+NAMED_WITH_FOLDER = frozenset({"Free variables", "Tetrahedra"})
+"""Folders whose title is part of the names of their switches."""
+
+NO_OPTION = "—"
+"""The text of a list when none of its options applies."""
+
+
+def with_keys(hint: str, keys: tuple[Key, ...]) -> str:
+    """Return the hint of a control with its keys at the end."""
+    if not keys:
+        return hint
+    return f"{hint} {'Key' if len(keys) == 1 else 'Keys'}: {', '.join(map(str, keys))}."
+
 
 Run = Callable[[viser.ClientHandle], None]
 """Runs a command for the browser that requested it."""
@@ -38,14 +90,6 @@ class Command:
     is_ready: Callable[[], bool] = lambda: True
     stands_alone: bool = True
     keys: tuple[Key, ...] = ()
-
-
-@dataclass
-class _Passing:
-    """The commands of a group that come and go."""
-
-    commands: tuple[Command, ...] = ()
-    handles: dict[str, viser.CommandHandle] = field(default_factory=dict[str, viser.CommandHandle])
 
 
 class Palette:
@@ -80,7 +124,8 @@ class Palette:
                 widget.handle.hint = with_keys(widget.hint, widget_keys)
         for command in more:
             self.add(command)
-        self._passing: dict[str, _Passing] = {}
+        # By group: the commands that come and go, and their handles by label.
+        self._passing: dict[str, tuple[tuple[Command, ...], dict[str, viser.CommandHandle]]] = {}
 
     @property
     def commands(self) -> tuple[Command, ...]:
@@ -99,17 +144,17 @@ class Palette:
         for index, key in enumerate(keys):
             # viser's commands have one key each.
             label = command.label if index == 0 else f"{command.label}  ({key})"
-            self._register(command, label, key)
+            self._registered.append((command, self._add_to_page(command, label, key)))
 
     def offer(self, group: str, passing: tuple[Command, ...]) -> None:
         """Offer these commands besides those that stay; remove the others of the group.
 
         The same object as in the last call changes nothing and takes no time.
         """
-        offered = self._passing.setdefault(group, _Passing())
-        if passing is offered.commands:
+        before, handles = self._passing.get(group, ((), {}))
+        if passing is before:
             return
-        offered.commands, handles = passing, offered.handles
+        self._passing[group] = passing, handles
         commands = {command.label: command for command in passing}
         for label in handles.keys() - commands.keys():
             handles.pop(label).remove()
@@ -126,9 +171,6 @@ class Palette:
         for command, handle in self._registered:
             if controls or command.stands_alone:
                 yield handle, "disabled", not command.is_ready()
-
-    def _register(self, command: Command, label: str, key: Key | None) -> None:
-        self._registered.append((command, self._add_to_page(command, label, key)))
 
     def _add_to_page(self, command: Command, label: str, key: Key | None) -> viser.CommandHandle:
         untyped: Any = key

@@ -66,3 +66,8 @@ def problem(feed: AnyFeed, title: str, button: str) -> str:
     if feed.is_cancelled:
         return alert("Stopped", f"Press “{button}”, or change something, to compute it.")
     return alert(title, feed.problem or "")
+
+
+def look_of(feed: AnyFeed) -> str:
+    """Return the class of what belongs to the drawing of a feed: pale while a newer one is made."""
+    return "" if feed.drawing is None or feed.is_current else "is-outdated"

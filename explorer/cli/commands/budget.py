@@ -4,42 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
-from explorer.cli import output
+from explorer.cli import output, values
 from explorer.cli.blocks import lines
-from explorer.cli.options import (
-    DesignOptions,
-    JsonOptions,
-    PoseOptions,
-    TypicalOptions,
-    write_files,
-)
-from explorer.cli.parsing import UsageError
-from explorer.cli.values import FILE, OPTIONAL, Flag, hint, numbers, positive
+from explorer.cli.options import JsonOptions, PoseOptions, TypicalOptions, write_files
+from explorer.errors import InputError
 from explorer.files.writing import check_writable
-from explorer.measures.blocks.budget import tolerance_budget
-from explorer.measures.size import PositionSet, positions_over
+from explorer.measures.blocks import precision as blocks
+from explorer.measures.box import PositionSet, positions_over
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
-from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
-from explorer.statics.accuracy import SOURCES
-from explorer.statics.budget.allocation import ToleranceBudget, costs_or_budget
-from explorer.statics.budget.costs import (
-    PARTS,
-    SourceCosts,
-    stated_tolerances,
-    with_tolerances,
-)
+from explorer.statics import budget
+from explorer.statics.accuracy import SOURCES, stated_tolerances
+from explorer.statics.budget import PARTS, SourceCosts, ToleranceBudget
 
-PROGRAM = "explorer budget"
 WORDS = {"box": "nodes of a grid over the box", "workspace": "nodes of a grid in the workspace"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
+class Budget(JsonOptions, TypicalOptions, PoseOptions):
     """Rank what tolerances cost in precision; find those of a wanted precision.
 
     The sources of errors are the six actuators and the 23 dimensions. The worst error is exact for
@@ -49,60 +37,49 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
     """
 
     over: Annotated[
-        PositionSet | None, hint("default: box with --required-box, otherwise pose")
+        PositionSet | None, values.hint("default: box with --required-box, otherwise pose")
     ] = None
     """Positions, at one orientation: that of the pose, nodes of a grid over a box, or nodes of a
     grid within the limits."""
 
-    required_box: Annotated[
-        Six | None,
-        numbers("--required-box", "x-low y-low z-low x-high y-high z-high"),
-        hint("default: the box of the design"),
-    ] = None
+    required_box: Annotated[values.Box, values.hint("default: the box of the design")] = None
     """Box of positions of b4 for `--over box`, in design units."""
 
-    wanted: Annotated[float | None, positive("--wanted"), OPTIONAL] = None
+    wanted: Annotated[values.Positive, values.OPTIONAL] = None
     """Largest displacement of the tool that is wanted, in mm; tolerances that keep it are found."""
 
-    wanted_turn: Annotated[float | None, positive("--wanted-turn"), hint("default: any")] = None
+    wanted_turn: Annotated[values.Positive, values.hint("default: any")] = None
     """Largest turn of the tool that is wanted besides, in degrees."""
 
-    keep_actuators: Flag = False
+    keep_actuators: values.Flag = False
     """Keep the errors of the actuators as the design states them."""
 
-    out: Annotated[Path | None, FILE] = None
+    out: Annotated[Path | None, values.FILE] = None
     """File for the design with the tolerances that are found."""
 
     def run(self) -> None:
         """Write the costs of the tolerances, and the tolerances that are found."""
         over, box = self._positions()
         if self.wanted is None and (self.wanted_turn or self.keep_actuators or self.out):
-            raise UsageError(
-                "--wanted-turn, --keep-actuators and --out need a displacement with --wanted",
-                PROGRAM,
+            raise InputError(
+                "--wanted-turn, --keep-actuators and --out need a displacement with --wanted"
             )
         if self.out is not None:
             check_writable(self.out)
         design, assumed = self.with_typical(self.read_design())
         pose, tool = self.pose(design), self.tool(design)
         positions = positions_over(design, over, pose, box or design.limits.box)
-        costs, found = costs_or_budget(
-            design,
-            positions,
-            pose.rotation,
-            self.wanted,
-            self.wanted_turn,
-            tool=tool,
-            keep_actuators=self.keep_actuators,
-        )
+        at, found = Configuration(design, positions, pose.rotation, tool), None
+        if self.wanted is not None:
+            found = budget.tolerance_budget(
+                at, self.wanted, self.wanted_turn, keep_actuators=self.keep_actuators
+            )
+        costs = budget.source_costs(at) if found is None else found.costs
         files: dict[Path, bytes] = {}
         if found is not None and self.out is not None:
-            files[self.out] = encode_design(with_tolerances(design, found.tolerances))
+            files[self.out] = encode_design(budget.with_tolerances(design, found.tolerances))
         written, errors = write_files(files)
-        head = (output.heading(design), *output.assumed_lines(assumed))
-        out = ("", str(written[0])) if written else ()
-        if over == "pose":
-            head += (output.pose_table(design, pose, tool),)
+        table = [output.pose_table(design, pose, tool)] if over == "pose" else []
         self.write(
             lambda: {
                 "over": over,
@@ -111,7 +88,11 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
                 "stated": stated_tolerances(design),
                 "out": next(iter(written), None),
             },
-            lambda: (*head, *self._as_lines(design, over, costs, found), *out),
+            chain(
+                [output.heading(design), *output.assumed_lines(assumed), *table],
+                self._as_lines(design, over, costs, found),
+                ("", str(written[0])) if written else (),
+            ),
             errors,
         )
 
@@ -120,15 +101,15 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
         given = self.required_box
         over = self.over or ("pose" if given is None else "box")
         if over != "box" and given is not None:
-            raise UsageError(f"--required-box needs --over box; got --over {over}", PROGRAM)
+            raise InputError(f"--required-box needs --over box; got --over {over}")
         for option, value in (("--position", self.position), ("--folds", self.folds)):
             if over != "pose" and value is not None:
-                raise UsageError(f"{option} is one position; leave out --over {over}", PROGRAM)
+                raise InputError(f"{option} is one position; leave out --over {over}")
         if given is None:
             return over, None
         lows, highs = given[:3], given[3:]
         if any(low > high for low, high in zip(lows, highs, strict=True)):
-            raise UsageError("--required-box takes three lows, then highs above them", PROGRAM)
+            raise InputError("--required-box takes three lows, then highs above them")
         return over, (lows, highs)
 
     def _as_lines(
@@ -138,18 +119,18 @@ class Budget(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
             yield f"worst over {costs.count:,} {WORDS[over]}, at one orientation"
         if over == "workspace" and not design.limits.margin:
             yield "the limits demand no margin: nearer to singular poses errors are larger"
-        yield from lines(tolerance_budget(costs, found, self.wanted, self.wanted_turn))
+        yield from lines(blocks.tolerance_budget(costs, found, self.wanted, self.wanted_turn))
 
 
 def _as_json(costs: SourceCosts, found: ToleranceBudget | None) -> dict[str, object]:
     names = "count position turn displacement displacement_within turn_within shares turn_shares"
+    totals = "worst_displacement worst_turn rms_displacement rms_turn"
     return {
         "sources": SOURCES,
         "parts": PARTS,
         "ranking": [SOURCES[k] for k in costs.ranking.tolist()],
-        **output.attributes(costs, names),
-        **output.attributes(costs, "worst_displacement worst_turn rms_displacement rms_turn"),
-        "tolerances": None if found is None else [*map(output.finite, found.tolerances.tolist())],
-        "effort": None if found is None else found.effort,
-        "least_effort": None if found is None else found.least_effort,
+        **output.attributes(costs, f"{names} {totals}"),
+        "tolerances": found and [*map(output.finite, found.tolerances.tolist())],
+        "effort": found and found.effort,
+        "least_effort": found and found.least_effort,
     }

@@ -7,44 +7,32 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import tyro
 
-from explorer.cli.load_options import held_by
-from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions, TypicalOptions
+from explorer.cli import values
+from explorer.cli.options import JsonOptions, PoseOptions, TypicalOptions, carrying_part
 from explorer.cli.output import DISAGREES, assumed_lines, figure, figures, table
-from explorer.cli.values import OPTIONAL, hint, load_numbers, positive, whole_number
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.machine import Six
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 
 if TYPE_CHECKING:
-    from explorer.export.imperfect import ImperfectMachine
     from explorer.export.simulation import SimulationModel
+    from explorer.prototype.imperfect import ImperfectMachine
 
 What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
 
 # Typical width of a browser window over its height.
 ASPECT = 1.6
-_ORIENTED = ("quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
-# Options of each object, besides those of all.
-TAKES: Mapping[What, tuple[str, ...]] = {
-    "workspace": ("tolerance", "load", *_ORIENTED),
-    "hull": ("tolerance", "load", *_ORIENTED),
-    "mechanism": ("density",),
-    "simulation": ("density", "masses", "errors", "typical"),
-    "scene": ("position", "folds", *_ORIENTED),
-}
 OF_ALL = ("what", "out", "format", "design", "json")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
+class Export(JsonOptions, TypicalOptions, PoseOptions):
     """Write the workspace as a mesh, the mechanism as parts or simulation, or the scene.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
@@ -65,35 +53,33 @@ class Export(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
 
     format: Annotated[
         str | None,
-        hint("default: the suffix of the file", "3mf|stl|glb|obj|ply|step|stl-zip|mjcf|html"),
+        values.hint(
+            "default: the suffix of the file", "3mf|stl|glb|obj|ply|step|stl-zip|mjcf|html"
+        ),
     ] = None
     """Format; 3mf has unit, names, colours, ply and obj doubles, step (extra `cad`) exact faces."""
 
     tolerance: Annotated[
-        float | None,
-        positive("--tolerance"),
-        hint("workspace and hull; default: a 500th of the reach"),
+        values.Positive, values.hint("workspace and hull; default: a 500th of the reach")
     ] = None
     """Largest distance of the mesh from the true surface, in design units."""
 
-    load: Annotated[Six | None, load_numbers("--load"), OPTIONAL] = None
+    load: Annotated[values.Load, values.OPTIONAL] = None
     """Force in N and moment in N × unit at the tool, besides the payload: write the part of the
     workspace where it is held within the limits of actuators, struts and guide."""
 
     density: Annotated[
-        float | None,
-        positive("--density"),
-        hint("mechanism, simulation; default: 1240, printed PLA"),
+        values.Positive, values.hint("mechanism, simulation; default: 1240, printed PLA")
     ] = None
     """Density of the bodies, in kg/m³."""
 
-    masses: Annotated[Literal["bars", "parts"], hint("simulation; default: bars")] = "bars"
+    masses: Annotated[Literal["bars", "parts"], values.hint("simulation; default: bars")] = "bars"
     """Masses of the bodies: of bars as thick as the legs, or of the parts of `export mechanism`."""
 
     errors: Annotated[
         int | None,
-        whole_number("--errors", 0, 2**31 - 1),
-        hint("simulation; default: a perfect machine", "SEED"),
+        values.whole_number(0, 2**31 - 1),
+        values.hint("simulation; default: a perfect machine", "SEED"),
     ] = None
     """Seed of a machine whose dimensions and encoders are off within the tolerances and errors of
     the design, and whose actuators and struts give way as the design states."""
@@ -108,62 +94,57 @@ class Export(JsonOptions, TypicalOptions, PoseOptions, DesignOptions):
                 f"--out {str(self.out)!r} has no suffix that names the format: give --format"
             )
         check_writable(self.out)
-        names = (field.name for field in dataclasses.fields(self))
-        self.refuse(*(name for name in names if name not in (*OF_ALL, *TAKES[self.what])))
-        data, facts = _WRITERS[self.what](self, file_format)
+        write, options = _WRITERS[self.what]
+        self.refuse_all_but(*options)
+        data, facts = write(self, file_format)
         write_whole(self.out, data)
-        self.write(lambda: {"file": self.out, **facts}, lambda: (str(self.out), *_as_lines(facts)))
+        self.write(lambda: {"file": self.out, **facts}, (str(self.out), *_as_lines(facts)))
 
-    def refuse(self, *options: str) -> None:
+    def refuse_all_but(self, *names: str) -> None:
         """Refuse options that do not apply to the object to write."""
-        for option in options:
-            if getattr(self, option) != getattr(type(self), option):
-                raise InputError(f"--{option.replace('_', '-')} is not for {self.what}")
+        for field in dataclasses.fields(self):
+            if field.name not in (*OF_ALL, *names) and getattr(self, field.name) != field.default:
+                raise InputError(f"--{field.name.replace('_', '-')} is not for {self.what}")
 
 
 Facts = dict[str, Any]
 
 
-def _as_lines(facts: Facts) -> list[str]:
-    """Return remarks on the file: a mesh that is off, a model, strokes below the limits."""
-    remarks: list[str] = []
+def _as_lines(facts: Facts) -> Iterator[str]:
+    """Yield remarks on the file: a mesh that is off, a model, strokes below the limits."""
     if "left_out" in facts:
-        remarks += simulation_lines(facts)
+        yield from _simulation_lines(facts)
     if facts.get("agrees") is False:
-        remarks.append(f"This differs from the workspace: {DISAGREES}.")
-    return remarks + [
-        f"leg {actuator['leg']}: stroke {_range(actuator['stroke_mm'])} mm"
-        f" (the limits require {_range(actuator['asked_mm'])} mm)"
-        for actuator in facts.get("actuators", [])
-    ]
-
-
-def _range(ends: tuple[float, float]) -> str:
-    return f"{ends[0]:.1f} to {ends[1]:.1f}"
+        yield f"This differs from the workspace: {DISAGREES}."
+    for actuator in facts.get("actuators", []):
+        stroke, asked = (
+            f"{low:.1f} to {high:.1f}"
+            for low, high in (actuator["stroke_mm"], actuator["asked_mm"])
+        )
+        yield f"leg {actuator['leg']}: stroke {stroke} mm (the limits require {asked} mm)"
 
 
 def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    from explorer.export.mesh import check_format, mesh_bytes
+    from explorer.export.mesh import FORMATS, check_format, mesh_bytes
 
     if command.what == "workspace" and file_format in ("step", "stp"):
         return _step(command)
-    check_format(file_format)
+    check_format(file_format, FORMATS, "mesh")
     design = command.read_design()
-    from explorer.workspace.solids.booleans import convex_hull
+    from explorer.workspace.solids.solid import convex_hull
     from explorer.workspace.solids.solids import workspace_solid
 
     home = command.oriented_home(design)
     if command.load is None:
         solid = workspace_solid(design, home.rotation, command.tolerance)
     else:
-        held = held_by(design, home.rotation, command.load, command.tolerance)
-        if held.factor is not None:
-            (part,) = held.solid.empty_because
+        part = carrying_part(design, home.rotation, command.load, command.tolerance)
+        solid = part.solid
+        if part.factor is not None:
             raise NoAnswerError(
-                f"no position holds the load; the best one found holds {held.factor:.3g} of load "
-                f"and payload, up to the {part}"
+                f"no position holds the load; the best one found holds {part.factor:.3g} of load "
+                f"and payload, up to the {solid.empty_because[0]}"
             )
-        solid = held.solid
     shift = command.shift(design, home)
     if shift is not None:
         solid = solid.shifted(shift)
@@ -181,14 +162,15 @@ def _name(command: Export, design: Design) -> str:
 
 
 def _step(command: Export) -> tuple[bytes, Facts]:
-    from explorer.export.step import check_extra, exact_workspace, step_bytes
+    from explorer.export.opencascade import check_extra
+    from explorer.export.step import exact_workspace, step_bytes
 
     if command.load is not None:
         raise InputError(
             "STEP takes exact faces, and the surface along which a part takes its limit consists "
             "of facets: write 3mf, stl, glb, obj or ply"
         )
-    command.refuse("tolerance")
+    command.refuse_all_but(*_ORIENTATION)
     check_extra()
     design = command.read_design()
     home = command.oriented_home(design)
@@ -202,43 +184,38 @@ def _step(command: Export) -> tuple[bytes, Facts]:
 
 
 def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    from explorer.export.assembly import assembly_bytes, check_format
+    from explorer.export.assembly import FORMATS, assembly_bytes
+    from explorer.export.mesh import check_format
+    from explorer.export.opencascade import check_extra
     from explorer.export.simulation import DENSITY
     from explorer.prototype.assembly import bill_of_materials, make_prototype
 
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
+    check_format(file_format, FORMATS, "assembly")
     if file_format == "step":
-        from explorer.export.step import assembly_step, check_extra
-
         check_extra()
-        prototype = make_prototype(command.read_design())
-        data = assembly_step(prototype.sizes)
-    else:
-        check_format(file_format)
-        prototype = make_prototype(command.read_design())
-        data = assembly_bytes(prototype, file_format)
+    prototype = make_prototype(command.read_design())
+    data = assembly_bytes(prototype, file_format)
     bill = bill_of_materials(prototype, command.density or DENSITY)
-    parts = [
-        {"name": item.name, "size_mm": item.size, "volume_mm3": item.volume, "mass_kg": item.mass}
-        for item in bill.items
-    ]
-    actuators = [
-        {
-            "leg": actuator.leg,
-            "stroke_mm": actuator.stroke,
-            "asked_mm": actuator.required,
-            "diameter_mm": actuator.diameter,
-            "mass_kg": actuator.mass,
-        }
-        for actuator in bill.actuators
-    ]
-    facts = {"parts": parts, "actuators": actuators, "mass_kg": bill.mass}
-    return data, {"format": file_format, **facts}
+    part_keys = ["name", "size_mm", "volume_mm3", "mass_kg"]
+    actuator_keys = ["leg", "stroke_mm", "asked_mm", "diameter_mm", "mass_kg"]
+    return data, {
+        "format": file_format,
+        "parts": [
+            dict(zip(part_keys, (part.name, part.size, part.volume, part.mass), strict=True))
+            for part in bill.items
+        ],
+        "actuators": [
+            dict(zip(actuator_keys, (a.leg, a.stroke, a.required, a.diameter, a.mass), strict=True))
+            for a in bill.actuators
+        ],
+        "mass_kg": bill.mass,
+    }
 
 
 def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    from explorer.export.imperfect import ImperfectMachine
     from explorer.export.simulation import DENSITY, SimulationModel
+    from explorer.prototype.imperfect import ImperfectMachine
 
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
@@ -248,16 +225,15 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
         from explorer.prototype.assembly import make_prototype
 
         masses = make_prototype(design).masses(density)
-
     if command.errors is None:
         if command.typical:
             raise InputError("--typical is for the errors of a machine: give --errors SEED")
         model = SimulationModel(design, density, masses)
-        return model.text().encode(), simulation_json(model)
+        return model.text().encode(), _simulation_json(model)
     design, assumed = command.with_typical(design)
     machine = ImperfectMachine.draw(design, command.errors)
     model = SimulationModel(machine, density, masses)
-    facts = {**simulation_json(model), "assumed": assumed, **imperfect_json(machine)}
+    facts = {**_simulation_json(model), "assumed": assumed, **_imperfect_json(machine)}
     return model.text().encode(), facts
 
 
@@ -268,7 +244,7 @@ def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
     pose = command.pose(design)
     import datetime as dt
 
-    from explorer.app.features.sharing.scene_html import FileCamera, scene_html
+    from explorer.app.features.sharing.scene_files import FileCamera, scene_html
     from explorer.app.scene.camera import FIELD_OF_VIEW, framing
     from explorer.app.server import start
 
@@ -283,18 +259,18 @@ def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
     return data, {"format": "html", "bytes": len(data)}
 
 
-_WRITERS: Mapping[What, Callable[[Export, str], tuple[bytes, Facts]]] = MappingProxyType(
-    {
-        "workspace": _mesh,
-        "hull": _mesh,
-        "mechanism": _mechanism,
-        "simulation": _simulation,
-        "scene": _scene,
-    }
-)
+_ORIENTATION = ("quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
+_WRITERS: dict[What, tuple[Callable[[Export, str], tuple[bytes, Facts]], tuple[str, ...]]] = {
+    "workspace": (_mesh, ("tolerance", "load", *_ORIENTATION)),
+    "hull": (_mesh, ("tolerance", "load", *_ORIENTATION)),
+    "mechanism": (_mechanism, ("density",)),
+    "simulation": (_simulation, ("density", "masses", "errors", "typical")),
+    "scene": (_scene, ("position", "folds", *_ORIENTATION)),
+}
+"""The function that writes each object, and its options besides those of all."""
 
 
-def simulation_json(model: SimulationModel) -> dict[str, Any]:
+def _simulation_json(model: SimulationModel) -> dict[str, Any]:
     """Return names, servos and what is left out of a model as plain values."""
     from explorer.export.simulation import SIMULATION_BODIES, SIMULATION_JOINTS
 
@@ -312,7 +288,7 @@ def simulation_json(model: SimulationModel) -> dict[str, Any]:
     }
 
 
-def imperfect_json(machine: ImperfectMachine) -> dict[str, Any]:
+def _imperfect_json(machine: ImperfectMachine) -> dict[str, Any]:
     """Return deviations and errors of the tool at home as plain values."""
     from explorer.statics.accuracy import SOURCES, UNITS, drawing_values, source_errors
 
@@ -337,8 +313,8 @@ def _tool_json(design: Design, error: FloatArray) -> dict[str, list[float]]:
     }
 
 
-def simulation_lines(facts: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the tables of a model from what `simulation_json` and `imperfect_json` return."""
+def _simulation_lines(facts: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the tables of a model from the facts on it and on the imperfect machine."""
     if "deviations" in facts:
         yield from _imperfect_lines(facts)
         yield ""
@@ -361,15 +337,15 @@ def _sizes(error: Mapping[str, list[float]]) -> str:
 
 def _imperfect_lines(facts: Mapping[str, Any]) -> Iterator[str]:
     yield from assumed_lines(facts["assumed"])
-    stated = [row for row in facts["deviations"] if row["largest"] > 0.0]
-    if not stated:
+    rows = [
+        (row["name"], figure(row["deviation"]), f"{row['largest']:g}", row["unit"])
+        for row in facts["deviations"]
+        if row["largest"] > 0.0
+    ]
+    if not rows:
         yield "the design states neither errors nor tolerances: only its servos give way"
         return
-    rows = [(f"seed {facts['seed']}", "deviation", "within ±", "")]
-    rows += [
-        (row["name"], figure(row["deviation"]), f"{row['largest']:g}", row["unit"])
-        for row in stated
-    ]
+    rows.insert(0, (f"seed {facts['seed']}", "deviation", "within ±", ""))
     yield from (table(rows, "<>><"), "")
     errors = [("tool at home off by", "size", *"xyz", "")]
     for part, unit in (("displacement", "mm"), ("turn", "degrees")):

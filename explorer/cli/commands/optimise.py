@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,40 +12,21 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
-from explorer.cli.options import DesignOptions, JsonOptions, write_files
+from explorer.cli import values
+from explorer.cli.options import DesignOptions, JsonOptions, replace_given, write_files
 from explorer.cli.output import attributes, figure, heading, table, write_json
-from explorer.cli.parsing import UsageError
-from explorer.cli.streams import SearchMeter
-from explorer.cli.values import (
-    FILE,
-    OF_DESIGN,
-    OPTIONAL,
-    Flag,
-    hint,
-    numbers,
-    numbers_or_none,
-    positive,
-    texts,
-    whole_number,
-)
+from explorer.cli.streams import Meter
 from explorer.errors import InputError, NoAnswerError
-from explorer.measures.catalogue import CATALOGUE, measures_in
-from explorer.measures.measure import Case
-from explorer.measures.measurements import Measurements, measure_design
-from explorer.measures.size import longest_leg
+from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design, measures_in
+from explorer.measures.measure import Case, longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
-from explorer.optimise.record import OBJECTIVE_SYMBOLS
+from explorer.optimise.outcome import OBJECTIVE_SYMBOLS
 
 if TYPE_CHECKING:
-    from explorer.optimise.demands import Box
-    from explorer.optimise.outcome import Outcome
-    from explorer.optimise.problem import Problem, Variable
-    from explorer.optimise.record import Settings
-
-
-_CORNERS = "x-low y-low z-low x-high y-high z-high"
+    from explorer.optimise.outcome import Iterate, Outcome, Settings
+    from explorer.optimise.problem import Box, Problem, Variable
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,88 +51,85 @@ class Optimise(JsonOptions, DesignOptions):
     required box the worst margin, the largest share of a limit of forces, the worst error, or the
     largest deflection under the load."""
 
-    target_volume: Annotated[float | None, positive("--target-volume", power=3), OPTIONAL] = None
+    target_volume: Annotated[values.PositiveVolume, values.OPTIONAL] = None
     """Volume to match, or least volume; for the shortest leg by default that of the design."""
 
-    target_reach: Annotated[float | None, positive("--target-reach"), OPTIONAL] = None
+    target_reach: Annotated[values.Positive, values.OPTIONAL] = None
     """Longest leg allowed; for the largest volume by default that of the design."""
 
-    box: Annotated[Six | tuple[()] | None, numbers_or_none("--box", _CORNERS), OF_DESIGN] = None
+    box: Annotated[
+        Six | tuple[()] | None, values.numbers(values.CORNERS, or_none=True), values.OF_DESIGN
+    ] = None
     """Box that bounds the workspace, in design units; none lifts that of the design."""
 
-    clearance: Annotated[float | None, positive("--clearance"), OPTIONAL] = None
+    clearance: Annotated[values.Positive, values.OPTIONAL] = None
     """Least clearance of every pair of legs over the workspace, in design units."""
 
-    clearance_margin: Annotated[
-        float | None, positive("--clearance-margin"), hint("default: a 20th of the reach")
-    ] = None
+    clearance_margin: Annotated[values.Positive, values.hint("default: a 20th of the reach")] = None
     """Least margin of the poses at which the clearance is demanded: legs meet at singularities."""
 
-    stroke_ratio: Annotated[float | None, positive("--stroke-ratio"), OPTIONAL] = None
+    stroke_ratio: Annotated[values.Positive, values.OPTIONAL] = None
     """Largest ratio of longest to shortest length of an actuator."""
 
-    required_box: Annotated[Six | None, numbers("--required-box", _CORNERS), OPTIONAL] = None
+    required_box: Annotated[values.Box, values.OPTIONAL] = None
     """A box that must lie in the workspace, in design units."""
 
-    force: Annotated[float | None, positive("--force"), OF_DESIGN] = None
+    force: Annotated[values.Positive, values.OF_DESIGN] = None
     """Force of any direction at the tool in N, besides the weight of the payload."""
 
-    most: Annotated[Six | None, numbers("--most", "l1 d1 d2 d3 d4 l4", or_one=True), OF_DESIGN] = (
-        None
-    )
+    most: Annotated[values.OfActuators, values.OF_DESIGN] = None
     """Largest forces of the actuators in N, or one for all."""
 
-    most_bending: Annotated[float | None, positive("--most-bending"), OF_DESIGN] = None
+    most_bending: Annotated[values.Positive, values.OF_DESIGN] = None
     """Largest bending moment of the struts in N m."""
 
-    held: Flag = False
+    held: values.Flag = False
     """Demand that payload and force are held over the required box, within the limits of
     actuators, struts and guide."""
 
-    error: Annotated[float | None, positive("--error"), OPTIONAL] = None
+    error: Annotated[values.Positive, values.OPTIONAL] = None
     """Worst displacement of the tool by the actuators' errors over the required box, in design
     units."""
 
-    deflection: Annotated[float | None, positive("--deflection"), OPTIONAL] = None
+    deflection: Annotated[values.Positive, values.OPTIONAL] = None
     """Largest displacement of the tool under payload and force over the required box, in design
     units."""
 
-    tilt: Annotated[float | None, positive("--tilt"), OPTIONAL] = None
+    tilt: Annotated[values.Positive, values.OPTIONAL] = None
     """Tilt in every azimuth that the required box must allow, in degrees."""
 
-    least: Annotated[
-        float | None, positive("--least"), hint("default: a 20th of the largest variable")
-    ] = None
+    least: Annotated[values.Positive, values.hint("default: a 20th of the largest variable")] = None
     """Smallest |a3y|, |b1y| and |b3 − b2|; a design with one of them zero is degenerate."""
 
-    free: Annotated[tuple[str, ...], texts("--free", "yaw|reach|shift-x|…"), OPTIONAL] = ()
+    free: Annotated[tuple[str, ...], values.texts("yaw|reach|shift-x|…"), values.OPTIONAL] = ()
     """Further free variables: yaw, reach (one maximum of all lengths), and shift-x, shift-y,
     shift-z of the required box."""
 
-    bounds: Annotated[tuple[str, ...], texts("--bounds", "NAME=LOW:HIGH …"), OPTIONAL] = ()
+    bounds: Annotated[tuple[str, ...], values.texts("NAME=LOW:HIGH …"), values.OPTIONAL] = ()
     """Bounds of variables, such as b1x=-10:10 yaw=-90:-45."""
 
-    starts: Annotated[int, whole_number("--starts", 1, 10_000)] = 1
+    starts: Annotated[int, values.whole_number(1, 10_000)] = 1
     """Number of starts: the given design, and others within the bounds."""
 
-    seed: Annotated[int, whole_number("--seed", 0, 2**31 - 1)] = 0
+    seed: Annotated[int, values.whole_number(0, 2**31 - 1)] = 0
     """Seed of the other starts."""
 
-    iterations: Annotated[int, whole_number("--iterations", 1, 100_000)] = 300
+    iterations: Annotated[int, values.whole_number(1, 100_000)] = 300
     """Largest number of iterations per start."""
 
-    out: Annotated[Path | None, FILE] = None
+    out: Annotated[Path | None, values.FILE] = None
     """File for the optimal design; the record of the search is written beside it."""
 
-    record: Annotated[Path | None, hint("default: OUT with .record.json", "FILE")] = None
+    record: Annotated[Path | None, values.hint("default: OUT with .record.json", "FILE")] = None
     """File for the record: problem, history and versions, written even without convergence."""
 
-    repeat: Annotated[Path | None, FILE] = None
+    repeat: Annotated[Path | None, values.FILE] = None
     """Record whose problem to solve again, instead of one given by options."""
 
     def run(self) -> None:
         """Write the outcome of the search."""
         from explorer.files.writing import check_writable
+        from explorer.optimise.outcome import encode_record, record_of
 
         record = self.record
         if self.out is not None:
@@ -162,18 +141,23 @@ class Optimise(JsonOptions, DesignOptions):
         problem, settings = self._problem()
         self._check_possible(problem)
         outcome = _search(problem, settings)
-        written, unwritten = write_files(self._files(outcome, settings, record))
+        files: dict[Path, bytes] = {}
+        if self.out is not None and outcome.converged:
+            files[self.out] = encode_design(optimised_design(outcome))
+        if record is not None and (outcome.converged or self.record is not None):
+            files[record] = encode_record(record_of(outcome, settings))
+        written, unwritten = write_files(files)
         unsolved = [] if outcome.converged else [NoAnswerError(outcome.run.message)]
         self.write(
             lambda: outcome_json(outcome, written),
-            lambda: (heading(optimised_design(outcome)), *outcome_lines(outcome, written)),
+            outcome_lines(outcome, written),
             [*unsolved, *unwritten],
         )
 
     def _problem(self) -> tuple[Problem, Settings]:
         """Return the problem and the settings that the options describe."""
         from explorer.optimise.defaults import make_problem
-        from explorer.optimise.record import Settings, load_record
+        from explorer.optimise.outcome import Settings, load_record
 
         if self.repeat is not None:
             record = load_record(self.repeat)
@@ -210,16 +194,15 @@ class Optimise(JsonOptions, DesignOptions):
 
     def _loaded(self, design: Design) -> Design:
         """Return the design with the given force and limits of forces and moments."""
-        replace = msgspec.structs.replace
-        if self.force is not None:
-            design = replace(design, payload=replace(design.payload, force_n=self.force))
+        actuators = design.actuators
         if self.most is not None:
-            actuators = replace(design.actuators, push_n=self.most, pull_n=None)
-            design = replace(design, actuators=actuators)
-        if self.most_bending is not None:
-            struts = replace(design.struts, moment_nm=self.most_bending)
-            design = replace(design, struts=struts)
-        return design
+            actuators = msgspec.structs.replace(actuators, push_n=self.most, pull_n=None)
+        return msgspec.structs.replace(
+            design,
+            payload=replace_given(design.payload, force_n=self.force),
+            actuators=actuators,
+            struts=replace_given(design.struts, moment_nm=self.most_bending),
+        )
 
     def _check_possible(self, problem: Problem) -> None:
         """Refuse a problem that the limits make infeasible, before kernels are compiled."""
@@ -240,32 +223,29 @@ class Optimise(JsonOptions, DesignOptions):
             write_json(infeasible_json(problem, conflicts[0].limit, message))
         raise NoAnswerError(message)
 
-    def _files(
-        self, outcome: Outcome, settings: Settings, record: Path | None
-    ) -> dict[Path, bytes]:
-        """Return the requested files by their paths."""
-        from explorer.optimise.record import encode_record, record_of
-
-        files: dict[Path, bytes] = {}
-        if self.out is not None and outcome.converged:
-            files[self.out] = encode_design(optimised_design(outcome))
-        if record is not None and (outcome.converged or self.record is not None):
-            files[record] = encode_record(record_of(outcome, settings))
-        return files
-
 
 def _search(problem: Problem, settings: Settings) -> Outcome:
     """Run a search with a progress bar."""
     from explorer.optimise.solver import optimise_design
 
-    starts, iterations = settings.starts, settings.iterations
-    with SearchMeter(starts, iterations, OBJECTIVE_SYMBOLS[problem.objective]) as meter:
+    starts, steps = settings.starts, Counter[int]()
+    symbol = OBJECTIVE_SYMBOLS[problem.objective]
+
+    def show(iterate: Iterate) -> None:
+        run = iterate.run
+        steps[run] += 1
+        share = (run + min(1.0, steps[run] / settings.iterations)) / starts
+        text = f"start {run + 1} of {starts}, {iterate.phase} {steps[run]}: {symbol} "
+        text += f"{iterate.value:.6g}, volume {iterate.volume:.6g}"
+        meter.show(text + (f", missed: {iterate.worst}" if iterate.spare < 0.0 else ""), share)
+
+    with Meter() as meter:
         return optimise_design(
             problem,
             starts=starts,
             seed=settings.seed,
-            iterations=iterations,
-            watch=meter.show_iterate,
+            iterations=settings.iterations,
+            watch=show,
         )
 
 
@@ -283,10 +263,7 @@ def _as_variable(word: str) -> Variable:
     except ValueError:
         ends = []
     if match is None or not ends:
-        raise UsageError(
-            f"--bounds takes NAME=LOW:HIGH, such as b1x=-10:10; got {word!r}",
-            "explorer optimise",
-        )
+        raise InputError(f"--bounds takes NAME=LOW:HIGH, such as b1x=-10:10; got {word!r}")
     return Variable(match[1].strip(), *ends)
 
 
@@ -344,6 +321,7 @@ def infeasible_json(problem: Problem, limit: str, message: str) -> dict[str, obj
 def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> Iterator[str]:
     """Yield an outcome as lines of text, with the start and the best design side by side."""
     problem = outcome.problem
+    yield heading(optimised_design(outcome))
     margin = None if problem.demands.clearance is None else problem.demands.clearance_margin
     box = problem.demands.required_box
     shifted = None if box is None else problem.required_box_at(outcome.best.values)
@@ -353,10 +331,10 @@ def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> Iterator[str]:
     )
     optimum = "optimum" if outcome.converged else "best so far"
     rows: list[tuple[str, ...]] = [("", "start", optimum, "change")]
-    for name, values in measure_rows(before, after):
-        finite = [value for value in values if value is not None and math.isfinite(value)]
-        change = f"{finite[1] - finite[0]:+.6g}" if len(finite) == len(values) else ""
-        rows.append((name, *map(_cell, values), change))
+    for name, pair in measure_rows(before, after):
+        finite = [value for value in pair if value is not None and math.isfinite(value)]
+        change = f"{finite[1] - finite[0]:+.6g}" if len(finite) == len(pair) else ""
+        rows.append((name, *map(_cell, pair), change))
     if outcome.converged:
         yield from (outcome.run.message, "")
     yield table(rows, "<>>>")

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from explorer.cli.options import DesignOptions, JsonOptions, PointOptions
-from explorer.cli.output import degrees, figure, figures, finite, heading, table
-from explorer.cli.values import OF_HOME, finite_number, numbers, whole_number
-from explorer.mechanism.configuration import Point, position_of
-from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Triple
+from explorer.cli import values
+from explorer.cli.options import JsonOptions, PointOptions
+from explorer.cli.output import attributes, degrees, figure, figures, finite, heading, table
+from explorer.mechanism.configuration import position_of
 
 if TYPE_CHECKING:
     from explorer.workspace.orientations.share import OrientationShare
-    from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap
-    from explorer.workspace.orientations.torsions import TiltByTorsion, TorsionRange
+    from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap, TorsionRange
+
+CONNECTED = "connected to tilt zero by a tilt without a gap"
+NOT_CONNECTED = "not connected to tilt zero by a tilt within the limits"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Orientation(JsonOptions, PointOptions, DesignOptions):
+class Orientation(JsonOptions, PointOptions):
     """Measure the orientations of a position: share of all, greatest tilts, torsion.
 
     The platform tilts from tilt zero, at one torsion and in each azimuth, until it meets the first
@@ -29,137 +28,109 @@ class Orientation(JsonOptions, PointOptions, DesignOptions):
     place, and b4 moves about it.
     """
 
-    position: Annotated[Triple | None, numbers("--position", "x y z"), OF_HOME] = None
+    position: Annotated[values.Position, values.OF_HOME] = None
     """Position of b4, or of the tool, in the base frame, in design units."""
 
-    torsion: Annotated[float | None, finite_number("--torsion"), OF_HOME] = None
+    torsion: Annotated[values.Finite, values.OF_HOME] = None
     """Torsion of the tilts, in degrees."""
 
-    samples: Annotated[int, whole_number("--samples", 2, 1_000_000)] = 100_000
+    samples: Annotated[int, values.whole_number(2, 1_000_000)] = 100_000
     """Number of orientations for the share."""
 
     def run(self) -> None:
         """Write the measures of the orientations."""
         from explorer.workspace.orientations.share import orientation_share
-        from explorer.workspace.orientations.tilts import greatest_tilt, tilt_map
-        from explorer.workspace.orientations.torsions import (
+        from explorer.workspace.orientations.tilts import (
+            greatest_tilt,
             is_connected,
             tilt_by_torsion,
+            tilt_map,
             torsion_range,
         )
 
         design = self.read_design()
         home, tool = design.home_pose, self.tool(design)
         position = position_of(design, home, self.at) if self.position is None else self.position
-        found = _Orientations(
-            design=design,
-            at=self.at,
-            position=position,
-            share=orientation_share(design, position, self.samples, tool=tool),
-            least=greatest_tilt(design, position, self.torsion, tool),
-            tilts=tilt_map(design, position, self.torsion, tool=tool),
-            by_torsion=tilt_by_torsion(design, position, tool=tool),
-            torsions=torsion_range(design, position, self.torsion, tool=tool),
-            is_home_connected=is_connected(design, position, home.rotation, tool=tool),
-        )
-        self.write(found.as_json, found.as_lines)
-
-
-@dataclass(frozen=True)
-class _Orientations:
-    """The orientations of a position, ready to be written."""
-
-    design: Design
-    at: Point
-    position: Triple
-    share: OrientationShare
-    least: GreatestTilt
-    tilts: TiltMap
-    by_torsion: TiltByTorsion
-    torsions: TorsionRange
-    is_home_connected: bool
-
-    def as_json(self) -> dict[str, object]:
-        """Return the answer as plain values."""
-        least, torsions, best = self.least, self.torsions, self.by_torsion.best
-        return {
-            "position" if self.at == "b4" else "tool_position": self.position,
-            "share": self.share.share,
-            "standard_error": self.share.standard_error,
-            "orientations": self.share.orientations,
-            "torsion": least.torsion,
-            "greatest_tilt": finite(least.tilt),
-            "azimuth": finite(least.azimuth),
-            "limit": least.limit,
-            "azimuths": self.tilts.azimuths,
-            "tilts": [finite(tilt) for tilt in self.tilts.tilts.tolist()],
-            "limits": self.tilts.limits,
-            "torsions": self.by_torsion.torsions,
-            "tilts_by_torsion": [finite(tilt) for tilt in self.by_torsion.tilts.tolist()],
-            "best_torsion": best.torsion,
-            "best_tilt": finite(best.tilt),
-            "torsion_range": [finite(torsions.low), finite(torsions.high)],
-            "torsion_limits": [torsions.low_limit, torsions.high_limit],
-            "home_connected": self.is_home_connected,
-        }
-
-    def as_lines(self) -> Iterator[str]:
-        """Yield the answer as lines of text."""
-        least = self.least
+        share = orientation_share(design, position, self.samples, tool=tool)
+        least = greatest_tilt(design, position, self.torsion, tool)
+        tilts = tilt_map(design, position, self.torsion, tool=tool)
+        by_torsion = tilt_by_torsion(design, position, tool=tool)
+        best = by_torsion.best
+        torsions = torsion_range(design, position, self.torsion, tool=tool)
+        is_home_connected = is_connected(design, position, home.rotation, tool=tool)
         name = "position" if self.at == "b4" else "tool position"
-        yield from (heading(self.design), f"{name}  {'  '.join(figures(self.position))}", "")
         rows = [
-            ("share of all orientations", self._share()),
+            ("share of all orientations", _share_words(share)),
             ("torsion", *degrees([least.torsion])),
-            ("greatest tilt in every azimuth", self._greatest()),
-            ("largest at any torsion", self._best()),
-            ("torsion range at tilt zero", self._torsions()),
-            ("home orientation", self._home()),
+            ("greatest tilt in every azimuth", _least_words(least)),
+            ("largest at any torsion", _best_words(best)),
+            ("torsion range at tilt zero", _range_words(torsions)),
+            ("home orientation", CONNECTED if is_home_connected else NOT_CONNECTED),
         ]
-        yield from (table(rows, "<<"), "")
-        if math.isnan(least.tilt):
-            return
-        listed = [("azimuth", "tilt", "ends at")]
-        for azimuth, tilt, limit in zip(
-            self.tilts.azimuths.tolist(), self.tilts.tilts.tolist(), self.tilts.limits, strict=True
-        ):
-            towards, most = degrees([azimuth, tilt])
-            listed.append((towards, most, limit or "no limit"))
-        yield table(listed, ">><")
+        self.write(
+            lambda: {
+                name.replace(" ", "_"): position,
+                **attributes(share, "share standard_error orientations"),
+                "torsion": least.torsion,
+                "greatest_tilt": finite(least.tilt),
+                "azimuth": finite(least.azimuth),
+                "limit": least.limit,
+                "azimuths": tilts.azimuths,
+                "tilts": [*map(finite, tilts.tilts.tolist())],
+                "limits": tilts.limits,
+                "torsions": by_torsion.torsions,
+                "tilts_by_torsion": [*map(finite, by_torsion.tilts.tolist())],
+                "best_torsion": best.torsion,
+                "best_tilt": finite(best.tilt),
+                "torsion_range": [finite(torsions.low), finite(torsions.high)],
+                "torsion_limits": [torsions.low_limit, torsions.high_limit],
+                "home_connected": is_home_connected,
+            },
+            [
+                heading(design),
+                f"{name}  {'  '.join(figures(position))}",
+                *("", table(rows, "<<"), ""),
+                *([] if math.isnan(least.tilt) else [_azimuth_table(tilts)]),
+            ],
+        )
 
-    def _share(self) -> str:
-        share = self.share
-        if share.share in (0.0, 1.0):
-            return f"{'all' if share.share else 'none'} of {share.orientations:,} orientations"
-        error = f"standard error {figure(share.standard_error)}"
-        return f"{figure(share.share)} ({error}, {share.orientations:,} orientations)"
 
-    def _greatest(self) -> str:
-        least = self.least
-        if math.isnan(least.tilt):
-            return f"none: tilt zero violates {least.limit}"
-        (tilt,) = degrees([least.tilt])
-        if least.limit is None:
-            return f"{tilt}, no limit"
-        return f"{tilt} in azimuth {degrees([least.azimuth])[0]}, ended by {least.limit}"
+def _azimuth_table(tilts: TiltMap) -> str:
+    rows = [("azimuth", "tilt", "ends at")]
+    pairs = zip(tilts.azimuths.tolist(), tilts.tilts.tolist(), strict=True)
+    for pair, limit in zip(pairs, tilts.limits, strict=True):
+        azimuth, tilt = degrees(pair)
+        rows.append((azimuth, tilt, limit or "no limit"))
+    return table(rows, ">><")
 
-    def _best(self) -> str:
-        best = self.by_torsion.best
-        if math.isnan(best.tilt):
-            return "none: tilt zero violates a limit at every torsion"
-        tilt, torsion = degrees([best.tilt, best.torsion])
-        return f"{tilt} at torsion {torsion}"
 
-    def _torsions(self) -> str:
-        torsions = self.torsions
-        if math.isnan(torsions.low):
-            return f"none: tilt zero violates {torsions.low_limit}"
-        if torsions.low_limit is None:
-            return "all"
-        low, high = degrees([torsions.low, torsions.high])
-        return f"{low} ({torsions.low_limit}) to {high} ({torsions.high_limit})"
+def _share_words(share: OrientationShare) -> str:
+    if share.share in (0.0, 1.0):
+        return f"{'all' if share.share else 'none'} of {share.orientations:,} orientations"
+    error = f"standard error {figure(share.standard_error)}"
+    return f"{figure(share.share)} ({error}, {share.orientations:,} orientations)"
 
-    def _home(self) -> str:
-        if self.is_home_connected:
-            return "connected to tilt zero by a tilt without a gap"
-        return "not connected to tilt zero by a tilt within the limits"
+
+def _least_words(least: GreatestTilt) -> str:
+    if math.isnan(least.tilt):
+        return f"none: tilt zero violates {least.limit}"
+    tilt, azimuth = degrees([least.tilt, least.azimuth])
+    if least.limit is None:
+        return f"{tilt}, no limit"
+    return f"{tilt} in azimuth {azimuth}, ended by {least.limit}"
+
+
+def _best_words(best: GreatestTilt) -> str:
+    if math.isnan(best.tilt):
+        return "none: tilt zero violates a limit at every torsion"
+    tilt, torsion = degrees([best.tilt, best.torsion])
+    return f"{tilt} at torsion {torsion}"
+
+
+def _range_words(torsions: TorsionRange) -> str:
+    if math.isnan(torsions.low):
+        return f"none: tilt zero violates {torsions.low_limit}"
+    if torsions.low_limit is None:
+        return "all"
+    low, high = degrees([torsions.low, torsions.high])
+    return f"{low} ({torsions.low_limit}) to {high} ({torsions.high_limit})"

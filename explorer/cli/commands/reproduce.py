@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
+from explorer.cli import values
 from explorer.cli.options import JsonOptions
 from explorer.cli.streams import write_error
-from explorer.cli.values import OPTIONAL, texts
 
 if TYPE_CHECKING:
     from explorer.reproduce.claim import Result
@@ -26,7 +26,7 @@ class Reproduce(JsonOptions):
     paper. What the paper leaves open is marked as our reading. All random cases have fixed seeds.
     """
 
-    claim: Annotated[tuple[str, ...], texts("--claim", "NAME …"), OPTIONAL] = ()
+    claim: Annotated[tuple[str, ...], values.texts("NAME …"), values.OPTIONAL] = ()
     """Names of the claims, such as table-1; all by default."""
 
     def run(self) -> None:
@@ -38,12 +38,10 @@ class Reproduce(JsonOptions):
         results = list(
             measure_claims(self.claim or None, lambda title: write_error(f"measuring: {title}"))
         )
-        self.write(
-            lambda: {"claims": [claim_json(result) for result in results]}, lambda: lines(results)
-        )
+        self.write(lambda: {"claims": [*map(_claim_json, results)]}, _lines(results))
 
 
-def claim_json(result: Result) -> dict[str, object]:
+def _claim_json(result: Result) -> dict[str, object]:
     """Return a claim and its measurement as plain values."""
     claim, measurement = result.claim, result.measurement
     return {
@@ -59,7 +57,7 @@ def claim_json(result: Result) -> dict[str, object]:
     }
 
 
-def lines(results: Sequence[Result]) -> Iterator[str]:
+def _lines(results: Sequence[Result]) -> Iterator[str]:
     """Yield claims with their verdicts, and how often there is each verdict."""
     for result in results:
         yield from claim_lines(result)

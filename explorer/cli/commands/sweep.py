@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import tyro
 
-from explorer.cli.options import JsonOptions, load
-from explorer.cli.output import figure, table
-from explorer.cli.parsing import UsageError
+from explorer.cli import values
+from explorer.cli.options import JsonOptions, load, replace_given
+from explorer.cli.output import attributes, figure, table
 from explorer.cli.streams import Meter, write, write_error
-from explorer.cli.values import DESIGN_NAME, OPTIONAL, Flag, hint, whole_number
+from explorer.errors import InputError
 from explorer.mechanism.design_file import encode_design
 
 if TYPE_CHECKING:
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from explorer.sweep.run import Progress
     from explorer.sweep.study import Study
     from explorer.sweep.workers import Workers
-
-
-_PROGRAM = "explorer sweep"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,40 +37,43 @@ class Sweep(JsonOptions):
     ] = None
     """Study file (JSON), or a built-in study (trade-off)."""
 
-    out: Annotated[Path | None, hint("needed for results", "FOLDER")] = None
+    out: Annotated[Path | None, values.hint("needed for results", "FOLDER")] = None
     """Folder of the results, with one file per chunk; created if it does not exist."""
 
-    design: Annotated[str | None, hint("default: the study's", DESIGN_NAME)] = None
+    design: Annotated[str | None, values.hint("default: the study's", values.DESIGN_NAME)] = None
     """Design to vary instead of the study's own: a preset, a design file, or the name of a design
     saved on the page."""
 
     workers: Annotated[
-        int | None, whole_number("--workers", 1, 1024), hint("default: one a core")
+        int | None, values.whole_number(1, 1024), values.hint("default: one a core")
     ] = None
     """Number of processes of this machine that evaluate designs."""
 
-    scheduler: Annotated[str | None, hint("optional", "tcp://HOST:PORT")] = None
+    scheduler: Annotated[str | None, values.hint("optional", "tcp://HOST:PORT")] = None
     """Dask scheduler whose workers evaluate designs instead; needs the extra `cluster`."""
 
-    limit: Annotated[int | None, whole_number("--limit", 1, 2**30), OPTIONAL] = None
+    limit: Annotated[int | None, values.whole_number(1, 2**30), values.OPTIONAL] = None
     """Stop after about this many further designs; the same command continues."""
 
-    summary: Flag = False
+    summary: values.Flag = False
     """Summarise the folder with its Pareto front, and compute nothing."""
 
-    row: Annotated[int | None, whole_number("--row", 0, 2**30), OPTIONAL] = None
+    row: Annotated[int | None, values.whole_number(0, 2**30), values.OPTIONAL] = None
     """Write the design with this index in the results as a design file, and compute nothing."""
 
-    new: Flag = False
+    new: values.Flag = False
     """Write an example of a study file, and compute nothing."""
 
     def run(self) -> None:
         """Compute the missing designs and summarise the folder."""
         if self.new:
-            self._write_study()
+            from explorer.sweep.study import STUDIES, encode_study
+
+            study = self._load_study(self.study or next(iter(STUDIES)))
+            write(encode_study(study).decode())
             return
         if self.out is None:
-            raise UsageError("name the folder of the results with --out", _PROGRAM)
+            raise InputError("name the folder of the results with --out")
         if self.row is not None:
             from explorer.sweep.results import design_at
 
@@ -83,17 +83,14 @@ class Sweep(JsonOptions):
         elif self.study is not None:
             self._compute(self._load_study(self.study), self.out)
         else:
-            raise UsageError(
-                "name a study file, or give --summary to summarise the folder", _PROGRAM
-            )
+            raise InputError("name a study file, or give --summary to summarise the folder")
 
     def _load_study(self, name: str) -> Study:
         from explorer.sweep.study import load_study
 
-        study = load_study(name)
-        if self.design is None:
-            return study
-        return msgspec.structs.replace(study, design=load(self.design))
+        return replace_given(
+            load_study(name), design=None if self.design is None else load(self.design)
+        )
 
     def _compute(self, study: Study, folder: Path) -> None:
         from explorer.sweep.run import run_study
@@ -118,8 +115,16 @@ class Sweep(JsonOptions):
                 # Pending tasks are useless after any kind of end.
                 workers.shutdown(cancel_futures=True)
         self.write(
-            lambda: progress_json(progress) | {"study": study.name, "folder": folder},
-            lambda: progress_lines(study, folder, progress),
+            lambda: {
+                **attributes(progress, "total done"),
+                "computed": progress.done - progress.kept,
+                "complete": progress.is_complete,
+                "counts": _sort_counts(progress.counts),
+                "seconds": progress.seconds,
+                "study": study.name,
+                "folder": folder,
+            },
+            progress_lines(study, folder, progress),
         )
 
     def _workers(self) -> Workers:
@@ -128,7 +133,7 @@ class Sweep(JsonOptions):
 
             return LocalWorkers(self.workers)
         if self.workers is not None:
-            raise UsageError("give one of --workers and --scheduler, not both", _PROGRAM)
+            raise InputError("give one of --workers and --scheduler, not both")
         from explorer.sweep.cluster import DaskWorkers
 
         workers = DaskWorkers(self.scheduler)
@@ -150,13 +155,22 @@ class Sweep(JsonOptions):
                 f"left out, since no part of the study has that name: {summary.strays[0]!r}{more}; "
                 "move such files away, because programs that read the whole folder read them too"
             )
-        self.write(lambda: summary_json(summary, folder), lambda: summary_lines(summary))
-
-    def _write_study(self) -> None:
-        from explorer.sweep.study import STUDIES, encode_study
-
-        study = self._load_study(self.study or next(iter(STUDIES)))
-        write(encode_study(study).decode())
+        self.write(
+            lambda: {
+                "study": summary.study.name,
+                "folder": folder,
+                "total": summary.study.count,
+                "rows": summary.count,
+                "complete": summary.count == summary.study.count,
+                "counts": _sort_counts(summary.counts),
+                "incomparable": summary.incomparable,
+                "damaged_parts": summary.damaged,
+                "stray_files": summary.strays,
+                "objectives": msgspec.to_builtins(summary.study.objectives),
+                "front": summary.front,
+            },
+            summary_lines(summary),
+        )
 
 
 SHOWN = 20
@@ -175,18 +189,6 @@ def progress_line(progress: Progress) -> str:
     return text + (f", {failed} not done" if failed else "")
 
 
-def progress_json(progress: Progress) -> dict[str, object]:
-    """Return the progress at the end of a run as plain values."""
-    return {
-        "total": progress.total,
-        "done": progress.done,
-        "computed": progress.done - progress.kept,
-        "complete": progress.is_complete,
-        "counts": _sort_counts(progress.counts),
-        "seconds": progress.seconds,
-    }
-
-
 def progress_lines(study: Study, folder: Path, progress: Progress) -> Iterator[str]:
     """Yield the progress at the end of a run as lines of text."""
     computed = progress.done - progress.kept
@@ -196,23 +198,6 @@ def progress_lines(study: Study, folder: Path, progress: Progress) -> Iterator[s
     yield from _count_lines(progress.counts)
     if not progress.is_complete:
         yield "not complete: the same command continues"
-
-
-def summary_json(summary: Summary, folder: Path) -> dict[str, object]:
-    """Return the results of a study as plain values."""
-    return {
-        "study": summary.study.name,
-        "folder": str(folder),
-        "total": summary.study.count,
-        "rows": summary.count,
-        "complete": summary.count == summary.study.count,
-        "counts": _sort_counts(summary.counts),
-        "incomparable": summary.incomparable,
-        "damaged_parts": summary.damaged,
-        "stray_files": summary.strays,
-        "objectives": msgspec.to_builtins(summary.study.objectives),
-        "front": summary.front,
-    }
 
 
 def summary_lines(summary: Summary) -> Iterator[str]:
@@ -229,16 +214,14 @@ def summary_lines(summary: Summary) -> Iterator[str]:
         yield f"without a value of an objective, so not in the front: {summary.incomparable}"
     names = [*dict.fromkeys([*(goal.measure for goal in study.objectives), *study.varied])]
     step = max(1.0, (len(summary.front) - 1) / (SHOWN - 1))
-    shown = [summary.front[round(k * step)] for k in range(min(SHOWN, len(summary.front)))]
-    if shown:
-        rows = [("index", *names)]
-        rows += [
-            (str(row["index"]), *(figure(float(row[name] or 0.0)) for name in names))
-            for row in shown
+    rows = [summary.front[round(k * step)] for k in range(min(SHOWN, len(summary.front)))]
+    if rows:
+        cells = [
+            (str(row["index"]), *(figure(float(row[n] or 0.0)) for n in names)) for row in rows
         ]
-        yield table(rows, ">" * len(rows[0]))
-    if len(shown) < len(summary.front):
-        yield f"{len(shown)} of them, evenly spread; --json has all"
+        yield table([("index", *names), *cells], ">" * (1 + len(names)))
+    if len(rows) < len(summary.front):
+        yield f"{len(rows)} of them, evenly spread; --json has all"
 
 
 def _count_lines(counts: Mapping[str, int]) -> list[str]:
@@ -254,7 +237,5 @@ def _duration(seconds: float) -> str:
     """Return a duration in words, such as 2 min 5 s."""
     if seconds < 60.0:
         return f"{seconds:.1f} s"
-    whole = round(seconds)
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

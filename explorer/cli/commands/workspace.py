@@ -2,40 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from explorer.cli import output
+from explorer.cli import options, output, values
 from explorer.cli.blocks import lines
-from explorer.cli.load_options import held_by
-from explorer.cli.options import (
-    DesignOptions,
-    JsonOptions,
-    OrientationOptions,
-    PointOptions,
-    RadiiOptions,
-)
-from explorer.cli.values import (
-    OF_DESIGN,
-    OPTIONAL,
-    Flag,
-    hint,
-    load_numbers,
-    numbers,
-    positive,
-    whole_number,
-)
 from explorer.errors import InputError
 from explorer.measures.blocks.clearances import workspace_clearances
-from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Six
-from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
 
 if TYPE_CHECKING:
     from explorer.numerics.arrays import FloatArray
@@ -44,7 +26,7 @@ if TYPE_CHECKING:
     from explorer.workspace.carried_region import CarriedRegion
     from explorer.workspace.solids.solid import Solid
 
-Ends = tuple[float, float]
+Range = Annotated[tuple[float, float] | None, values.numbers("low high"), values.OPTIONAL]
 
 # The measures of nodes that the remark on their volume gives.
 _IN_REMARK = ("node_count", "node_step")
@@ -56,7 +38,9 @@ SAMPLES_OF_TILT = 33
 
 
 @dataclass(frozen=True, kw_only=True)
-class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, DesignOptions):
+class Workspace(
+    options.JsonOptions, options.RadiiOptions, options.OrientationOptions, options.PointOptions
+):
     """Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.
 
     Ranges or a tilt add the inclusive volume (union over these orientations) and the total
@@ -65,53 +49,51 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
     over several each by its own vector.
     """
 
-    step: Annotated[float | None, positive("--step"), OF_DESIGN] = None
+    step: Annotated[values.Positive, values.OF_DESIGN] = None
     """Step of the paper's grid of nodes, in design units."""
 
-    tolerance: Annotated[
-        float | None, positive("--tolerance"), hint("default: a 500th of the reach")
-    ] = None
+    tolerance: Annotated[values.Positive, values.hint("default: a 500th of the reach")] = None
     """Largest distance of the mesh from the true surface, in design units."""
 
-    hull: Flag = False
+    hull: values.Flag = False
     """Add the convex hull."""
 
-    interference: Flag = False
+    interference: values.Flag = False
     """Add the accessible volume, without a collision of legs on the way from the home pose, and
     the volume that each pair blocks."""
 
-    radius_curve: Flag = False
+    radius_curve: values.Flag = False
     """Add the accessible volume as a function of one radius of all legs, and the largest radius
     without a loss."""
 
-    yaw_range: Annotated[Ends | None, numbers("--yaw-range", "low high"), OPTIONAL] = None
+    yaw_range: Range = None
     """Range of yaw in degrees; the other angles are those of the given orientation."""
 
-    pitch_range: Annotated[Ends | None, numbers("--pitch-range", "low high"), OPTIONAL] = None
+    pitch_range: Range = None
     """Range of pitch in degrees."""
 
-    roll_range: Annotated[Ends | None, numbers("--roll-range", "low high"), OPTIONAL] = None
+    roll_range: Range = None
     """Range of roll in degrees."""
 
-    tilt: Annotated[float | None, positive("--tilt"), OPTIONAL] = None
+    tilt: Annotated[values.Positive, values.OPTIONAL] = None
     """Half-angle of a cone of tilts of the platform, in degrees."""
 
     samples: Annotated[
         int | None,
-        whole_number("--samples", 1, 1_000_000),
-        hint("default: 5 a range, 33 tilts, 100000 for a capability"),
+        values.whole_number(1, 1_000_000),
+        values.hint("default: 5 a range, 33 tilts, 100000 for a capability"),
     ] = None
     """Number of orientations: per range, of a tilt, or of all."""
 
-    load: Annotated[Six | None, load_numbers("--load"), OPTIONAL] = None
+    load: Annotated[values.Load, values.OPTIONAL] = None
     """Force in N and moment in N × unit at the tool, besides the payload: add the volume where it
     is held within the limits of actuators, struts and guide."""
 
-    capability: Annotated[Triple | None, numbers("--capability", "x y z"), OPTIONAL] = None
+    capability: Annotated[values.Position, values.OPTIONAL] = None
     """Position of b4, or of the tool, at which to compute the share of feasible orientations, among
     the given or all."""
 
-    table1: Flag = False
+    table1: values.Flag = False
     """Measure the claim table-1 of `explorer reproduce` instead: the paper's Table 1."""
 
     def run(self) -> None:
@@ -121,7 +103,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
             from explorer.reproduce.claims import measure_claims
 
             (result,) = measure_claims(["table-1"])
-            self.write(lambda: dict(result.measurement.values), lambda: claim_lines(result))
+            self.write(lambda: dict(result.measurement.values), claim_lines(result))
             return
         design = self.with_radii(self.read_design())
         pose = self.oriented_home(design)
@@ -131,12 +113,13 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
         if self.at == "tool":
             tool = "  ".join(output.figures(design.tool.position))
             head.insert(2, f"of the tool point  {tool}")
-        self.write(measures.as_json, lambda: (*head, *measures.as_lines()))
+        self.write(measures.as_json, chain(head, measures.as_lines()))
 
     def _measure(
         self, design: Design, pose: Pose, orientations: FloatArray | None
     ) -> WorkspaceMeasures:
-        from explorer.workspace.solids import booleans, solids
+        from explorer.workspace.solids import solids
+        from explorer.workspace.solids.solid import convex_hull
 
         case, rotation = Case(design, node_step=self.step, pose=pose), pose.rotation
         # Too fine a grid is refused before anything else is computed.
@@ -145,7 +128,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
         shift, tool = self.shift(design, pose), self.tool(design)
         measures = WorkspaceMeasures(case, shift, solid if shift is None else solid.shifted(shift))
         if self.hull:
-            measures.hull = booleans.convex_hull(measures.solid)
+            measures.hull = convex_hull(measures.solid)
         if orientations is not None:
             measures.orientations = len(orientations)
             measures.inclusive = solids.inclusive_solid(design, orientations, self.tolerance, tool)
@@ -160,7 +143,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
             chosen = count if orientations is None else orientations
             measures.capability = orientation_capability(design, self.capability, chosen, tool)
         if self.load is not None:
-            measures.held = held_by(design, rotation, self.load, self.tolerance)
+            measures.carrying = options.carrying_part(design, rotation, self.load, self.tolerance)
         if self.interference:
             from explorer.workspace.accessible.workspace import accessible_workspace
 
@@ -175,7 +158,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
 
     def _orientations(self, pose: Pose) -> FloatArray | None:
         """Return the requested orientations, shape (n, 3, 3); None without any."""
-        from explorer.workspace.orientations.sets import cone_of_directions, yaw_pitch_roll_range
+        from explorer.workspace.orientations.share import cone_of_directions, yaw_pitch_roll_range
 
         ranges = (self.yaw_range, self.pitch_range, self.roll_range)
         if self.tilt is not None:
@@ -209,7 +192,7 @@ class WorkspaceMeasures:
         inclusive: Union of the workspaces over the orientations.
         total: Intersection of the workspaces over the orientations.
         capability: Share of feasible orientations at a position, from 0 to 1.
-        held: Part where a load is held.
+        carrying: Part where a load is held.
         accessible: Accessible workspace.
         curve: Accessible volume as a function of the radius of all legs.
     """
@@ -222,41 +205,45 @@ class WorkspaceMeasures:
     inclusive: Solid | None = None
     total: Solid | None = None
     capability: float | None = None
-    held: CarriedRegion | None = None
+    carrying: CarriedRegion | None = None
     accessible: AccessibleWorkspace | None = None
     curve: RadiusCurve | None = None
 
-    def _extent(self) -> FloatArray | tuple[Triple, Triple] | None:
-        """Return the lowest and the highest position of the counted nodes."""
+    @cached_property
+    def measured(self) -> Mapping[str, float | None]:
+        """Values of the measures in the catalogue."""
+        return measure_design(self.case, measures_in("workspace")).values
+
+    @property
+    def extent(self) -> FloatArray | None:
+        """The lowest and the highest position of the counted nodes, shape (2, 3)."""
         extent = self.case.paper_nodes.extent
-        if extent is None or self.shift is None:
-            return extent
-        return np.array(extent) + self.shift
+        shift = 0.0 if self.shift is None else self.shift
+        return None if extent is None else np.array(extent) + shift
 
     def as_json(self) -> dict[str, object]:
         """Return the measures as plain values."""
-        measured = measure_design(self.case, measures_in("workspace"))
+        meshes = {"inclusive_mesh": self.inclusive, "total_mesh": self.total}
         answer: dict[str, object] = {
-            "volume": measured["volume"],
+            "volume": self.measured["volume"],
             **output.attributes(self.case.volume, "gradient empty_because"),
-            "node_step": measured["node_step"],
-            **measured.values,
-            "extent": self._extent(),
+            "node_step": self.measured["node_step"],
+            **self.measured,
+            "extent": self.extent,
             "mesh": output.mesh_json(self.solid),
         }
         if self.solid.agrees is False:
             answer["mesh_agrees"] = False
         if self.hull is not None:
             answer["hull_volume"] = self.hull.volume
-        if self.inclusive is not None and self.total is not None:
+        if self.orientations is not None:
             answer["orientations"] = self.orientations
-            answer["inclusive_mesh"] = output.mesh_json(self.inclusive)
-            answer["total_mesh"] = output.mesh_json(self.total)
-        if self.held is not None:
-            answer["held_volume"] = self.held.held_volume
-            answer["held_mesh"] = output.mesh_json(self.held.solid)
-            if self.held.factor is not None:
-                answer["held_factor"] = self.held.factor
+        answer |= {key: output.mesh_json(mesh) for key, mesh in meshes.items() if mesh is not None}
+        if self.carrying is not None:
+            answer["held_volume"] = self.carrying.held_volume
+            answer["held_mesh"] = output.mesh_json(self.carrying.solid)
+            if self.carrying.factor is not None:
+                answer["held_factor"] = self.carrying.factor
         if self.capability is not None:
             answer["orientation_capability"] = self.capability
         if self.accessible is not None:
@@ -283,43 +270,38 @@ class WorkspaceMeasures:
     def as_lines(self) -> Iterator[str]:
         """Yield the measures as lines of text."""
         design, nodes, volume = self.case.design, self.case.paper_nodes, self.case.volume
-        remarks = {"node_volume": f"{nodes.count} nodes at multiples of {nodes.step:.6g}"}
-        volumes: list[tuple[str, float, str]] = []
+        rows: list[tuple[str, float, str]] = []
         others: list[tuple[str, str]] = []
-        measured = measure_design(self.case, measures_in("workspace"))
-        for name, value in measured.values.items():
+        for name, value in self.measured.items():
             measure = CATALOGUE[name]
             if measure.power == CATALOGUE["volume"].power:
-                volumes.append((measure.heading, value or 0.0, remarks.get(name, "")))
+                remark = f"{nodes.count} nodes at multiples of {nodes.step:.6g}"
+                remark = remark if name == "node_volume" else ""
+                rows.append((measure.heading, value or 0.0, remark))
             elif name not in _IN_REMARK:
-                text = f"{output.measure_text(measure, value)} {measure.unit_in('units')}"
-                others.append((measure.heading, text.rstrip()))
-        volumes += self._volumes_of_meshes()
+                text = "none" if value is None else output.figure(value)
+                others.append((measure.heading, f"{text} {measure.unit_in('units')}".rstrip()))
+        rows += self._volumes_of_meshes()
         accessible = self.accessible
         if accessible is not None:
             remark = f"{accessible.accessible_node_count} of {accessible.node_count} nodes"
             title = CATALOGUE["accessible_volume"].heading
-            volumes.append((title, accessible.accessible_volume, remark))
+            rows.append((title, accessible.accessible_volume, remark))
         cubic = (0.1 * design.unit_mm) ** 3
-        rows = [("", "units³", "cm³", "")]
-        rows += [
-            (name, output.figure(v), output.figure(v * cubic), remark)
-            for name, v, remark in volumes
-        ]
-        yield output.table(rows, "<>><")
+        cells = [(name, output.figure(v), output.figure(v * cubic), text) for name, v, text in rows]
+        yield output.table([("", "units³", "cm³", ""), *cells], "<>><")
         if others:
             yield output.table(others, "<<")
-        extent = self._extent()
-        if extent is not None:
+        if self.extent is not None:
             yield from ("", "extent of the nodes")
-            for axis, low, high in zip("xyz", *extent, strict=True):
+            for axis, low, high in zip("xyz", *self.extent.tolist(), strict=True):
                 yield f"  {axis}  {output.figure(low)} to {output.figure(high)}"
         if volume.empty_because:
             yield from ("", f"empty because of {', '.join(volume.empty_because)}")
         if volume.gradient:
-            rates = [("moves with", "units² (yaw: units³ a radian)")]
-            rates += [(name, output.figure(rate)) for name, rate in volume.gradient.items()]
-            yield from ("", output.table(rates, "<>"))
+            rates = [(name, output.figure(rate)) for name, rate in volume.gradient.items()]
+            head = ("moves with", "units² (yaw: units³ a radian)")
+            yield from ("", output.table([head, *rates], "<>"))
         if self.capability is not None:
             yield from ("", f"orientation capability {100.0 * self.capability:.2f} %")
         if accessible is not None:
@@ -340,11 +322,11 @@ class WorkspaceMeasures:
             if solid is not None:
                 remark = f"{self.orientations} orientations, {_mesh_remark(solid)}"
                 yield name, solid.volume, remark
-        if self.held is not None:
-            remark = _mesh_remark(self.held.solid)
-            if self.held.factor is not None:
-                remark += f"; {self.held.factor:.3g} of load and payload is held somewhere"
-            yield "that holds the load", self.held.held_volume, remark
+        if self.carrying is not None:
+            remark = _mesh_remark(self.carrying.solid)
+            if self.carrying.factor is not None:
+                remark += f"; {self.carrying.factor:.3g} of load and payload is held somewhere"
+            yield "that holds the load", self.carrying.held_volume, remark
 
 
 def _mesh_remark(solid: Solid) -> str:

@@ -1,4 +1,4 @@
-"""Elements of HTML and SVG as trees.
+"""Elements of HTML and SVG as trees, and blocks as such elements.
 
 A report consists of elements only, whose text is escaped: no name in a design file can become
 markup. Looks are classes of `style.css`.
@@ -6,11 +6,17 @@ markup. Looks are classes of `style.css`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 from unicodedata import category
 from xml.etree.ElementTree import Element, tostring
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.measures.blocks import block as kinds
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
 
 Piece: TypeAlias = "Element | str | float | None"
@@ -29,22 +35,14 @@ def element(tag: str, *pieces: Piece, **attributes: str | float | None) -> Eleme
             words = value if isinstance(value, str) else coordinate(value)
             result.set(name.rstrip("_").replace("_", "-"), printable(words))
     for piece in pieces:
-        add(result, piece)
+        child = number(piece) if isinstance(piece, float | int) else piece
+        if isinstance(child, Element):
+            result.append(child)
+        elif child is not None and len(result):
+            result[-1].tail = (result[-1].tail or "") + printable(child)
+        elif child is not None:
+            result.text = (result.text or "") + printable(child)
     return result
-
-
-def add(parent: Element, piece: Piece) -> None:
-    """Append a piece to an element: an element, text, or a number."""
-    if piece is None:
-        return
-    if isinstance(piece, float | int):
-        piece = number(piece)
-    if isinstance(piece, Element):
-        parent.append(piece)
-    elif len(parent):
-        parent[-1].tail = (parent[-1].tail or "") + printable(piece)
-    else:
-        parent.text = (parent.text or "") + printable(piece)
 
 
 def printable(text: str) -> str:
@@ -66,6 +64,24 @@ def coordinate(value: float) -> str:
     return "0" if text == "-0" else text
 
 
+def path_of(points: FloatArray, end: str = "Z") -> str:
+    """Return points (n, 2) as the data of a path, a polygon unless `end` is empty."""
+    return "M" + "L".join(f"{coordinate(x)},{coordinate(y)}" for x, y in points.tolist()) + end
+
+
+def line(ends: ArrayLike, class_: str | None = None, *, stroke: str | None = None) -> Element:
+    """Return a straight line of a drawing between two points, shape (2, 2)."""
+    (x1, y1), (x2, y2) = np.asarray(ends).tolist()
+    return element("line", x1=x1, y1=y1, x2=x2, y2=y2, class_=class_, stroke=stroke)
+
+
+def drawing_text(
+    words: str, x: float, y: float, class_: str = "small", *, anchor: str | None = None
+) -> Element:
+    """Return words that start at (x, y) in a drawing; `anchor` may be their "middle" or "end"."""
+    return element("text", words, x=x, y=y, class_=class_, text_anchor=anchor)
+
+
 def number(value: float, digits: int = 6) -> Element:
     """Return an element with a rounded number, whose `value` is the number in full."""
     return figure(format_number(value, digits), value)
@@ -79,27 +95,14 @@ def figure(text: str, value: float) -> Element:
 def percentage(share: float) -> Element:
     """Return an element with a share in per cent to one decimal."""
     value = 100.0 * share
-    return element("span", element("data", format_decimals(value, 1), value=repr(value)), " %")
+    return element("span", figure(format_decimals(value, 1), value), " %")
 
 
-def drawing_text(
-    words: str, x: float, y: float, *, anchor: str = "middle", class_: str = "small"
-) -> Element:
-    """Return words in a drawing; `anchor` says whether (x, y) is their middle, start or end."""
-    return element("text", words, x=x, y=y, class_=class_, text_anchor=anchor)
-
-
-def ends(low: float, high: float) -> Cell:
-    """Return the pieces of a range of numbers."""
-    return number(low), " to ", number(high)
-
-
-def range_of(values: Sequence[float], unit: str, digits: int = 4) -> Cell:
+def range_of(values: Sequence[float], unit: str = "", digits: int = 6) -> tuple[Piece, ...]:
     """Return one number that all values are, or the least and the largest, with their unit."""
     low, high = min(values), max(values)
-    if low == high:
-        return number(low, digits), f" {unit}"
-    return number(low, digits), " to ", number(high, digits), f" {unit}"
+    least = () if low == high else (number(low, digits), " to ")
+    return *least, number(high, digits), unit
 
 
 def vector(values: Sequence[float], digits: int = 3) -> tuple[Piece, ...]:
@@ -114,7 +117,7 @@ def whole(value: int) -> Element:
 
 
 def table(
-    heads: Sequence[str], rows: Iterable[Sequence[Cell]], *, align: str, caption: Piece = None
+    heads: Sequence[str], rows: Iterable[Sequence[Cell]], align: str, caption: Piece = None
 ) -> Element:
     """Return a table.
 
@@ -125,7 +128,7 @@ def table(
         caption: Caption above the table.
     """
 
-    def line(tag: str, cells: Sequence[Cell]) -> Element:
+    def row_of(tag: str, cells: Sequence[Cell]) -> Element:
         row = element("tr")
         for index, (cell, side) in enumerate(zip(cells, align, strict=True)):
             pieces = cell if isinstance(cell, Sequence) and not isinstance(cell, str) else (cell,)
@@ -138,8 +141,8 @@ def table(
     return element(
         "table",
         None if caption is None else element("caption", caption),
-        element("thead", line("th", heads)) if heads else None,
-        element("tbody", *(line("td", row) for row in rows)),
+        element("thead", row_of("th", heads)) if heads else None,
+        element("tbody", *(row_of("td", row) for row in rows)),
     )
 
 
@@ -151,3 +154,83 @@ def paragraph(*pieces: Piece, class_: str | None = None) -> Element:
 def illustration(drawing: Element, *caption: Piece) -> Element:
     """Return a figure: a drawing with its caption."""
     return element("figure", drawing, element("figcaption", *caption))
+
+
+def elements(blocks: Iterable[kinds.Block]) -> Iterator[Element]:
+    """Yield blocks as elements; hints of tables are printed in their captions."""
+    for block in blocks:
+        match block:
+            case kinds.Statement(title, words, look):
+                between = (": ",) if title and words else ()
+                pieces = (*pieces_of(title), *between, *pieces_of(words))
+                yield paragraph(*pieces, class_="note" if look in ("close", "beyond") else None)
+            case kinds.Facts(title, facts, hint):
+                rows = [(fact.name, pieces_of(fact.words), _remark(fact)) for fact in facts]
+                yield table((), rows, "<><", _caption(title, hint))
+            case kinds.Table():
+                columns = [_column(column) for column in block.columns]
+                heads, aligns, cells = zip(*columns, strict=True)
+                rows = zip(*cells, strict=True)
+                yield table(heads, rows, "".join(aligns), _caption(block.title, block.hint))
+            case kinds.Split(title, names, shares, hint):
+                rows = zip(names, map(_share, shares), strict=True)
+                yield table((), rows, "<>", _caption(title, hint))
+
+
+def pieces_of(words: kinds.Words) -> tuple[Piece, ...]:
+    """Return words as pieces, their numbers as elements with the number in full."""
+    pieces: list[Piece] = []
+    for part in kinds.parts_of(words):
+        match part:
+            case str():
+                pieces.append(part)
+            case kinds.Number():
+                pieces += figure(part.text, part.value), part.unit
+            case kinds.Vector():
+                for text, value in zip(part.texts, part.values, strict=True):
+                    pieces += figure(text, value), ", "
+                pieces[-1] = part.unit
+            case kinds.Share():
+                pieces += _share(part.value)
+    return tuple(pieces)
+
+
+def _remark(fact: kinds.Fact) -> tuple[Piece, ...]:
+    between = "; " if fact.remark and fact.hint else ""
+    return (*pieces_of(fact.remark), between, element("span", fact.hint, class_="dim"))
+
+
+def _share(share: float | None) -> tuple[Piece, ...]:
+    words = kinds.Share(share).text(1)
+    return (words,) if share is None else (figure(words, 100.0 * share),)
+
+
+def _caption(title: str, hint: str) -> Element:
+    return element("span", title, element("span", hint, class_="hint") if hint else None)
+
+
+def _column(
+    column: kinds.Names | kinds.Column | kinds.Shares | kinds.Bars,
+) -> tuple[str, str, Sequence[Cell]]:
+    """Return the head of a column, the letter of its alignment, and its cells."""
+    match column:
+        case kinds.Names():
+            return column.head, "<", [pieces_of(words) for words in column.words]
+        case kinds.Column():
+            return kinds.head_of(column), ">", [*_numbers(column)]
+        case kinds.Shares(head, values):
+            return head, ">", [_share(value) for value in values]
+        case kinds.Bars(lengths, _):
+            return "", "<", [_bar(length) for length in lengths]
+
+
+def _numbers(column: kinds.Column) -> Iterator[Cell]:
+    for text, value, (before, unit) in zip(column.texts, column.values, column.around, strict=True):
+        written = figure(text, value) if math.isfinite(value) else text
+        yield written if column.has_one_unit else (before, written, unit)
+
+
+def _bar(length: float) -> Element:
+    """Return a bar whose length is a share of the longest one."""
+    bar = element("rect", x=0.0, y=0.0, width=100.0 * length, height=7.0)
+    return element("svg", bar, class_="bar", viewBox="0 0 100 7", preserveAspectRatio="none")

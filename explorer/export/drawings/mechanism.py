@@ -1,19 +1,22 @@
-"""The mechanism as a line drawing: base, guide, four legs, platform, and the flags' colours.
+"""The mechanism as a line drawing, and the views of space on paper that drawings share.
 
-Each element of the two flags has the colour of the incidence that it is part of, as in the
-page: a1 and the platform that of δ1, the guide and the line b2b3 that of δ2, b4 and the base
-that of δ3.
+Paper has y downwards. Each element of the two flags has the colour of the incidence that it is
+part of, as in the page: a1 and the platform that of δ1, the guide and the line b2b3 that of δ2, b4
+and the base that of δ3.
 """
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from explorer.export.drawings.markup import coordinate, drawing_text, element
-from explorer.export.drawings.projection import Projection, ViewName, fit_view, labels
+from explorer.export.drawings.markup import coordinate, drawing_text, element, line, path_of
 from explorer.legs.clearance import leg_axes
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import verdict
@@ -21,6 +24,10 @@ from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import css, proximity_colour
+
+ViewName = Literal["isometric", "front", "side", "top"]
+Frame: TypeAlias = tuple[float, float, float, float]
+"""Left, top, right and bottom of a rectangle on paper."""
 
 WIDTH = 720.0
 # The share of a leg that is cylinder.
@@ -31,22 +38,121 @@ ROOM = 30.0
 SHEET_HEIGHT, LEAD_HEIGHT = 640.0, 430.0
 # The least width and height of a view's cell.
 LEAST_CELL = 210.0
+# From the target towards the eye, as the page's camera.
+_FROM = np.array([0.72, -1.0, 0.62])
+# The size of a letter of a label, and the distances and directions at which labels are tried.
+_LETTER, _HEIGHT = 6.4, 12.0
+_DIRECTIONS = np.radians((45, 135, -45, -135, 90, -90, 0, 180))
+_PLACES = np.array([*itertools.product((13.0, 19.0, 26.0), _DIRECTIONS)])
+_ALONG = np.linspace(0.0, 1.0, 25)[:, None]
+
+
+def _axes(name: ViewName) -> FloatArray:
+    """Return right, up and towards the eye, in rows, shape (3, 3)."""
+    x, y, z = np.eye(3)
+    if name == "isometric":
+        toward = _FROM / np.linalg.norm(_FROM)
+        right = np.cross(z, toward)
+        right /= np.linalg.norm(right)
+        return np.array([right, np.cross(toward, right), toward])
+    right, up = {"top": (x, y), "front": (x, z), "side": (y, z)}[name]
+    return np.array([right, up, np.cross(right, up)])
+
+
+@dataclass(frozen=True)
+class Projection:
+    """A view, scaled and moved to its place on paper.
+
+    Attributes:
+        axes: Right, up and towards the eye, in rows, shape (3, 3).
+        scale: Points of paper per design unit.
+        offset: Position of the origin of space on paper, shape (2,).
+    """
+
+    axes: FloatArray
+    scale: float
+    offset: FloatArray
+
+    def to(self, points: FloatArray) -> FloatArray:
+        """Return points (..., 3) on paper, shape (..., 2)."""
+        flat = points @ self.axes[:2].T * self.scale
+        return flat * np.array([1.0, -1.0]) + self.offset
+
+    def depth(self, points: FloatArray) -> FloatArray:
+        """Return the nearness of points (..., 3) to the eye, in design units, shape (...)."""
+        return np.asarray(points @ self.axes[2])
+
+
+def extents(name: ViewName, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return lows and highs of points (n, 3) to the right and up in a view, each (2,)."""
+    flat = points @ _axes(name)[:2].T
+    return flat.min(axis=0), flat.max(axis=0)
+
+
+def fit_view(
+    name: ViewName, points: FloatArray, frame: Frame, scale: float | None = None
+) -> Projection:
+    """Return the view in which points (n, 3) fill a frame, in its middle.
+
+    Args:
+        name: Name of the view.
+        points: Points to show, shape (n, 3).
+        frame: Frame on paper.
+        scale: Points of paper per design unit; the largest that fits if None.
+    """
+    lows, highs = extents(name, points)
+    corners = np.array(frame).reshape(2, 2)
+    if scale is None:
+        # Points that coincide have no size to fit.
+        spans = np.maximum(highs - lows, 1e-9 * float(np.abs(points).max()) or 1.0)
+        scale = float((np.ptp(corners, axis=0) / spans).min())
+    middle = 0.5 * (lows + highs) * scale * np.array([1.0, -1.0])
+    return Projection(_axes(name), scale, corners.mean(axis=0) - middle)
+
+
+def labels(
+    names: Sequence[tuple[str, FloatArray]], lines: Sequence[FloatArray], within: Frame
+) -> Iterator[Element]:
+    """Yield labels of points, each where it covers least.
+
+    Args:
+        names: Words of each label and its point, shape (2,).
+        lines: Straight lines to keep clear, by their ends, each of shape (2, 2).
+        within: Frame of the labels.
+    """
+    distance, angle = _PLACES.T
+    taken = [np.concatenate([point - 4.5, point + 4.5]) for _, point in names]
+    covered = np.concatenate([a + _ALONG * (b - a) for a, b in lines])
+    for name, point in names:
+        size = np.array([_LETTER * len(name) + 4.0, _HEIGHT])
+        aside = np.cos(angle) * (distance + 0.5 * size[0] - 4.0)
+        middle = point + np.stack([aside, -np.sin(angle) * distance], axis=-1)
+        low, high = (middle + sign * 0.5 * size for sign in (-1.0, 1.0))
+        boxes, lows, highs = np.array(taken), low[:, None], high[:, None]
+        common = np.minimum(highs, boxes[:, 2:]) - np.maximum(lows, boxes[:, :2])
+        overlap = np.maximum(common, 0.0).prod(axis=-1).sum(axis=-1)
+        inside = ((covered > lows) & (covered < highs)).all(axis=-1).sum(axis=-1)
+        beyond = np.concatenate([within[:2] - low, high - within[2:], np.zeros_like(low)], axis=1)
+        cost = overlap + 4.0 * inside + 50.0 * beyond.max(axis=1) + 0.4 * distance
+        best = int(cost.argmin())
+        taken.append(np.concatenate([low[best], high[best]]))
+        x, y = float(middle[best, 0]), float(high[best, 1]) - 2.5
+        yield drawing_text(name, x, y, "label", anchor="middle")
 
 
 def points_to_show(snapshot: Snapshot) -> FloatArray:
     """Return the points that a drawing of a mechanism must show, shape (n, 3)."""
-    return np.concatenate([np.array(_points(snapshot)), _guide(snapshot), _carriages(snapshot)])
+    return np.concatenate([np.array(snapshot.points), _guide(snapshot), _carriages(snapshot)])
 
 
 def cover_drawing(snapshot: Snapshot) -> Element:
     """Return the first picture of a report."""
-    frame = (2 * ROOM, ROOM, WIDTH - 4 * ROOM, LEAD_HEIGHT - 2 * ROOM)
+    frame = (2.0 * ROOM, ROOM, WIDTH - 2.0 * ROOM, LEAD_HEIGHT - ROOM)
     view = fit_view("isometric", points_to_show(snapshot), frame)
-    box = (0.0, 0.0, WIDTH, LEAD_HEIGHT)
     return svg_drawing(
         LEAD_HEIGHT,
         "The mechanism, seen from above at an angle",
-        element("g", *mechanism(snapshot, view, box)),
+        element("g", *mechanism(snapshot, view, (0.0, 0.0, WIDTH, LEAD_HEIGHT))),
         scale_bar(view, snapshot.design.unit_mm, 4.0, LEAD_HEIGHT - 8.0),
         axes_cross(view, WIDTH - 40.0, LEAD_HEIGHT - 34.0),
     )
@@ -55,8 +161,7 @@ def cover_drawing(snapshot: Snapshot) -> Element:
 def three_views(snapshot: Snapshot) -> Element:
     """Return the mechanism from above, from the front and from the side, at one scale."""
     points = points_to_show(snapshot)
-    wide, deep = (float(extent) for extent in np.ptp(points[:, :2], axis=0))
-    high = float(np.ptp(points[:, 2]))
+    wide, deep, high = np.ptp(points, axis=0).tolist()
     least = 1e-9 * max(wide, deep, high)
     room = 2.0 * ROOM
     scale = min(
@@ -66,28 +171,24 @@ def three_views(snapshot: Snapshot) -> Element:
     left = min(max(scale * wide + room, LEAST_CELL), WIDTH - LEAST_CELL)
     upper, lower = (max(scale * extent + room + 16.0, LEAST_CELL) for extent in (deep, high))
     height = upper + lower
-    cells: tuple[tuple[ViewName, str, float, float, float, float], ...] = (
-        ("top", "From above", 0.0, 0.0, left, upper),
-        ("front", "From the front", 0.0, upper, left, lower),
-        ("side", "From the right", left, upper, WIDTH - left, lower),
+    cells: tuple[tuple[ViewName, str, Frame], ...] = (
+        ("top", "From above", (0.0, 0.0, left, upper)),
+        ("front", "From the front", (0.0, upper, left, height)),
+        ("side", "From the right", (left, upper, WIDTH, height)),
     )
     views: list[Element] = []
-    for name, title, x, y, width, tall in cells:
-        view = fit_view(name, points, (x, y + 16.0, width, tall - 16.0), scale)
-        box = (x, y + 16.0, x + width, y + tall)
-        views.append(element("text", title, x=x + 8.0, y=y + 18.0, class_="title"))
+    for name, title, (x, y, right, bottom) in cells:
+        box = (x, y + 16.0, right, bottom)
+        view = fit_view(name, points, box, scale)
+        views.append(drawing_text(title, x + 8.0, y + 18.0, "title"))
         views.extend(mechanism(snapshot, view, box))
         views.append(axes_cross(view, x + 14.0, y + 62.0, flat=True))
-    lines = element(
-        "path",
-        d=f"M0,{coordinate(upper)}H{coordinate(WIDTH)}M{coordinate(left)},0V{coordinate(height)}",
-        class_="rule",
-    )
+    rules = (((0.0, upper), (WIDTH, upper)), ((left, 0.0), (left, height)))
     view = fit_view("front", points, (0.0, 0.0, 1.0, 1.0), scale)
     return svg_drawing(
         height,
         "The mechanism from above, from the front and from the right, at one scale",
-        lines,
+        *(line(ends, "rule") for ends in rules),
         *views,
         *_key(left + 24.0, 18.0),
         scale_bar(view, snapshot.design.unit_mm, left + 24.0, upper - 18.0),
@@ -106,91 +207,65 @@ def svg_drawing(height: float, title: str, *pieces: Element) -> Element:
     )
 
 
-def mechanism(
-    snapshot: Snapshot, view: Projection, box: tuple[float, float, float, float] | None
-) -> Iterator[Element]:
+def mechanism(snapshot: Snapshot, view: Projection, box: Frame | None) -> Iterator[Element]:
     """Yield the elements of a mechanism, with labels within a box, or without labels if None."""
     points = snapshot.points
     legs = leg_axes(Configuration(snapshot.design, snapshot.pose.position, snapshot.rotation))
-    here = verdict(snapshot)
-    tints = [css(proximity_colour(level)) for level in here.levels]
-    low, high = _guide(snapshot)
-    yield _area(view, [low, high, points.a3], tints[2])
-    yield _line(view, low, high, "rail")
-    yield _line(view, low, high, "flag", stroke=tints[1])
+    tints = [css(proximity_colour(level)) for level in verdict(snapshot).levels]
+    guide, carriages = _guide(snapshot), _carriages(snapshot)
+    yield _area(view, [*guide, points.a3], "base", tints[2])
+    yield line(view.to(guide), "rail")
+    yield line(view.to(guide), "flag", stroke=tints[1])
     stations = np.array([points.b4, points.b2, points.b3])
     along = (stations - points.b4) @ snapshot.rotation[:, 0]
-    ends = stations[along.argmin()], stations[along.argmax()]
-    pieces: list[tuple[float, list[Element]]] = [
-        (float(view.depth(leg).mean()), list(_leg(view, leg))) for leg in legs
-    ]
+    ends = stations[[along.argmin(), along.argmax()]]
+    pieces = [(float(view.depth(leg).mean()), _leg(view, leg)) for leg in legs]
     plate = [
-        _area(view, [*ends, points.b1], tints[0], class_="platform"),
-        _line(view, *ends, "flag", stroke=tints[1]),
+        _area(view, [*ends, points.b1], "platform", tints[0]),
+        line(view.to(ends), "flag", stroke=tints[1]),
     ]
     pieces.append((float(view.depth(np.array([*ends, points.b1])).mean()), plate))
     for _, elements in sorted(pieces, key=lambda piece: piece[0]):
         yield from elements
-    for station in _carriages(snapshot):
-        x, y = view.to(station).tolist()
+    for x, y in view.to(carriages).tolist():
         yield element("rect", x=x - 5.0, y=y - 5.0, width=10.0, height=10.0, class_="carriage")
-    yield _dot(view, points.a1, 5.0, "joint", fill=tints[0])
-    yield _dot(view, points.a3, 4.2, "joint")
-    for ball in (points.b1, points.b2, points.b3):
-        yield _dot(view, ball, 4.2, "ball")
-    yield _dot(view, points.b4, 5.0, "ball", fill=tints[2])
+    dots = [(points.a1, 5.0, "joint", tints[0]), (points.a3, 4.2, "joint", None)]
+    dots += [(ball, 4.2, "ball", None) for ball in (points.b1, points.b2, points.b3)]
+    for point, radius, look, fill in (*dots, (points.b4, 5.0, "ball", tints[2])):
+        x, y = view.to(np.asarray(point)).tolist()
+        yield element("circle", cx=x, cy=y, r=radius, class_=look, fill=fill)
     if box is not None:
-        named = [(name, view.to(np.asarray(point))) for name, point in points._asdict().items()]
-        named += [
-            (name, view.to(station))
-            for name, station in zip(("d1", "d3"), _carriages(snapshot), strict=True)
-        ]
-        lines = [(view.to(a), view.to(b)) for a, b in [*legs, (low, high), ends]]
-        yield element("g", *labels(named, lines, box))
+        places = {**points._asdict(), **dict(zip(("d1", "d3"), carriages, strict=True))}
+        named = [(name, view.to(np.asarray(point))) for name, point in places.items()]
+        yield element("g", *labels(named, [view.to(ends) for ends in (*legs, guide, ends)], box))
 
 
 def scale_bar(view: Projection, unit_mm: float, x: float, y: float) -> Element:
     """Return a scale bar of a round length, labelled in design units and millimetres."""
     length = round_length(130.0 / view.scale)
-    end = x + length * view.scale
     path = (
         f"M{coordinate(x)},{coordinate(y - 4.0)}v8M{coordinate(x)},{coordinate(y)}"
-        f"H{coordinate(end)}m0,-4v8"
+        f"h{coordinate(length * view.scale)}m0,-4v8"
     )
     words = f"{format_number(length, 6)} units = {format_number(length * unit_mm, 6)} mm"
-    return element(
-        "g",
-        element("path", d=path, class_="bar"),
-        element("text", words, x=x, y=y - 7.0, class_="small"),
-    )
+    return element("g", element("path", d=path, class_="bar"), drawing_text(words, x, y - 7.0))
 
 
 def round_length(length: float) -> float:
     """Return the largest of 1, 2 and 5 times a power of ten that is not above a length."""
-    power = 10.0 ** np.floor(np.log10(length))
-    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= length))
+    power = 10.0 ** math.floor(math.log10(length))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length)
 
 
 def axes_cross(view: Projection, x: float, y: float, *, flat: bool = False) -> Element:
     """Return the axes of the base; of a flat view only those in its plane."""
     axes = element("g", class_="axes")
-    for name, axis in zip("xyz", np.eye(3), strict=True):
-        dx, dy = ((view.to(axis) - view.to(np.zeros(3))) / view.scale).tolist()
-        if flat and np.hypot(dx, dy) < 0.5:
-            continue
-        end_x, end_y = x + 22.0 * dx, y + 22.0 * dy
-        axes.append(element("line", x1=x, y1=y, x2=end_x, y2=end_y))
-        axes.append(drawing_text(name, x + 30.0 * dx, y + 30.0 * dy + 3.5))
+    for name, (right, up) in zip("xyz", view.axes[:2].T.tolist(), strict=True):
+        if not flat or math.hypot(right, up) >= 0.5:
+            axes.append(line(((x, y), (x + 22.0 * right, y - 22.0 * up))))
+            at = x + 30.0 * right, y - 30.0 * up + 3.5
+            axes.append(drawing_text(name, *at, anchor="middle"))
     return axes
-
-
-def path_of(points: FloatArray) -> str:
-    """Return a closed polygon (n, 2) as the data of a path."""
-    return "M" + "L".join(f"{coordinate(x)},{coordinate(y)}" for x, y in points.tolist()) + "Z"
-
-
-def _points(snapshot: Snapshot) -> Sequence[FloatArray]:
-    return [np.asarray(point) for point in snapshot.points]
 
 
 def _carriages(snapshot: Snapshot) -> FloatArray:
@@ -205,54 +280,42 @@ def _guide(snapshot: Snapshot) -> FloatArray:
     return np.array([[min(stations) - beyond, 0, 0], [max(stations) + beyond, 0, 0]])
 
 
-def _leg(view: Projection, leg: FloatArray) -> Iterator[Element]:
-    start, end = leg
-    middle = start + CYLINDER * (end - start)
-    yield _line(view, start, end, "casing")
-    yield _line(view, start, middle, "casing thick")
-    yield _line(view, start, end, "rod")
-    yield _line(view, start, middle, "cylinder")
+def _leg(view: Projection, leg: FloatArray) -> list[Element]:
+    ends = view.to(leg)
+    cylinder = view.to(np.array([leg[0], leg[0] + CYLINDER * (leg[1] - leg[0])]))
+    return [
+        line(ends, "casing"),
+        line(cylinder, "casing thick"),
+        line(ends, "rod"),
+        line(cylinder, "cylinder"),
+    ]
 
 
-def _line(
-    view: Projection, start: FloatArray, end: FloatArray, class_: str, stroke: str | None = None
-) -> Element:
-    (x1, y1), (x2, y2) = view.to(start).tolist(), view.to(end).tolist()
-    return element("line", x1=x1, y1=y1, x2=x2, y2=y2, class_=class_, stroke=stroke)
-
-
-def _area(
-    view: Projection, corners: Sequence[FloatArray], fill: str, class_: str = "base"
-) -> Element:
+def _area(view: Projection, corners: Sequence[FloatArray], class_: str, fill: str) -> Element:
     return element("path", d=path_of(view.to(np.array(corners))), class_=class_, fill=fill)
-
-
-def _dot(
-    view: Projection, point: FloatArray, radius: float, class_: str, fill: str | None = None
-) -> Element:
-    x, y = view.to(np.asarray(point)).tolist()
-    return element("circle", cx=x, cy=y, r=radius, class_=class_, fill=fill)
 
 
 def _key(x: float, y: float) -> Iterator[Element]:
     """Yield the key to the signs of the drawings."""
-    yield element("text", "Key", x=x, y=y, class_="title")
-    leg = [
-        element("line", x1=x, y1=0.0, x2=x + length, y2=0.0, class_=name)
+    yield drawing_text("Key", x, y, "title")
+    leg = (
+        line(((x, 0.0), (x + length, 0.0)), name)
         for name, length in (("rod", 18.0), ("cylinder", 10.0))
-    ]
-    carriage = element("rect", x=x + 4.0, y=-5.0, width=10.0, height=10.0, class_="carriage")
+    )
     joint, ball = (
         element("circle", cx=x + 9.0, cy=0.0, r=4.2, class_=name) for name in ("joint", "ball")
     )
     entries = (
         (joint, "universal joint, on the base"),
-        (carriage, "carriage on the guide: d1, d3"),
+        (
+            element("rect", x=x + 4.0, y=-5.0, width=10.0, height=10.0, class_="carriage"),
+            "carriage on the guide: d1, d3",
+        ),
         (ball, "ball joint, on the platform"),
         (element("g", *leg), "leg: cylinder and rod"),
     )
     for index, (sign, words) in enumerate(entries):
-        line = y + 22.0 + 20.0 * index
-        sign.set("transform", f"translate(0 {coordinate(line)})")
+        level = y + 22.0 + 20.0 * index
+        sign.set("transform", f"translate(0 {coordinate(level)})")
         yield sign
-        yield element("text", words, x=x + 28.0, y=line + 4.0, class_="small")
+        yield drawing_text(words, x + 28.0, level + 4.0)

@@ -7,32 +7,34 @@ other measures, limits on swings and collisions of legs are outlined on a fine g
 
 from __future__ import annotations
 
+import cmath
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from explorer.export.drawings.markup import coordinate, element
-from explorer.export.drawings.mechanism import path_of, round_length
+from explorer.export.drawings.markup import coordinate, drawing_text, element, line, path_of
+from explorer.export.drawings.mechanism import WIDTH, round_length, svg_drawing
 from explorer.legs.clearance import leg_clearances
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.margins import margins
+from explorer.mechanism.margins import margins, planes_of_singularity
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, WARN_SHARE, css
-from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.limits.table import bounds_angles
-from explorer.workspace.position_bands import PositionBands, position_bands
-from explorer.workspace.slices.level_loops import level_loops
-from explorer.workspace.slices.outline import AXES, Edge, Outline, slice_outline
+from explorer.workspace.position_bands import MEASURE_WORDS, PositionBands, position_bands
+from explorer.workspace.slices.outline import AXES, Edge, Outline, level_loops, slice_outline
 
+# The space around a map that has ticks, and between maps.
+LEFT, RIGHT, TOP, BOTTOM = 42.0, 12.0, 26.0, 38.0
+MOST_HEIGHT = 290.0
+_TICKS, _SLICES = 5, 6
 # The longer side of a workspace in the drawing's own coordinates.
 OWN_SIZE = 1000.0
 # Cells of a grid on the longer side; those of the condition number take long.
@@ -93,11 +95,6 @@ class Slices:
         """Whether outlines are arcs and lines, rather than those of a grid."""
         return not bounds_angles(self.design)
 
-    def area(self, axis: str, level: float) -> float | None:
-        """Return the exact area of a slice, in squared design units; None with cones."""
-        outline = self.outline(axis, level)
-        return None if outline is None else outline.area
-
     def outline(self, axis: str, level: float) -> Outline | None:
         """Return the exact outline of a slice; None with cones."""
         return slice_outline(self.design, self.rotation, axis, level)
@@ -119,19 +116,15 @@ class Slices:
                 (n, 2), filled by the even-odd rule; () to mark none.
         """
         lows, scale = self.lows[in_plane(axis)], self.own_scale
-
-        def to_map(points: FloatArray) -> FloatArray:
-            return (points - lows) * scale
-
-        data = self._outline_data(axis, level, to_map)
+        data = self._outline_data(axis, level)
         if not data:
             return element("g")
         filled = element("g", clip_path=f"url(#{name})")
 
         def add(polygons: Iterable[FloatArray], **look: str) -> None:
-            paths = [path_of(to_map(polygon)) for polygon in polygons]
+            paths = "".join(path_of((polygon - lows) * scale) for polygon in polygons)
             if paths:
-                filled.append(element("path", d="".join(paths), **look))
+                filled.append(element("path", d=paths, **look))
 
         first, *others = self.bands.colours
         add([self._corners(axis)], fill=css(first))
@@ -140,10 +133,9 @@ class Slices:
             add(beyond(edge), fill=css(colour), fill_rule="evenodd")
         if self.bands.measure == "margin":
             last, furthest = self.bands.edges[-1], self.bands.levels[-1]
-            for number in range(1, CONTOURS):
-                level_of_margin = number * self.contour_step
-                if level_of_margin > furthest:
-                    add(beyond(last * level_of_margin / furthest), class_="contour")
+            for margin in self.contour_step * np.arange(1.0, CONTOURS):
+                if margin > furthest:
+                    add(beyond(last * float(margin) / furthest), class_="contour")
         add(
             not_accessible,
             fill=css(NOT_ACCESSIBLE),
@@ -152,12 +144,11 @@ class Slices:
             class_="is-blocked",
         )
         if any(self.design.limits.leg_radii):
-            grid = self._grid(axis, level, CELLS)
-            clearance = leg_clearances(
-                Configuration(self.design, grid.points, self.rotation)
-            ).clearance
+            columns, rows, points = self._grid(axis, level, CELLS)
+            configuration = Configuration(self.design, points, self.rotation)
+            least = leg_clearances(configuration).clearance.min(axis=-1)
             add(
-                level_loops(grid.columns, grid.rows, -clearance.min(axis=-1), 0.0),
+                level_loops(columns, rows, -least, 0.0),
                 fill=css(OUTLINE),
                 fill_rule="evenodd",
                 class_="is-colliding",
@@ -165,16 +156,16 @@ class Slices:
         clip = element("clipPath", element("path", d=data, clip_rule="evenodd"), id=name)
         return element("g", clip, filled, element("path", d=data, class_="edge"))
 
-    def _outline_data(self, axis: str, level: float, to_map: ToMap) -> str:
+    def _outline_data(self, axis: str, level: float) -> str:
         """Return the outline of a slice as the data of a path; "" if the slice is empty."""
+        lows, scale = self.lows[in_plane(axis)], self.own_scale
         outline = self.outline(axis, level)
         if outline is not None:
-            return "".join(_loop(loop, to_map, self.own_scale) for loop in outline.loops)
-        grid = self._grid(axis, level, CELLS)
-        slack = slacks(constraints(self.design, self.rotation), grid.points).min(axis=-1)
-        return "".join(
-            path_of(to_map(loop)) for loop in level_loops(grid.columns, grid.rows, slack, 0.0)
-        )
+            return "".join(_loop_data(loop, lows, scale) for loop in outline.loops)
+        columns, rows, points = self._grid(axis, level, CELLS)
+        slack = slacks(constraints(self.design, self.rotation), points).min(axis=-1)
+        loops = level_loops(columns, rows, slack, 0.0)
+        return "".join(path_of((loop - lows) * scale) for loop in loops)
 
     def _corners(self, axis: str) -> FloatArray:
         (u0, v0), (u1, v1) = self.lows[in_plane(axis)], self.highs[in_plane(axis)]
@@ -190,8 +181,8 @@ class Slices:
             unit = self.bands.levels[-1] / self.bands.edges[-1]
             return lambda value: self._beyond_margin(axis, level, value * unit)
         is_slow = self.bands.measure == "condition"
-        grid = self._grid(axis, level, CONDITION_CELLS if is_slow else CELLS)
-        field = self._signed(grid.points.reshape(-1, 3)).reshape(grid.points.shape[:2])
+        columns, rows, points = self._grid(axis, level, CONDITION_CELLS if is_slow else CELLS)
+        field = self._signed(points.reshape(-1, 3)).reshape(points.shape[:2])
         index = AXES.index(axis)
 
         def loops(value: float, sign: float) -> list[FloatArray]:
@@ -199,7 +190,7 @@ class Slices:
                 return sign * self._signed(np.insert(points, index, level, axis=1))
 
             refine = None if is_slow else field_at
-            return level_loops(grid.columns, grid.rows, sign * field, value, refine)
+            return level_loops(columns, rows, sign * field, value, refine)
 
         return lambda value: [*loops(value, 1.0), *loops(value, -1.0)]
 
@@ -224,7 +215,10 @@ class Slices:
             else:
                 yield polygon
 
-    def _grid(self, axis: str, level: float, cells: int) -> _Grid:
+    def _grid(
+        self, axis: str, level: float, cells: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return columns (n,), rows (m,) and points (m, n, 3) of a grid, all ascending."""
         lows, sides = self.lows[in_plane(axis)], (self.highs - self.lows)[in_plane(axis)]
         many = np.maximum(2.0, np.rint(cells * sides / sides.max())).astype(int) + 1
         columns, rows = (
@@ -234,15 +228,7 @@ class Slices:
         points = np.full((len(rows), len(columns), 3), level)
         first, second = in_plane(axis)
         points[..., first], points[..., second] = columns, rows[:, None]
-        return _Grid(columns, rows, points)
-
-
-class _Grid(NamedTuple):
-    """A grid of positions on a slice: columns (n,), rows (m,), points (m, n, 3), all ascending."""
-
-    columns: FloatArray
-    rows: FloatArray
-    points: FloatArray
+        return columns, rows, points
 
 
 def in_plane(axis: str) -> list[int]:
@@ -250,37 +236,27 @@ def in_plane(axis: str) -> list[int]:
     return [index for index, name in enumerate(AXES) if name != axis]
 
 
-ToMap: TypeAlias = Callable[[FloatArray], FloatArray]
-"""The conversion of points from design units to the own coordinates of a map."""
+def _loop_data(loop: tuple[Edge, ...], lows: FloatArray, scale: float) -> str:
+    """Return a closed loop of edges as the data of a path, scaled from the lows of a map."""
 
+    def text(point: tuple[float, float]) -> str:
+        x, y = ((np.array(point) - lows) * scale).tolist()
+        return f"{coordinate(x)},{coordinate(y)}"
 
-def _text(point: ArrayLike, to_map: ToMap) -> str:
-    """Return a point as coordinates of a path."""
-    x, y = to_map(np.asarray(point)).tolist()
-    return f"{coordinate(x)},{coordinate(y)}"
-
-
-def _loop(loop: tuple[Edge, ...], to_map: ToMap, scale: float) -> str:
-    """Return a closed loop of edges as the data of a path."""
-    data = [f"M{_text(loop[0].start, to_map)}"]
+    data = [f"M{text(loop[0].start)}"]
     for edge in loop:
         if edge.centre is None:
-            data.append(f"L{_text(edge.end, to_map)}")
+            data.append(f"L{text(edge.end)}")
             continue
         radius = coordinate(edge.radius * scale)
         arc = f"A{radius},{radius} 0 0 {int(edge.turn > 0.0)}"
         if abs(edge.turn) > math.pi - 1e-6:
             # An arc of a path must be less than a whole circle: two halves are plain.
-            data.append(f"{arc} {_text(_middle(edge), to_map)}")
-        data.append(f"{arc} {_text(edge.end, to_map)}")
+            centre, start = complex(*edge.centre), complex(*edge.start)
+            middle = centre + (start - centre) * cmath.exp(0.5j * edge.turn)
+            data.append(f"{arc} {text((middle.real, middle.imag))}")
+        data.append(f"{arc} {text(edge.end)}")
     return "".join((*data, "Z"))
-
-
-def _middle(edge: Edge) -> FloatArray:
-    centre = np.array(edge.centre)
-    x, y = np.array(edge.start) - centre
-    c, s = math.cos(0.5 * edge.turn), math.sin(0.5 * edge.turn)
-    return centre + np.array([c * x - s * y, s * x + c * y])
 
 
 def _clip(polygon: FloatArray, values: FloatArray) -> FloatArray:
@@ -293,3 +269,151 @@ def _clip(polygon: FloatArray, values: FloatArray) -> FloatArray:
         if b >= 0.0:
             corners.append(polygon[k])
     return np.array(corners) if len(corners) > 2 else np.zeros((0, 2))
+
+
+def slices_through(slices: Slices, position: Sequence[float], name: str = "slice") -> Element:
+    """Return the three maps of the slices through a position, side by side at one scale.
+
+    Args:
+        slices: The slices.
+        position: The position, shape (3,), in design units.
+        name: First part of the names of the maps, unique in the document.
+    """
+    spans = (slices.highs - slices.lows).tolist()
+    wide, high = 2.0 * spans[0] + spans[1], max(spans[1], spans[2])
+    scale = min((WIDTH - 3.0 * (LEFT + RIGHT)) / wide, MOST_HEIGHT / high)
+    maps: list[Element] = []
+    left = 0.5 * (WIDTH - 3.0 * (LEFT + RIGHT) - scale * wide)
+    for axis in ("z", "y", "x"):
+        first, second = in_plane(axis)
+        level = float(position[AXES.index(axis)])
+        x, y = left + LEFT, TOP + scale * spans[second]
+        maps.append(_place(slices, axis, level, x, y, scale, f"{name}-{axis}"))
+        for k, low, across in ((first, x, y), (second, y, x)):
+            ends = float(slices.lows[k]), float(slices.highs[k])
+            maps.append(ruler(AXES[k], ends, low, scale, across=across, up=k == second))
+        u, v = (float(position[k] - slices.lows[k]) * scale for k in (first, second))
+        maps.extend(cross(x + u, y - v))
+        title = f"{axis} = {format_number(level, 4)}"
+        maps.append(drawing_text(title, x, TOP - 10.0, "title"))
+        left += LEFT + scale * spans[first] + RIGHT
+    return svg_drawing(TOP + BOTTOM + scale * high, "Three slices of the workspace", *maps)
+
+
+def slice_strip(slices: Slices) -> tuple[Element, list[tuple[float, float | None]]]:
+    """Return maps of slices at even steps along x, and the level and area of each."""
+    spans = (slices.highs - slices.lows).tolist()
+    width = WIDTH / _SLICES
+    scale = min((width - 10.0) / spans[1], 200.0 / spans[2])
+    bottom = TOP + scale * spans[2]
+    maps: list[Element] = []
+    areas: list[tuple[float, float | None]] = []
+    for index in range(_SLICES):
+        level = float(slices.lows[0] + spans[0] * (index + 0.5) / _SLICES)
+        middle = (index + 0.5) * width
+        left = middle - 0.5 * scale * spans[1]
+        maps.append(_place(slices, "x", level, left, bottom, scale, f"strip-{index}"))
+        title = f"x = {format_number(level, 4)}"
+        maps.append(drawing_text(title, middle, 16.0, "title", anchor="middle"))
+        outline = slices.outline("x", level)
+        areas.append((level, None if outline is None else outline.area))
+    return svg_drawing(bottom + 6.0, "Slices along x", *maps), areas
+
+
+def legend(slices: Slices, unit_mm: float) -> Element:
+    """Return the legend of the colours of maps, of the smallest margin or of another measure."""
+    bands, step, left, pieces = slices.bands, 46.0, 130.0, list[Element]()
+    colours, levels = bands.colours, bands.levels
+    title, rows = "smallest margin", [("units", 1.0), ("mm", unit_mm)]
+    words = MEASURE_WORDS.get(bands.measure)
+    if words is not None:
+        title, rows = words[0], [words[1:]]
+        # Of these, less is better; the last band goes on without end.
+        colours, levels = colours[::-1], (0.0, *levels[:0:-1])
+        left += 30.0
+    pieces.append(drawing_text(title, left - 12.0, 15.0, anchor="end"))
+    for row, (unit, factor) in enumerate(rows):
+        y = 33.0 + 14.0 * row
+        pieces.append(drawing_text(unit, left - 12.0, y, anchor="end"))
+        for index, level in enumerate(levels):
+            number = format_number(level * factor, 3)
+            pieces.append(drawing_text(number, left + step * index, y, anchor="middle"))
+    for index, colour in enumerate(colours):
+        x = left + step * index
+        pieces.append(element("rect", x=x, y=4.0, width=step, height=14.0, fill=css(colour)))
+    if any(slices.design.limits.leg_radii):
+        x = left + step * len(colours) + 18.0
+        pieces.append(element("rect", x=x, y=4.0, width=14.0, height=14.0, fill=css(OUTLINE)))
+        pieces.append(drawing_text("legs collide", x + 19.0, 15.0))
+    return svg_drawing(24.0 + 14.0 * len(rows), "The colours of the maps", *pieces)
+
+
+def _place(
+    slices: Slices, axis: str, level: float, x: float, y: float, scale: float, name: str
+) -> Element:
+    """Return a map with its lows at (x, y) on paper, at a scale in points per design unit."""
+    group = slices.map(axis, level, name)
+    group.set("transform", map_transform(scale / slices.own_scale, x, y))
+    return group
+
+
+def map_transform(size: float, x: float, y: float) -> str:
+    """Return the transform that puts a map's lows at (x, y), at a size in points per own point."""
+    return f"matrix({size:.6g} 0 0 {-size:.6g} {x:.6g} {y:.6g})"
+
+
+def cross(x: float, y: float) -> tuple[Element, Element]:
+    """Return a cross with its middle at (x, y), over its own light rim."""
+    data = f"M{coordinate(x - 5)},{coordinate(y)}h10m-5,-5v10"
+    rim, sign = (element("path", d=data, class_=look) for look in ("cross casing", "cross"))
+    return rim, sign
+
+
+def ruler(
+    title: str,
+    ends: tuple[float, float],
+    start: float,
+    scale: float,
+    *,
+    across: float,
+    up: bool,
+    whole: bool = False,
+    grid: float = 0.0,
+    words: Callable[[float], str] = lambda value: format_number(value, 5),
+) -> Element:
+    """Return an axis with ticks at round numbers, below a map or to its left.
+
+    Args:
+        title: Words beside the axis; "" for none.
+        ends: Values at the lowest and the highest end.
+        start: Place of the lowest end on paper, along the axis.
+        scale: Points of paper per unit of the values.
+        across: Place of the axis on paper, across it.
+        up: Whether the axis goes up, at the left of the map.
+        whole: Whether ticks are at whole numbers only.
+        grid: Length of the line that each tick has across the map.
+        words: Words for the value of a tick.
+    """
+    low, high = ends
+    step = round_length((high - low) / _TICKS * 1.6)
+    if whole:
+        step = max(1.0, float(math.ceil(step)))
+    axis = element("g", class_="ruler")
+    way = -1.0 if up else 1.0
+
+    def put(along: float, off: float) -> tuple[float, float]:
+        return (across - off, along) if up else (along, across + off)
+
+    end = start + way * scale * (high - low)
+    axis.append(line((put(start, 0.0), put(end, 0.0))))
+    for tick in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1):
+        at = start + way * scale * (tick * step - low)
+        if grid:
+            axis.append(line((put(at, 0.0), put(at, -grid)), "grid"))
+        axis.append(line((put(at, 0.0), put(at, 4.0))))
+        place = put(at + 3.5, 7.0) if up else put(at, 15.0)
+        axis.append(drawing_text(words(tick * step), *place, anchor="end" if up else "middle"))
+    place = put(0.5 * (start + end) + (3.5 if up else 0.0), 30.0)
+    if title:
+        axis.append(drawing_text(title, *place, "axis", anchor="middle"))
+    return axis

@@ -6,30 +6,21 @@ has a minimum: then no visible face covers another, and the drawing is exact.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+import operator
 from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from explorer.export.drawings.markup import coordinate, element
-from explorer.export.drawings.mechanism import (
-    ROOM,
-    WIDTH,
-    axes_cross,
-    mechanism,
-    path_of,
-    points_to_show,
-    scale_bar,
-    svg_drawing,
-)
-from explorer.export.drawings.projection import Projection, extents, fit_view
+from explorer.export.drawings import mechanism as drawings
+from explorer.export.drawings.markup import element, path_of
+from explorer.export.drawings.mechanism import ROOM, WIDTH, Projection
 from explorer.export.drawings.slices import Slices
 from explorer.measures.snapshot import Snapshot
 from explorer.singularity.colours import css, mix
 from explorer.workspace.limits.constraints import HalfSpace
-from explorer.workspace.solids.booleans import cut_solid
-from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solid import Solid, cut_solid
 
 MOST_HEIGHT = 380.0
 
@@ -42,28 +33,28 @@ def workspace_views(snapshot: Snapshot, solid: Solid, slices: Slices) -> Element
         solid: Mesh of its workspace, not empty.
         slices: Slices of the same workspace.
     """
-    points = np.concatenate([points_to_show(snapshot), solid.vertices])
-    lows, highs = extents("isometric", points)
+    points = np.concatenate([drawings.points_to_show(snapshot), solid.vertices])
+    lows, highs = drawings.extents("isometric", points)
     half = 0.5 * WIDTH
     wide, high = (highs - lows).tolist()
     scale = min((half - 2.0 * ROOM) / wide, (MOST_HEIGHT - 2.0 * ROOM) / high)
     height = scale * high + 2.0 * ROOM
-    whole = fit_view("isometric", points, (0.0, 0.0, half, height), scale)
-    opened = fit_view("isometric", points, (half, 0.0, half, height), scale)
+    whole = drawings.fit_view("isometric", points, (0.0, 0.0, half, height), scale)
+    opened = drawings.fit_view("isometric", points, (half, 0.0, WIDTH, height), scale)
     level = snapshot.pose.position[1]
     cut = cut_solid(solid, HalfSpace("cut", np.array([0.0, -1.0, 0.0]), -level))
     pieces = [
-        element("g", *mechanism(snapshot, whole, None)),
+        element("g", *drawings.mechanism(snapshot, whole, None)),
         element("g", shaded_faces(solid, whole), opacity="0.66"),
         visible_edges(solid, whole),
-        scale_bar(whole, snapshot.design.unit_mm, 4.0, height - 6.0),
-        axes_cross(whole, half - 40.0, height - 30.0),
+        drawings.scale_bar(whole, snapshot.design.unit_mm, 4.0, height - 6.0),
+        drawings.axes_cross(whole, half - 40.0, height - 30.0),
     ]
     if not cut.is_empty:
         pieces += [shaded_faces(cut, opened), visible_edges(cut, opened)]
     pieces.append(_on_cut(slices, level, opened))
-    pieces.append(element("g", *mechanism(snapshot, opened, None), opacity="0.9"))
-    return svg_drawing(height, "The workspace, whole and cut open", *pieces)
+    pieces.append(element("g", *drawings.mechanism(snapshot, opened, None), opacity="0.9"))
+    return drawings.svg_drawing(height, "The workspace, whole and cut open", *pieces)
 
 
 def _on_cut(slices: Slices, level: float, view: Projection) -> Element:
@@ -88,45 +79,29 @@ def shaded_faces(solid: Solid, view: Projection) -> Element:
     """Return the visible faces of a solid, shaded by their angle to the light."""
     corners = solid.vertices[solid.faces]
     normals = _mesh(solid).face_normals
-    seen = np.flatnonzero(normals @ view.toward > 0.0)
+    seen = np.flatnonzero(normals @ view.axes[2] > 0.0)
     order = seen[np.argsort(view.depth(corners[seen].mean(axis=1)), kind="stable")]
     light = _LIGHT / np.linalg.norm(_LIGHT)
     facing = 0.5 + 0.5 * (normals[order] @ view.axes.T @ light)
-    shades = np.rint(facing * (_SHADES - 1)).astype(int).tolist()
-    flat = view.to(corners[order])
+    shades = np.rint(facing * (_SHADES - 1)).tolist()
     group = element("g", class_="faces")
-    last, data = -1, list[str]()
-    for shade, triangle in zip(shades, flat, strict=True):
-        if shade != last and data:
-            group.append(_faces(last, data))
-            data = []
-        last = shade
-        data.append(path_of(triangle))
-    if data:
-        group.append(_faces(last, data))
+    shaded = zip(shades, map(path_of, view.to(corners[order])), strict=True)
+    for shade, faces in itertools.groupby(shaded, key=operator.itemgetter(0)):
+        colour = css(mix(_DARK, _PALE, shade / (_SHADES - 1)))
+        data = "".join(face for _, face in faces)
+        group.append(element("path", d=data, fill=colour, stroke=colour))
     return group
 
 
 def visible_edges(solid: Solid, view: Projection) -> Element:
     """Return the visible edges: those between two limits, and the silhouette."""
-    return element("path", d="".join(_edges(solid, view)), class_="edge")
-
-
-def _faces(shade: int, data: list[str]) -> Element:
-    colour = css(mix(_DARK, _PALE, shade / (_SHADES - 1)))
-    return element("path", d="".join(data), fill=colour, stroke=colour)
-
-
-def _edges(solid: Solid, view: Projection) -> Iterator[str]:
     mesh = _mesh(solid)
-    facing = mesh.face_normals @ view.toward > 0.0
+    facing = mesh.face_normals @ view.axes[2] > 0.0
     one, other = mesh.face_adjacency.T
     differs = solid.limit_of_face[one] != solid.limit_of_face[other]
     drawn = (facing[one] & facing[other] & differs) | (facing[one] != facing[other])
-    flat = view.to(solid.vertices)
-    for a, b in mesh.face_adjacency_edges[drawn].tolist():
-        (x1, y1), (x2, y2) = flat[a].tolist(), flat[b].tolist()
-        yield (f"M{coordinate(x1)},{coordinate(y1)}L{coordinate(x2)},{coordinate(y2)}")
+    ends = view.to(solid.vertices[mesh.face_adjacency_edges[drawn]])
+    return element("path", d="".join(path_of(edge, "") for edge in ends), class_="edge")
 
 
 def _mesh(solid: Solid) -> Any:

@@ -12,78 +12,47 @@ from typing import TypeVar
 
 import numpy as np
 
-from explorer.errors import ExplorerError
+from explorer.errors import ExplorerError, NoAnswerError
 from explorer.export.simulation import DENSITY
-from explorer.measures.catalogue import measures_in
+from explorer.measures.catalogue import Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import Snapshot, evaluate
-from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Payload, Tool
-from explorer.mechanism.pose import Pose
-from explorer.optimise.record import Record
+from explorer.optimise.outcome import Record
 from explorer.prototype.assembly import Bill, bill_of_materials, make_prototype
 from explorer.statics.compliance import largest_deflection
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.workspace.accessible.workspace import AccessibleWorkspace, accessible_workspace
 from explorer.workspace.carried_region import CarriedRegion
-from explorer.workspace.slices.volume import NodeCount, Volume
+from explorer.workspace.slices.volume import NodeCount
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import workspace_solid
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Missing:
-    """A value that could not be computed.
-
-    Attributes:
-        reason: Reason, in one line.
-    """
-
-    reason: str
-
-
-def compute(function: Callable[[], T]) -> T | Missing:
+def compute(function: Callable[[], T]) -> T | ExplorerError:
     """Return the value of a function, or why it cannot be computed."""
     try:
         return function()
     except ExplorerError as error:
-        return Missing(str(error))
+        return error
 
 
-@dataclass(frozen=True)
-class ReportData:
+@dataclass
+class ReportData(Case):
     """The data of a report: a design in a pose and its workspace at that orientation.
 
     Attributes:
-        case: Design and pose, as the catalogue measures them.
         record: Record of the search that found the design; None without one.
     """
 
-    case: Case
-    record: Record | None
-
-    @property
-    def design(self) -> Design:
-        """The design."""
-        return self.case.design
-
-    @property
-    def unit_mm(self) -> float:
-        """Millimetres per design unit."""
-        return self.design.unit_mm
-
-    @property
-    def volume(self) -> Volume:
-        """The exact volume of the workspace."""
-        return self.case.volume
+    record: Record | None = None
 
     @property
     def is_home(self) -> bool:
         """Whether the pose is the home pose."""
-        return self.case.at == self.design.home_pose
+        return self.at == self.design.home_pose
 
     @property
     def pose_words(self) -> str:
@@ -93,50 +62,50 @@ class ReportData:
     @cached_property
     def measured(self) -> Measurements:
         """Measures of the catalogue that the report lists."""
-        return measure_design(self.case, measures_in("report"))
+        return measure_design(self, measures_in("report"))
 
     @cached_property
     def snapshot(self) -> Snapshot:
         """Values of the design in the pose."""
-        return evaluate(self.design, self.case.at)
+        return evaluate(self.design, self.at)
 
     @cached_property
-    def nodes(self) -> NodeCount | Missing:
+    def counted(self) -> NodeCount | ExplorerError:
         """Nodes of the workspace, counted as in the paper."""
-        return compute(lambda: self.case.paper_nodes)
+        return compute(lambda: self.paper_nodes)
 
     @cached_property
-    def solid(self) -> Solid | Missing:
+    def solid(self) -> Solid | ExplorerError:
         """Mesh of the workspace."""
         if self.volume.volume <= 0.0:
-            return Missing("the workspace is empty")
-        return compute(lambda: workspace_solid(self.design, self.case.rotation, volume=self.volume))
+            return NoAnswerError("the workspace is empty")
+        return compute(lambda: workspace_solid(self.design, self.rotation, volume=self.volume))
 
     @cached_property
-    def accessible(self) -> AccessibleWorkspace | Missing | None:
+    def accessible(self) -> AccessibleWorkspace | ExplorerError | None:
         """Accessible part of the workspace; None where all legs have zero radius."""
         if not any(self.design.limits.leg_radii):
             return None
-        at = self.case.at
-        return compute(lambda: accessible_workspace(self.design, at.rotation, start=at.position))
+        start = self.at.position
+        return compute(lambda: accessible_workspace(self.design, self.rotation, start=start))
 
     @property
     def loaded(self) -> LoadedPose:
         """The pose under the payload's weight and its force of any direction."""
-        return LoadedPose(self.design, self.case.at)
+        return LoadedPose(self.design, self.at)
 
     @property
     def has_machine(self) -> bool:
         """Whether the design has a tool, a payload or a limit of a force."""
         has_load = self.design.tool != Tool() or self.design.payload != Payload()
-        return has_load or self.case.is_limited
+        return has_load or self.has("is_limited")
 
     @cached_property
-    def held(self) -> CarriedRegion | Missing | None:
+    def carried(self) -> CarriedRegion | ExplorerError | None:
         """Part of the workspace that holds the payload; None without a payload or limits."""
-        if not (self.case.is_loaded and self.case.is_limited):
+        if not (self.has("is_loaded") and self.has("is_limited")):
             return None
-        return compute(lambda: self.case.held)
+        return compute(lambda: self.carried_region)
 
     @cached_property
     def precision(self) -> ToolPrecision | None:
@@ -145,7 +114,7 @@ class ReportData:
         The load is the payload's weight, and its force in the direction that moves the tool most.
         """
         weighed = ToolPrecision(self.loaded)
-        if not (weighed.has_errors or self.case.is_elastic):
+        if not (weighed.has_errors or self.has("is_elastic")):
             return None
         force = self.design.payload.force_n
         _, worst = largest_deflection(weighed.compliance, weighed.wrench, force)
@@ -155,20 +124,6 @@ class ReportData:
         return ToolPrecision(replace(weighed.loaded, load=(x, y, z, 0.0, 0.0, 0.0)))
 
     @cached_property
-    def bill(self) -> Bill | Missing:
+    def bill(self) -> Bill | ExplorerError:
         """Bill of the prototype's parts."""
         return compute(lambda: bill_of_materials(make_prototype(self.design), DENSITY))
-
-
-def gather_report_data(
-    design: Design, pose: Pose | None = None, record: Record | None = None
-) -> ReportData:
-    """Return the data of a report, which are computed when they are read.
-
-    Args:
-        design: The manipulator.
-        pose: Pose of the platform, whose orientation is that of the workspace; the home pose if
-            None.
-        record: Record of the search that found the design.
-    """
-    return ReportData(Case(design, pose=pose), record)

@@ -1,39 +1,39 @@
-"""The report as one HTML page: title block, sections, and the commands that reproduce it."""
+"""The report as one HTML page: title block, sections, the search, and how to reproduce it."""
 
 from __future__ import annotations
 
 import datetime as dt
+import json
+import math
 import shlex
 from collections.abc import Callable, Iterable, Iterator
 from hashlib import sha256
 from xml.etree.ElementTree import Element
 
+import msgspec
+import numpy as np
+
 from explorer import __version__
-from explorer.export.drawings.markup import (
-    Piece,
-    as_html,
-    element,
-    illustration,
-    number,
-    paragraph,
-    table,
-    whole,
-)
-from explorer.export.drawings.mechanism import cover_drawing
-from explorer.export.report.data import Missing, ReportData
-from explorer.export.report.loads import loads_section, precision_section
-from explorer.export.report.mechanism import mechanism_section, parts_section
-from explorer.export.report.search import claims_section, search_section
-from explorer.export.report.singularity import legs_section, singularity_section
-from explorer.export.report.workspace import workspace_section
+from explorer.errors import ExplorerError
+from explorer.export.drawings import markup
+from explorer.export.drawings.markup import Piece, Row, element, paragraph, whole
+from explorer.export.drawings.mechanism import WIDTH, cover_drawing, svg_drawing
+from explorer.export.drawings.slices import ruler
+from explorer.export.report import mechanism, workspace
+from explorer.export.report.data import ReportData
 from explorer.files.packaged import packaged_file, versions
 from explorer.measures.blocks import source as sources
 from explorer.measures.catalogue import CATALOGUE
-from explorer.mechanism.design_file import encode_design
-from explorer.numerics.number_text import format_number
+from explorer.mechanism.design import VARIABLES
+from explorer.mechanism.design_file import PRESETS, encode_design
+from explorer.numerics.number_text import format_number, power_of_ten
+from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Record, curves_of
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.accessible.workspace import AccessibleWorkspace
 
+# The height of the charts of the search, and the space around each.
+HEIGHT = 190.0
+LEFT, RIGHT, TOP, BOTTOM = 52.0, 14.0, 26.0, 36.0
 # The page may fetch nothing.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
@@ -63,7 +63,7 @@ def report_html(data: ReportData, date: dt.date) -> str:
         pieces = list(section(data))
         if pieces:
             body.append(element("section", *pieces))
-    return f"<!DOCTYPE html>\n{as_html(element('html', head, body, lang='en-GB'))}\n"
+    return f"<!DOCTYPE html>\n{markup.as_html(element('html', head, body, lang='en-GB'))}\n"
 
 
 def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
@@ -74,11 +74,12 @@ def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
     particulars = (
         ("Date", element("time", date.isoformat(), datetime=date.isoformat())),
         ("Made by", f"Flagged 4-4 explorer {__version__}"),
-        ("Unit", f"1 unit = {format_number(data.unit_mm, 6)} mm"),
+        ("Unit", f"1 unit = {format_number(data.design.unit_mm, 6)} mm"),
         ("Design file, SHA-256", element("span", f"{code[:16]}…", title=code)),
     )
     yield element("dl", *(_entry(*each) for each in particulars), class_="particulars")
-    yield illustration(cover_drawing(data.snapshot), f"The mechanism in {data.pose_words}.")
+    caption = f"The mechanism in {data.pose_words}."
+    yield markup.illustration(cover_drawing(data.snapshot), caption)
     yield element("dl", *(_entry(*each) for each in _headline(data)), class_="headline")
 
 
@@ -96,54 +97,195 @@ def _entry(name: Piece, *pieces: Piece) -> Element:
 
 
 def _headline(data: ReportData) -> Iterator[tuple[Piece, ...]]:
-    unit, snapshot = data.unit_mm, data.snapshot
+    snapshot, reach = data.snapshot, data.design.reach * data.design.unit_mm
     for name, value in data.measured.values.items():
         measure = CATALOGUE[name]
         title = f"{measure.heading[:1].upper()}{measure.heading[1:]}"
         if value is None:
             yield title, "infinite" if name in data.measured.infinite else "–"
-        elif name == "node_volume" and not isinstance(data.nodes, Missing):
-            count = element("span", whole(data.nodes.count), " nodes")
-            yield title, number(value), _unit("units³, "), count
+        elif name == "node_volume" and not isinstance(data.counted, ExplorerError):
+            count = element("span", whole(data.counted.count), " nodes")
+            yield title, value, _unit("units³, "), count
         else:
-            yield title, number(value), _unit(measure.unit_in("units"))
-    yield "Reach", number(data.design.reach * unit, 4), _unit("mm")
-    margin = snapshot.proximity * data.design.reach
-    yield "Smallest margin |δ| here", number(margin * unit, 4), _unit("mm")
-    yield "Inverse condition here", number(snapshot.inverse_condition, 4), _unit("of 1")
-    clearance = float(snapshot.clearances.clearance.min())
-    yield "Least clearance here", number(clearance * unit, 4), _unit("mm")
+            yield title, value, _unit(measure.unit_in("units"))
+    yield "Reach", markup.number(reach, 4), _unit("mm")
+    yield "Smallest margin |δ| here", markup.number(snapshot.proximity * reach, 4), _unit("mm")
+    yield (
+        "Inverse condition here",
+        markup.number(float(snapshot.inverse_condition), 4),
+        _unit("of 1"),
+    )
+    clearance = float(snapshot.clearances.clearance.min()) * data.design.unit_mm
+    yield "Least clearance here", markup.number(clearance, 4), _unit("mm")
 
 
 def _unit(words: str) -> Element:
     return element("span", f" {words}")
 
 
+def search_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on the search that found the design; nothing without a record."""
+    record = data.record
+    if record is None:
+        return
+    yield element("h2", "Optimisation")
+    run, problem = record.runs[record.chosen], record.problem
+    if record.design.variables != data.design.variables:
+        words = "The design of this report is not the one that this search found."
+        yield paragraph(words, class_="note")
+    yield paragraph(f"{run.message[:1].upper()}{run.message[1:].rstrip('.')}.")
+    drawn = charts(record)
+    if drawn is not None:
+        words = "The search from the chosen start, by iterations; dashed lines are the demands."
+        yield markup.illustration(drawn, words)
+    best = next((step for step in record.history if step.number == run.best), None)
+    rows: list[Row] = [
+        ("objective", problem.objective.replace("-", " ")),
+        ("status", run.status),
+    ]
+    if problem.demands.volume is not None:
+        rows.append(("demanded volume, units³", problem.demands.volume))
+    if best is not None:
+        value = "infinite" if best.objective is None else best.objective
+        rows.append((OBJECTIVE_SYMBOLS[problem.objective], value))
+        rows.append(("volume, units³", best.volume))
+    rows += [
+        ("iterations", whole(run.iterations)),
+        ("evaluations", whole(run.evaluations)),
+        ("starts", whole(record.settings.starts)),
+        ("seed", whole(record.settings.seed)),
+        ("time, s", record.seconds),
+    ]
+    if run.holding:
+        rows.append(("held by", run.holding))
+    names = [*((element("b", name),) for name in VARIABLES), (element("b", "|a3|"), " reach")]
+    before, after = ((*each.variables, each.reach) for each in (problem.start, record.design))
+    changes = [(*row, row[2] - row[1]) for row in zip(names, before, after, strict=True)]
+    heads = ("units", "start", "optimum", "change")
+    yield element(
+        "div",
+        markup.table((), rows, "<>", "The search"),
+        markup.table(heads, changes, "<>>>", "The design"),
+        class_="pair",
+    )
+    if drawn is None:
+        yield paragraph("No iterate was recorded.")
+
+
+def charts(record: Record) -> Element | None:
+    """Return the charts of the chosen start; None if it has no iterates."""
+    steps = [step for step in record.history if step.run == record.chosen]
+    if not steps:
+        return None
+    curves = curves_of(record.problem, steps)
+    width = WIDTH / len(curves)
+    drawn: list[Element] = []
+    for index, curve in enumerate(curves):
+        left = index * width + LEFT
+        drawn.append(markup.drawing_text(_title(record, curve), left - 30.0, 13.0, "title"))
+        drawn.extend(_chart(curve, left, width - LEFT - RIGHT))
+    return svg_drawing(HEIGHT, "The search, by iterations", *drawn)
+
+
+def _title(record: Record, curve: Curve) -> str:
+    if curve.kind == "volume":
+        return "Exact volume (units³)"
+    if curve.kind == "spare":
+        return "Worst demand; missed below 0"
+    if curve.powers:
+        return "F = |1 − V / V′|"
+    return f"{OBJECTIVE_SYMBOLS[record.problem.objective].capitalize()} (units)"
+
+
+def _chart(curve: Curve, left: float, width: float) -> Iterator[Element]:
+    """Yield one chart with its axes."""
+    low, high = _range(curve)
+    last = float(max(1, len(curve.values) - 1))
+    bottom, upwards = HEIGHT - BOTTOM, (HEIGHT - TOP - BOTTOM) / (high - low)
+    yield ruler("iteration", (0.0, last), left, width / last, across=bottom, up=False, whole=True)
+    yield ruler(
+        "",
+        (low, high),
+        bottom,
+        upwards,
+        across=left,
+        up=True,
+        whole=curve.powers,
+        grid=width,
+        words=lambda value: power_of_ten(round(value)) if curve.powers else format_number(value, 5),
+    )
+    if curve.level is not None:
+        y = bottom - upwards * (curve.level - low)
+        yield markup.line(((left, y), (left + width, y)), "level")
+    index = np.flatnonzero(np.isfinite(curve.values))
+    x, y = left + width * index / last, bottom - upwards * (curve.values[index] - low)
+    points = np.stack([x, y], axis=-1, dtype=np.float64)
+    if len(index):
+        yield element("path", d=markup.path_of(points, ""), class_="curve")
+    if len(index) <= 60:
+        for x, y in points.tolist():
+            yield element("circle", cx=x, cy=y, r=2.2, class_="point")
+
+
+def _range(curve: Curve) -> tuple[float, float]:
+    values = [*curve.values.tolist(), *([] if curve.level is None else [curve.level])]
+    finite = [value for value in values if math.isfinite(value)] or [0.0]
+    low, high = min(finite), max(finite)
+    if curve.powers:
+        low = math.floor(low)
+        return float(low), float(max(math.ceil(high), low + 1))
+    room = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
+    return low - room, high + room
+
+
+def claims_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on the paper's claims; nothing for designs other than the paper's."""
+    design = data.design
+    if not any(
+        msgspec.structs.replace(preset, name=design.name, unit_mm=design.unit_mm) == design
+        for preset in PRESETS.values()
+    ):
+        return
+    claims = json.loads(packaged_file("claims", "claims.json").read_text("utf-8"))
+    yield element("h2", "The paper’s claims")
+    yield paragraph(
+        "The command explorer reproduce measures them again, with the paper’s words and the values "
+        "behind each verdict. Numbers mark our reading of what the paper leaves open."
+    )
+    readings = list(dict.fromkeys(claim["reading"] for claim in claims if claim["reading"]))
+    numbers = {"": "", None: "", **{reading: str(n) for n, reading in enumerate(readings, start=1)}}
+    rows = [(claim["claim"], claim["verdict"], numbers[claim["reading"]]) for claim in claims]
+    yield markup.table(("claim", "verdict", "our reading"), rows, "<<<")
+    for reading in readings:
+        yield paragraph(f"{numbers[reading]}. {reading}")
+
+
 def _reproduction(data: ReportData) -> Iterator[Element]:
     yield element("h2", "How to reproduce it")
-    name = sources.name_of(data.design)
+    name, record = sources.name_of(data.design), data.record
     where: tuple[Piece, ...] = ("The design is a preset of the explorer. ",)
     if name == sources.DESIGN_FILE:
         where = ("Save the file below as ", element("code", name), ". ")
     yield paragraph(*where, "These commands give the same figures:")
     yield element("pre", "\n".join(_commands(data, shlex.quote(name))), id="commands")
-    if data.record is None:
+    columns = {"this report": versions()}
+    if record is None:
         yield paragraph("Nothing here is random; there is no seed.")
     else:
-        settings = data.record.settings
         yield paragraph(
-            *("The search is the same each time: seed ", whole(settings.seed), ", "),
-            *(whole(settings.starts), " start" if settings.starts == 1 else " starts"),
-            *(" of at most ", whole(settings.iterations), " iterations. "),
+            *("The search is the same each time: seed ", whole(record.settings.seed), ", "),
+            *(
+                whole(record.settings.starts),
+                " start" if record.settings.starts == 1 else " starts",
+            ),
+            *(" of at most ", whole(record.settings.iterations), " iterations. "),
             "Nothing else here is random.",
         )
-    columns = {"this report": versions()}
-    if data.record is not None:
-        columns["the search"] = data.record.versions
+        columns["the search"] = record.versions
     names = dict.fromkeys(name for each in columns.values() for name in each)
     rows = [(name, *(each.get(name, "–") for each in columns.values())) for name in names]
     yield element("h3", "Versions")
-    yield table(("", *columns), rows, align="<" * (1 + len(columns)))
+    yield markup.table(("", *columns), rows, "<" * (1 + len(columns)))
     yield element("h3", "Design file")
     yield paragraph("SHA-256 ", element("code", _hash(data), id="design-hash"), class_="dim")
     yield element("pre", encode_design(data.design).decode(), id="design")
@@ -159,27 +301,26 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
     yield f"explorer workspace --design {source}{turned} --hull{legs}"
     yield sources.pose_source("singularity", design, pose).command
     yield sources.pose_source("interference", design, pose).command
-    loaded = LoadedPose(design, pose)
-    if data.case.is_loaded or data.case.is_limited:
-        yield sources.load_source("forces", loaded).command
+    if data.has("is_loaded") or data.has("is_limited"):
+        yield sources.load_source("forces", LoadedPose(design, pose)).command
     if data.precision is not None:
         yield sources.load_source("accuracy", data.precision.loaded).command
-    if data.held is not None:
+    if data.carried is not None:
         yield f"explorer workspace --design {source}{turned} --load 0 0 0"
-    if not isinstance(data.bill, Missing):
+    if not isinstance(data.bill, ExplorerError):
         yield f"explorer export mechanism --design {source} --out mechanism.zip"
     if data.record is not None:
         yield "explorer optimise --repeat record.json --out data.json"
 
 
 _SECTIONS: tuple[Callable[[ReportData], Iterable[Element]], ...] = (
-    mechanism_section,
-    workspace_section,
-    singularity_section,
-    legs_section,
-    loads_section,
-    precision_section,
-    parts_section,
+    mechanism.mechanism_section,
+    workspace.workspace_section,
+    mechanism.singularity_section,
+    mechanism.legs_section,
+    workspace.loads_section,
+    workspace.precision_section,
+    mechanism.parts_section,
     search_section,
     claims_section,
     _reproduction,

@@ -1,26 +1,28 @@
-"""The sections on the mechanism and its prototype: variables, limits, pose and parts."""
+"""The sections on the mechanism, its singularities, the clearances of its legs, and its parts."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from explorer.export.drawings.markup import (
-    Cell,
-    Row,
-    element,
-    illustration,
-    number,
-    paragraph,
-    table,
-)
+from explorer.errors import ExplorerError
+from explorer.export.drawings import markup
+from explorer.export.drawings.markup import Cell, Row, element, number
 from explorer.export.drawings.mechanism import three_views
-from explorer.export.report.data import Missing, ReportData
+from explorer.export.report.data import ReportData
 from explorer.export.simulation import DENSITY
+from explorer.legs.clearance import PAIRS
+from explorer.measures.blocks import singularity as blocks
+from explorer.measures.blocks.block import Facts, Statement
+from explorer.measures.blocks.clearances import pose_clearances, workspace_clearances
+from explorer.measures.verdict import verdict
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_SHARE
+from explorer.singularity.ellipsoids import performance, singularity_free_ball
+from explorer.workspace.accessible.workspace import AccessibleWorkspace, PairCost
+from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.table import joint_ranges, limits_in_force
 
 _MEANINGS = {
@@ -30,6 +32,7 @@ _MEANINGS = {
     "b1y": "b1 in the platform, across it",
     "b2": "b2 on the platform’s line, from b4",
     "b3": "b3 on the platform’s line, from b4",
+    "|a3|": "reach",
 }
 _JOINTS = {
     "l1": "leg 1, from a1 to b1",
@@ -44,12 +47,12 @@ _JOINTS = {
 def mechanism_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on the mechanism."""
     yield element("h2", "Mechanism")
-    yield paragraph(
+    yield markup.paragraph(
         "A fixed base and a moving platform, joined by four legs with six actuators. Leg 1 starts "
         "at a1 and leg 4 at a3; legs 2 and 3 start at carriages on the guide, the base’s x-axis. "
         "b4 is the platform’s origin."
     )
-    yield illustration(
+    yield markup.illustration(
         three_views(data.snapshot),
         f"The mechanism in {data.pose_words}, in three views at one scale (third angle). "
         "Colours show how near each element of the two flags is to its incidence: "
@@ -61,23 +64,22 @@ def mechanism_section(data: ReportData) -> Iterator[Element]:
     yield _limits(data)
     broken = data.snapshot.violations
     if broken:
-        yield paragraph(f"This pose breaks limits: {'; '.join(map(str, broken))}.", class_="note")
+        words = f"This pose breaks limits: {'; '.join(map(str, broken))}."
+        yield markup.paragraph(words, class_="note")
 
 
 def _lengths(data: ReportData, name: Cell, value: float) -> Row:
     """Return a row with a length in design units and in millimetres."""
-    return name, value, value * data.unit_mm
+    return name, value, value * data.design.unit_mm
 
 
 def _variables(data: ReportData) -> Element:
-    meanings = {**_MEANINGS, "|a3|": "reach"}
     values = (*data.design.variables, data.design.reach)
     rows = [
         _lengths(data, (element("b", name), f" {meaning}"), value)
-        for (name, meaning), value in zip(meanings.items(), values, strict=True)
+        for (name, meaning), value in zip(_MEANINGS.items(), values, strict=True)
     ]
-    heads = ("design variable", "units", "mm")
-    return table(heads, rows, align="<>>", caption="Design variables X")
+    return markup.table(("design variable", "units", "mm"), rows, "<>>", "Design variables X")
 
 
 def _pose(data: ReportData) -> Element:
@@ -86,70 +88,112 @@ def _pose(data: ReportData) -> Element:
         _lengths(data, f"{axis} of b4", value)
         for axis, value in zip("xyz", pose.position, strict=True)
     ]
-    angles = yaw_pitch_roll_from_rotation(data.snapshot.rotation).tolist()
-    for name, angle in zip(("yaw", "pitch", "roll"), angles, strict=True):
-        rows.append((name, (number(angle), "°"), ""))
-    for name, value in zip("wxyz", pose.quaternion, strict=True):
-        rows.append((f"quaternion {name}", value, ""))
-    name = "Home pose" if data.is_home else "Pose"
-    return table(("", "units", "mm"), rows, align="<>>", caption=name)
+    angles = yaw_pitch_roll_from_rotation(data.rotation).tolist()
+    rows += [
+        (name, (number(angle), "°"), "")
+        for name, angle in zip(("yaw", "pitch", "roll"), angles, strict=True)
+    ]
+    rows += [
+        (f"quaternion {name}", value, "")
+        for name, value in zip("wxyz", pose.quaternion, strict=True)
+    ]
+    return markup.table(("", "units", "mm"), rows, "<>>", "Home pose" if data.is_home else "Pose")
 
 
 def _joints(data: ReportData) -> Element:
-    unit = data.unit_mm
     ranges = joint_ranges(data.design)
     rows: list[Row] = []
     for name, value in zip(JOINTS, data.snapshot.joints.tolist(), strict=True):
-        bounds = tuple(end * unit for end in ranges[name]) if name in ranges else ("none", "none")
+        ends = ranges.get(name)
+        bounds = [("none" if ends is None else ends[k] * data.design.unit_mm) for k in (0, 1)]
         rows.append((*_lengths(data, (element("b", name), f" {_JOINTS[name]}"), value), *bounds))
-    return table(
-        ("joint", "units", "mm", "minimum, mm", "maximum, mm"),
-        rows,
-        align="<>>>>",
-        caption=f"Joints in {data.pose_words}, and their limits",
-    )
+    heads = ("joint", "units", "mm", "minimum, mm", "maximum, mm")
+    return markup.table(heads, rows, "<>>>>", f"Joints in {data.pose_words}, and their limits")
 
 
 def _limits(data: ReportData) -> Element:
-    rows: list[Row] = []
-    for symbols, demand in limits_in_force(data.design):
-        words, in_mm = demand.words(), demand.words(data.unit_mm)
-        # Signs and angles have no length.
-        rows.append((symbols, words, in_mm if demand.has_length else ""))
+    # Signs and angles have no length.
+    rows: list[Row] = [
+        (symbols, demand.words(), demand.words(data.design.unit_mm) if demand.has_length else "")
+        for symbols, demand in limits_in_force(data.design)
+    ]
     for leg, radius in enumerate(data.design.limits.leg_radii, 1):
         rows.append(_lengths(data, f"radius of leg {leg}", radius))
-    return table(("limit", "units", "mm"), rows, align="<>>", caption="Limits in force")
+    return markup.table(("limit", "units", "mm"), rows, "<>>", "Limits in force")
+
+
+def singularity_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on singularities."""
+    snapshot, unit = data.snapshot, data.design.unit_mm
+    here = verdict(snapshot)
+    yield element("h2", "Singularities")
+    yield markup.paragraph(f"All values are those in {data.pose_words}.")
+    certified = min(nearest.bound for nearest in snapshot.nearest)
+    regular = (
+        blocks.free_ball(snapshot, singularity_free_ball(data.at), "b4"),
+        blocks.regular_distance(certified, unit),
+    )
+    yield from markup.elements(
+        (
+            Statement(here.title, here.reason(unit), blocks.LOOKS[here.kind]),
+            *blocks.freedoms(snapshot),
+            blocks.margin_table(snapshot),
+            blocks.tetrahedra(snapshot),
+            blocks.conditioning(snapshot),
+            Facts("Around the pose", regular),
+            blocks.nearest_poses(snapshot),
+        )
+    )
+    ellipsoids = blocks.ellipsoids(performance(data.design, data.at), "b4")
+    yield element("div", *markup.elements(ellipsoids), class_="pair")
+
+
+def legs_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on the clearances of the legs."""
+    accessible = data.accessible
+    if isinstance(accessible, AccessibleWorkspace):
+        pairs = accessible.pairs
+    else:
+        least = least_clearances(data.design, data.rotation)
+        rows = zip(PAIRS, least.clearance.tolist(), least.bound.tolist(), strict=True)
+        pairs = [PairCost(*row, blocked_volume=0.0) for row in rows]
+    yield element("h2", "Legs")
+    yield markup.paragraph(
+        f"The first table is of {data.pose_words}. A pair that shares a joint has no clearance."
+    )
+    yield from markup.elements(pose_clearances(data.snapshot))
+    yield from markup.elements(workspace_clearances(pairs, data.design))
 
 
 def parts_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on the prototype."""
     yield element("h2", "Prototype")
     bill = data.bill
-    if isinstance(bill, Missing):
-        yield paragraph(f"Its parts cannot be made: {bill.reason}.", class_="note")
+    if isinstance(bill, ExplorerError):
+        yield markup.paragraph(f"Its parts cannot be made: {bill}.", class_="note")
         return
-    yield paragraph(
+    yield markup.paragraph(
         f"Parts sized from the design, of {format_number(DENSITY, 6)} kg/m³ (printed PLA): ",
         number(bill.mass * 1000.0, 4),
         " g in all.",
     )
     actuators = [
-        (str(leg.leg), *_rounded(*leg.stroke, *leg.required, leg.diameter, leg.mass * 1000.0))
+        (str(leg.leg), *_numbers(*leg.stroke, *leg.required, leg.diameter, leg.mass * 1000.0))
         for leg in bill.actuators
     ]
     parts = [
-        (item.name, *_rounded(*item.size, item.volume / 1000.0, item.mass * 1000.0))
+        (item.name, *_numbers(*item.size, item.volume / 1000.0, item.mass * 1000.0))
         for item in bill.items
     ]
-    yield table(
+    yield markup.table(
         ("leg", "from, mm", "to, mm", "limits from, mm", "to, mm", "Ø, mm", "mass, g"),
         actuators,
-        align="<>>>>>>",
-        caption="Actuators: strokes, and the strokes that the limits require",
+        "<>>>>>>",
+        "Actuators: strokes, and the strokes that the limits require",
     )
     heads = ("part", "x, mm", "y, mm", "z, mm", "volume, cm³", "mass, g")
-    yield table(heads, parts, align="<>>>>>", caption="Bill of parts")
+    yield markup.table(heads, parts, "<>>>>>", "Bill of parts")
 
 
-def _rounded(*values: float) -> list[Element]:
+def _numbers(*values: float) -> list[Element]:
     return [number(value, 4) for value in values]

@@ -1,32 +1,33 @@
-"""The section on the workspace: pictures, slices, volumes, and the limits that bound it."""
+"""The sections on the workspace, on loads and on precision."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import replace
 from xml.etree.ElementTree import Element
 
+import msgspec
 import numpy as np
 
-from explorer.export.drawings.markup import (
-    Cell,
-    Piece,
-    Row,
-    element,
-    ends,
-    illustration,
-    number,
-    paragraph,
-    table,
-    whole,
-)
-from explorer.export.drawings.slice_drawing import legend, slice_strip, slices_through
-from explorer.export.drawings.slices import Slices
+from explorer.errors import ExplorerError
+from explorer.export.drawings import markup
+from explorer.export.drawings.markup import Cell, Piece, Row, element, number, paragraph, whole
+from explorer.export.drawings.slices import Slices, legend, slice_strip, slices_through
 from explorer.export.drawings.workspace_drawing import workspace_views
-from explorer.export.report.data import Missing, ReportData, compute
+from explorer.export.report.data import ReportData, compute
+from explorer.measures.blocks import forces, precision as blocks
+from explorer.measures.blocks.block import Block
 from explorer.measures.catalogue import CATALOGUE
+from explorer.mechanism.machine import Tool
+from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.workspace.solids.booleans import convex_hull
-from explorer.workspace.solids.solid import Solid
+from explorer.singularity.colours import WARN_SHARE
+from explorer.statics.loaded import LoadedPose, WorstForce
+from explorer.workspace.carried_region import CarriedRegion
+from explorer.workspace.position_bands import position_bands
+from explorer.workspace.solids.solid import Solid, convex_hull
 
 
 def workspace_section(data: ReportData) -> Iterator[Element]:
@@ -45,38 +46,39 @@ def workspace_section(data: ReportData) -> Iterator[Element]:
         f"{data.pose_words}. The volume is integrated from exact slices and exact to rounding; ",
         "the node volume is counted as in the paper: grid nodes, boundary included, times step³.",
     )
-    solid = data.solid
-    if isinstance(solid, Missing):
-        yield paragraph(f"There is no picture of it: {solid.reason}", class_="note")
+    solid, bounding = data.solid, None
+    if isinstance(solid, ExplorerError):
+        yield paragraph(f"There is no picture of it: {solid}", class_="note")
     elif solid.is_empty:
         yield paragraph("It is too thin to be drawn.", class_="note")
     else:
         yield from _pictures(data, solid)
+        bounding = _bounds(solid)
     yield _volumes(data)
-    if isinstance(data.accessible, Missing):
-        reason = data.accessible.reason
-        yield paragraph(f"The accessible workspace cannot be computed: {reason}.", class_="note")
-    bounding = _bounding(solid) if isinstance(solid, Solid) and not solid.is_empty else None
-    gradient = _gradient(data) if data.volume.gradient else None
-    yield element("div", element("div", _extent(data), bounding), gradient, class_="pair")
+    if isinstance(data.accessible, ExplorerError):
+        words = f"The accessible workspace cannot be computed: {data.accessible}."
+        yield paragraph(words, class_="note")
+    rates = data.volume.gradient
+    gradient = markup.table(
+        ("with", "units³ per unit; yaw per radian"),
+        [*rates.items()],
+        "<>",
+        "Gradient of the volume",
+    )
+    extent = element("div", _extent(data), bounding)
+    yield element("div", extent, gradient if rates else None, class_="pair")
 
 
 def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
-    extent = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    slices = Slices.of(data.design, data.snapshot.rotation, extent)
-    snapshot = data.snapshot
-    level = format_number(snapshot.pose.position[1], 4)
-    yield illustration(
-        workspace_views(snapshot, solid, slices),
+    slices, position = Slices.of(data.design, data.rotation, solid.ends), data.at.position
+    yield markup.illustration(
+        workspace_views(data.snapshot, solid, slices),
         "The workspace about the mechanism: whole, and cut open at "
-        f"y = {level} with the map of the cut, in the colours of the next figure.",
+        f"y = {format_number(position[1], 4)} with the map of the cut, in the colours of the next "
+        "figure.",
     )
-    yield illustration(
-        element(
-            "div",
-            slices_through(slices, snapshot.pose.position),
-            legend(slices, snapshot.design.unit_mm),
-        ),
+    yield markup.illustration(
+        element("div", slices_through(slices, position), legend(slices, data.design.unit_mm)),
         "Slices through b4 (the cross), axes in design units, coloured by the smallest "
         "of the three margins. ",
         "Outlines are exact arcs and lines; bands are exact too, since margins are linear "
@@ -87,64 +89,65 @@ def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
         number(slices.contour_step),
         " units of it.",
     )
-    drawn, areas = slice_strip(slices, "x")
-    yield illustration(drawn, "Slices along the guide, at one scale, in the same colours.")
+    drawn, areas = slice_strip(slices)
+    caption = "Slices along the guide, at one scale, in the same colours."
+    yield markup.illustration(drawn, caption)
     known = [area for _, area in areas if area is not None]
     if len(known) == len(areas):
-        square = (0.1 * data.unit_mm) ** 2
+        square = (0.1 * data.design.unit_mm) ** 2
         heads = ("slice at", *(f"x = {format_number(x, 4)}" for x, _ in areas))
         rows = [
             ("area, units²", *(number(area, 5) for area in known)),
             ("area, cm²", *(number(area * square, 5) for area in known)),
         ]
-        yield table(heads, rows, align="<" + ">" * len(areas))
+        yield markup.table(heads, rows, "<" + ">" * len(areas))
 
 
 def _volumes(data: ReportData) -> Element:
-    nodes, solid, accessible = data.nodes, data.solid, data.accessible
-    hull = solid if isinstance(solid, Missing) else compute(lambda: convex_hull(solid).volume)
-    remarks: dict[str, Cell] = {}
+    counted, solid, accessible = data.counted, data.solid, data.accessible
     is_exact = data.volume.error <= 1e-6 * data.volume.volume
-    remarks["volume"] = "exact" if is_exact else "to four digits"
-    if not isinstance(nodes, Missing):
-        steps = (" nodes at multiples of ", number(nodes.step), " units")
-        remarks["node_volume"] = (whole(nodes.count), *steps)
+    remarks: dict[str, Cell] = {"volume": "exact" if is_exact else "to four digits"}
+    if not isinstance(counted, ExplorerError):
+        steps = (" nodes at multiples of ", number(counted.step), " units")
+        remarks["node_volume"] = (whole(counted.count), *steps)
     rows: list[Row] = []
 
     def add(name: str, volume: float | None, remark: Cell) -> None:
-        cells = ("–", "–") if volume is None else (volume, volume * (0.1 * data.unit_mm) ** 3)
+        cells = (
+            ("–", "–") if volume is None else (volume, volume * (0.1 * data.design.unit_mm) ** 3)
+        )
         rows.append((name, *cells, remark))
 
     for name, value in data.measured.values.items():
         measure = CATALOGUE[name]
         if measure.power == CATALOGUE["volume"].power:
-            remark = remarks.get(name) or measure.reason(data.case)
-            add(measure.heading, value, remark)
-    if isinstance(hull, Missing):
-        add("convex hull", None, hull.reason)
+            add(measure.heading, value, remarks.get(name) or measure.reason(data))
+    hull = solid if isinstance(solid, ExplorerError) else compute(lambda: convex_hull(solid).volume)
+    if isinstance(hull, ExplorerError):
+        add("convex hull", None, str(hull))
     else:
         add("convex hull", hull, "of the mesh")
-    if accessible is not None and not isinstance(accessible, Missing):
+    if accessible is not None and not isinstance(accessible, ExplorerError):
         count, within = accessible.accessible_node_count, accessible.node_count
-        share: tuple[Piece, ...] = ()
+        share: tuple[Piece, ...] = ("without a collision of legs",)
         if count is not None and within is not None:
-            share = ("; ", whole(count), " of ", whole(within), " nodes")
+            share = (*share, "; ", whole(count), " of ", whole(within), " nodes")
         name = CATALOGUE["accessible_volume"].heading
-        add(name, accessible.accessible_volume, ("without a collision of legs", *share))
-    return table(("volume", "units³", "cm³", ""), rows, align="<>><", caption="Volumes")
+        add(name, accessible.accessible_volume, share)
+    return markup.table(("volume", "units³", "cm³", ""), rows, "<>><", "Volumes")
 
 
 def _extent(data: ReportData) -> Element | None:
-    if isinstance(data.nodes, Missing) or data.nodes.extent is None:
+    if isinstance(data.counted, ExplorerError) or data.counted.extent is None:
         return None
     rows = [
-        (axis, ends(low, high), ends(low * data.unit_mm, high * data.unit_mm))
-        for axis, low, high in zip("xyz", *data.nodes.extent, strict=True)
+        (axis, markup.range_of(ends), markup.range_of([end * data.design.unit_mm for end in ends]))
+        for axis, *ends in zip("xyz", *data.counted.extent, strict=True)
     ]
-    return table(("axis", "units", "mm"), rows, align="<>>", caption="Extent of the counted nodes")
+    return markup.table(("axis", "units", "mm"), rows, "<>>", "Extent of the counted nodes")
 
 
-def _bounding(solid: Solid) -> Element:
+def _bounds(solid: Solid) -> Element:
     corners = solid.vertices[solid.faces]
     size = float(np.ptp(solid.vertices, axis=0).max())
     sides = (corners[:, 1:] - corners[:, :1]) / size
@@ -156,10 +159,189 @@ def _bounding(solid: Solid) -> Element:
         if share > 0.0
     ]
     heads = ("bounded by", "share of the surface")
-    return table(heads, rows, align="<>", caption="Limits that bound it")
+    return markup.table(heads, rows, "<>", "Limits that bound it")
 
 
-def _gradient(data: ReportData) -> Element:
-    heads = ("with", "units³ per unit; yaw per radian")
-    rows = [*data.volume.gradient.items()]
-    return table(heads, rows, align="<>", caption="Gradient of the volume")
+def loads_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on loads; nothing without a tool, a payload and limits of forces."""
+    if not data.has_machine:
+        return
+    yield element("h2", "Loads")
+    yield paragraph(
+        "What the platform carries, what its machine can bear, and what holds the payload: its "
+        "weight, and the force at the tool in its worst direction. Platform and legs count as "
+        f"weightless, and nothing has friction. All values are those in {data.pose_words}.",
+    )
+    yield element("div", _payload(data), _limits(data), class_="pair")
+    yield from markup.elements(_in_the_pose(data))
+    if data.carried is not None and data.volume.volume > 0.0:
+        yield from _over_the_workspace(data, data.carried)
+
+
+def _payload(data: ReportData) -> Element:
+    tool, payload = data.design.tool, data.design.payload
+    rows = _point(data, "tool point", tool.position)
+    if tool.quaternion != Tool().quaternion:
+        rotation = Pose((0.0, 0.0, 0.0), tool.quaternion).rotation
+        angles = yaw_pitch_roll_from_rotation(rotation).tolist()
+        for name, angle in zip(("yaw", "pitch", "roll"), angles, strict=True):
+            rows.append((f"{name} of the tool", (number(angle), "°"), ""))
+    rows.append(("mass of the payload", _amount(payload.mass_kg, "kg"), ""))
+    if payload.mass_kg:
+        rows += _point(data, "payload’s centre", payload.centre)
+    rows.append(("force at the tool, any direction", _amount(payload.force_n, "N"), ""))
+    rows.append(("gravity, along x, y, z of the base", markup.vector(data.design.gravity), ""))
+    caption = "Tool and payload, from b4 in the platform’s axes"
+    return markup.table(("", "units", "mm"), rows, "<>>", caption)
+
+
+def _point(data: ReportData, name: str, point: Triple) -> list[Row]:
+    return [
+        (f"{axis} of the {name}", value, value * data.design.unit_mm)
+        for axis, value in zip("xyz", point, strict=True)
+    ]
+
+
+def _limits(data: ReportData) -> Element:
+    actuators, struts, guide = data.design.actuators, data.design.struts, data.design.guide
+    rows: list[Row] = [
+        (name, "no limit" if six is None else markup.range_of(six, " N", 4))
+        for name, six in (
+            ("push of an actuator, at most", actuators.push_n),
+            ("pull of an actuator, at most", actuators.pull_n or actuators.push_n),
+        )
+    ]
+    if struts.outer_mm is not None:
+        rows.append(("outer diameter of the struts", _amount(struts.outer_mm, "mm")))
+        rows.append(("inner diameter of the struts", _amount(struts.inner_mm, "mm")))
+    if struts.stress_mpa is not None:
+        rows.append(("stress of the struts, at most", _amount(struts.stress_mpa, "MPa")))
+    rows += [
+        ("bending of a strut, at most", _amount(struts.largest_moment, "N m", "no limit")),
+        ("force across the guide, at most", _amount(guide.force_n, "N", "no limit")),
+        ("moment on the guide, at most", _amount(guide.moment_nm, "N m", "no limit")),
+    ]
+    return markup.table((), rows, "<>", "Actuators, struts, and the guide at each carriage")
+
+
+def _in_the_pose(data: ReportData) -> Iterator[Block]:
+    loaded = data.loaded
+    if not loaded.is_regular or (data.has("is_loaded") and data.has("is_limited")):
+        yield forces.verdict(loaded, "payload")
+    if not loaded.is_regular:
+        return
+    if data.has("is_loaded"):
+        yield from forces.reaction_tables(loaded)
+    if data.has("is_limited"):
+        most = forces.largest_loads(loaded)
+        if data.design.payload.force_n:
+            worst = forces.worst_force(worst_payload_force(data), "the payload's force")
+            most = replace(most, facts=(*most.facts, *worst))
+        yield most
+
+
+def worst_payload_force(data: ReportData) -> WorstForce:
+    """Return the direction of the payload's force that uses the largest share of a limit."""
+    payload = msgspec.structs.replace(data.design.payload, force_n=0.0)
+    weighed = msgspec.structs.replace(data.design, payload=payload)
+    return LoadedPose(weighed, data.at).worst_force(data.design.payload.force_n)
+
+
+def _over_the_workspace(
+    data: ReportData, carried: CarriedRegion | ExplorerError
+) -> Iterator[Element]:
+    yield element("h3", "Where the payload is held")
+    if isinstance(carried, ExplorerError):
+        words = f"The volume that holds it cannot be computed: {carried}."
+        yield paragraph(words, class_="note")
+    else:
+        yield _held_volumes(data, carried)
+        if carried.best is not None and carried.factor is not None:
+            yield _best(carried.best, carried.factor)
+    if isinstance(data.solid, Solid) and not data.solid.is_empty:
+        yield _share_slices(data, data.solid)
+    yield paragraph(
+        "Towards a singular plane every force and every share grows without bound, so that no "
+        "machine holds the payload up to it. Positions beyond one, where a margin has another sign "
+        "than at home, do not count as held, whatever their shares: nothing holds the payload on "
+        "the way."
+    )
+
+
+def _held_volumes(data: ReportData, carried: CarriedRegion) -> Element:
+    cubic, entire = (0.1 * data.design.unit_mm) ** 3, data.volume.volume
+    rows: list[Row] = [
+        (name, volume, volume * cubic, markup.percentage(volume / entire), remark)
+        for name, volume, remark in (
+            ("whole workspace", entire, ""),
+            ("holds the payload", carried.held_volume, "of a mesh, to half a per cent"),
+        )
+    ]
+    return markup.table(("volume", "units³", "cm³", "share", ""), rows, "<>>><")
+
+
+def _best(position: FloatArray, factor: float) -> Element:
+    """Return the words for the position of an empty solid that holds most of the payload."""
+    at = ("(", *markup.vector(position.tolist()), ")")
+    if factor > 1.0:
+        words = "The positions that hold the payload are too few for a solid. The best is "
+        return paragraph(words, *at, ".", class_="note")
+    words = "No position of the workspace holds the payload. The best one found, "
+    of_it = markup.percentage(factor), " of its weight and force."
+    return paragraph(words, *at, ", holds ", *of_it, class_="note")
+
+
+def _share_slices(data: ReportData, solid: Solid) -> Element:
+    warn_below = WARN_SHARE * data.design.reach
+    bands = position_bands(data.design, data.rotation, "share", warn_below=warn_below)
+    slices = Slices.of(data.design, data.rotation, solid.ends, bands)
+    maps = slices_through(slices, data.at.position, "load")
+    return markup.illustration(
+        element("div", maps, legend(slices, data.design.unit_mm)),
+        "Slices through b4 (the cross), axes in design units, coloured by the largest share of a "
+        "limit that the payload uses; it is held where that is at most 100 %.",
+    )
+
+
+def _amount(value: float | None, unit: str, without: str = "none") -> Cell:
+    """Return an amount to four digits; words if it is zero, infinite or not given."""
+    return (number(value, 4), f" {unit}") if value and math.isfinite(value) else without
+
+
+def precision_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on precision; nothing of a design that is exact and rigid."""
+    precision = data.precision
+    if precision is None:
+        return
+    yield element("h2", "Precision")
+    yield paragraph(
+        "How far the tool is from where it should be: by the errors of the actuators and the "
+        "tolerances of the dimensions, and because what holds the payload gives way. The model is "
+        f"linear, without preload. All values are those in {data.pose_words}."
+    )
+    yield from markup.elements(blocks.tool_errors(precision))
+    if data.has("is_elastic"):
+        yield _stiffness(data)
+    payload = data.design.payload
+    load = "the payload’s weight" if payload.mass_kg else "no load"
+    if payload.force_n:
+        weight = f"{load} and " if payload.mass_kg else ""
+        load = f"{weight}the payload’s force in its worst direction"
+    yield from markup.elements(blocks.deflections(precision, load, has_force=True))
+
+
+def _stiffness(data: ReportData) -> Element:
+    struts, six = data.design.struts, data.design.actuators.stiffness_n_mm
+    actuators = "rigid" if six is None else markup.range_of(six, " N/mm", 4)
+    rows: list[Row] = [("stiffness of an actuator", actuators)]
+    if struts.outer_mm is None:
+        rows.append(("struts of legs 2 and 3", "rigid"))
+    else:
+        tube = number(struts.outer_mm, 4), " × ", number(struts.inner_mm, 4), " mm"
+        rows += [
+            # In newton square metres, from square millimetres.
+            ("bending stiffness EI of a strut", _amount(1e-6 * struts.bending_stiffness, "N m²")),
+            ("outer and inner diameter of a strut", tube),
+            ("its Young’s modulus", _amount(struts.modulus_gpa, "GPa")),
+        ]
+    return markup.table((), rows, "<>", "What gives way")

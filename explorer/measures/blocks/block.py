@@ -2,7 +2,7 @@
 
 A function of a value yields the blocks that tell it, so that a word, a unit or a number of digits
 is written once. Each of the three has one renderer of blocks: `explorer.app.widgets.blocks`,
-`explorer.export.report.blocks` and `explorer.cli.blocks`. The page has room for few columns: it
+`explorer.export.drawings.markup` and `explorer.cli.blocks`. The page has room for few columns: it
 leaves out what is `wide`, and shows a hint where a pointer rests; the others print the hints of
 tables. The command line writes six digits of each number, whatever its digits here.
 """
@@ -80,11 +80,7 @@ class Vector:
     @property
     def texts(self) -> list[str]:
         """The components for people, without their unit."""
-        if self.span:
-            return [
-                format_fitted(value, self.span, self.digits, infinite="∞") for value in self.values
-            ]
-        return format_column(self.values, self.digits, infinite="∞")
+        return Column("", self.values, digits=self.digits, span=self.span).texts
 
 
 def direction(values: Sequence[float]) -> Vector:

@@ -8,16 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from explorer.legs.clearance import PAIRS, pair_name
-from explorer.measures.blocks.block import (
-    Block,
-    Column,
-    Look,
-    Names,
-    Number,
-    Statement,
-    Table,
-    Vector,
-)
+from explorer.measures.blocks import block
 from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
@@ -37,7 +28,9 @@ def names_of(pairs: Iterable[bool]) -> str:
     return ", ".join(pair_name(pair) for pair, is_in in zip(PAIRS, pairs, strict=True) if is_in)
 
 
-def verdict(clearance: FloatArray, bound: FloatArray, design: Design, where: str = "") -> Statement:
+def verdict(
+    clearance: FloatArray, bound: FloatArray, design: Design, where: str = ""
+) -> block.Statement:
     """Return whether legs collide, touch or are clear, and the least clearance.
 
     Args:
@@ -54,80 +47,86 @@ def verdict(clearance: FloatArray, bound: FloatArray, design: Design, where: str
     pair = int(clearance.argmin())
     least, unit = float(clearance[pair]), design.unit_mm
     numbers = (
-        Number(least, " units", 3, design.reach),
+        block.Number(least, " units", 3, design.reach),
         ", ",
-        Number(unit * least, " mm", 3, unit * design.reach),
+        block.Number(unit * least, " mm", 3, unit * design.reach),
     )
-    return Statement(title, (f"Least clearance: legs {pair_name(PAIRS[pair])}, ", *numbers), look)
+    return block.Statement(
+        title, (f"Least clearance: legs {pair_name(PAIRS[pair])}, ", *numbers), look
+    )
 
 
-def _lengths(values: FloatArray, design: Design, *, wide: bool = False) -> tuple[Column, Column]:
-    """Return clearances in design units and in millimetres, these `wide` or not."""
+def _table(
+    title: str,
+    values: FloatArray,
+    design: Design,
+    before: Iterable[block.Names | block.Column] = (),
+    after: Iterable[block.Names | block.Column] = (),
+    hint: str = CLEARANCE,
+    *,
+    is_wide: bool = False,
+) -> block.Table:
+    """Return a table of clearances in design units and in millimetres, these wide or not."""
     reach, unit = design.reach, design.unit_mm
-    return (
-        Column("clearance", values.tolist(), " units", DIGITS, size=reach, infinite="joined"),
-        Column("clearance", (unit * values).tolist(), " mm", DIGITS, size=unit * reach,
-               infinite="", wide=wide),
+    columns = (
+        block.Names("legs", [pair_name(pair) for pair in PAIRS]),
+        *before,
+        block.Column("clearance", values.tolist(), " units", DIGITS, size=reach, infinite="joined"),
+        block.Column("clearance", (unit * values).tolist(), " mm", DIGITS, size=unit * reach,
+                     infinite="", wide=is_wide),
+        *after,
     )  # fmt: skip
+    looks: list[block.Look | None] = [
+        "beyond" if value < 0.0 else None for value in values.tolist()
+    ]
+    return block.Table(title, columns, hint, looks)
 
 
-def _legs() -> Names:
-    return Names("legs", [pair_name(pair) for pair in PAIRS])
+def _points(head: str, points: FloatArray) -> block.Names:
+    words = [("(", block.Vector(point), ")") for point in points.tolist()]
+    return block.Names(head, words, wide=True)
 
 
-def _looks(values: FloatArray) -> list[Look | None]:
-    return ["beyond" if value < 0.0 else None for value in values.tolist()]
-
-
-def _points(head: str, points: FloatArray) -> Names:
-    return Names(head, [("(", Vector(point), ")") for point in points.tolist()], wide=True)
-
-
-def pose_clearances(snapshot: Snapshot) -> Iterator[Block]:
+def pose_clearances(snapshot: Snapshot) -> Iterator[block.Block]:
     """Yield whether legs collide in a pose, and the clearance of each pair."""
     legs, design = snapshot.clearances, snapshot.design
     yield verdict(legs.clearance, legs.clearance, design)
-    yield Table(
-        "Clearance here",
-        (
-            _legs(),
-            Column("axes apart", legs.distance.tolist(), " units", infinite="", wide=True),
-            *_lengths(legs.clearance, design),
-            _points("closest point of the first", legs.points[:, 0]),
-            _points("of the second", legs.points[:, 1]),
-        ),
-        CLEARANCE,
-        _looks(legs.clearance),
+    apart = block.Column("axes apart", legs.distance.tolist(), " units", infinite="", wide=True)
+    points = (
+        _points("closest point of the first", legs.points[:, 0]),
+        _points("of the second", legs.points[:, 1]),
     )
+    yield _table("Clearance here", legs.clearance, design, (apart,), points)
 
 
-def move_clearances(move: MoveClearance, design: Design) -> Iterator[Block]:
+def move_clearances(move: MoveClearance, design: Design) -> Iterator[block.Block]:
     """Yield whether legs collide on a move, by the exact test and the paper's, and where."""
     yield verdict(move.clearance, move.bound, design, " on the way")
     steps = "one step" if move.steps == 1 else f"{move.steps} steps"
     overlap = "no overlap" if move.is_free else f"overlap of {names_of(move.overlaps)}"
-    yield Statement("", f"The paper's test in {steps}, without radii: {overlap}.")
+    yield block.Statement("", f"The paper's test in {steps}, without radii: {overlap}.")
     apart = np.isfinite(move.clearance)
     swept = np.where(apart, np.where(move.overlaps, "overlap", "free"), "")
     positions, rotations = move.poses
-    yield Table(
+    places = np.where(apart, 100.0 * move.share, np.inf).tolist()
+    yield _table(
         "Least clearance on the way, and where on the way",
+        move.clearance,
+        design,
+        (block.Names("swept tetrahedra", swept.tolist()),),
         (
-            _legs(),
-            Names("swept tetrahedra", swept.tolist()),
-            *_lengths(move.clearance, design, wide=True),
-            Column("never below", move.bound.tolist(), " units", infinite="", wide=True),
-            Column("at", np.where(apart, 100.0 * move.share, np.inf).tolist(), " %", 3,
-                   infinite=""),
-            _points("b4 there" if move.tool is None else "tool there",
-                    positions + tool_offset(rotations, move.tool)),
+            block.Column("never below", move.bound.tolist(), " units", infinite="", wide=True),
+            block.Column("at", places, " %", 3, infinite=""),
+            _points(
+                "b4 there" if move.tool is None else "tool there",
+                positions + tool_offset(rotations, move.tool),
+            ),
         ),
-        CLEARANCE,
-        _looks(move.clearance),
-    )  # fmt: skip
+        is_wide=True,
+    )
 
 
-def workspace_clearances(pairs: Sequence[PairCost], design: Design) -> Iterator[Block]:
+def workspace_clearances(pairs: Sequence[PairCost], design: Design) -> Iterator[block.Block]:
     """Yield whether legs collide in a workspace, and what each pair blocks; nothing if it is empty.
 
     Args:
@@ -139,20 +138,17 @@ def workspace_clearances(pairs: Sequence[PairCost], design: Design) -> Iterator[
         return
     yield verdict(clearance, clearance, design, " in the workspace")
     if (least := float(clearance.min())) > 0.0:
-        radius = Number(0.5 * least, " units", 3)
-        yield Statement("", ("No two legs collide if all radii grow by up to ", radius, "."))
+        radius = block.Number(0.5 * least, " units", 3)
+        yield block.Statement("", ("No two legs collide if all radii grow by up to ", radius, "."))
     bounds, blocked = [pair.bound for pair in pairs], [pair.blocked_volume for pair in pairs]
-    column = Column("blocked alone", blocked, " units³")
-    yield Table(
+    column = block.Column("blocked alone", blocked, " units³")
+    certified = block.Column("certified", bounds, " units", DIGITS, infinite="", wide=True)
+    yield _table(
         "Least clearance in the workspace",
-        (
-            _legs(),
-            *_lengths(clearance, design),
-            Column("certified", bounds, " units", DIGITS, infinite="", wide=True),
-            *([column] if any(blocked) else ()),
-        ),
-        "Of all positions within the limits at this orientation; certified is a lower bound. A "
-        "pair blocks alone the positions at which it collides, and those that it cuts off from the "
-        "start.",
-        _looks(clearance),
+        clearance,
+        design,
+        after=(certified, column) if any(blocked) else (certified,),
+        hint="Of all positions within the limits at this orientation; certified is a lower bound. "
+        "A pair blocks alone the positions at which it collides, and those that it cuts off from "
+        "the start.",
     )

@@ -7,21 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from explorer.measures.blocks.block import (
-    Block,
-    Column,
-    Fact,
-    Facts,
-    Names,
-    Number,
-    Share,
-    Shares,
-    Statement,
-    Table,
-    Vector,
-    Words,
-    direction,
-)
+from explorer.measures.blocks import block
 from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.pose import Pose, Triple
@@ -29,16 +15,16 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding
 from explorer.statics.forces import WorstDirection
 from explorer.statics.loaded import LoadedPose, WorstForce
-from explorer.statics.reactions import PART_NAMES, has_limits
+from explorer.statics.reactions import PART_NAMES, has_limits, limited_parts
 
 
-def shares_of(loaded: LoadedPose) -> list[float | None]:
-    """Return the shares of the limits in the order of `PART_NAMES`; None without a limit."""
-    pairs = zip(loaded.shares.tolist(), loaded.limited.tolist(), strict=True)
+def utilisations(loaded: LoadedPose) -> list[float | None]:
+    """Return the utilisations of the limits in the order of `PART_NAMES`; None without a limit."""
+    pairs = zip(loaded.shares.tolist(), limited_parts(loaded.design).tolist(), strict=True)
     return [share if is_limited else None for share, is_limited in pairs]
 
 
-def verdict(loaded: LoadedPose, load: str = "load") -> Statement:
+def verdict(loaded: LoadedPose, load: str = "load") -> block.Statement:
     """Return whether a load is held, and which part is nearest to its limit.
 
     Args:
@@ -46,44 +32,44 @@ def verdict(loaded: LoadedPose, load: str = "load") -> Statement:
         load: Noun for the load, such as "payload".
     """
     if not loaded.is_regular:
-        return Statement("Singular pose", "The forces are infinite.", "beyond")
+        return block.Statement("Singular pose", "The forces are infinite.", "beyond")
     if not has_limits(loaded.design):
         words = "Shares need limits of the actuators, the struts or the guide."
-        return Statement("No limits are given", words)
+        return block.Statement("No limits are given", words)
     share, part = loaded.share, PART_NAMES[loaded.worst]
     if share > 1.0:
-        words = part.capitalize(), " needs ", Share(share), " of its limit"
-        return Statement(f"Does not hold the {load}", words, "beyond")
-    look = Share(share).look
+        words = part.capitalize(), " needs ", block.Share(share), " of its limit"
+        return block.Statement(f"Does not hold the {load}", words, "beyond")
+    look = block.Share(share).look
     near = ", close to a limit" if look == "close" else ""
-    words = "Largest share of a limit: ", part, ", ", Share(share)
-    return Statement(f"Holds the {load}{near}", words, look)
+    words = "Largest share of a limit: ", part, ", ", block.Share(share)
+    return block.Statement(f"Holds the {load}{near}", words, look)
 
 
-def reaction_tables(loaded: LoadedPose) -> Iterator[Block]:
+def reaction_tables(loaded: LoadedPose) -> Iterator[block.Block]:
     """Yield the forces of the actuators, and the loads of struts and guide, beside their limits."""
-    held, design = loaded.held, loaded.design
+    held, design = loaded.reactions, loaded.design
     spread = np.where(np.isfinite(held.spread), held.spread, 0.0)
     push, pull = (side.tolist() for side in design.actuators.limits)
     values = held.actuators.tolist()
     size = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
-    shares, is_limited = shares_of(loaded), has_limits(design)
+    shares, is_limited = utilisations(loaded), has_limits(design)
     if force := design.payload.force_n:
-        words = "The payload's force of ", Number(force, " N"), " acts too, in any direction."
-        yield Statement("", words)
-    yield Table(
+        words = "The payload's force of ", block.Number(force, " N"), " acts too, in any direction."
+        yield block.Statement("", words)
+    yield block.Table(
         "Forces of the actuators",
         (
-            Names("actuator", JOINTS),
-            Column("force", values, " N", size=_size(held.actuators, spread[:6])),
+            block.Names("actuator", JOINTS),
+            block.Column("force", values, " N", size=_size(held.actuators, spread[:6])),
             *_process(loaded, spread[:6], " N"),
-            Names("sense", [_sense(drop_rounding(value, size)) for value in values]),
+            block.Names("sense", [_sense(drop_rounding(value, size)) for value in values]),
             *(
-                Column(head, limits, " N", infinite="no limit", wide=True)
+                block.Column(head, limits, " N", infinite="no limit", wide=True)
                 for head, limits in (("push at most", push), ("pull at most", pull))
                 if is_limited
             ),
-            *((Shares("of its limit", shares[:6]),) if is_limited else ()),
+            *((block.Shares("of its limit", shares[:6]),) if is_limited else ()),
         ),
         "A positive force pushes the value of its joint up.",
     )
@@ -96,16 +82,16 @@ def reaction_tables(loaded: LoadedPose) -> Iterator[Block]:
         for _ in (2, 3)
     ]
     units = " N m", " N m", " N", " N", " N m", " N m"
-    yield Table(
+    yield block.Table(
         "Struts and guide",
         (
-            Names("part", PART_NAMES[6:]),
-            Column("load", loads.tolist(), units, size=_size(loads, metres * spread[6:])),
+            block.Names("part", PART_NAMES[6:]),
+            block.Column("load", loads.tolist(), units, size=_size(loads, metres * spread[6:])),
             *_process(loaded, metres * spread[6:], units),
             *(
                 (
-                    Column("at most", limits, units, infinite="no limit", wide=True),
-                    Shares("of its limit", shares[6:]),
+                    block.Column("at most", limits, units, infinite="no limit", wide=True),
+                    block.Shares("of its limit", shares[6:]),
                 )
                 if is_limited
                 else ()
@@ -122,41 +108,54 @@ def _size(values: FloatArray, spread: FloatArray) -> float:
 
 def _process(
     loaded: LoadedPose, spread: FloatArray, unit: str | tuple[str, ...]
-) -> tuple[Column, ...]:
+) -> tuple[block.Column, ...]:
     """Return the column of what the payload's force of any direction adds; none without one."""
     if not loaded.design.payload.force_n:
         return ()
-    return (Column("payload's force", spread.tolist(), unit, 3, before="± "),)
+    return (block.Column("payload's force", spread.tolist(), unit, 3, before="± "),)
 
 
 def _sense(force: float) -> str:
     return "" if not math.isfinite(force) or force == 0.0 else "pushes" if force > 0.0 else "pulls"
 
 
-def most_held(loaded: LoadedPose) -> Facts:
+def largest_loads(loaded: LoadedPose) -> block.Facts:
     """Return the largest payload, and the largest force in every direction."""
-    payload, newton = loaded.largest_payload, loaded.newton
-    facts = [
-        Fact(
-            "payload",
-            (Number(payload, " kg"),) if math.isfinite(payload) else "no limit",
-            hint="Largest mass at the centre of the payload, besides the load, that keeps all "
-            "limits",
-        ),
-        Fact(
-            "force in every direction",
-            (Number(1.0 / newton.share, " N"),) if newton.share else "no limit",
-            f"limited by {PART_NAMES[newton.part]}" if newton.share else "",
-            "Largest force at the tool, alone, that all parts hold in every direction, and the "
-            "part that gives way first",
-        ),
-    ]
-    if newton.share and np.isfinite(newton.direction).all():
-        facts.append(Fact("its worst direction", _along(newton.direction), wide=True))
-    return Facts("Most that is held here", facts)
+    payload, unit = loaded.largest_payload, loaded.unit_force
+    largest = block.Fact(
+        "payload",
+        (block.Number(payload, " kg"),) if math.isfinite(payload) else "no limit",
+        hint="Largest mass at the centre of the payload, besides the load, that keeps all limits",
+    )
+    hint = (
+        "Largest force at the tool, alone, that all parts hold in every direction, and the part "
+        "that gives way first"
+    )
+    force = _largest_force(unit.share, unit.direction, PART_NAMES[unit.part], hint)
+    return block.Facts("Most that is held here", (largest, *force))
 
 
-def worst_force(worst: WorstForce, force: str) -> Iterator[Fact]:
+def most_of_actuators(worst: WorstDirection) -> block.Facts:
+    """Return the largest force in every direction that the actuators alone hold."""
+    part = f"actuator {JOINTS[int(worst.actuator)]}"
+    facts = (*_largest_force(float(worst.share), worst.direction, part),)
+    return block.Facts("Most that the actuators hold", facts)
+
+
+def _largest_force(
+    share: float, along: FloatArray, part: str, hint: str = ""
+) -> Iterator[block.Fact]:
+    """Yield the largest force in every direction, given the worst direction of one newton."""
+    name = "force in every direction"
+    if not share:
+        yield block.Fact(name, "no limit", hint=hint)
+        return
+    yield block.Fact(name, (block.Number(1.0 / share, " N"),), f"limited by {part}", hint)
+    if np.isfinite(along).all():
+        yield block.Fact("its worst direction", _along(along), wide=True)
+
+
+def worst_force(worst: WorstForce, force: str) -> Iterator[block.Fact]:
     """Yield the worst direction of a force; nothing in a singular pose or without limits.
 
     Args:
@@ -164,24 +163,13 @@ def worst_force(worst: WorstForce, force: str) -> Iterator[Fact]:
         force: The force in words, such as "this force".
     """
     if np.isfinite(worst.direction).all():
-        remark = f"{PART_NAMES[worst.part]} at ", Share(worst.share)
-        yield Fact(f"worst direction of {force}", _along(worst.direction), remark, act="turn")
+        remark = f"{PART_NAMES[worst.part]} at ", block.Share(worst.share)
+        yield block.Fact(f"worst direction of {force}", _along(worst.direction), remark, act="turn")
 
 
-def most_of_actuators(worst: WorstDirection) -> Facts:
-    """Return the largest force in every direction that the actuators alone hold."""
-    share = float(worst.share)
-    facts = [Fact("force in every direction", "no limit")]
-    if share:
-        limited = f"limited by actuator {JOINTS[int(worst.actuator)]}"
-        facts = [
-            Fact("force in every direction", (Number(1.0 / share, " N"),), limited),
-            Fact("its worst direction", _along(worst.direction)),
-        ]
-    return Facts("Most that the actuators hold", facts)
-
-
-def nearest_held(loaded: LoadedPose, nearest: Pose | None, tool: Triple | None) -> Statement:
+def nearest_carrying(
+    loaded: LoadedPose, nearest: Pose | None, tool: Triple | None
+) -> block.Statement:
     """Return where the nearest position is that holds the load of a pose that does not.
 
     Args:
@@ -190,14 +178,18 @@ def nearest_held(loaded: LoadedPose, nearest: Pose | None, tool: Triple | None) 
         tool: Point whose position is told, in the platform frame; None for b4.
     """
     if nearest is None:
-        return Statement("", "No position in this orientation and mode was found that holds it.")
+        return block.Statement(
+            "", "No position in this orientation and mode was found that holds it."
+        )
     unit, reach = loaded.design.unit_mm, loaded.design.reach
-    apart = Number(unit * math.dist(nearest.position, loaded.pose.position), " mm", 3, unit * reach)
+    apart = block.Number(
+        unit * math.dist(nearest.position, loaded.pose.position), " mm", 3, unit * reach
+    )
     there = nearest.position if tool is None else tool_position(nearest, tool)
     point = "b4" if tool is None else "the tool"
-    words = "Held ", apart, f" from here, with {point} at ", Vector(there, digits=4)
-    return Statement("", words, act="go")
+    words = "Held ", apart, f" from here, with {point} at ", block.Vector(there, digits=4)
+    return block.Statement("", words, act="go")
 
 
-def _along(direction_: FloatArray) -> Words:
-    return (direction(direction_.tolist()),)
+def _along(direction_: FloatArray) -> block.Words:
+    return (block.direction(direction_.tolist()),)

@@ -1,4 +1,4 @@
-"""The precision of the tool in a pose: its errors, their sources, its deflection and compliance."""
+"""The precision of the tool: errors and their sources, deflection, and the budget of tolerances."""
 
 from __future__ import annotations
 
@@ -7,22 +7,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from explorer.measures.blocks.block import (
-    Bars,
-    Block,
-    Column,
-    Fact,
-    Facts,
-    Names,
-    Number,
-    Split,
-    Statement,
-    Table,
-    Vector,
-    direction,
-)
+from explorer.measures.blocks import block
 from explorer.mechanism.design import JOINTS
+from explorer.numerics.arrays import FloatArray
 from explorer.statics.accuracy import IS_TILT, RMS_ERRORS, SOURCES
+from explorer.statics.budget import PARTS, SourceCosts, ToleranceBudget
 from explorer.statics.compliance import is_elastic
 from explorer.statics.loaded import GROUPS, ToolPrecision
 
@@ -31,7 +20,7 @@ LISTED = 8
 """Number of sources of errors that the page and a report list by themselves."""
 
 
-def tool_errors(precision: ToolPrecision, listed: int | None = LISTED) -> Iterator[Block]:
+def tool_errors(precision: ToolPrecision, listed: int | None = LISTED) -> Iterator[block.Block]:
     """Yield the errors of the tool, and what each source does alone.
 
     Args:
@@ -39,10 +28,10 @@ def tool_errors(precision: ToolPrecision, listed: int | None = LISTED) -> Iterat
         listed: Number of sources that are listed, from the largest; all if None.
     """
     if not precision.has_errors:
-        yield Statement("The design states no errors")
+        yield block.Statement("The design states no errors")
         return
     if not precision.is_regular:
-        yield Statement("Errors are infinite here", "The pose is singular.", "beyond")
+        yield block.Statement("Errors are infinite here", "The pose is singular.", "beyond")
         return
     unit, bounds = precision.loaded.design.unit_mm, precision.bounds
     stated = [name for name, sources in GROUPS.items() if bounds[sources].any()]
@@ -57,14 +46,16 @@ def tool_errors(precision: ToolPrecision, listed: int | None = LISTED) -> Iterat
     moved = [unit * float(error.displacement) for error in errors]
     turned = [math.degrees(error.turn) for error in errors]
     # The last group has all errors, the first of its two is the worst.
-    within = Number(moved[-2], " mm", DIGITS), ", ±", Number(turned[-2], "°", DIGITS)
-    yield Statement(("Tool within ±", *within))
-    yield Table(
+    within = block.Number(moved[-2], " mm", DIGITS), ", ±", block.Number(turned[-2], "°", DIGITS)
+    yield block.Statement(("Tool within ±", *within))
+    yield block.Table(
         "Errors of the tool",
         (
-            Names("error of", [f"{name}, {kind}" for name in stated for kind in ("worst", "RMS")]),
-            Column("displacement", moved, " mm", DIGITS),
-            Column("turn", turned, "°", DIGITS),
+            block.Names(
+                "error of", [f"{name}, {kind}" for name in stated for kind in ("worst", "RMS")]
+            ),
+            block.Column("displacement", moved, " mm", DIGITS),
+            block.Column("turn", turned, "°", DIGITS),
         ),
         "Displacement of the tool point, and turn of the tool. Worst: the largest for all signs "
         f"of the errors, each at its largest. RMS: root mean square of {RMS_ERRORS}.",
@@ -72,35 +63,44 @@ def tool_errors(precision: ToolPrecision, listed: int | None = LISTED) -> Iterat
     yield from _sources(precision, listed)
 
 
-def _sources(precision: ToolPrecision, listed: int | None) -> Iterator[Block]:
+def _sources(precision: ToolPrecision, listed: int | None) -> Iterator[block.Block]:
     unit, bounds = precision.loaded.design.unit_mm, precision.bounds
     moved, turned = unit * precision.alone.displacement, np.degrees(precision.alone.turn)
     order: list[int] = np.lexsort([-turned, -moved]).tolist()
     ranked = [k for k in order if moved[k] > 0.0 or turned[k] > 0.0]
     shown = ranked[:listed]
-    most = float(moved.max()) or 1.0
     limits = [math.degrees(bounds[k]) if IS_TILT[k] else unit * float(bounds[k]) for k in shown]
-    yield Table(
+    yield block.Table(
         "By source",
         (
-            Names("source", [SOURCES[k] for k in shown]),
-            Column("bound", limits, ["°" if IS_TILT[k] else " mm" for k in shown], before="± ",
-                   wide=True),
-            Column("displacement", moved[shown].tolist(), " mm", DIGITS),
-            Column("turn", turned[shown].tolist(), "°", DIGITS),
-            Bars(
-                (moved[shown] / most).tolist(),
-                ["actuator" if k < len(JOINTS) else "dimension" for k in shown],
-            ),
+            block.Names("source", [SOURCES[k] for k in shown]),
+            block.Column("bound", limits, _units(shown), before="± ", wide=True),
+            block.Column("displacement", moved[shown].tolist(), " mm", DIGITS),
+            block.Column("turn", turned[shown].tolist(), "°", DIGITS),
+            _bars(moved, shown),
         ),
         "What each actuator at its largest error, and each dimension at its tolerance, does alone.",
-    )  # fmt: skip
+    )
     if len(ranked) > len(shown):
-        rest = Number(float(moved[ranked[len(shown)]]), " mm", 2)
-        yield Statement("", (f"{len(ranked) - len(shown)} more, each at most ", rest))
+        rest = block.Number(float(moved[ranked[len(shown)]]), " mm", 2)
+        yield block.Statement("", (f"{len(ranked) - len(shown)} more, each at most ", rest))
 
 
-def deflections(precision: ToolPrecision, load: str, *, has_force: bool = False) -> Iterator[Block]:
+def _units(sources: list[int], tilt: str = "°", length: str = " mm") -> list[str]:
+    return [tilt if IS_TILT[k] else length for k in sources]
+
+
+def _bars(moved: FloatArray, sources: list[int]) -> block.Bars:
+    """Return bars of what sources of errors displace, over the largest of all."""
+    return block.Bars(
+        (moved[sources] / (float(moved.max()) or 1.0)).tolist(),
+        ["actuator" if k < len(JOINTS) else "dimension" for k in sources],
+    )
+
+
+def deflections(
+    precision: ToolPrecision, load: str, *, has_force: bool = False
+) -> Iterator[block.Block]:
     """Yield the deflection of the tool, what gives way, and the softest directions.
 
     Args:
@@ -110,31 +110,37 @@ def deflections(precision: ToolPrecision, load: str, *, has_force: bool = False)
     """
     design = precision.loaded.design
     if not is_elastic(design):
-        yield Statement(
+        yield block.Statement(
             "",
             "Rigid: the design states no stiffness of its actuators and no tubes for its struts.",
         )
         return
     if not precision.is_regular:
-        yield Statement("", "The deflection is infinite: the pose is singular.", "beyond")
+        yield block.Statement("", "The deflection is infinite: the pose is singular.", "beyond")
         return
     unit, force, deflection = design.unit_mm, design.payload.force_n, precision.deflection
     moved, turned = (unit * deflection[:3]).tolist(), np.degrees(deflection[3:]).tolist()
     facts = [
-        Fact("displacement", (Number(math.hypot(*moved), " mm", DIGITS),), (Vector(moved),)),
-        Fact("turn", (Number(math.hypot(*turned), "°", DIGITS),), (Vector(turned),)),
+        block.Fact(
+            "displacement",
+            (block.Number(math.hypot(*moved), " mm", DIGITS),),
+            (block.Vector(moved),),
+        ),
+        block.Fact(
+            "turn", (block.Number(math.hypot(*turned), "°", DIGITS),), (block.Vector(turned),)
+        ),
     ]
     if force and has_force:
         along = [each / force for each in precision.loaded.load[:3]]
-        facts.append(Fact("direction of the payload's force", "", (direction(along),)))
+        facts.append(block.Fact("direction of the payload's force", "", (block.direction(along),)))
     elif force:
-        most = Number(unit * precision.largest_displacement, " mm", DIGITS)
+        most = block.Number(unit * precision.largest_displacement, " mm", DIGITS)
         hint = "The payload's force acts besides, in the direction that deflects the tool most."
-        facts.append(Fact("with the payload's force", ("at most ", most), hint=hint))
-    yield Facts("Deflection", facts, f"Displacement and turn of the tool under {load}.")
+        facts.append(block.Fact("with the payload's force", ("at most ", most), hint=hint))
+    yield block.Facts("Deflection", facts, f"Displacement and turn of the tool under {load}.")
     shares = [float(share) for share in precision.shares]
     if not np.isnan(shares).any():
-        yield Split(
+        yield block.Split(
             "Work of the load",
             ("guide", "struts", "actuators"),
             shares,
@@ -144,7 +150,7 @@ def deflections(precision: ToolPrecision, load: str, *, has_force: bool = False)
     yield from _softest(precision)
 
 
-def _softest(precision: ToolPrecision) -> Iterator[Block]:
+def _softest(precision: ToolPrecision) -> Iterator[block.Block]:
     unit, principal = precision.loaded.design.unit_mm, precision.principal
     # Radians per newton and unit become degrees per newton metre.
     per_moment = math.degrees(1e3 / unit)
@@ -164,11 +170,100 @@ def _softest(precision: ToolPrecision) -> Iterator[Block]:
             principal.moment_directions,
         ),
     ):
-        yield Table(
+        yield block.Table(
             title,
             (
-                Names("along x, y, z", [(direction(axis),) for axis in axes.tolist()]),
-                Names("compliance", [(Number(value, name, DIGITS),) for value in values.tolist()]),
+                block.Names("along x, y, z", [(block.direction(axis),) for axis in axes.tolist()]),
+                block.Names(
+                    "compliance",
+                    [(block.Number(value, name, DIGITS),) for value in values.tolist()],
+                ),
             ),
             hint,
         )
+
+
+def tolerance_budget(
+    costs: SourceCosts,
+    found: ToleranceBudget | None,
+    wanted: float | None = None,
+    wanted_turn: float | None = None,
+) -> Iterator[block.Block]:
+    """Yield the errors that tolerances allow, and what each of them costs, the costliest first.
+
+    Args:
+        costs: Costs of the tolerances.
+        found: The tolerances, if they were found for a wanted precision.
+        wanted: Largest displacement of the tool that was wanted, in mm; None for any.
+        wanted_turn: Largest turn of the tool that was wanted, in degrees; None for any.
+    """
+    has_tolerances = bool(costs.tolerances[np.isfinite(costs.tolerances)].any())
+    if has_tolerances:
+        yield _errors(costs, wanted, wanted_turn)
+    else:
+        yield block.Statement(
+            "",
+            "The design states no tolerances; the displacements are those by an error of 1 mm, and "
+            "by a tilt that moves the guide's end by 1 mm.",
+        )
+    if found is not None:
+        above = block.Number(100.0 * found.excess, " %", 2)
+        effort = block.Number(found.effort, " /mm", 4)
+        words = ("The sum of 1/tolerance is ", effort, ", at most ", above, " above the least.")
+        yield block.Statement("", words, act="set")
+    yield _costs(costs, per_unit=not has_tolerances)
+
+
+def _errors(costs: SourceCosts, wanted: float | None, wanted_turn: float | None) -> block.Facts:
+    def limit(value: float | None, unit: str) -> str:
+        return "" if value is None else f"of the wanted {value:g}{unit}"
+
+    where = "" if costs.count == 1 else f" At the worst of {costs.count:,} positions."
+    return block.Facts(
+        "Errors of the tool",
+        (
+            block.Fact(
+                "worst displacement",
+                (block.Number(costs.worst_displacement, " mm", DIGITS),),
+                limit(wanted, " mm"),
+            ),
+            block.Fact(
+                "worst turn",
+                (block.Number(costs.worst_turn, "°", DIGITS),),
+                limit(wanted_turn, "°"),
+            ),
+            block.Fact("RMS displacement", (block.Number(costs.rms_displacement, " mm", DIGITS),)),
+            block.Fact("RMS turn", (block.Number(costs.rms_turn, "°", DIGITS),)),
+        ),
+        f"Worst: for all signs of the errors. RMS: root mean square of {RMS_ERRORS}.{where}",
+    )
+
+
+def _costs(costs: SourceCosts, *, per_unit: bool) -> block.Table:
+    """Return the table of the sources of errors.
+
+    Args:
+        costs: Costs of the tolerances.
+        per_unit: Whether displacements are those by unit errors, in place of the tolerances.
+    """
+    moved = costs.displacement / costs.lengths if per_unit else costs.displacement_within
+    ranking: list[int] = costs.ranking.tolist()
+    return block.Table(
+        "By source",
+        (
+            block.Names("error of", [SOURCES[k] for k in ranking]),
+            block.Names("part", [PARTS[k] for k in ranking]),
+            block.Column("displacement", costs.displacement[ranking].tolist(),
+                         _units(ranking, " mm/°", " mm/mm"), wide=True),
+            block.Column("turn", costs.turn[ranking].tolist(),
+                         _units(ranking, "°/°", "°/mm"), wide=True),
+            block.Column("tolerance", costs.tolerances[ranking].tolist(), _units(ranking), DIGITS,
+                         before="± ", infinite="any"),
+            _bars(moved, ranking),
+            block.Column("displacement", moved[ranking].tolist(), " mm", 2),
+            block.Column("turn", costs.turn_within[ranking].tolist(), "°", wide=True),
+            block.Column("share", (100.0 * costs.shares[ranking]).tolist(), " %", wide=True),
+        ),
+        "Errors of the six actuators and the 23 dimensions. A tilt counts as what it moves the "
+        "guide's end by.",
+    )  # fmt: skip

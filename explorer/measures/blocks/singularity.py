@@ -7,24 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from explorer.measures.blocks.block import (
-    Column,
-    Fact,
-    Facts,
-    Look,
-    Names,
-    Number,
-    Statement,
-    Table,
-    Vector,
-    Words,
-    direction,
-)
+from explorer.measures.blocks import block
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import Kind, Warnings
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, TETRAHEDRA
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import Performance, SingularityFreeBall
 from explorer.singularity.freedoms import FreeTurn
@@ -34,7 +23,7 @@ VERDICT_HINT = (
     "The distance is the root-mean-square displacement of b1 to b4 (Nawratil's metric) to the "
     "nearest singular pose, of any position and orientation"
 )
-LOOKS: dict[Kind, Look] = {"clear": "within", "near": "close", "singular": "beyond"}
+LOOKS: dict[Kind, block.Look] = {"clear": "within", "near": "close", "singular": "beyond"}
 LARGEST_GAIN = 1e9
 """Gain beyond which a pose counts as singular in a direction: J is known to fewer digits."""
 
@@ -51,7 +40,7 @@ def colour_words(warn: Warnings, unit_mm: float) -> str:
     )
 
 
-def margin_table(snapshot: Snapshot) -> Table:
+def margin_table(snapshot: Snapshot) -> block.Table:
     """Return the three margins, with the distance and the least turn to where each is zero."""
     reach, unit = snapshot.design.reach, snapshot.design.unit_mm
     distances = [unit * each.distance for each in snapshot.nearest]
@@ -60,21 +49,22 @@ def margin_table(snapshot: Snapshot) -> Table:
         for turn, distance in zip(snapshot.least_turns, distances, strict=True)
     ]
     margins = snapshot.margins
-    return Table(
+    return block.Table(
         "Margins",
         (
-            Names("margin", [f"δ{number}" for number in (1, 2, 3)]),
-            Column("δ", margins.tolist(), " units", size=reach, span=reach,
-                   hint="The margin: zero where the mechanism is singular. δ1 and δ3 are "
-                   "distances, δ2 is the mutual moment of two lines, a distance times a sine. Its "
-                   "sign is that of the mode."),
-            Column("δ", (unit * margins).tolist(), " mm", size=unit * reach, span=unit * reach,
-                   wide=True),
-            Column("distance", distances, " mm", 5, span=unit * reach,
-                   hint="To the nearest pose with δ = 0: the root-mean-square displacement of b1 "
-                   "to b4 (Nawratil's metric)."),
-            Column("turn", turns, "°", 3, span=90.0,
-                   hint="The least turn about b4 or a1 that leads to δ = 0, a transmission angle."),
+            block.Names("margin", [f"δ{number}" for number in (1, 2, 3)]),
+            block.Column("δ", margins.tolist(), " units", size=reach, span=reach,
+                         hint="The margin: zero where the mechanism is singular. δ1 and δ3 are "
+                         "distances, δ2 is the mutual moment of two lines, a distance times a "
+                         "sine. Its sign is that of the mode."),
+            block.Column("δ", (unit * margins).tolist(), " mm", size=unit * reach,
+                         span=unit * reach, wide=True),
+            block.Column("distance", distances, " mm", 5, span=unit * reach,
+                         hint="To the nearest pose with δ = 0: the root-mean-square displacement "
+                         "of b1 to b4 (Nawratil's metric)."),
+            block.Column("turn", turns, "°", 3, span=90.0,
+                         hint="The least turn about b4 or a1 that leads to δ = 0, a transmission "
+                         "angle."),
         ),
         f"{MARGIN_KINDS}; the signs of the three name the assembly mode. Distances are the "
         "root-mean-square displacement of b1 to b4 (Nawratil's metric), turns the least about b4 "
@@ -82,85 +72,85 @@ def margin_table(snapshot: Snapshot) -> Table:
     )  # fmt: skip
 
 
-def tetrahedra(snapshot: Snapshot) -> Table:
+def tetrahedra(snapshot: Snapshot) -> block.Table:
     """Return the tetrahedra that are flat where a margin is zero, and their volumes."""
     size = float(snapshot.volume_sizes.max())
-    return Table(
+    return block.Table(
         "Tetrahedra",
         (
-            Names("margin", [f"δ{number}" for number in (1, 2, 3)]),
-            Names("zero when", INCIDENCES),
-            Names("tetrahedron", [" ".join(points) for points in TETRAHEDRA]),
-            Column("volume", snapshot.volumes.tolist(), " units³", size=size),
+            block.Names("margin", [f"δ{number}" for number in (1, 2, 3)]),
+            block.Names("zero when", INCIDENCES),
+            block.Names("tetrahedron", [" ".join(points) for points in TETRAHEDRA]),
+            block.Column("volume", snapshot.volumes.tolist(), " units³", size=size),
         ),
         "A margin is zero where its tetrahedron is flat.",
     )
 
 
-def nearest_poses(snapshot: Snapshot) -> Table:
+def nearest_poses(snapshot: Snapshot) -> block.Table:
     """Return the nearest singular pose of each margin."""
     poses = [nearest.pose for nearest in snapshot.nearest]
     places = np.array([pose.position for pose in poses]).T.tolist()
     angles = np.array([yaw_pitch_roll_from_rotation(pose.rotation) for pose in poses]).T.tolist()
-    return Table(
+    return block.Table(
         "Nearest singular poses",
         (
-            Names("with", [f"δ{nearest.incidence} = 0" for nearest in snapshot.nearest]),
+            block.Names("with", [f"δ{nearest.incidence} = 0" for nearest in snapshot.nearest]),
             *(
-                Column(axis, values, " units", 5, size=snapshot.design.reach)
+                block.Column(axis, values, " units", 5, size=snapshot.design.reach)
                 for axis, values in zip("xyz", places, strict=True)
             ),
             *(
-                Column(name, values, "°", 5, size=180.0)
+                block.Column(name, values, "°", 5, size=180.0)
                 for name, values in zip(("yaw", "pitch", "roll"), angles, strict=True)
             ),
         ),
     )
 
 
-def conditioning(snapshot: Snapshot) -> Facts:
+def conditioning(snapshot: Snapshot) -> block.Facts:
     """Return the measures of the actuator Jacobian J, the mode and the stratum."""
 
-    def ratio(value: float) -> Words:
-        return (Number(value, digits=5, size=1.0, span=1.0),)
+    def ratio(value: float | FloatArray) -> block.Words:
+        return (block.Number(float(value), digits=5, size=1.0, span=1.0),)
 
     worst = int(snapshot.transmissions.argmin())
-    determinant = Number(snapshot.determinant, " units³", size=snapshot.determinant_size)
-    return Facts(
+    determinant = block.Number(snapshot.determinant, " units³", size=snapshot.determinant_size)
+    return block.Facts(
         "Conditioning",
         (
-            Fact("det J", (determinant,), hint="Determinant of the actuator Jacobian"),
-            Fact(
+            block.Fact("det J", (determinant,), hint="Determinant of the actuator Jacobian"),
+            block.Fact(
                 "1/cond J",
                 ratio(snapshot.inverse_condition),
                 hint="Inverse condition number of J, with lengths divided by the reach; 0 is "
                 "singular, 1 is best",
             ),
-            Fact(
+            block.Fact(
                 "least σ of J",
                 ratio(snapshot.smallest_singular_value),
                 hint="Smallest singular value of J, with lengths divided by the reach: errors of "
                 "actuators and loads grow at most 1/σ times to those of the platform and of the "
                 "actuators",
             ),
-            Fact(
+            block.Fact(
                 "manipulability",
                 ratio(snapshot.manipulability),
                 hint="|det J| with lengths divided by the reach (Yoshikawa)",
             ),
-            Fact(
+            block.Fact(
                 "transmission index",
                 (*ratio(snapshot.transmission_index), f" ({JOINTS[worst]})"),
                 hint="Output transmission index of the worst actuator, the cosine between its "
                 "force and the motion that it causes; 0 is singular, good above 0.64 to 0.7",
             ),
-            Fact(
+            block.Fact(
                 "min |δ| / reach",
                 ratio(snapshot.proximity),
                 hint=f"Smallest margin over the reach |a3|; {MARGIN_KINDS}",
             ),
-            Fact("assembly mode", snapshot.mode_words, wide=True),
-            Fact("stratum", stratum_words(snapshot.stratum), wide=True),
+            block.Fact("assembly mode", snapshot.mode_words, wide=True),
+            block.Fact("stratum", stratum_words(snapshot.stratum), wide=True),
         ),
     )
 
@@ -179,28 +169,28 @@ def stratum_sentence(stratum: Stratum) -> str:
     return f"{zero} = 0: {describe_stratum(stratum)}"
 
 
-def freedoms(snapshot: Snapshot) -> Iterator[Statement]:
+def freedoms(snapshot: Snapshot) -> Iterator[block.Statement]:
     """Yield what locked actuators let the platform do; nothing in a pose that is not singular."""
     if not snapshot.is_singular:
         return
     found = snapshot.freedoms
     if found.count == 0:
         words = "A leg has length zero and holds its end: with all actuators locked the platform"
-        yield Statement("", f"{words} cannot move.")
+        yield block.Statement("", f"{words} cannot move.")
         return
     can = "can still move" if found.count == 1 else f"still has {found.count} freedoms"
     among = ", among them" if len(found.turns) < found.count else ""
     ends = f"{among}:" if found.turns else "."
-    yield Statement("", f"With all actuators locked the platform {can}{ends}")
+    yield block.Statement("", f"With all actuators locked the platform {can}{ends}")
     yield from (_free_turn(snapshot, turn) for turn in found.turns)
 
 
-def _free_turn(snapshot: Snapshot, turn: FreeTurn) -> Statement:
-    point = Vector(turn.point.tolist(), span=snapshot.design.reach)
-    through: Words = ("b4 (", point, ") units") if turn.incidence == 1 else ("a1",)
-    along = Vector(turn.direction.tolist(), span=1.0)
+def _free_turn(snapshot: Snapshot, turn: FreeTurn) -> block.Statement:
+    point = block.Vector(turn.point.tolist(), span=snapshot.design.reach)
+    through: block.Words = ("b4 (", point, ") units") if turn.incidence == 1 else ("a1",)
+    along = block.Vector(turn.direction.tolist(), span=1.0)
     at_all = "; no joint changes at any angle" if turn.is_finite else ""
-    return Statement(
+    return block.Statement(
         "",
         (
             f"it turns about {turn.line_name}, pitch 0, through ",
@@ -217,7 +207,7 @@ def _free_turn(snapshot: Snapshot, turn: FreeTurn) -> Statement:
     )
 
 
-def gains(performance: Performance, point: str) -> Table:
+def gains(performance: Performance, point: str) -> block.Table:
     """Return the least and the largest gain of speed and of force, by the reach for turning.
 
     Args:
@@ -225,16 +215,16 @@ def gains(performance: Performance, point: str) -> Table:
         point: Point of the platform, such as "b4".
     """
     moves, turns = performance.translation, performance.rotation
-    axes = moves.velocity, moves.force, turns.velocity, turns.force
-    return Table(
+    axes = moves.gain, moves.force, turns.gain, turns.force
+    return block.Table(
         "Gains",
         (
-            Names(
+            block.Names(
                 "per unit of the actuators",
                 (f"speed of {point}", f"force at {point}", "angular velocity", "moment"),
             ),
-            Column("min", [finite_gain(float(each.min())) for each in axes], digits=3),
-            Column("max", [finite_gain(float(each.max())) for each in axes], digits=3),
+            block.Column("min", [finite_gain(float(each.min())) for each in axes], digits=3),
+            block.Column("max", [finite_gain(float(each.max())) for each in axes], digits=3),
         ),
         "Per unit of actuator speed or force; angular velocity times the reach, moment over the "
         "reach.",
@@ -246,13 +236,13 @@ def finite_gain(value: float) -> float:
     return math.inf if value > LARGEST_GAIN else value
 
 
-def tool_condition(condition: float) -> Facts:
+def tool_condition(condition: float) -> block.Facts:
     """Return the inverse condition number of J at the tool."""
-    value = Number(condition, digits=5, size=1.0, span=1.0)
-    return Facts("At the tool", (Fact("1/cond J", (value,)),))
+    value = block.Number(condition, digits=5, size=1.0, span=1.0)
+    return block.Facts("At the tool", (block.Fact("1/cond J", (value,)),))
 
 
-def ellipsoids(performance: Performance, point: str) -> Iterator[Table]:
+def ellipsoids(performance: Performance, point: str) -> Iterator[block.Table]:
     """Yield the gains of a pose and their axes, as for `gains`."""
     for found, title, hint in (
         (
@@ -266,17 +256,21 @@ def ellipsoids(performance: Performance, point: str) -> Iterator[Table]:
             "Angular velocity times the reach; the actuator force per moment over the reach too.",
         ),
     ):
-        yield Table(
+        yield block.Table(
             title,
             (
-                Names("along x, y, z", [(direction(axis),) for axis in found.axes.T.tolist()]),
-                Column("gain", [finite_gain(value) for value in found.gain.tolist()], digits=6),
+                block.Names(
+                    "along x, y, z", [(block.direction(axis),) for axis in found.axes.T.tolist()]
+                ),
+                block.Column(
+                    "gain", [finite_gain(value) for value in found.gain.tolist()], digits=6
+                ),
             ),
             hint,
         )
 
 
-def free_ball(snapshot: Snapshot, ball: SingularityFreeBall, point: str) -> Fact:
+def free_ball(snapshot: Snapshot, ball: SingularityFreeBall, point: str) -> block.Fact:
     """Return the radius of the largest ball of positions without a singular one.
 
     Args:
@@ -287,20 +281,20 @@ def free_ball(snapshot: Snapshot, ball: SingularityFreeBall, point: str) -> Fact
     unit = snapshot.design.unit_mm
     hint = f"No position of {point} within this radius is singular at this orientation"
     if snapshot.is_singular:
-        return Fact("singularity-free radius", f"none: δ{ball.incidence} = 0 here", hint=hint)
-    return Fact(
+        return block.Fact("singularity-free radius", f"none: δ{ball.incidence} = 0 here", hint=hint)
+    return block.Fact(
         "singularity-free radius",
-        (Number(ball.radius, " units"),),
-        (Number(ball.radius * unit, " mm", 3), f", to δ{ball.incidence} = 0"),
+        (block.Number(ball.radius, " units"),),
+        (block.Number(ball.radius * unit, " mm", 3), f", to δ{ball.incidence} = 0"),
         hint,
     )
 
 
-def regular_distance(distance: float, unit_mm: float) -> Fact:
+def regular_distance(distance: float, unit_mm: float) -> block.Fact:
     """Return the distance within which no pose is singular."""
-    return Fact(
+    return block.Fact(
         "regular within",
-        (Number(distance, " units"),),
-        (Number(distance * unit_mm, " mm", 3),),
+        (block.Number(distance, " units"),),
+        (block.Number(distance * unit_mm, " mm", 3),),
         "No pose is singular whose b1 to b4 are displaced by less, root mean square",
     )

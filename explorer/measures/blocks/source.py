@@ -108,7 +108,7 @@ def load_source(topic: LoadTopic, loaded: LoadedPose, density: float | None = No
         lines.append("precision = ToolPrecision(loaded)")
         lines.append("print(precision.worst(), precision.deflection)")
     else:
-        lines.append("print(loaded.held.actuators, loaded.shares)")
+        lines.append("print(loaded.reactions.actuators, loaded.shares)")
     command = f"{_start(topic, design)}{options} --at tool"
     return Source(command, (*imports, "", *lines), remark)
 

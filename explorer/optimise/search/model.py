@@ -14,22 +14,17 @@ from functools import cached_property
 import numpy as np
 
 from explorer.errors import DesignError
-from explorer.measures.size import box_margins
+from explorer.measures.box import box_margins
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.optimise.problem import OF_THE_MACHINE, OVER_BOX, Problem
-from explorer.optimise.search.demands.clearances import ClearanceDemand, first_positions
-from explorer.optimise.search.demands.geometry import (
-    MET,
-    BoxDemand,
-    DegenerateDemand,
-    Demand,
-    GapDemand,
-    MarginDemand,
-    ReachDemand,
-    VolumeDemand,
-    tilt_demands,
+from explorer.optimise.problem import AZIMUTHS, OF_THE_MACHINE, OVER_BOX, Problem
+from explorer.optimise.search import demands
+from explorer.optimise.search.grid_demands import (
+    CAUSES,
+    ClearanceDemand,
+    DisplacementDemand,
+    LoadDemand,
+    first_positions,
 )
-from explorer.optimise.search.demands.loads import CAUSES, DisplacementDemand, LoadDemand
 from explorer.optimise.search.state import UNBOUNDED, State, scaled_bounds, scales
 
 MISSED = 1e3
@@ -83,13 +78,13 @@ class Model:
         self.raises_worst = problem.objective in OVER_BOX
         u = np.array(start) / self.scales
         here = State(problem, u)
-        self.demands: list[Demand] = _demands(problem, here)
+        self.demands: list[demands.Demand] = _demands(problem, here)
         clearance = problem.demands.clearance
         self._clearance: ClearanceDemand | None = None
         if clearance is not None:
             positions = first_positions(problem, here.design)
             self._clearance = ClearanceDemand(clearance, positions)
-        self.raised: Demand | None = None
+        self.raised: demands.Demand | None = None
         if self.raises_worst:
             # The last one, see `_demands`.
             self.raised = self.demands[-1]
@@ -110,16 +105,12 @@ class Model:
     @cached_property
     def equalities(self) -> BoolArray:
         """Which demands are equalities, shape (m,), boolean."""
-        return np.array(
-            [demand.is_equality for demand in self.demands for _ in demand.names], dtype=bool
-        )
+        return np.array([each.is_equality for each in self.demands for _ in each.names], dtype=bool)
 
     @cached_property
     def limits(self) -> BoolArray:
         """Which demands are limits of the design, shape (m,), boolean."""
-        return np.array(
-            [demand.is_limit for demand in self.demands for _ in demand.names], dtype=bool
-        )
+        return np.array([each.is_limit for each in self.demands for _ in each.names], dtype=bool)
 
     @cached_property
     def bounds(self) -> FloatArray:
@@ -144,14 +135,10 @@ class Model:
             self._last = self._evaluate(np.array(u, dtype=np.float64))
         return self._last
 
-    def read_back(self, at: Evaluation) -> Evaluation:
-        """Return a place with the design as its file will be read."""
-        return self._evaluate(at.u, at.state.read_back())
-
-    def _evaluate(self, u: FloatArray, state: State | None = None) -> Evaluation:
+    def _evaluate(self, u: FloatArray) -> Evaluation:
         if self._before_each is not None:
             self._before_each()
-        state = state or State(self.problem, u[: self.count])
+        state = State(self.problem, u[: self.count])
         if not np.isfinite(u).all():
             raise DesignError("the solver tried a design that is not finite")
         # A problem may demand nothing.
@@ -200,7 +187,7 @@ class Model:
         """
         if self.equalities.all():
             return 0.0, ""
-        allowed = np.where(self.limits, at.state.design.tolerance / self.problem.size, MET)
+        allowed = np.where(self.limits, at.state.design.tolerance / self.problem.size, demands.MET)
         spare = np.where(self.equalities, np.inf, at.values + allowed)
         index = int(spare.argmin())
         value = float(at.values[index])
@@ -212,18 +199,17 @@ class Model:
         if self._clearance is None or not self.is_relaxed:
             return spare, name
         least, pair = self._clearance.worst(at.state)
-        return (spare, name) if spare <= max(least, -MET) else (least, pair)
+        return (spare, name) if spare <= max(least, -demands.MET) else (least, pair)
 
 
 def reported_objective(problem: Problem, state: State) -> float:
     """Return the value that the objective of a problem is about, in its own unit.
 
-    It is infinite where the objective is about loads, errors or deflections and the required box is
-    on or across a singular plane.
+    Loads, errors and deflections over a box on or across a singular plane are infinite.
     """
     match problem.objective:
         case "match-volume":
-            return abs(1.0 - state.volume / problem.wanted_volume)
+            return abs(1.0 - state.volume / (problem.demands.volume or math.nan))
         case "smallest-reach":
             return state.longest_leg[0]
         case "largest-volume":
@@ -231,42 +217,44 @@ def reported_objective(problem: Problem, state: State) -> float:
         case "largest-margin":
             return float(box_margins(state.box, state.rotation).min())
         case "smallest-load":
-            return state.statics.largest_share
-        case "smallest-error" | "smallest-deflection" as objective:
-            statics = state.statics
-            is_error = objective == "smallest-error"
-            return statics.worst_error if is_error else statics.largest_deflection
+            values = state.statics.node_utilisations
+        case "smallest-error":
+            values = state.statics.errors.displacement
+        case "smallest-deflection":
+            values = state.statics.deflections
+    return state.statics.worst(values)
 
 
-def _demands(problem: Problem, start: State) -> list[Demand]:
-    demands = problem.demands
-    listed: list[Demand] = []
-    if demands.volume is not None:
+def _demands(problem: Problem, start: State) -> list[demands.Demand]:
+    wanted = problem.demands
+    listed: list[demands.Demand] = []
+    if wanted.volume is not None:
         exact = problem.objective == "match-volume"
-        listed.append(VolumeDemand(demands.volume, is_equality=exact))
-    if demands.reach is not None:
-        listed.append(ReachDemand(demands.reach))
-    if demands.least > 0.0:
-        listed.append(DegenerateDemand(demands.least, start))
+        listed.append(demands.VolumeDemand(wanted.volume, is_equality=exact))
+    if wanted.reach is not None:
+        listed.append(demands.ReachDemand(wanted.reach))
+    if wanted.least > 0.0:
+        listed.append(demands.DegenerateDemand(wanted.least, start))
     if start.design.limits.gap > 0.0:
-        listed.append(GapDemand(start))
-    if demands.required_box is not None:
-        listed.append(BoxDemand(start))
-    if demands.tilt is not None:
-        listed += tilt_demands(start, demands.tilt)
-    machine: list[Demand] = []
-    if demands.held:
+        listed.append(demands.GapDemand(start))
+    if wanted.required_box is not None:
+        listed.append(demands.BoxDemand(start))
+    if wanted.tilt is not None:
+        azimuths = np.linspace(0.0, 360.0, AZIMUTHS, endpoint=False).tolist()
+        listed += [demands.TiltDemand(start, azimuth, wanted.tilt) for azimuth in azimuths]
+    machine: list[demands.Demand] = []
+    if wanted.held:
         machine.append(LoadDemand(start, 1.0))
-    if demands.error is not None:
-        machine.append(DisplacementDemand(start, "error", demands.error))
-    if demands.deflection is not None:
-        machine.append(DisplacementDemand(start, "deflection", demands.deflection))
+    if wanted.error is not None:
+        machine.append(DisplacementDemand(start, "error", wanted.error))
+    if wanted.deflection is not None:
+        machine.append(DisplacementDemand(start, "deflection", wanted.deflection))
     listed += machine
     if machine or problem.objective in OF_THE_MACHINE:
-        listed.append(MarginDemand(start, is_open=True))
+        listed.append(demands.MarginDemand(start, is_open=True))
     # What an objective raises comes last.
     if problem.objective == "largest-margin":
-        listed.append(MarginDemand(start))
+        listed.append(demands.MarginDemand(start))
     elif problem.objective == "smallest-load":
         listed.append(LoadDemand(start))
     elif problem.objective in CAUSES:

@@ -2,7 +2,7 @@
 
 The solver's own verdict does not count: a volume must be matched, the conditions of an optimum
 must hold, and a clearance must be kept over the whole workspace, between the solver's positions
-too. All of this is checked with the design as its file will be read.
+too. A design is read from its file to the last bit.
 
 Clearances divide the designs into regions: on the border between two of them legs cross, which
 no solver that follows slopes passes. Where a region holds no solution, the search continues in
@@ -24,13 +24,11 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_ascii, format_number
-from explorer.optimise.outcome import Iterate, Phase, Run, Status
+from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Iterate, Phase, Run, Status
 from explorer.optimise.problem import OVER_BOX, Problem
-from explorer.optimise.record import OBJECTIVE_SYMBOLS
-from explorer.optimise.search.demands.geometry import MET
+from explorer.optimise.search.demands import MET
 from explorer.optimise.search.model import Evaluation, Model, reported_objective
-from explorer.optimise.search.optimality import nearest_feasible, optimality
-from explorer.optimise.search.sqp import Stop, Trail, solve
+from explorer.optimise.search.sqp import Stop, Trail, nearest_feasible, optimality, solve
 from explorer.optimise.search.starts import open_workspace, promising_starts
 from explorer.optimise.search.state import State, scales
 from explorer.workspace.least_clearance import least_clearances
@@ -61,7 +59,7 @@ SAME = 1e-6
 
 
 class Attempt(NamedTuple):
-    """Result of one attempt."""
+    """The result of one attempt."""
 
     status: Status
     holding: str
@@ -99,7 +97,7 @@ class Search:
                 attempts.append(attempt)
                 if attempt.status in ENDED or self.steps_left <= 0:
                     break
-        chosen = min(attempts, key=self._rank)
+        chosen = min(attempts, key=lambda a: (a.status != "converged", self.trail.rank(a.best)))
         if self.trail.is_cancelled:
             chosen = chosen._replace(status="cancelled", holding="", message="")
         return Run(
@@ -123,9 +121,6 @@ class Search:
         for values in itertools.islice(places, ATTEMPTS - 1):
             yield self._attempt(values)
 
-    def _rank(self, attempt: Attempt) -> tuple[bool, tuple[bool, float, float]]:
-        return attempt.status != "converged", self.trail.rank(attempt.best)
-
     def _message(self, chosen: Attempt) -> str:
         demanded, largest = self.problem.demands.volume or 0.0, self.largest_volume
         if chosen.status == "infeasible" and 0.0 < largest < demanded:
@@ -136,10 +131,7 @@ class Search:
         return chosen.message or _default_message(self.problem, chosen, self.steps)
 
     def _attempt(self, values: Sequence[float], *, is_relaxed: bool = False) -> Attempt:
-        """Search from some values of the variables.
-
-        If it is relaxed, the clearance is not demanded, but only looked at in the end.
-        """
+        """Search from some values; if it is relaxed, the clearance is only looked at in the end."""
         problem, trail = self.problem, self.trail
         trail.begin()
         try:
@@ -155,8 +147,7 @@ class Search:
                     )
                     return Attempt("infeasible", because[0] if because else "", words, trail.best)
                 values = (opened * scales(problem)).tolist()
-            model = Model(problem, values, trail.before_each, is_relaxed=is_relaxed)
-            return self._solve(model)
+            return self._solve(Model(problem, values, trail.before_each, is_relaxed=is_relaxed))
         except Stop:
             if not trail.history:
                 trail.see_opening(State(problem, np.array(values) / scales(problem)), "")
@@ -181,7 +172,7 @@ class Search:
         is_done = False
         for _ in range(ROUNDS):
             before = self.steps
-            at = self._feasible(model, self._sqp(model, at.u, "solving", self._is_settled))
+            at = self._feasible(model, self._sqp(model, at.u, "solving", self._may_end))
             is_done = self._is_done(model, at)
             if is_done:
                 missed = self._crossings(model, at)
@@ -219,11 +210,10 @@ class Search:
 
     def _is_done(self, model: Model, at: Evaluation) -> bool:
         """Whether a place solves the problem, but for clearances between positions."""
-        if self.problem.objective == "match-volume":
-            return self._is_kept(model, at)
-        return self._is_kept(model, at) and optimality(model, at).is_optimal
+        is_matched = self.problem.objective == "match-volume"
+        return self._is_kept(model, at) and (is_matched or optimality(model, at).is_optimal)
 
-    def _is_settled(self, model: Model, at: Evaluation) -> bool:
+    def _may_end(self, model: Model, at: Evaluation) -> bool:
         """Whether the solver may end here: volume matched, or optimum that steps no longer change.
 
         The solver would wander on among designs that share the best objective.
@@ -242,26 +232,22 @@ class Search:
         )
 
     def _is_kept(self, model: Model, at: Evaluation) -> bool:
-        """Whether all demands are met, here and by the design as its file will be read."""
-        return self._meets(model, at) and self._meets(model, model.read_back(at))
-
-    def _meets(self, model: Model, at: Evaluation) -> bool:
+        """Whether all demands are met."""
         most = MATCHED if self.problem.objective == "match-volume" else math.inf
         # An infinite objective is no optimum.
         if not reported_objective(self.problem, at.state) < most:
             return False
-        return model.worst(at)[0] >= 0.0 and at.state.volume > at.state.measured.error
+        return model.worst(at)[0] >= 0.0 and at.state.volume > at.state.workspace.error
 
     def _is_short(self, state: State) -> bool:
         """Whether the volume is smaller than demanded."""
-        demanded = self.problem.demands.volume
-        return demanded is not None and state.volume < demanded * (1.0 - MET)
+        return state.volume < (self.problem.demands.volume or 0.0) * (1.0 - MET)
 
     def _grow(self, model: Model, at: Evaluation) -> list[float] | None:
         """Return values with the demanded volume; None if it is out of reach."""
         demands = msgspec.structs.replace(self.problem.demands, volume=None)
         growing = msgspec.structs.replace(self.problem, objective="largest-volume", demands=demands)
-        demanded = self.problem.wanted_volume
+        demanded = self.problem.demands.volume or 0.0
         values, is_relaxed = at.state.values.tolist(), model.is_relaxed
         model = Model(growing, values, self.trail.before_each, is_relaxed=is_relaxed)
 
@@ -302,17 +288,17 @@ class Search:
             most = min(most, STEPS_TO_MATCH)
         if model.is_relaxed:
             most = min(most, STEPS_WITHOUT_CLEARANCE - self.steps)
-        ended = solve(model, u, see=see, most=max(1, most))
+        last, steps = solve(model, u, see=see, most=max(1, most))
         self.evaluations += model.evaluations - before
-        self.steps += ended.steps
-        self.steps_left -= ended.steps
+        self.steps += steps
+        self.steps_left -= steps
         if self.trail.is_cancelled:
             raise Stop
-        return ended.last
+        return last
 
     def _crossings(self, model: Model, at: Evaluation) -> FloatArray:
         """Return positions at which the clearance is not kept after all, shape (k, 3)."""
-        demands, state = self.problem.demands, at.state.read_back()
+        demands, state = self.problem.demands, at.state
         if demands.clearance is None:
             return np.zeros((0, 3))
         least = least_clearances(

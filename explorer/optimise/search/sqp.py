@@ -1,13 +1,27 @@
-"""SciPy's SLSQP, with a call for every accepted iterate, and the record of a search's iterates.
+"""Steps to an optimum: SciPy's SLSQP with the record of its iterates, and the test of its end.
 
 SLSQP evaluates gradients only at iterates that it accepts, which distinguishes them from the trial
-points of its line searches.
+points of its line searches. Its own verdict only says that its steps became small. At an optimum
+the slope of the objective is a sum of the gradients of the demands and bounds that are just met,
+those of inequalities with a factor of at least zero (Karush, Kuhn and Tucker).
+
+Volumes have kinks where two limits become the same surface, and optima like to lie there:
+the workspace is largest for its reach where the balls of legs 1 and 4 are one. There the
+gradients all around take part, each as if it were one more demand (J. V. Burke, A. S.
+Lewis, M. L. Overton, "A robust gradient sampling algorithm", 2005).
+
+A solver that lowers an objective ends where rounding keeps it from lowering both that and the
+misses, which are then larger than the tolerance of limits. From there each step is the shortest
+that meets the demands to first order, found by least distance programming (C. L. Lawson, R. J.
+Hanson, "Solving Least Squares Problems", 1974, chapter 23).
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,43 +30,59 @@ from explorer.errors import DesignError
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.optimise.outcome import Iterate, Phase
 from explorer.optimise.problem import Problem
-from explorer.optimise.search.demands.geometry import MET
+from explorer.optimise.search.demands import MET
 from explorer.optimise.search.model import MISSED, Evaluation, Model, reported_objective
 from explorer.optimise.search.state import State
 
 # SLSQP stops by itself once the objective changes by less than this.
 PRECISION = 1e-14
 
-Values = Callable[[FloatArray], FloatArray]
+Point = tuple[float, FloatArray, FloatArray, FloatArray]
+"""An objective with its slope (n,), and the values (m,) and gradients (m, n) of demands."""
 
 
 class Stop(Exception):  # noqa: N818 - a signal, not an error
     """Raised by a callback to end the solver where it is."""
 
 
-class Ended(NamedTuple):
-    """End of a solver: the last evaluation and the number of steps."""
-
-    last: Evaluation
-    steps: int
-
-
 def slsqp(
-    objective: Callable[[FloatArray], float],
-    slope: Values,
+    evaluate: Callable[[FloatArray], Point],
+    see: Callable[[FloatArray, FloatArray], None],
     start: FloatArray,
     bounds: FloatArray,
-    demands: list[tuple[str, Values, Values]],
+    equal: BoolArray,
     *,
     most: int,
     precision: float,
 ) -> FloatArray:
-    """Return the variables at which SLSQP ends, within the bounds, shape (n,).
+    """Return the variables at which SLSQP ends, within lows and highs (n, 2), shape (n,).
 
-    The demands are ("eq" or "ineq", values (m,), gradients (m, n)): zero, or at least zero. The
-    bounds are lows and highs, shape (n, 2), infinite for none.
+    Each accepted iterate is seen, with the values of the demands: to be zero where they are to be
+    equal (m,), and else at least zero. Where there is no design, all are missed by far.
     """
     from scipy import optimize
+
+    last: list[tuple[FloatArray, Point]] = []
+
+    def at(x: FloatArray) -> Point:
+        if not (last and np.array_equal(last[0][0], x)):
+            no_demand = np.full(len(equal), -MISSED), np.zeros((len(equal), len(x)))
+            point = MISSED, np.zeros(len(x)), *no_demand
+            with contextlib.suppress(DesignError):
+                point = evaluate(x)
+            last[:] = [(x.copy(), point)]
+        return last[0][1]
+
+    def objective(x: FloatArray) -> float:
+        return at(x)[0]
+
+    def slope(x: FloatArray) -> FloatArray:
+        point = at(x)
+        see(x, point[2])
+        return point[1]
+
+    def demand(which: BoolArray, part: int, x: FloatArray) -> FloatArray:
+        return at(x)[2:][part][which]
 
     minimize: Any = optimize.minimize
     lows, highs = bounds.T
@@ -62,7 +92,11 @@ def slsqp(
         jac=slope,
         method="SLSQP",
         bounds=bounds,
-        constraints=[{"type": kind, "fun": f, "jac": jac} for kind, f, jac in demands],
+        constraints=[
+            {"type": kind, "fun": partial(demand, which, 0), "jac": partial(demand, which, 1)}
+            for kind, which in (("eq", equal), ("ineq", ~equal))
+            if which.any()
+        ],
         options={"maxiter": most, "ftol": precision},
     )
     return np.clip(np.asarray(result.x, dtype=np.float64), lows, highs)
@@ -70,60 +104,32 @@ def slsqp(
 
 def solve(
     model: Model, start: FloatArray, *, see: Callable[[Evaluation], None], most: int
-) -> Ended:
+) -> tuple[Evaluation, int]:
     """Run SLSQP on a model from scaled variables, to the end or until `Stop` is raised.
 
-    Each accepted iterate is seen, the start among them.
+    Each accepted iterate is seen, the start among them. Return the last one and the number of
+    steps.
     """
-    seen: list[Evaluation] = []
+    accepted: list[Evaluation] = []
 
-    def at(u: FloatArray) -> Evaluation | None:
+    def evaluate(u: FloatArray) -> Point:
+        at = model.at(u)
+        return at.objective, at.slope, at.values, at.gradients
+
+    def accept(u: FloatArray, _: FloatArray) -> None:
         try:
-            return model.at(u)
+            at = model.at(u)
         except DesignError:
-            return None
+            return
+        if not (accepted and np.array_equal(accepted[-1].u, at.u)):
+            accepted.append(at)
+            see(at)
 
-    def objective(u: FloatArray) -> float:
-        evaluation = at(u)
-        return evaluation.objective if evaluation else MISSED
-
-    def slope(u: FloatArray) -> FloatArray:
-        evaluation = at(u)
-        if evaluation is None:
-            return np.zeros(len(u))
-        if not (seen and np.array_equal(seen[-1].u, evaluation.u)):
-            seen.append(evaluation)
-            see(evaluation)
-        return evaluation.slope
-
-    def demands_of(kind: str, which: BoolArray) -> tuple[str, Values, Values]:
-        count = int(which.sum())
-
-        def values(u: FloatArray) -> FloatArray:
-            evaluation = at(u)
-            return evaluation.values[which] if evaluation else np.full(count, -MISSED)
-
-        def gradients(u: FloatArray) -> FloatArray:
-            evaluation = at(u)
-            return evaluation.gradients[which] if evaluation else np.zeros((count, len(u)))
-
-        return kind, values, gradients
-
-    equal = model.equalities
-    kinds = (("eq", equal), ("ineq", ~equal))
-    demands = [demands_of(kind, which) for kind, which in kinds if which.any()]
-    try:
-        u = slsqp(objective, slope, start, model.bounds, demands, most=most, precision=PRECISION)
-        last = at(u)
-        if last is not None and not np.array_equal(seen[-1].u, last.u):
-            seen.append(last)
-            see(last)
-    except Stop:
-        pass
-    return Ended(seen[-1], len(seen) - 1)
-
-
-Watch = Callable[[Iterate], None]
+    bounds, equal = model.bounds, model.equalities
+    with contextlib.suppress(Stop):
+        u = slsqp(evaluate, accept, start, bounds, equal, most=most, precision=PRECISION)
+        accept(u, u)
+    return accepted[-1], len(accepted) - 1
 
 
 class Trail:
@@ -136,7 +142,10 @@ class Trail:
     """
 
     def __init__(
-        self, problem: Problem, watch: Watch | None, stop: Callable[[], bool] | None
+        self,
+        problem: Problem,
+        watch: Callable[[Iterate], None] | None = None,
+        stop: Callable[[], bool] | None = None,
     ) -> None:
         self.problem = problem
         self.history: list[Iterate] = []
@@ -147,11 +156,7 @@ class Trail:
         self._best: Iterate | None = None
 
     def before_each(self) -> None:
-        """Raise `Stop` before an evaluation if the search is to end.
-
-        Raises:
-            Stop: the search is to end here.
-        """
+        """Raise `Stop` before an evaluation if the search is to end."""
         if self.is_cancelled or (self._stop is not None and self._stop()):
             self.is_cancelled = True
             raise Stop
@@ -210,3 +215,147 @@ class Trail:
             missed = max(missed, short) if short > MET else missed
         larger = problem.objective in ("largest-volume", "largest-margin")
         return iterate.volume <= 0.0, missed, -iterate.value if larger else iterate.value
+
+
+# A demand or bound with less than this to spare takes part.
+ACTIVE = 1e-6
+# An optimum's conditions hold if their residual is below this.
+OPTIMAL = 1e-5
+# Distance at which gradients about a possible kink are sampled, and how many for each variable.
+AROUND = 1e-5
+SAMPLES = 6
+
+
+class Optimality(NamedTuple):
+    """How nearly the conditions hold.
+
+    Attributes:
+        residual: Remainder of the slope that no such sum makes up, as a share of the slope.
+        holding: The demand or bound with the largest factor, "" if none has one.
+    """
+
+    residual: float
+    holding: str
+
+    @property
+    def is_optimal(self) -> bool:
+        """Whether the conditions hold."""
+        return self.residual <= OPTIMAL
+
+
+def optimality(model: Model, at: Evaluation, *, kinks: bool = True) -> Optimality:
+    """Return how nearly a place that meets all demands is an optimum.
+
+    To see an optimum in a kink takes many evaluations.
+    """
+    smooth = _conditions(model, at, [at])
+    if smooth.is_optimal or not kinks or model.problem.objective == "match-volume":
+        return smooth
+    return min(smooth, _conditions(model, at, [at, *_sample_nearby(model, at)]))
+
+
+def _sample_nearby(model: Model, at: Evaluation) -> list[Evaluation]:
+    """Return the problem at places close by, within the bounds."""
+    lows, highs = model.bounds.T
+    random = np.random.default_rng(0)
+    nearby: list[Evaluation] = []
+    for _ in range(SAMPLES * len(at.u)):
+        step = random.normal(size=len(at.u))
+        step *= AROUND / float(np.linalg.norm(step))
+        try:
+            nearby.append(model.at(np.clip(at.u + step, lows, highs)))
+        except DesignError:
+            continue
+    return nearby
+
+
+def _conditions(model: Model, at: Evaluation, around: list[Evaluation]) -> Optimality:
+    """Return how nearly the conditions hold with the gradients at some places."""
+    from scipy.optimize import nnls
+
+    active: list[tuple[str, FloatArray]] = []
+    for index, (value, name) in enumerate(zip(at.values.tolist(), model.names, strict=True)):
+        if model.equalities[index] or value <= ACTIVE:
+            # An equality may pull either way.
+            signs = (1.0, -1.0) if model.equalities[index] else (1.0,)
+            active += [(name, s * place.gradients[index]) for place in around for s in signs]
+    ends = zip(model.problem.names, np.eye(len(at.u)), at.u, *model.bounds.T, strict=False)
+    for variable, unit, here, low, high in ends:
+        if here <= low + ACTIVE:
+            active.append((f"lower bound of {variable}", unit))
+        if here >= high - ACTIVE:
+            active.append((f"upper bound of {variable}", -unit))
+    steepness = float(np.linalg.norm(at.slope))
+    if steepness == 0.0:
+        return Optimality(0.0, "")
+    slopes = np.array([place.slope for place in around]).T
+    # Some mean of the slopes less some sum of the gradients is to be nothing; the last row
+    # makes it a mean.
+    demands = np.array([row for _, row in active]).reshape(-1, len(at.u)).T
+    columns = np.vstack(
+        [
+            np.hstack([slopes, -demands]) / steepness,
+            np.hstack([np.ones(slopes.shape[1]), np.zeros(len(active))]),
+        ]
+    )
+    goal = np.zeros(len(at.u) + 1)
+    goal[-1] = 1.0
+    factors, residual = nnls(columns, goal)
+    pulls = factors[len(around) :] * np.linalg.norm(demands, axis=0)
+    if not len(pulls) or not pulls.max() > 0.0:
+        return Optimality(float(residual), "")
+    return Optimality(float(residual), active[int(pulls.argmax())][0])
+
+
+# Demands that are missed by more than this, dimensionless, are not missed by little.
+NEARLY = 1e-6
+# Each step squares the misses.
+MOST_STEPS = 4
+# Below this residual no step meets the demands to first order.
+CONTRADICTION = 1e-9
+# Cap on what a demand has to spare, over the worst miss.
+FAR = 1e3
+
+
+def nearest_feasible(model: Model, at: Evaluation) -> Evaluation | None:
+    """Return the nearest evaluation that meets all demands; None if no step leads to one."""
+    lows, highs = model.bounds.T
+    for _ in range(MOST_STEPS):
+        spare = model.worst(at)[0]
+        if spare >= 0.0:
+            break
+        missed = np.abs(at.values[model.equalities]).max(initial=-spare)
+        if not missed <= NEARLY:
+            return None
+        step = _shortest(model, at)
+        if step is None:
+            return None
+        try:
+            at = model.at(np.clip(at.u + step, lows, highs))
+        except DesignError:
+            return None
+    return at if model.worst(at)[0] >= 0.0 else None
+
+
+def _shortest(model: Model, at: Evaluation) -> FloatArray | None:
+    """Return the shortest step that meets all demands and bounds to first order."""
+    from scipy.optimize import nnls
+
+    lows, highs = model.bounds.T
+    equal, identity = model.equalities, np.eye(len(at.u))
+    low, high = np.isfinite(lows), np.isfinite(highs)
+    # The step is to make rows · step at least what is missing.
+    rows = np.vstack([at.gradients, -at.gradients[equal], identity[low], -identity[high]])
+    missing = np.concatenate(
+        [-at.values, at.values[equal], (lows - at.u)[low], (at.u - highs)[high]]
+    )
+    # The step is proportional to the misses, so these may be in units of the worst one.
+    unit = missing.max()
+    goal = np.zeros(len(at.u) + 1)
+    goal[-1] = 1.0
+    matrix = np.vstack([rows.T, np.maximum(missing / unit, -FAR)])
+    factors, norm = nnls(matrix, goal)
+    if norm <= CONTRADICTION:
+        return None
+    residual = matrix @ factors - goal
+    return -unit * residual[:-1] / residual[-1]

@@ -14,9 +14,9 @@ import numpy as np
 from explorer.errors import DesignError, InputError
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import DISTANCES, Problem, distance_of
-from explorer.optimise.search.demands.geometry import DegenerateDemand, GapDemand
-from explorer.optimise.search.model import Model
-from explorer.optimise.search.sqp import slsqp
+from explorer.optimise.search.demands import DegenerateDemand, GapDemand
+from explorer.optimise.search.model import MISSED, Model
+from explorer.optimise.search.sqp import Point, slsqp
 from explorer.optimise.search.state import UNBOUNDED, State, scaled_bounds
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace
 
@@ -42,10 +42,8 @@ def more_starts(problem: Problem, count: int, seed: int) -> Iterator[tuple[float
         return
     from scipy.stats import qmc
 
-    lows = np.array([variable.low for variable in problem.variables])
-    highs = np.array([variable.high for variable in problem.variables])
+    lows, highs = np.array([(variable.low, variable.high) for variable in problem.variables]).T
     sequence = qmc.Sobol(len(lows), rng=seed)
-    yielded = 0
     for _ in range(TRIES * count):
         values = tuple((lows + (highs - lows) * sequence.random(1)[0]).tolist())
         try:
@@ -54,8 +52,8 @@ def more_starts(problem: Problem, count: int, seed: int) -> Iterator[tuple[float
             continue
         if all(abs(distance_of(design, name)) >= problem.demands.least for name in DISTANCES):
             yield values
-            yielded += 1
-            if yielded == count:
+            count -= 1
+            if count == 0:
                 return
 
 
@@ -67,16 +65,13 @@ def promising_starts(
     They are taken from the sequence with a seed. `before_each` is called before each evaluation,
     and may raise.
     """
-    candidates = list(more_starts(problem, CANDIDATES, seed))
-    missed: list[float] = []
-    for values in candidates:
+
+    def miss_of(values: tuple[float, ...]) -> float:
         model = Model(problem, values, before_each)
         at = model.at(model.start)
-        missed.append(
-            float(np.abs(at.values[model.equalities]).sum()) - min(0.0, model.worst(at)[0])
-        )
-    for index in np.argsort(missed):
-        yield candidates[index]
+        return float(np.abs(at.values[model.equalities]).sum()) - min(0.0, model.worst(at)[0])
+
+    yield from sorted(more_starts(problem, CANDIDATES, seed), key=miss_of)
 
 
 # Number of positions on each axis among which the search begins at the least broken one.
@@ -87,8 +82,6 @@ ROOM = 0.1
 # Cost of moving the position, relative to that of changing the design.
 COST_OF_PLACE = 0.01
 MOST_ITERATIONS = 60
-# Value of each limit where no design exists.
-NO_DESIGN = -1e3
 
 
 def open_workspace(
@@ -108,51 +101,34 @@ def open_workspace(
         sides.append(GapDemand(here))
     names = [limit.name for limit in here.limits if isinstance(limit, BallOrCylinder | HalfSpace)]
     labels = [*names, *(name for side in sides for name in side.names)]
-    count = len(labels)
-    place = _least_broken(here) / size
-    first = np.concatenate([start, place])
-    last: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-
-    def slacks(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        if last and np.array_equal(last[0][0], x):
-            return last[0][1:]
-        values: list[float] = []
-        rows: list[FloatArray] = []
-        try:
-            state = State(problem, x[:n])
-            limits = {limit.name: limit for limit in state.limits}
-        except DesignError:
-            return np.full(count, NO_DESIGN), np.zeros((count, len(x)))
-        for name in names:
-            limit = limits.get(name)
-            if not isinstance(limit, BallOrCylinder | HalfSpace):
-                # No position keeps this limit here.
-                values.append(NO_DESIGN)
-                rows.append(np.zeros(len(x)))
-                continue
-            slack, by_u, by_p = state.slack(limit, x[None, n:] * size)
-            norm = float(np.linalg.norm(limit.normal)) if isinstance(limit, HalfSpace) else 1.0
-            values.append((float(slack[0]) / norm - radius) / size)
-            rows.append(np.concatenate([by_u[0] / size, by_p[0]]) / norm)
-        for side in sides:
-            value, gradient = side.measure(state)
-            values.extend(value.tolist())
-            rows.extend(np.concatenate([row, np.zeros(3)]) for row in gradient)
-        last[:] = [(x.copy(), np.array(values), np.array(rows))]
-        return last[0][1:]
-
+    first = np.concatenate([start, _least_broken(here) / size])
     costs = np.concatenate([np.ones(n), np.full(3, COST_OF_PLACE)])
 
-    def slope(x: FloatArray) -> FloatArray:
-        see(State(problem, x[:n]), labels[int(slacks(x)[0].argmin())])
-        return costs * (x - first)
+    def evaluate(x: FloatArray) -> Point:
+        state = State(problem, x[:n])
+        limits = {limit.name: limit for limit in state.limits}
+        # A limit that is not there is one that no position keeps.
+        values, rows = np.full(len(labels), -MISSED), np.zeros((len(labels), len(x)))
+        for index, name in enumerate(names):
+            limit = limits.get(name)
+            if isinstance(limit, BallOrCylinder | HalfSpace):
+                slack, by_u, by_p = state.slack(limit, x[None, n:] * size)
+                norm = float(np.linalg.norm(limit.normal)) if isinstance(limit, HalfSpace) else 1.0
+                values[index] = (float(slack[0]) / norm - radius) / size
+                rows[index] = np.concatenate([by_u[0] / size, by_p[0]]) / norm
+        index = len(names)
+        for side in sides:
+            end = index + len(side.names)
+            values[index:end], rows[index:end, :n] = side.measure(state)
+            index = end
+        return 0.5 * float(costs @ (x - first) ** 2), costs * (x - first), values, rows
 
     end = slsqp(
-        lambda x: 0.5 * float(costs @ (x - first) ** 2),
-        slope,
+        evaluate,
+        lambda x, values: see(State(problem, x[:n]), labels[int(values.argmin())]),
         first,
         np.vstack([scaled_bounds(problem), [UNBOUNDED] * 3]),
-        [("ineq", lambda x: slacks(x)[0], lambda x: slacks(x)[1])],
+        np.zeros(len(labels), dtype=bool),
         most=MOST_ITERATIONS,
         precision=1e-8,
     )

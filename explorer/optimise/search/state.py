@@ -12,13 +12,11 @@ from functools import cached_property
 
 import numpy as np
 
-from explorer.measures.statics import BoxStatics
+from explorer.measures.box import BoxStatics
 from explorer.mechanism.design import LENGTHS, Design
-from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.demands import Box
-from explorer.optimise.problem import REACH, YAW, Problem
+from explorer.optimise.problem import REACH, YAW, Box, Problem
 from explorer.workspace.limits.constraints import (
     YAW as YAW_PARAMETER,
     BallOrCylinder,
@@ -47,41 +45,27 @@ def scaled_bounds(problem: Problem) -> FloatArray:
 
 
 class State:
-    """A problem at scaled variables; each property is computed once.
+    """A problem at scaled variables (n,); each property is computed once."""
 
-    Args:
-        problem: The problem.
-        u: Scaled variables, shape (n,).
-        design: The design here, if it is not the one that the problem makes of them.
-    """
-
-    def __init__(self, problem: Problem, u: FloatArray, design: Design | None = None) -> None:
+    def __init__(self, problem: Problem, u: FloatArray) -> None:
         self.problem = problem
         self.u = u
         self.values: FloatArray = u * scales(problem)
-        self._given = design
 
     @cached_property
     def design(self) -> Design:
         """The design here."""
-        return self._given or self.problem.design_at(self.values.tolist())
-
-    def read_back(self) -> State:
-        """Return the same place with the design as its file will be read."""
-        return State(self.problem, self.u, decode_design(encode_design(self.design), "the design"))
+        return self.problem.design_at(self.values.tolist())
 
     @cached_property
     def rotation(self) -> FloatArray:
         """The orientation of the workspace, shape (3, 3)."""
         return self.design.home_pose.rotation
 
-    def turned(self, turn: FloatArray) -> State:
-        """Return the same place at another orientation: that of home, turned by a rotation (3, 3).
-
-        The rotation is along the axes of the base after its yaw is home's.
-        """
-        other = State(self.problem, self.u, self.design)
-        own = self.rotation
+    def turn(self, turn: FloatArray) -> State:
+        """Return the same place with the orientation of home turned, along axes at its yaw."""
+        other, own = State(self.problem, self.u), self.rotation
+        other.design = self.design
         yaw = rotation_from_yaw_pitch_roll((yaw_pitch_roll_from_rotation(own)[0], 0.0, 0.0))
         other.rotation = yaw @ turn @ yaw.T @ own
         return other
@@ -102,20 +86,20 @@ class State:
         return constraints(self.design, self.rotation)
 
     @cached_property
-    def measured(self) -> Volume:
+    def workspace(self) -> Volume:
         """Volume of the workspace and its gradient."""
         return workspace_volume(self.design, self.rotation, explain=False)
 
     @property
     def volume(self) -> float:
         """The exact volume of the workspace."""
-        return self.measured.volume
+        return self.workspace.volume
 
     def volume_root(self, unit: float) -> tuple[float, FloatArray]:
         """Return the cube root of the volume over a unit, and its derivatives, shape (n,)."""
         root = (self.volume / unit) ** (1.0 / 3.0)
         slope = root / (3.0 * self.volume) if self.volume > 0.0 else 0.0
-        return root, slope * self.along(self.measured.gradient)
+        return root, slope * self.along(self.workspace.gradient)
 
     @cached_property
     def chain(self) -> Chain:
@@ -140,10 +124,14 @@ class State:
         return chain
 
     def _maximum_slope(self, length: str, chain: Chain) -> FloatArray:
-        """Return the derivatives of a maximum length by the scaled variables, shape (n,)."""
+        """Return the derivatives of a maximum length, or of |a3|, by the scaled variables, (n,)."""
+        slope = np.zeros(len(self.u))
         if getattr(self.design.limits, length)[1] is not None:
-            return chain.get(f"{length} maximum", np.zeros(len(self.u)))
-        return _reach_slope(self.design, chain, len(self.u))
+            return chain.get(f"{length} maximum", slope)
+        for name, value in zip(("a3x", "a3y"), self.design.a3, strict=True):
+            if name in chain:
+                slope += value / self.design.reach * chain[name]
+        return slope
 
     @cached_property
     def longest_leg(self) -> tuple[float, FloatArray]:
@@ -164,8 +152,8 @@ class State:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the slacks (k,) of a limit at positions (k, 3), and their derivatives.
 
-        Those by the scaled variables with the position fixed are (k, n), those by the position (k,
-        3).
+        These are by the scaled variables with the position fixed (k, n), and by the position
+        (k, 3).
         """
         by_limit = np.ones((len(p), 4))
         match limit:
@@ -178,8 +166,7 @@ class State:
                 by_limit *= 1.0 if limit.inside else -1.0
                 by_p = -by_limit[:, :3]
             case HalfSpace():
-                by_limit[:, :3] = -p
-                by_p = np.broadcast_to(-limit.normal, p.shape)
+                by_limit[:, :3], by_p = -p, np.broadcast_to(-limit.normal, p.shape)
         return limit.slack(p), by_limit @ self.motion(limit), by_p
 
     def motion(self, limit: BallOrCylinder | HalfSpace) -> FloatArray:
@@ -192,12 +179,3 @@ class State:
         """Return the derivatives of k parameters by the scaled variables, shape (k, n)."""
         zero = np.zeros(len(self.u))
         return np.array([self.chain.get(name, zero) for name in names])
-
-
-def _reach_slope(design: Design, chain: Chain, n: int) -> FloatArray:
-    """Return the derivatives of |a3| by the scaled variables, shape (n,)."""
-    total = np.zeros(n)
-    for name, value in zip(("a3x", "a3y"), design.a3, strict=True):
-        if name in chain:
-            total += value / design.reach * chain[name]
-    return total

@@ -9,7 +9,7 @@ that they start from is checked before it is used.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,9 +22,10 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.search import descend
-from explorer.workspace.limits.constraints import constraints, satisfies, slacks
-from explorer.workspace.limits.region import box_of
+from explorer.workspace.limits.constraints import Constraint, constraints, satisfies, slacks
+from explorer.workspace.limits.region import box_of, region_of
 from explorer.workspace.limits.valid_poses import poses_are_valid, violations
+from explorer.workspace.slices.volume import check_node_count, node_range
 
 ALL_PAIRS = tuple(range(len(PAIRS)))
 # Clearance, over the reach, below which legs touch at a node.
@@ -34,6 +35,8 @@ SLACK = 1e-9
 CELLS = 40
 STARTS = 6
 CLEAR = 1e-6
+# Largest number of nodes of the paper's grid, all steps of which are checked.
+MOST_PAPER_NODES = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -90,9 +93,7 @@ class Survey:
     """The limits and collisions of a grid of positions at one orientation.
 
     Attributes:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        grid: The grid.
+        design, rotation, grid: What is surveyed; the rotation is platform to base, shape (3, 3).
         within: Whether a node keeps all limits, shape (nx, ny, nz).
         clearance: Clearance of each pair of legs at each node, shape (nx, ny, nz, 6).
         first, second: Flat indices of the two nodes of each step along an axis, shape (m,).
@@ -182,8 +183,7 @@ class StartError(InputError):
     """A start that breaks a limit or at which legs collide.
 
     Attributes:
-        nearest: Nearest valid position at the same orientation, shape (3,); None if there
-            is none.
+        nearest: Nearest valid position at the same orientation, shape (3,); None without any.
     """
 
     def __init__(self, message: str, nearest: FloatArray | None) -> None:
@@ -224,6 +224,31 @@ def _text_of(position: FloatArray) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in position) + ")"
 
 
+def count_nodes(
+    design: Design,
+    rotation: FloatArray,
+    limits: tuple[Constraint, ...],
+    start: FloatArray,
+    step: float,
+    most: int | None,
+) -> tuple[int, int] | tuple[None, None]:
+    """Count the nodes of the paper's grid within the limits, and the accessible ones.
+
+    Both counts are None if the grid has more nodes than `most`.
+    """
+    first, counts = node_range(region_of(limits), step)
+    if most is not None and float(np.prod(counts)) > most:
+        return None, None
+    check_node_count(counts, step, MOST_PAPER_NODES)
+    if not counts.all():
+        return 0, 0
+    x, y, z = counts.astype(int).tolist()
+    surveyed = survey(design, rotation, Grid(first * step, np.full(3, step), (x, y, z)))
+    within = int(surveyed.within.sum())
+    is_valid = not start_faults(design, rotation, start)
+    return within, int(surveyed.accessible_from(start).sum()) if is_valid else 0
+
+
 def nearest_clear_position(
     design: Design, rotation: FloatArray, position: FloatArray
 ) -> FloatArray | None:
@@ -248,17 +273,29 @@ def nearest_clear_position(
         spare: FloatArray = np.asarray(np.minimum(clearance, 1.0), dtype=np.float64) - CLEAR
         return np.concatenate([slacks(limits, p * reach) / reach, spare])
 
-    def squared_distance(p: FloatArray) -> tuple[float, FloatArray]:
-        away = p - position / reach
-        return float(away @ away), 2.0 * away
-
     best = nodes[0]
     for node in nodes:
-        optimum = descend(squared_distance, slacks_at, node / reach)
-        if optimum is None:
-            continue
-        candidate = optimum * reach
+        candidate = descend_towards(position, slacks_at, node, reach)
         nearer = np.linalg.norm(candidate - position) < np.linalg.norm(best - position)
         if nearer and not start_faults(design, rotation, candidate):
             best = candidate
     return best
+
+
+def descend_towards(
+    position: FloatArray,
+    spare: Callable[[FloatArray], FloatArray],
+    start: FloatArray,
+    unit: float,
+) -> FloatArray:
+    """Return where a descent of the distance from a position leads; the start if it fails.
+
+    What is spare of the limits, a function of positions over a unit of length, stays positive.
+    """
+
+    def squared_distance(p: FloatArray) -> tuple[float, FloatArray]:
+        away = p - position / unit
+        return float(away @ away), 2.0 * away
+
+    found = descend(squared_distance, spare, start / unit)
+    return start if found is None else unit * found

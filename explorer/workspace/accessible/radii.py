@@ -1,16 +1,14 @@
 """The volume of the accessible workspace as a function of one radius of all legs.
 
-A position is accessible up to a largest radius: half the bottleneck clearance of the widest
-path from the start. A maximum spanning tree of a grid gives the widest paths to all nodes, and
-so the whole curve at once (T. C. Hu, "The Maximum Capacity Route Problem", Operations Research
-9, 1961).
+A position is accessible up to a largest radius: half the bottleneck clearance of the widest path
+from the start. A maximum spanning tree of a grid gives these paths to all nodes at once (T. C. Hu,
+"The Maximum Capacity Route Problem", Operations Research 9, 1961).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -18,12 +16,12 @@ from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.moves import move_clearances
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.search import Stages, Watch, ignore_stage
 from explorer.workspace.accessible.nodes import Survey, check_start, make_cell_grid, survey
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
-from explorer.workspace.slices.volume import home_rotation, workspace_volume
+from explorer.workspace.limits.constraints import orientation_of
+from explorer.workspace.slices.volume import workspace_volume
 from explorer.workspace.solids.solids import workspace_solid
 
 DEFAULT_CELLS = 40
@@ -54,10 +52,7 @@ class RadiusCurve:
 
     @property
     def harmless(self) -> float:
-        """The largest radius with which no two legs collide anywhere within the limits.
-
-        It is 0 if two legs touch without a radius, or if the workspace is empty.
-        """
+        """The largest radius with which no two legs collide within the limits; 0 without one."""
         return 0.0 if self.closest_legs is None else 0.5 * float(self.least.clearance.min())
 
     @property
@@ -102,7 +97,7 @@ def radius_curve(
     Raises:
         InputError: Not a rotation, the start breaks a limit, or legs cross there.
     """
-    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    r = orientation_of(design, rotation)
     p = np.array(design.home_pose.position) if start is None else np.array(start, dtype=float)
     thin = with_radius(design, 0.0)
     stages = Stages(watch, STAGES)
@@ -127,8 +122,7 @@ def radius_curve(
 
 def with_radius(design: Design, radius: float) -> Design:
     """Return a design whose four legs have one radius, in design units."""
-    limits = msgspec.structs.replace(design.limits, leg_radii=(radius,) * 4)
-    return msgspec.structs.replace(design, limits=limits)
+    return design.with_limits(leg_radii=(radius,) * 4)
 
 
 def _bottleneck_clearances(surveyed: Survey, start: FloatArray) -> FloatArray:

@@ -2,7 +2,11 @@
 
 A connected component of a grid of nodes and certified steps tells on which side of the
 collisions the home lies. The solid of the limits, exact where they bound it, is cut along the
-collision surface; the accessible workspace is the part that holds the home.
+surface at which legs begin to collide; the accessible workspace is the part that holds the home.
+
+That surface is interpolated between the nodes of a grid and projected onto the true one. Legs
+without a radius collide only where their axes cross: on a surface with free positions on both
+sides, so that a signed distance is needed to tell the sides apart.
 """
 
 from __future__ import annotations
@@ -15,37 +19,42 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError
-from explorer.legs.clearance import PAIRS, radii_of_pairs
+from explorer.legs.clearance import (
+    PAIRS,
+    leg_axes,
+    leg_clearances,
+    pair_name,
+    point_rates,
+    radii_of_pairs,
+)
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics import checks
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
 from explorer.numerics.search import Stages, Watch, ignore_stage
-from explorer.workspace.accessible.collision_surface import nearest_pair, project_onto_collisions
 from explorer.workspace.accessible.nodes import (
     ALL_PAIRS,
     SLACK,
-    Grid,
     Survey,
     check_start,
+    count_nodes,
     make_grid,
-    start_faults,
     survey,
 )
-from explorer.workspace.least_clearance import LeastClearances, least_clearances
-from explorer.workspace.limits.constraints import Constraint, constraints
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import (
-    check_node_count,
-    home_rotation,
-    node_range,
-    node_step_of,
-    workspace_volume,
-)
-from explorer.workspace.solids.booleans import Surface, carved_solid
-from explorer.workspace.solids.solid import Solid
+from explorer.workspace.least_clearance import least_clearances
+from explorer.workspace.limits.constraints import constraints, orientation_of
+from explorer.workspace.slices.volume import node_step_of, workspace_volume
+from explorer.workspace.solids.solid import Solid, Surface, carved_solid
 from explorer.workspace.solids.solids import workspace_solid
 
+# Newton steps onto the surface, and the largest step as a share of a cell.
+STEPS = 6
+SHARE = 0.3
+# Strides of the search for a first collision, and its tolerance as a share of a cell.
+STRIDES = 16
+NEAR = 0.05
+# The least slope of clearance over position that a Newton step divides by.
+LEAST_SLOPE = 0.02
 # Numbers of nodes on each axis of the workspace's extent, and beyond it on either side.
 DEFAULT_NODES = 40
 FEWEST_NODES, MOST_NODES = 8, 160
@@ -53,12 +62,10 @@ BEYOND = 2
 # Offset, over the reach, of the collision surface of legs without radii beyond their crossing,
 # where it might coincide with a limit.
 TOUCHING = 1e-4
-# Largest number of nodes of the paper's grid, all steps of which are checked.
-MOST_PAPER_NODES = 2_000_000
 # Number of stages of the computation besides those of single pairs.
 FIXED_STAGES = 5
 CUBE = np.ones((3, 3, 3), dtype=np.bool_)
-PAIR_NAMES = tuple(f"legs {first}–{second}" for first, second in PAIRS)
+PAIR_NAMES = tuple(f"legs {pair_name(pair)}" for pair in PAIRS)
 """Names of the faces at which a pair of legs begins to collide."""
 
 
@@ -68,8 +75,7 @@ class PairCost:
 
     Attributes:
         legs: Numbers of the two legs, such as (1, 2).
-        clearance: Least clearance within the limits, in design units; negative in
-            collision, inf for a pair that shares a joint.
+        clearance: Least clearance within the limits, in design units; inf with a common joint.
         bound: Certified lower bound of the clearance within the limits.
         blocked_volume: Volume that this pair alone takes from the workspace, in cubed design
             units: positions at which it collides, and those that it cuts off from the home.
@@ -89,11 +95,9 @@ class AccessibleWorkspace:
         volume: Exact volume within the limits, in cubed design units.
         accessible_volume: Volume of the accessible part, in cubed design units.
         solid: The accessible part.
-        step: Step of the paper's grid of nodes, as in
-            `explorer.workspace.slices.volume.NodeCount`.
-        node_count: Number of nodes of that grid within the limits; None if not counted.
-        accessible_node_count: Number of its nodes that clear steps of the grid lead to; None if not
-            counted.
+        step: Step of the paper's grid of nodes, see `explorer.workspace.slices.volume.NodeCount`.
+        node_count: Number of its nodes within the limits; None if not counted.
+        accessible_node_count: Number of those that its clear steps lead to; None likewise.
         pairs: The six pairs of legs, in the order of `PAIRS`.
     """
 
@@ -130,22 +134,18 @@ def accessible_workspace(
         start: Position from which moves start, shape (3,); that of the home pose if None.
         nodes: Number of nodes of the grid on each axis of the workspace's extent.
         node_step: Step of the paper's grid of nodes, as in `workspace_nodes`.
-        most_nodes: Largest number of nodes of the paper's grid to count; the counts of a
-            finer grid are None. If this is None, too fine a grid is refused.
-        tolerance: Tolerance of the solid where limits bound it, as in
-            `explorer.workspace_solid`. Where collisions do, faces are as long as a step.
+        most_nodes: Largest number of nodes of that grid to count; the counts of a finer one are
+            None. If this is None, too fine a grid is refused.
+        tolerance: Tolerance of the solid where limits bound it, see `explorer.workspace_solid`.
         watch: Called before each stage.
 
     Raises:
-        InputError: Not a rotation, the start collides or breaks a limit, or a number is out
-            of range. An empty workspace has no start to check.
+        InputError: Not a rotation, a start that collides or breaks a limit (unless the workspace
+            is empty), or a number out of range.
     """
-    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    r = orientation_of(design, rotation)
     p = np.array(design.home_pose.position) if start is None else np.array(start, dtype=float)
-    if not FEWEST_NODES <= nodes <= MOST_NODES:
-        raise InputError(
-            f"the nodes on an axis must be from {FEWEST_NODES} to {MOST_NODES}; got {nodes}"
-        )
+    checks.whole("the number of nodes on an axis", nodes, FEWEST_NODES, MOST_NODES)
     limits = constraints(design, r)
     stages = Stages(watch, FIXED_STAGES + len(ALL_PAIRS))
     stages.begin("solid of the limits")
@@ -154,59 +154,31 @@ def accessible_workspace(
     step = node_step_of(design, node_step)
     stages.begin("least clearances")
     least = least_clearances(design, r)
-    if whole.is_empty:
-        # A workspace without volume, such as a part of a plane, may hold nodes of the grid.
-        counts = _paper_nodes(design, r, limits, p, step, most_nodes)
-        pairs = (_cost(pair, least, 0.0) for pair in ALL_PAIRS)
-        return AccessibleWorkspace(0.0, 0.0, whole, step, *counts, tuple(pairs))
-    check_start(design, r, p)
-    volume = exact.volume
-    stages.begin("grid of positions")
-    carver = _Carver(design, r, p, whole, volume, nodes)
-    blocking = [pair for pair in ALL_PAIRS if least.bound[pair] <= 0.0 and carver.blocks(pair)]
-    single_pairs = blocking if len(blocking) > 1 else []
-    stages.count = FIXED_STAGES + len(single_pairs)
-    stages.begin("collisions of all legs")
-    solid, accessible = carver.carve(blocking)
-    blocked = dict.fromkeys(blocking, volume - accessible)
-    for pair in single_pairs:
-        stages.begin(f"collisions of {PAIR_NAMES[pair]}")
-        blocked[pair] = max(0.0, volume - carver.carve([pair])[1])
-    costs = [_cost(pair, least, blocked.get(pair, 0.0)) for pair in ALL_PAIRS]
-    stages.begin("nodes of the grid")
-    counts = _paper_nodes(design, r, limits, p, step, most_nodes)
+    # A workspace without volume, such as a part of a plane, may hold nodes of the grid.
+    volume, solid, accessible, blocked = 0.0, whole, 0.0, dict[int, float]()
+    if not whole.is_empty:
+        check_start(design, r, p)
+        volume = exact.volume
+        stages.begin("grid of positions")
+        carver = _Carver(design, r, p, whole, volume, nodes)
+        blocking = [pair for pair in ALL_PAIRS if least.bound[pair] <= 0.0 and carver.blocks(pair)]
+        single_pairs = blocking if len(blocking) > 1 else []
+        stages.count = FIXED_STAGES + len(single_pairs)
+        stages.begin("collisions of all legs")
+        solid, accessible = carver.carve(blocking)
+        blocked = dict.fromkeys(blocking, volume - accessible)
+        for pair in single_pairs:
+            stages.begin(f"collisions of {PAIR_NAMES[pair]}")
+            blocked[pair] = max(0.0, volume - carver.carve([pair])[1])
+        stages.begin("nodes of the grid")
+    costs = [
+        PairCost(
+            legs, float(least.clearance[pair]), float(least.bound[pair]), blocked.get(pair, 0.0)
+        )
+        for pair, legs in enumerate(PAIRS)
+    ]
+    counts = count_nodes(design, r, limits, p, step, most_nodes)
     return AccessibleWorkspace(volume, accessible, solid, step, *counts, tuple(costs))
-
-
-def _cost(pair: int, least: LeastClearances, blocked: float) -> PairCost:
-    clearance, bound = float(least.clearance[pair]), float(least.bound[pair])
-    return PairCost(PAIRS[pair], clearance, bound, blocked)
-
-
-def _paper_nodes(
-    design: Design,
-    rotation: FloatArray,
-    limits: tuple[Constraint, ...],
-    start: FloatArray,
-    step: float,
-    most: int | None,
-) -> tuple[int, int] | tuple[None, None]:
-    """Count the nodes of the paper's grid within the limits, and the accessible ones.
-
-    Both counts are None if the grid has more nodes than `most`.
-    """
-    first, counts = node_range(region_of(limits), step)
-    if most is not None and float(np.prod(counts)) > most:
-        return None, None
-    check_node_count(counts, step, MOST_PAPER_NODES)
-    if not counts.all():
-        return 0, 0
-    x, y, z = counts.astype(int).tolist()
-    surveyed = survey(design, rotation, Grid(first * step, np.full(3, step), (x, y, z)))
-    accessible = (
-        0 if start_faults(design, rotation, start) else int(surveyed.accessible_from(start).sum())
-    )
-    return int(surveyed.within.sum()), accessible
 
 
 @dataclass(frozen=True)
@@ -286,13 +258,106 @@ class _Carver:
         values[~near] = np.abs(values[~near])
 
         def name_of(points: FloatArray) -> IntArray:
-            return nearest_pair(design, rotation, pairs, points)
+            return _nearest_pairs(design, rotation, pairs, points)[1]
 
-        return Surface(
-            values,
-            surveyed.grid.lows,
-            surveyed.grid.step,
-            partial(project_onto_collisions, design, rotation, pairs, touching, surveyed.grid.step),
-            PAIR_NAMES,
-            name_of,
-        )
+        lows, step = surveyed.grid.lows, surveyed.grid.step
+        project = partial(_project_onto_collisions, design, rotation, pairs, touching, step)
+        return Surface(values, lows, step, project, PAIR_NAMES, name_of)
+
+
+def _project_onto_collisions(
+    design: Design,
+    rotation: FloatArray,
+    pairs: Sequence[int],
+    touching: float,
+    step: FloatArray,
+    points: FloatArray,
+    beside: FloatArray,
+) -> FloatArray:
+    """Project points (n, 3) onto the surface at which the nearest pair of legs begins to collide.
+
+    For pairs without radii that surface is `touching` beyond a crossing of axes. Beside each point
+    is a free position on the near side of the surface, shape (n, 3). A point that diverges is
+    returned as it is. The grid has a step on each axis, shape (3,).
+    """
+    if not len(points):
+        return points
+    # On the way from `beside` to a point the legs may pass through one another.
+    collision, pair, collides = _first_collisions(design, rotation, pairs, step, beside, points)
+    side = np.sign(_signed_distances(design, rotation, pair, beside)[3])
+    is_signed = _signed_distances(design, rotation, pair, points)[2]
+    radii = radii_of_pairs(design)[pair]
+    target = np.where(radii > 0.0, 0.0, -touching)
+    projected = np.where((collides & ~is_signed)[:, None], collision, points)
+    for _ in range(STEPS):
+        value, gradient, has_side, _ = _signed_distances(design, rotation, pair, projected)
+        direction = np.where(has_side, side, 1.0)
+        value, gradient = value * direction - radii, gradient * direction[:, None]
+        square = dot(gradient, gradient)
+        ratio = np.where(square > LEAST_SLOPE**2, (target - value) / np.maximum(square, 1e-300), 0)
+        move = ratio[:, None] * gradient
+        cells = np.abs(move / step).max(axis=1)
+        projected += move * np.minimum(1.0, SHARE / np.maximum(cells, 1e-300))[:, None]
+    astray = np.abs((projected - points) / step).max(axis=1) > 1.0
+    projected[astray] = np.where(collides[:, None], collision, points)[astray]
+    return projected
+
+
+def _first_collisions(
+    design: Design,
+    rotation: FloatArray,
+    pairs: Sequence[int],
+    step: FloatArray,
+    start: FloatArray,
+    end: FloatArray,
+) -> tuple[FloatArray, IntArray, BoolArray]:
+    """Return the first collisions on segments from free starts to ends, shape (n, 3) each.
+
+    A stride as long as the clearance is free, since clearance changes no faster than position.
+    Returned are positions, the ends where there is no collision; the pairs of legs nearest there,
+    shape (n,); and whether a collision precedes the end, shape (n,).
+    """
+    segment = end - start
+    length = np.linalg.norm(segment, axis=1)
+    covered, at = np.zeros(len(start)), start
+    clearance, pair = _nearest_pairs(design, rotation, pairs, at)
+    for _ in range(STRIDES):
+        covered = np.minimum(length, covered + np.maximum(clearance, 0.0))
+        at = start + (covered / np.maximum(length, 1e-300))[:, None] * segment
+        clearance, pair = _nearest_pairs(design, rotation, pairs, at)
+    return at, pair, covered < length - NEAR * float(step.min())
+
+
+def _nearest_pairs(
+    design: Design, rotation: FloatArray, pairs: Sequence[int], points: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Return the least clearance of some pairs at positions (n, 3), and its pair, (n,) each."""
+    clearance = leg_clearances(Configuration(design, points, rotation)).clearance[:, list(pairs)]
+    return clearance.min(axis=1), np.array(pairs, dtype=np.int64)[clearance.argmin(axis=1)]
+
+
+def _signed_distances(
+    design: Design, rotation: FloatArray, pair: IntArray, at: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
+    """Return distances (n,) of the axes of a pair of legs at each position, signed if possible.
+
+    Where the closest points lie between the ends of the legs, the distance is that of the two
+    lines, and its sign tells on which side of each other they are. Returned are also the gradients
+    in position, (n, 3), which distances are signed, and the signed ones of the lines in any case.
+    """
+    poses = Configuration(design, at, rotation)
+    clearances, axes = leg_clearances(poses), leg_axes(poses)
+    rows, ends = np.arange(len(at)), np.array(PAIRS)[pair] - 1
+    one, two = axes[rows, ends[:, 0]], axes[rows, ends[:, 1]]
+    u, v = one[:, 1] - one[:, 0], two[:, 1] - two[:, 0]
+    normal = np.cross(u, v)
+    length = np.linalg.norm(normal, axis=-1)
+    scale = np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1)
+    normal = normal / np.where(length > 0.0, length, 1.0)[:, None]
+    signed, distance = dot(one[:, 0] - two[:, 0], normal), clearances.distance[rows, pair]
+    has_side = (length > 1e-6 * scale) & (np.abs(np.abs(signed) - distance) <= 1e-9 * design.reach)
+    off = clearances.points[rows, pair, 0] - clearances.points[rows, pair, 1]
+    outward = off / np.where(distance > 0.0, distance, 1.0)[:, None]
+    rates = point_rates(axes, clearances.points)[rows, pair]
+    gradient = np.where(has_side[:, None], normal, outward) * rates
+    return np.where(has_side, signed, distance), gradient, has_side, signed

@@ -2,22 +2,105 @@
 
 Regular triangles on the surface of each limit are cut by all other limits, at points that are
 found on the exact surfaces. So faces are as fine as the pattern, their edges lie on the exact
-curves, and no facet of a boolean is seen.
+curves, and no facet of a boolean is seen. Triangles share their vertices before and after a cut:
+each edge that the line crosses gets one vertex.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
-from explorer.workspace.faces.divide import divide, find_roots
 from explorer.workspace.faces.surfaces import Smooth, Surfaces, pattern
 from explorer.workspace.limits.constraints import Constraint, Never
 from explorer.workspace.limits.region import box_of, contract_box
 from explorer.workspace.solids.facets import Box
+
+# Most steps of the search for a root on an edge.
+STEPS = 12
+
+
+class Division(NamedTuple):
+    """Triangles divided along a line.
+
+    Attributes:
+        ends: Ends of the edges that the line crosses, the one below the level first, shape (k, 2).
+            The i-th of them gets the vertex n + i, where n is the number of vertices so far.
+        faces: Faces after the division, shape (m, 3).
+        is_high: Whether each of these faces is above the level, shape (m,).
+        origin: Face that each of them is a part of, shape (m,).
+    """
+
+    ends: IntArray
+    faces: IntArray
+    is_high: BoolArray
+    origin: IntArray
+
+
+def divide(faces: IntArray, high: BoolArray) -> Division:
+    """Divide the faces (m, 3) with vertices on either side of a level, high for n vertices."""
+    count = len(high)
+    sides = high[faces]
+    number = sides[:, 0].astype(np.int64) + sides[:, 1] + sides[:, 2]
+    mixed = np.flatnonzero((number == 1) | (number == 2))
+    whole = np.flatnonzero((number == 0) | (number == 3))
+    if not len(mixed):
+        return Division(np.zeros((0, 2), dtype=np.int64), faces, number == 3, np.arange(len(faces)))
+    # The corner that is alone on its side comes first.
+    lone_is_high = number[mixed] == 1
+    lone = np.argmax(sides[mixed] == lone_is_high[:, None], axis=1)
+    corners = np.take_along_axis(faces[mixed], (lone[:, None] + np.arange(3)) % 3, axis=1)
+    a, b, c = corners.T
+    crossed = np.concatenate([np.stack([a, b], axis=1), np.stack([a, c], axis=1)])
+    flip = np.concatenate([lone_is_high, lone_is_high])
+    crossed[flip] = crossed[flip][:, ::-1]
+    keys, inverse = np.unique(crossed[:, 0] * count + crossed[:, 1], return_inverse=True)
+    ends = np.stack([keys // count, keys % count], axis=1)
+    on_ab, on_ac = count + inverse[: len(mixed)], count + inverse[len(mixed) :]
+    divided = [faces[whole]] + [
+        np.stack(triple, axis=1) for triple in ((a, on_ab, on_ac), (on_ab, b, c), (on_ab, c, on_ac))
+    ]
+    return Division(
+        ends,
+        np.concatenate(divided),
+        np.concatenate([number[whole] == 3, lone_is_high, ~lone_is_high, ~lone_is_high]),
+        np.concatenate([whole, mixed, mixed, mixed]),
+    )
+
+
+def find_roots(
+    value: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray, tolerance: float
+) -> FloatArray:
+    """Return where n functions of a parameter from 0 to 1 are zero, shape (n,).
+
+    They are negative at 0 and not negative at 1. Their roots are found to a tolerance of their
+    values by the method of false position in the Illinois variant, which keeps the root between two
+    ends.
+    """
+    start, end = np.zeros(len(low)), np.ones(len(low))
+    at = -low / (high - low)
+    if not len(low):
+        return at
+    last = np.zeros(len(low), dtype=np.int64)
+    for _ in range(STEPS):
+        here = value(at)
+        if float(np.abs(here).max()) <= tolerance:
+            break
+        below = here < 0.0
+        side = np.where(below, -1, 1)
+        # An end that stays for the second time counts half.
+        again = side == last
+        low = np.where(below, here, np.where(again, 0.5 * low, low))
+        high = np.where(below, np.where(again, 0.5 * high, high), here)
+        start, end = np.where(below, at, start), np.where(below, end, at)
+        last = side
+        at = start + (end - start) * (-low / (high - low))
+    return at
+
 
 # Distances below this share of the size of a workspace are rounding; those of roots are
 # below this share of it.
@@ -104,18 +187,13 @@ def workspace_faces(limits: Sequence[Constraint]) -> Faces:
 
 def _cut_by_all(limits: Sequence[Smooth], surfaces: Surfaces, box: Box) -> _Cut:
     """Return the triangles of all limits' patterns in a box, cut by all limits."""
-    vertices, triangles, owner = [NOTHING.vertices], [NOTHING.triangles], [NOTHING.owner]
-    count = 0
-    for index, limit in enumerate(limits):
-        if surfaces.is_repeated(index):
-            continue
-        points, faces = pattern(limit, box)
-        vertices.append(points)
-        triangles.append(faces + count)
-        owner.append(np.full(len(points), index, dtype=np.int64))
-        count += len(points)
-    points, faces = np.concatenate(vertices), np.concatenate(triangles)
-    owners = np.concatenate(owner)
+    chosen = [index for index in range(len(limits)) if not surfaces.is_repeated(index)]
+    patterns = [pattern(limits[index], box) for index in chosen]
+    sizes = [len(points) for points, _ in patterns]
+    points = np.concatenate([NOTHING.vertices, *(points for points, _ in patterns)])
+    parts = zip(patterns, np.cumsum([0, *sizes]).tolist(), strict=False)
+    faces = np.concatenate([NOTHING.triangles, *(own + first for (_, own), first in parts)])
+    owners, count = np.repeat(np.array(chosen, dtype=np.int64), sizes), len(points)
     rounding = ROUNDING * box.size
     values = np.array([surfaces.distances_from(points, k) for k in range(len(limits))])
     values[owners, np.arange(count)] = np.inf
@@ -156,10 +234,10 @@ def _snap(cut: _Cut, surfaces: Surfaces, values: FloatArray, rounding: float) ->
         return cut
     points = cut.vertices[chosen]
     which = np.stack([cut.owner[chosen], nearest[chosen]], axis=1)
-    moved, off = surfaces.settle(points, which, ROOT_SHARE * rounding)
-    fits = (np.linalg.norm(moved - points, axis=1) < room[chosen]) & (off <= rounding)
+    projected, off = surfaces.project(points, which, ROOT_SHARE * rounding)
+    fits = (np.linalg.norm(projected - points, axis=1) < room[chosen]) & (off <= rounding)
     vertices, cuts = cut.vertices.copy(), cut.cuts.copy()
-    vertices[chosen[fits]] = moved[fits]
+    vertices[chosen[fits]] = projected[fits]
     cuts[chosen[fits]] = 1 << nearest[chosen[fits]]
     return replace(cut, vertices=vertices, cuts=cuts)
 
@@ -205,14 +283,14 @@ def _cross(
     error = ROOT_SHARE * rounding
     chord = start + (value[a] / (value[a] - value[b]))[:, None] * span
     cutting = np.full((len(a), 1), index, dtype=np.int64)
-    points, off = surfaces.settle(chord, np.concatenate([own, cutting], axis=1), error)
+    points, off = surfaces.project(chord, np.concatenate([own, cutting], axis=1), error)
     moved = np.linalg.norm(points - chord, axis=1)
     lost = np.flatnonzero((off > rounding) | (moved > 0.3 * np.linalg.norm(span, axis=1)))
     if len(lost):
         # Where surfaces nearly touch, the crossing is kept between the ends.
         def point(share: FloatArray) -> FloatArray:
             near = start[lost] + share[:, None] * span[lost]
-            return surfaces.settle(near, own[lost, :1], error)[0]
+            return surfaces.project(near, own[lost, :1], error)[0]
 
         def value_at(share: FloatArray) -> FloatArray:
             return surfaces.distances_from(point(share), index)
@@ -231,7 +309,7 @@ def _stays(
     triangles = cut.triangles[chosen]
     owner = cut.owner[triangles[:, 0]]
     middles = cut.vertices[triangles].mean(axis=1)
-    middle, _ = surfaces.settle(middles, owner[:, None], ROOT_SHARE * rounding)
+    middle, _ = surfaces.project(middles, owner[:, None], ROOT_SHARE * rounding)
     value = surfaces.distances_from(middle, index)
     return np.where(np.abs(value) <= rounding, owner < index, value > 0.0)
 

@@ -8,15 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray, IntArray, dot
-from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace
-from explorer.workspace.solids.facets import (
-    BEYOND,
-    Box,
-    Facets,
-    facing_part,
-    frame_about,
-    sphere_part,
-)
+from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace, surface_of
+from explorer.workspace.solids import facets
+from explorer.workspace.solids.facets import Box, Facets
 
 # Largest angle between the normals at two ends of an edge, in radians.
 WIDEST = 0.06
@@ -38,15 +32,12 @@ Smooth = BallOrCylinder | HalfSpace | Cone
 
 
 class Surfaces:
-    """The surfaces of limits: level = steepness |s (p − origin)| + axis · s (p − origin).
-
-    The scale s of the axes is (0, 1, 1) for cylinders and wedges, otherwise 1.
-    """
+    """The surfaces of limits, see `surface_of`."""
 
     def __init__(self, limits: Sequence[Smooth]) -> None:
         self._limits = limits
         # Origin, scale, axis, steepness and level of each.
-        self._rows = np.array([_row_of(limit) for limit in limits]).reshape(-1, 11)
+        self._rows = np.array([np.hstack(surface_of(limit)) for limit in limits]).reshape(-1, 11)
 
     def is_repeated(self, index: int) -> bool:
         """Return whether an earlier limit is the same."""
@@ -71,7 +62,7 @@ class Surfaces:
         """Return signed distances (n,) of points (n, 3) from one surface, see `distances`."""
         return self._limits[index].signed_distance(points)
 
-    def settle(
+    def project(
         self, points: FloatArray, which: IntArray, error: float
     ) -> tuple[FloatArray, FloatArray]:
         """Return points (n, 3) on several surfaces at once, and their distances from these, (n,).
@@ -98,22 +89,6 @@ class Surfaces:
         return points, off
 
 
-def _row_of(limit: Smooth) -> list[float]:
-    match limit:
-        case HalfSpace():
-            length = float(np.linalg.norm(limit.normal))
-            return [*np.zeros(3), *np.ones(3), *limit.normal / length, 0.0, limit.offset / length]
-        case BallOrCylinder():
-            side, along = 1.0 if limit.inside else -1.0, 1.0 if limit.is_ball else 0.0
-            # Points of a cylinder's axis differ along x alone.
-            origin = limit.centre * [along, 1.0, 1.0]
-            return [*origin, along, 1.0, 1.0, *np.zeros(3), side, side * limit.radius]
-        case Cone():
-            along = 0.0 if limit.flat else 1.0
-            origin = limit.apex * [along, 1.0, 1.0]
-            return [*origin, along, 1.0, 1.0, *-limit.axis, math.cos(limit.half_angle), 0.0]
-
-
 def pattern(limit: BallOrCylinder | HalfSpace | Cone, box: Box) -> Facets:
     """Return triangles that cover the surface of a limit within a box, and more.
 
@@ -131,8 +106,8 @@ def pattern(limit: BallOrCylinder | HalfSpace | Cone, box: Box) -> Facets:
     edge = _edge(limit.radius, box)
     towards, angle = _part_near(centre, limit.radius, box)
     if limit.is_ball:
-        points, faces = sphere_part(angle, edge / limit.radius)
-        return limit.centre + limit.radius * (points @ frame_about(towards)), faces
+        points, faces = facets.sphere_part(angle, edge / limit.radius)
+        return limit.centre + limit.radius * (points @ facets.frame_about(towards)), faces
     count = max(3, math.ceil(2.0 * angle * limit.radius / edge))
     turns = math.atan2(towards[1], towards[0]) + np.linspace(-angle, angle, count + 1)
     rows = _rows(box.lows[0], box.highs[0], edge)
@@ -153,13 +128,13 @@ def _part_near(centre: FloatArray, radius: float, box: Box) -> tuple[FloatArray,
     to_middle = box.middle[3 - len(centre) :] - centre
     seen = _seen(float(np.linalg.norm(to_middle)), box)
     if seen > NARROW:
-        return facing_part(centre, radius, box, 0.0)
+        return facets.facing_part(centre, radius, box, 0.0)
     return to_middle / np.linalg.norm(to_middle), seen
 
 
 def _seen(distance: float, box: Box) -> float:
     """Return the half-angle at which a box is seen, and a little more; π from inside."""
-    half = (0.5 + BEYOND) * box.size
+    half = (0.5 + facets.BEYOND) * box.size
     return math.asin(half / distance) if half < distance else math.pi
 
 
@@ -192,7 +167,7 @@ def _plane(normal: FloatArray, limit: HalfSpace, box: Box) -> Facets:
     along = box.corners @ normal
     if not along.min() <= offset <= along.max():
         return NONE
-    frame = frame_about(normal)
+    frame = facets.frame_about(normal)
     flat = box.corners @ frame[:2].T
     edge = LONGEST * box.size
     u, v = (_rows(flat[:, k].min(), flat[:, k].max(), edge) for k in (0, 1))
@@ -205,7 +180,7 @@ def _cone(limit: Cone, box: Box) -> Facets:
     near, far = box.distances(limit.apex)
     radius = far * math.sin(limit.half_angle)
     edge = _edge(radius, box)
-    frame = frame_about(limit.axis)
+    frame = facets.frame_about(limit.axis)
     across = frame[:2] @ (box.middle - limit.apex)
     seen = _seen(float(np.linalg.norm(across)), box)
     count = max(FEWEST, math.ceil(2.0 * seen * radius / edge))

@@ -21,8 +21,8 @@ from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import TOLERANCE, Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, position_array
-from explorer.workspace.limits.limit import Bound, Demand, LegAngle
-from explorer.workspace.limits.quantities import D1, D2, D3, D4, DELTA1, DELTA2, L1, L4, ORDER, X, Z
+from explorer.workspace.limits import quantities
+from explorer.workspace.limits.quantities import Bound, Demand, LegAngle
 from explorer.workspace.limits.table import demands_of
 
 YAW = "yaw"
@@ -81,10 +81,6 @@ class BallOrCylinder(_Distances):
         )
         return self.radius - distance if self.inside else distance - self.radius
 
-    def shifted(self, offset: FloatArray) -> BallOrCylinder:
-        """Return the limit of positions that are moved by a constant vector, shape (3,)."""
-        return replace(self, centre=self.centre + offset)
-
 
 @dataclass(frozen=True)
 class HalfSpace(_Distances):
@@ -109,14 +105,6 @@ class HalfSpace(_Distances):
     def signed_distance(self, p: FloatArray) -> FloatArray:
         """Return the distances of positions (..., 3) from the surface, negative outside."""
         return self.slack(p) / float(np.linalg.norm(self.normal))
-
-    def shifted(self, offset: FloatArray) -> HalfSpace:
-        """Return the limit of positions that are moved by a constant vector, shape (3,)."""
-        rates = {
-            name: np.array([*rate[:3], rate[3] + rate[:3] @ offset])
-            for name, rate in self.rates.items()
-        }
-        return replace(self, offset=self.offset + float(self.normal @ offset), rates=rates)
 
 
 @dataclass(frozen=True)
@@ -145,12 +133,8 @@ class Cone(_Distances):
         """Return the distances of positions (..., 3) from the nearby surface, to first order."""
         return self.slack(p) * np.linalg.norm(self._leg(p), axis=-1)
 
-    def shifted(self, offset: FloatArray) -> Cone:
-        """Return the limit of positions that are moved by a constant vector, shape (3,)."""
-        return replace(self, apex=self.apex + offset)
-
     def _leg(self, p: FloatArray) -> FloatArray:
-        return (p - self.apex) * (np.array([0.0, 1.0, 1.0]) if self.flat else 1.0)
+        return (p - self.apex) * (ACROSS if self.flat else 1.0)
 
 
 @dataclass(frozen=True)
@@ -163,12 +147,26 @@ class Never(_Distances):
         """Return minus infinity for positions (..., 3)."""
         return np.full(p.shape[:-1], -math.inf)
 
-    def shifted(self, _: FloatArray) -> Never:
-        """Return the limit itself."""
-        return self
-
 
 Constraint: TypeAlias = BallOrCylinder | HalfSpace | Cone | Never
+
+
+def shift(limit: Constraint, offset: FloatArray) -> Constraint:
+    """Return the limit of positions moved by a vector, shape (3,); a half-space loses its rates."""
+    match limit:
+        case BallOrCylinder():
+            return replace(limit, centre=limit.centre + offset)
+        case HalfSpace():
+            return replace(limit, offset=limit.offset + float(limit.normal @ offset), rates={})
+        case Cone():
+            return replace(limit, apex=limit.apex + offset)
+        case Never():
+            return limit
+
+
+def orientation_of(design: Design, rotation: ArrayLike | None = None) -> FloatArray:
+    """Return an orientation, shape (3, 3), after checking it; that of the home pose if None."""
+    return design.home_pose.rotation if rotation is None else checked_rotation(rotation)
 
 
 def constraints(
@@ -200,14 +198,30 @@ def constraints_over(
     matrices = checked_rotation(rotations)
     if matrices.ndim != 3 or not len(matrices):
         raise InputError(f"rotations must have the shape (n, 3, 3); got {matrices.shape}")
-    families = [constraints(design, r) for r in matrices]
-    if tool is None:
-        return families
-    offsets = tool_offset(matrices, tool)
     return [
-        tuple(limit.shifted(offset) for limit in family)
-        for family, offset in zip(families, offsets, strict=True)
+        tuple(shift(limit, offset) for limit in constraints(design, r))
+        for r, offset in zip(matrices, tool_offset(matrices, tool), strict=True)
     ]
+
+
+def surface_of(
+    limit: BallOrCylinder | HalfSpace | Cone,
+) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
+    """Return (origin, scale, axis, steepness, level) of the surface of a limit.
+
+    It is steepness |s (p − origin)| + axis · s (p − origin) = level, with less than the level
+    inside. The scale s of the axes is (0, 1, 1) for cylinders and flat cones, otherwise 1.
+    """
+    match limit:
+        case HalfSpace():
+            length = float(np.linalg.norm(limit.normal))
+            return np.zeros(3), np.ones(3), limit.normal / length, 0.0, limit.offset / length
+        case BallOrCylinder():
+            side, scale = 1.0 if limit.inside else -1.0, np.ones(3) if limit.is_ball else ACROSS
+            return limit.centre * scale, scale, np.zeros(3), side, side * limit.radius
+        case Cone():
+            scale = ACROSS if limit.flat else np.ones(3)
+            return limit.apex * scale, scale, -limit.axis, math.cos(limit.half_angle), 0.0
 
 
 def slacks(limits: tuple[Constraint, ...], position: ArrayLike) -> FloatArray:
@@ -234,14 +248,15 @@ def angle_between(vector: FloatArray, axis: FloatArray) -> FloatArray:
 def _solids(design: Design, r: FloatArray, demand: Demand) -> Iterator[Constraint]:
     """Yield the solids of a demand: its quantity is of one of four forms at a rotation."""
     kind = demand.quantity
-    if kind <= D3:
+    if kind <= quantities.D3:
         yield from _half_spaces(demand, *_line(design, r, kind))
-    elif L1 <= kind <= L4:
-        yield from _balls(demand, *_apex(design, r, kind - L1), is_ball=kind not in (D2, D4))
-    elif kind <= ORDER:
+    elif quantities.L1 <= kind <= quantities.L4:
+        leg = kind - quantities.L1
+        yield from _balls(demand, *_apex(design, r, leg), is_ball=leg in (0, 3))
+    elif kind <= quantities.ORDER:
         # d3 − d1 is the same at every position.
         apart = (design.b3 - design.b2) * float(r[0, 0])
-        value = apart if kind == ORDER else abs(apart)
+        value = apart if kind == quantities.ORDER else abs(apart)
         _, low, high, *_ = demand.row(design)
         if not low <= value <= high:
             yield Never(demand.name)
@@ -280,15 +295,15 @@ def _line(
 ) -> tuple[FloatArray, float, dict[str, FloatArray]]:
     """Return k, c and the derivatives of (k, c) by parameter of a quantity k·p + c."""
     u, n = r[:, 0], r[:, 2]
-    if kind in (D1, D3):
-        name, b = ("b2", design.b2) if kind == D1 else ("b3", design.b3)
+    if kind in (quantities.D1, quantities.D3):
+        name, b = ("b2", design.b2) if kind == quantities.D1 else ("b3", design.b3)
         rates = {name: _scalar_rate(float(u[0])), YAW: _scalar_rate(b * float(_turning(u)[0]))}
         return AXES[0], b * float(u[0]), rates
-    if kind <= Z:
-        return AXES[kind - X], 0.0, {}
-    if kind == DELTA1:
+    if kind <= quantities.Z:
+        return AXES[kind - quantities.X], 0.0, {}
+    if kind == quantities.DELTA1:
         gradient, turning = -n, -_turning(n)
-    elif kind == DELTA2:
+    elif kind == quantities.DELTA2:
         gradient, turning = (np.array([0.0, -v[2], v[1]]) for v in (u, _turning(u)))
     else:
         gradient, turning = AXES[2], np.zeros(3)

@@ -1,18 +1,24 @@
-"""The quantities that limits bound, and how fast each of them can change.
+"""The quantities that limits bound, what a limit demands of them, and which poses satisfy that.
 
-Every limit demands low ≤ g(pose) ≤ high of one quantity g. Kernels take demands as rows; see
-`explorer.workspace.limits.table` for what makes them.
+A limit demands low ≤ g(pose) ≤ high of one quantity g, or of each of several. Kernels take demands
+as rows of numbers. `explorer.workspace.limits.table` lists the limits.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from explorer.legs.clearance import closest_shares, square_at
+from explorer.mechanism.design import TOLERANCE, Design
 from explorer.mechanism.margins import margins_at
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.number_text import format_number
 from explorer.numerics.vectors import cross3, dot3, minus, norm3, vector
 
 # Quantities, those first that take the least time: b4, the margins, the carriages, their distance,
@@ -148,3 +154,201 @@ def quantity_rows(
                 values[k, index] = angle_at(demands, index, r, base, ends)
             else:
                 values[k, index] = quantity_at(kind, p, r, base, ends)
+
+
+# Digits of a bound in lists of limits.
+DIGITS = 5
+
+
+@helper
+def satisfies_limits(
+    demands: FloatArray, p: FloatArray, r: FloatArray, base: FloatArray, ends: FloatArray
+) -> bool:
+    """Return whether a pose satisfies the demands of its limits."""
+    for index in range(demands.shape[0]):
+        kind = int(demands[index, QUANTITY])
+        if kind == ANGLE:
+            value = angle_at(demands, index, r, base, ends)
+        else:
+            value = quantity_at(kind, p, r, base, ends)
+        if not demands[index, LOW] <= value <= demands[index, HIGH]:
+            return False
+    return True
+
+
+@helper
+def square_between(i: int, j: int, base: FloatArray, ends: FloatArray) -> float:
+    """Return the squared distance of the axes of two legs."""
+    first, second = vector(base, i), vector(base, j)
+    u, v = minus(vector(ends, i), first), minus(vector(ends, j), second)
+    w = minus(first, second)
+    s, t = closest_shares(u, v, w)
+    return square_at(s, t, u, v, w)
+
+
+@helper
+def is_clear(i: int, j: int, radius: float, base: FloatArray, ends: FloatArray) -> bool:
+    """Return whether the axes of two legs are farther apart than a sum of radii."""
+    if radius < 0.0:
+        return True
+    # The projections on an axis of the base already separate most pairs.
+    for axis in range(3):
+        a, b = base[i, axis], ends[i, axis]
+        c, d = base[j, axis], ends[j, axis]
+        if max(min(a, b) - max(c, d), min(c, d) - max(a, b)) > radius:
+            return True
+    return square_between(i, j, base, ends) > radius * radius
+
+
+@helper
+def is_valid(
+    row: FloatArray,
+    demands: FloatArray,
+    p: FloatArray,
+    r: FloatArray,
+    base: FloatArray,
+    ends: FloatArray,
+) -> bool:
+    """Return whether a pose satisfies all rules; write the ends of the legs."""
+    write_ends(row, p, r, base, ends)
+    if not satisfies_limits(demands, p, r, base, ends):
+        return False
+    pair = RADII
+    for i in range(3):
+        for j in range(i + 1, 4):
+            if not is_clear(i, j, row[pair], base, ends):
+                return False
+            pair += 1
+    return True
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], b1[::1])")
+def valid_rows(
+    row: FloatArray,
+    demands: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    valid: BoolArray,
+) -> None:
+    """Write whether n poses satisfy all rules, given as the row and the demands of `Rules`."""
+    base, ends = np.zeros((4, 3)), np.zeros((4, 3))
+    for index in range(position.shape[0]):
+        valid[index] = is_valid(row, demands, position[index], rotation[index], base, ends)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """An end of a range.
+
+    Attributes:
+        value: Value in design units, of an angle in degrees; infinite if nothing is demanded.
+        rates: Derivatives by parameter, such as {"l1 maximum": 1.0}.
+        words: What the value is, such as "the reach".
+    """
+
+    value: float
+    rates: Mapping[str, float] = field(default_factory=dict[str, float])
+    words: str = ""
+
+
+@dataclass(frozen=True)
+class LegAngle:
+    """The angle of a leg from an axis.
+
+    Attributes:
+        leg: Index of the leg, 0 to 3.
+        axis: Unit axis, shape (3,), in the frame of the platform or the base; None if it is not
+            known, so that no pose satisfies the limit.
+        in_platform: Whether the axis turns with the platform.
+    """
+
+    leg: int
+    axis: FloatArray | None
+    in_platform: bool
+
+
+@dataclass(frozen=True)
+class Demand:
+    """The range in which a limit demands a quantity.
+
+    Solids and turns rely on it that the distance of the carriages has no maximum and an angle no
+    minimum, and moves that a margin is bounded on one side of zero.
+
+    Attributes:
+        name: Name of the limit, such as "l1", "box x" or "margin δ1".
+        quantity: Index of the quantity.
+        low, high: Ends of the range.
+        symbol: Symbol of the quantity; the name if empty.
+        has_ends: Whether each end is a limit of its own, such as "l1 maximum".
+        is_sign: Whether the demand is on the sign that the quantity has at home.
+        angle: The angle that is meant, if the quantity is one.
+    """
+
+    name: str
+    quantity: int
+    low: Bound = Bound(-math.inf)
+    high: Bound = Bound(math.inf)
+    symbol: str = ""
+    has_ends: bool = True
+    is_sign: bool = False
+    angle: LegAngle | None = None
+
+    def row(self, design: Design) -> list[float]:
+        """Return the demand as kernels take it, widened by the tolerance."""
+        low, high, angle = self.low.value, self.high.value, self.angle
+        if angle is None:
+            ends = low - design.tolerance, high + design.tolerance
+            return [self.quantity, *ends, 0.0, 0.0, 0.0, 0.0, 0.0]
+        if angle.axis is None:
+            return [self.quantity, low, -math.inf, angle.leg, 0.0, 0.0, 0.0, 0.0]
+        ends = math.radians(low) - TOLERANCE, math.radians(high) + TOLERANCE
+        return [self.quantity, *ends, angle.leg, *angle.axis.tolist(), angle.in_platform]
+
+    def end_names(self) -> tuple[str, str]:
+        """Return the names of the limits at the low and the high end."""
+        ends = ("minimum", "maximum") if self.has_ends else ("", "")
+        first, second = (f"{self.name} {end}".rstrip() for end in ends)
+        return first, second
+
+    def text_of(self, value: float, **form: Any) -> str:
+        """Return a value of the quantity in words; `form` as for `format_number`."""
+        return f"{format_number(value, **form)}{'°' if self.angle else ''}"
+
+    def words(self, unit: float = 1.0) -> str:
+        """Return the range in words.
+
+        Args:
+            unit: Design unit in the unit of lengths that is asked for.
+        """
+        factor = unit if self.angle is None else 1.0
+
+        def number(bound: Bound) -> str:
+            size = abs(bound.value) if self.is_sign else bound.value
+            text = self.text_of(factor * size, digits=DIGITS)
+            return f"{text} ({bound.words})" if bound.words else text
+
+        if self.is_sign:
+            bound = self.low if math.isfinite(self.low.value) else self.high
+            least = f", magnitude at least {number(bound)}" if bound.value else ""
+            return f"sign as at home{least}"
+        if self.high.value == math.inf:
+            return f"at least {number(self.low)}"
+        if not self.is_range:
+            return f"at most {number(self.high)}"
+        return f"{number(self.low)} to {number(self.high)}"
+
+    @property
+    def has_length(self) -> bool:
+        """Whether the words of the range have a length in them."""
+        ends = self.low.value, self.high.value
+        return self.angle is None and any(end and math.isfinite(end) for end in ends)
+
+    @property
+    def is_range(self) -> bool:
+        """Whether both ends exclude something; no length or angle is below zero."""
+        least = 0.0 if self.quantity in MAGNITUDES else -math.inf
+        return self.low.value > least and self.high.value < math.inf
+
+
+MAGNITUDES = (GAP, *range(L1, ANGLE + 1))
+"""Quantities that are never negative."""

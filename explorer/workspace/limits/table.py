@@ -6,29 +6,106 @@ page all read it: a new limit is one row.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from operator import attrgetter
+from typing import Any
 
 import numpy as np
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair, Swing
-from explorer.mechanism.feasible_intervals import possible_ranges, without_box, without_guide
+from explorer.mechanism.feasible_intervals import possible_ranges
 from explorer.mechanism.margins import MARGIN_KINDS
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.limit import Bound, Demand, Entry, LegAngle, Limit, LimitCase, Switch
-from explorer.workspace.limits.quantities import (
-    ANGLE,
-    D1,
-    D3,
-    DELTA1,
-    DEMAND_COLUMNS,
-    GAP as GAP_QUANTITY,
-    L1,
-    ORDER,
-    X,
-)
+from explorer.workspace.limits import quantities
+from explorer.workspace.limits.quantities import Bound, Demand, LegAngle
+
+
+@dataclass(frozen=True)
+class LimitCase:
+    """What the demands of a limit follow from.
+
+    Attributes:
+        design: The manipulator.
+        value: Value of the limit's field.
+        signs: Sign triple to demand, even if no margin is; None for the home's.
+        order: Sign of d3 − d1 to demand, 0 for either; the design's if None.
+    """
+
+    design: Design
+    value: Any
+    signs: tuple[int, int, int] | None
+    order: int | None
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A checkbox, for one field or for several.
+
+    Attributes:
+        label, hint: Words beside it, and a sentence on what it does.
+        turn: Function of a design, the field's value and on or off, which returns the new value;
+            None if off is None, and on the value that the entries show while it is None.
+        is_on: Function of the value.
+    """
+
+    label: str
+    hint: str
+    turn: Callable[[Design, Any, bool], object] | None = None
+    is_on: Callable[[Any], bool] = lambda value: value is not None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A slider for a number or for the ends of a range.
+
+    Attributes:
+        label, hint: Words beside it, and a sentence on what it sets.
+        track: Function of a design that returns the range of the slider.
+        axis: Index in each of the two corners of a box; None for the field itself.
+        is_number: Whether the value is one number.
+        is_angle: Whether it is in degrees, rather than in design units.
+        free: Number in place of None; without a switch the field becomes None there. A range shows
+            its track.
+        least: Least value of the track.
+    """
+
+    label: str
+    hint: str
+    track: Callable[[Design], Pair]
+    axis: int | None = None
+    is_number: bool = False
+    is_angle: bool = False
+    free: float | None = None
+    least: float = -math.inf
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A row of the table.
+
+    Attributes:
+        path: Field below `Design.limits`, such as "guide" or "swing.a1".
+        subjects: The field at the beginning of a sentence, and its parts by the words that
+            follow its path in messages.
+        demands: Function that yields the demands that are in force.
+        entries: Sliders that edit it.
+        switch: Checkbox before the entries.
+    """
+
+    path: str
+    subjects: Mapping[str, str]
+    demands: Callable[[LimitCase], Iterable[Demand]]
+    entries: tuple[Entry, ...] = ()
+    switch: Switch | None = None
+
+    def value(self, design: Design) -> Any:
+        """Return the value of the field in a design."""
+        return attrgetter(self.path)(design.limits)
+
 
 Number = partial(Entry, is_number=True)
 GAP, CARRIAGE_ORDER = "gap |d1 − d3|", "carriage order"
@@ -39,7 +116,7 @@ def _length(name: str) -> Limit:
         low, high = case.value
         most = Bound(high, {f"{name} maximum": 1.0}) if high is not None else _reach(case.design)
         least = Bound(low, {f"{name} minimum": 1.0})
-        yield Demand(name, L1 + LENGTHS.index(name), least, most)
+        yield Demand(name, quantities.L1 + LENGTHS.index(name), least, most)
 
     def track(design: Design) -> Pair:
         longest = max(design.length_range(length)[1] for length in LENGTHS)
@@ -72,18 +149,18 @@ def _guide(case: LimitCase) -> Iterator[Demand]:
     if case.value is not None:
         low, high = case.value
         ends = Bound(low, {"guide minimum": 1.0}), Bound(high, {"guide maximum": 1.0})
-        yield from (Demand("d1", D1, *ends), Demand("d3", D3, *ends))
+        yield from (Demand("d1", quantities.D1, *ends), Demand("d3", quantities.D3, *ends))
 
 
 def _guide_track(design: Design) -> Pair:
-    _, d1, _, d3, _, _ = possible_ranges(without_guide(design)).joints
+    _, d1, _, d3, _, _ = possible_ranges(design.with_limits(guide=None)).joints
     own = design.limits.guide or d1
     return min(d1[0], d3[0], own[0]), max(d1[1], d3[1], own[1])
 
 
 def _gap(case: LimitCase) -> Iterator[Demand]:
     if case.value > 0.0:
-        yield Demand(GAP, GAP_QUANTITY, Bound(case.value), has_ends=False)
+        yield Demand(GAP, quantities.GAP, Bound(case.value), has_ends=False)
 
 
 def _gap_track(design: Design) -> Pair:
@@ -94,7 +171,7 @@ def _gap_track(design: Design) -> Pair:
 def _order(case: LimitCase) -> Iterator[Demand]:
     sign = case.design.demanded_order if case.order is None else case.order
     if sign:
-        yield _sign_demand(CARRIAGE_ORDER, ORDER, sign, Bound(0.0), "d3 − d1")
+        yield _sign_demand(CARRIAGE_ORDER, quantities.ORDER, sign, Bound(0.0), "d3 − d1")
 
 
 def _sign_demand(name: str, quantity: int, sign: int, least: Bound, symbol: str) -> Demand:
@@ -110,11 +187,11 @@ def _box(case: LimitCase) -> Iterator[Demand]:
         for axis, (letter, low, high) in enumerate(zip("xyz", *case.value, strict=True)):
             name = f"box {letter}"
             ends = Bound(low, {f"{name} minimum": 1.0}), Bound(high, {f"{name} maximum": 1.0})
-            yield Demand(name, X + axis, *ends, symbol=f"b4 {letter}")
+            yield Demand(name, quantities.X + axis, *ends, symbol=f"b4 {letter}")
 
 
 def _box_track(design: Design, axis: int) -> Pair:
-    free = possible_ranges(without_box(design)).position[axis]
+    free = possible_ranges(design.with_limits(box=None)).position[axis]
     own = design.limits.box or ((free[0],) * 3, (free[1],) * 3)
     return min(free[0], own[0][axis]), max(free[1], own[1][axis])
 
@@ -125,7 +202,7 @@ def _margins(case: LimitCase) -> Iterator[Demand]:
     least = Bound(case.value or 0.0, {"margin": 1.0})
     for index, sign in enumerate(case.signs or case.design.home_signs):
         symbol = f"δ{index + 1}"
-        yield _sign_demand(f"margin {symbol}", DELTA1 + index, sign, least, symbol)
+        yield _sign_demand(f"margin {symbol}", quantities.DELTA1 + index, sign, least, symbol)
 
 
 def _swing(joint: str, kind: str) -> Limit:
@@ -135,7 +212,9 @@ def _swing(joint: str, kind: str) -> Limit:
         if case.value is not None:
             angle = angle_from_home(case.design, leg, in_platform=joint.startswith("b"))
             name = f"swing {joint}"
-            yield Demand(name, ANGLE, high=Bound(case.value), has_ends=False, angle=angle)
+            yield Demand(
+                name, quantities.ANGLE, high=Bound(case.value), has_ends=False, angle=angle
+            )
 
     hint = (
         f"Maximum angle of leg {leg + 1} in this joint from its direction in the home pose; 180 "
@@ -274,7 +353,7 @@ def by_quantity(demands: Iterable[Demand]) -> list[Demand]:
 def rows_of(design: Design, demands: Sequence[Demand]) -> FloatArray:
     """Return the rows of demands for kernels, shape (n, DEMAND_COLUMNS)."""
     rows = [demand.row(design) for demand in demands]
-    return np.array(rows, dtype=np.float64).reshape(-1, DEMAND_COLUMNS)
+    return np.array(rows, dtype=np.float64).reshape(-1, quantities.DEMAND_COLUMNS)
 
 
 def limits_in_force(design: Design) -> Iterator[tuple[str, Demand]]:

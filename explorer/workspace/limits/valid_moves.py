@@ -16,18 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.legs.moves import ends_of_moves
 from explorer.mechanism.configuration import one_tool
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins_of
-from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import (
-    BoolArray,
-    FloatArray,
-    batch_shape,
-    for_kernel,
-    position_array,
-    rows_for_kernel,
-)
+from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, column, cross3, dot3, minus, vector
 from explorer.workspace.limits.quantities import (
@@ -45,11 +38,13 @@ from explorer.workspace.limits.quantities import (
     SPEEDS,
     TURNS,
     angle_at,
+    is_valid,
     quantity_at,
+    square_between,
     write_ends,
     write_speeds,
 )
-from explorer.workspace.limits.valid_poses import Rules, is_valid, square_between
+from explorer.workspace.limits.valid_poses import Rules
 
 # The share of the reach by which a limit may be exceeded between poses that satisfy it, and the
 # share of this tolerance that signs and clearances must exceed on the way, to be certain.
@@ -74,37 +69,18 @@ def moves_are_valid(
     """Return whether straight moves are proven to satisfy all limits and clearances, shape (...).
 
     A move that turns by half a turn is not valid, since neither way is the shorter one. The ends
-    are positions of b4 in the base frame, shape (..., 3), and rotations from platform to base.
-
-    Args:
-        design: The manipulator.
-        start_position: Position at the start.
-        start_rotation: Rotation at the start.
-        end_position: Position at the end.
-        end_rotation: Rotation at the end.
-        rules: Rules of the design, if they have been computed before.
-        tolerance: Length by which limits may be exceeded; a 10,000th of the reach if None.
-        tool: Point that moves straight in the platform frame, shape (3,); None for b4.
+    are positions of b4 in the base frame, shape (..., 3), and rotations from platform to base. The
+    tolerance is the length by which limits may be exceeded, a 10,000th of the reach if None. Rules
+    may have been computed before. The tool, shape (3,), moves straight; None for b4.
 
     Raises:
         InputError: A pose that is not finite or not a rotation, or not a point.
     """
-    p, q = (
-        position_array(name, value)
-        for name, value in (("start position", start_position), ("end position", end_position))
-    )
-    r, s = checked_rotation(start_rotation), checked_rotation(end_rotation)
-    ends = (p, 1), (r, 2), (q, 1), (s, 2)
-    batch = batch_shape(*ends)
-    start, turn, end, last_turn = (
-        rows_for_kernel(value, batch, trailing) for value, trailing in ends
-    )
-    valid = np.empty(len(start), dtype=np.bool_)
+    batch, ends = ends_of_moves(start_position, start_rotation, end_position, end_rotation)
+    valid = np.empty(len(ends[0]), dtype=np.bool_)
     rules = rules or Rules.of(design)
     most = DEFAULT_TOLERANCE * design.reach if tolerance is None else tolerance
-    point = for_kernel(one_tool(tool))
-    move = start, turn, end, last_turn
-    valid_move_rows(20 * len(start), rules.row, rules.demands, *move, point, most, valid)
+    valid_move_rows(20 * len(valid), *rules, *ends, one_tool(tool), most, valid)
     return valid.reshape(batch)
 
 

@@ -8,43 +8,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.legs.clearance import closest_shares, joined_pairs, radii_of_pairs, square_at
+from explorer.legs.clearance import joined_pairs, radii_of_pairs
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import (
-    BoolArray,
-    FloatArray,
-    batch_shape,
-    position_array,
-    rows_for_kernel,
-)
-from explorer.numerics.compiled import helper, kernel
-from explorer.numerics.vectors import minus, vector
-from explorer.workspace.limits.limit import Demand
-from explorer.workspace.limits.quantities import (
-    ANGLE,
-    DELTA1,
-    DELTA3,
-    GEOMETRY_COLUMNS,
-    HIGH,
-    LOW,
-    QUANTITY,
-    RADII,
-    angle_at,
-    quantity_at,
-    quantity_rows,
-    write_ends,
-)
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.workspace.limits import quantities
+from explorer.workspace.limits.quantities import Demand
 from explorer.workspace.limits.table import by_quantity, demands_of, rows_of
 
 
-@dataclass(frozen=True)
-class Rules:
+class Rules(NamedTuple):
     """The demands of a design on a pose, as kernels take them.
 
     Attributes:
@@ -61,17 +39,17 @@ class Rules:
         design: Design, signs: tuple[int, int, int] | None = None, order: int | None = None
     ) -> Rules:
         """Return the rules of a design; signs and order as for `demands_of`."""
-        row = np.empty(GEOMETRY_COLUMNS)
-        row[:RADII] = design.variables
+        row = np.empty(quantities.GEOMETRY_COLUMNS)
+        row[: quantities.RADII] = design.variables
         # No clearance is demanded of a pair that shares a joint.
-        row[RADII:] = np.where(joined_pairs(design), -1.0, radii_of_pairs(design))
+        row[quantities.RADII :] = np.where(joined_pairs(design), -1.0, radii_of_pairs(design))
         # What takes the least time comes first, since most invalid poses violate that too.
         return Rules(row, rows_of(design, by_quantity(demands_of(design, signs, order))))
 
     def without_clearances(self) -> Rules:
         """Return rules that demand no clearance."""
         row = self.row.copy()
-        row[RADII:] = -1.0
+        row[quantities.RADII :] = -1.0
         return Rules(row, self.demands)
 
     def tighten(self, margin: float, clearance: float) -> Rules:
@@ -80,9 +58,15 @@ class Rules:
         The margin is ignored if the rules demand none.
         """
         row, demands = self.row.copy(), self.demands.copy()
-        row[RADII:] = np.where(row[RADII:] < 0.0, row[RADII:], row[RADII:] + clearance)
-        low, high = demands[:, LOW], demands[:, HIGH]
-        of_margins = (demands[:, QUANTITY] >= DELTA1) & (demands[:, QUANTITY] <= DELTA3)
+        row[quantities.RADII :] = np.where(
+            row[quantities.RADII :] < 0.0,
+            row[quantities.RADII :],
+            row[quantities.RADII :] + clearance,
+        )
+        low, high = demands[:, quantities.LOW], demands[:, quantities.HIGH]
+        of_margins = (demands[:, quantities.QUANTITY] >= quantities.DELTA1) & (
+            demands[:, quantities.QUANTITY] <= quantities.DELTA3
+        )
         low[of_margins & np.isfinite(low) & (low < margin)] = margin
         high[of_margins & np.isfinite(high) & (high > -margin)] = -margin
         return Rules(row, demands)
@@ -104,89 +88,12 @@ def poses_are_valid(
     Raises:
         InputError: A pose that is not finite or not a rotation.
     """
-    p, r = position_array("position", position), checked_rotation(rotation)
-    batch = batch_shape((p, 1), (r, 2))
-    p_rows, r_rows = rows_for_kernel(p, batch, 1), rows_for_kernel(r, batch, 2)
-    valid = np.empty(len(p_rows), dtype=np.bool_)
-    rules = rules or Rules.of(design)
-    valid_rows(len(p_rows), rules.row, rules.demands, p_rows, r_rows, valid)
-    return valid.reshape(batch)
-
-
-@helper
-def satisfies_limits(
-    demands: FloatArray, p: FloatArray, r: FloatArray, base: FloatArray, ends: FloatArray
-) -> bool:
-    """Return whether a pose satisfies the demands of its limits."""
-    for index in range(demands.shape[0]):
-        kind = int(demands[index, QUANTITY])
-        if kind == ANGLE:
-            value = angle_at(demands, index, r, base, ends)
-        else:
-            value = quantity_at(kind, p, r, base, ends)
-        if not demands[index, LOW] <= value <= demands[index, HIGH]:
-            return False
-    return True
-
-
-@helper
-def square_between(i: int, j: int, base: FloatArray, ends: FloatArray) -> float:
-    """Return the squared distance of the axes of two legs."""
-    first, second = vector(base, i), vector(base, j)
-    u, v = minus(vector(ends, i), first), minus(vector(ends, j), second)
-    w = minus(first, second)
-    s, t = closest_shares(u, v, w)
-    return square_at(s, t, u, v, w)
-
-
-@helper
-def is_clear(i: int, j: int, radius: float, base: FloatArray, ends: FloatArray) -> bool:
-    """Return whether the axes of two legs are farther apart than a sum of radii."""
-    if radius < 0.0:
-        return True
-    # The projections on an axis of the base already separate most pairs.
-    for axis in range(3):
-        a, b = base[i, axis], ends[i, axis]
-        c, d = base[j, axis], ends[j, axis]
-        if max(min(a, b) - max(c, d), min(c, d) - max(a, b)) > radius:
-            return True
-    return square_between(i, j, base, ends) > radius * radius
-
-
-@helper
-def is_valid(
-    row: FloatArray,
-    demands: FloatArray,
-    p: FloatArray,
-    r: FloatArray,
-    base: FloatArray,
-    ends: FloatArray,
-) -> bool:
-    """Return whether a pose satisfies all rules; write the ends of the legs."""
-    write_ends(row, p, r, base, ends)
-    if not satisfies_limits(demands, p, r, base, ends):
-        return False
-    pair = RADII
-    for i in range(3):
-        for j in range(i + 1, 4):
-            if not is_clear(i, j, row[pair], base, ends):
-                return False
-            pair += 1
-    return True
-
-
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], b1[::1])")
-def valid_rows(
-    row: FloatArray,
-    demands: FloatArray,
-    position: FloatArray,
-    rotation: FloatArray,
-    valid: BoolArray,
-) -> None:
-    """Write whether n poses satisfy all rules, given as the row and the demands of `Rules`."""
-    base, ends = np.zeros((4, 3)), np.zeros((4, 3))
-    for index in range(position.shape[0]):
-        valid[index] = is_valid(row, demands, position[index], rotation[index], base, ends)
+    at = Configuration(design, position, rotation)
+    valid = np.empty(len(at.positions), dtype=np.bool_)
+    quantities.valid_rows(
+        len(valid), *(rules or Rules.of(design)), at.positions, at.rotations, valid
+    )
+    return valid.reshape(at.batch)
 
 
 @dataclass(frozen=True)
@@ -238,8 +145,8 @@ def violations(
     rows = rows_of(design, demands)
     values = np.empty((len(configuration.positions), len(demands)))
     poses = configuration.positions, configuration.rotations
-    quantity_rows(len(values), row, rows, *poses, values)
-    lows, highs = rows[:, LOW], rows[:, HIGH]
+    quantities.quantity_rows(len(values), row, rows, *poses, values)
+    lows, highs = rows[:, quantities.LOW], rows[:, quantities.HIGH]
     beyond = np.greater(values, highs) * 1 - np.less(values, lows)
     return [
         tuple(

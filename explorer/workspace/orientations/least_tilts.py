@@ -10,8 +10,7 @@ from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector
 from explorer.workspace.limits.quantities import A3, D1, HIGH, L1, LOW, QUANTITY, X
-from explorer.workspace.orientations.turn_polynomials import SCRATCH, TurnSearch, arm_of
-from explorer.workspace.orientations.turns import NO_LIMIT, tilt_in
+from explorer.workspace.orientations.turns import NO_LIMIT, SCRATCH, TurnSearch, arm_of, first_limit
 
 # Share of a bracket that the search by the golden section keeps.
 GOLDEN_SECTION = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -21,6 +20,35 @@ AZIMUTH_WIDTH, NARROW_WIDTH = 1e-4, 1e-6
 # Largest number of worst azimuths: two each of l1 and l4, three each of d2 and d4, two for each
 # carriage, and six of the box.
 WORST = 20
+
+
+@helper
+def write_tilt(azimuth: float, torsion: float, turn: FloatArray) -> None:
+    """Write the turn from tilt zero in an azimuth, angles in radians, see `first_limit`."""
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    a, b = math.cos(torsion - azimuth), math.sin(torsion - azimuth)
+    # R = still + level cos θ + upright sin θ.
+    for column in range(3):
+        across, along = (b, a) if column == 0 else ((a, -b) if column == 1 else (0.0, 0.0))
+        for i in range(3):
+            if column == 2:
+                still = 0.0
+                level = 1.0 if i == 2 else 0.0
+                upright = c if i == 0 else (s if i == 1 else 0.0)
+            else:
+                still = -across * s if i == 0 else (across * c if i == 1 else 0.0)
+                level = along * c if i == 0 else (along * s if i == 1 else 0.0)
+                upright = -along if i == 2 else 0.0
+            turn[i, column, 0] = still + level
+            turn[i, column, 1] = 2.0 * upright
+            turn[i, column, 2] = still - level
+
+
+@helper
+def tilt_in(search: TurnSearch, azimuth: float, torsion: float) -> tuple[float, int]:
+    """Return the greatest tilt of a position in one azimuth and its limit, in radians."""
+    write_tilt(azimuth, torsion, search.turn)
+    return first_limit(search)
 
 
 @helper
@@ -201,3 +229,20 @@ def least_tilt_rows(
             if found < best:
                 best, towards[index], limits[index] = found, azimuth, limit
         least[index] = best
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], i8[::1])")
+def tilt_rows(
+    row: FloatArray,
+    demands: FloatArray,
+    p: FloatArray,
+    tool: FloatArray,
+    torsion: float,
+    azimuths: FloatArray,
+    tilts: FloatArray,
+    limits: IntArray,
+) -> None:
+    """Write the greatest tilts of a position in m azimuths, shape (m,), angles in radians."""
+    search = TurnSearch(row, demands, p, tool, np.zeros((3, 3, 3)), np.zeros(SCRATCH))
+    for k in range(azimuths.shape[0]):
+        tilts[k], limits[k] = tilt_in(search, azimuths[k], torsion)

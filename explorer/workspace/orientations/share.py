@@ -1,16 +1,19 @@
-"""The share of orientations that a position can have: of all with its standard error, or of a set.
+"""Sets of orientations, and the share of them that a position can have.
 
-Orientations that stand for all are several sets of super-Fibonacci spirals (M. Alexa,
-"Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of SO(3)", CVPR 2022), each turned by a
-random rotation of its own. Every turned point is spread evenly over all rotations, so the mean of
-the sets is without bias, and the spread of the sets gives its standard error (randomised
-quasi-Monte Carlo; A. B. Owen, "Practical Quasi-Monte Carlo Integration", 2023, chapter 17). It is a
-few times smaller than that of as many independent orientations.
+A set is a range of yaw, pitch and roll, or a cone of tilts. Orientations that stand for all are
+several sets of super-Fibonacci spirals (M. Alexa, "Super-Fibonacci Spirals: Fast, Low-Discrepancy
+Sampling of SO(3)", CVPR 2022), each turned by a random rotation of its own. Every turned point is
+spread evenly over all rotations, so the mean of the sets is without bias, and the spread of the
+sets gives its standard error (randomised quasi-Monte Carlo; A. B. Owen, "Practical Quasi-Monte
+Carlo Integration", 2023, chapter 17). It is a few times smaller than that of as many independent
+orientations.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,11 +23,96 @@ from scipy.spatial.transform import Rotation
 from explorer.errors import InputError
 from explorer.mechanism.configuration import one_tool, tool_offset
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel
+from explorer.mechanism.pose import checked_rotation, rotation_from_yaw_pitch_roll
+from explorer.numerics import arrays
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.checks import whole
 from explorer.numerics.compiled import kernel
-from explorer.workspace.limits.valid_poses import Rules, is_valid, valid_rows
-from explorer.workspace.orientations.sets import MOST_ORIENTATIONS, one_position, whole_number
+from explorer.workspace.limits.quantities import is_valid, valid_rows
+from explorer.workspace.limits.valid_poses import Rules
+
+MOST_ORIENTATIONS = 1_000_000
+"""Largest number of orientations in a set."""
+
+# Largest number of azimuths or torsions.
+MOST_ANGLES = 100_000
+GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
+
+
+def yaw_pitch_roll_range(
+    lows: Sequence[float], highs: Sequence[float], counts: Sequence[int]
+) -> FloatArray:
+    """Return a grid of orientations over yaw (outermost), pitch and roll, shape (n, 3, 3).
+
+    Args:
+        lows: Least yaw, pitch and roll, in degrees.
+        highs: Largest yaw, pitch and roll, in degrees.
+        counts: Numbers of values on the ranges, ends included; a single one is the middle.
+
+    Raises:
+        InputError: Not three of each, a reversed range, or no usable number of orientations.
+    """
+    low, high = arrays.finite_array("lows", lows, (3,)), arrays.finite_array("highs", highs, (3,))
+    if low.ndim != 1 or high.ndim != 1 or len(counts) != 3:
+        raise InputError("lows, highs and counts are of yaw, pitch and roll: three numbers each")
+    axes: list[FloatArray] = []
+    for name, start, end, count in zip(("yaw", "pitch", "roll"), low, high, counts, strict=True):
+        if start > end:
+            raise InputError(f"{name}: the low end {start:g}° exceeds the high end {end:g}°")
+        whole(f"the number of values of {name}", count, 1, MOST_ORIENTATIONS)
+        first, last = (start, end) if count > 1 else (0.5 * (start + end), 0.0)
+        axes.append(np.asarray(np.linspace(first, last, count), dtype=np.float64))
+    whole("the number of orientations", math.prod(counts), 1, MOST_ORIENTATIONS)
+    return rotation_from_yaw_pitch_roll(np.array(list(itertools.product(*axes))))
+
+
+def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> FloatArray:
+    """Return orientations that tilt a platform in all directions up to a half-angle, (count, 3, 3).
+
+    Each tilt turns the platform's z-axis along the shortest arc, without torsion. The tilted
+    axes are spread evenly over the cone, the first at its centre, the last on its rim.
+
+    Args:
+        rotation: Rotation from platform to base without tilt, shape (3, 3).
+        half_angle: Half-angle of the cone in degrees, 0 to 180.
+        count: Number of orientations.
+
+    Raises:
+        InputError: Not a rotation, a half-angle out of its range, or no usable count.
+    """
+    untilted = checked_rotation(rotation)
+    if not 0.0 <= half_angle <= 180.0:
+        raise InputError(f"the half-angle of tilts must lie within 0° to 180°; got {half_angle:g}°")
+    whole("the number of orientations", count, 1, MOST_ORIENTATIONS)
+    share = np.arange(count) / max(1, count - 1)
+    # The area of a spherical cap grows with 1 - cos of the tilt.
+    tilt = 2.0 * np.arcsin(np.sqrt(share) * math.sin(0.5 * math.radians(half_angle)))
+    turn = GOLDEN_ANGLE * np.arange(count)
+    axes = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(count)])
+    return untilted @ Rotation.from_rotvec(tilt[:, None] * axes).as_matrix()
+
+
+def one_position(position: ArrayLike) -> FloatArray:
+    """Return one position (3,); an `InputError` says if it is not finite, or there are several."""
+    p = arrays.position_array("position", position)
+    if p.ndim != 1:
+        raise InputError(f"give one position, three numbers; got the shape {p.shape}")
+    return p
+
+
+def one_angle(name: str, angle: ArrayLike) -> float:
+    """Return one angle; an `InputError` says if it is not finite, or there are several."""
+    value = arrays.finite_array(name, angle, ())
+    if value.ndim:
+        raise InputError(f"give one {name}, a number; got the shape {value.shape}")
+    return float(value)
+
+
+def even_angles(name: str, count: object, fewest: int = 3) -> FloatArray:
+    """Return a checked number of angles in degrees at equal distances once around from 0 on."""
+    number = whole(f"the number of {name}", count, fewest, MOST_ANGLES)
+    return np.asarray(np.arange(number) * (360.0 / number), dtype=np.float64)
+
 
 CAPABILITY_ORIENTATIONS = 100_000
 """Number of orientations that gives the share at a position to about a thousandth."""
@@ -64,16 +152,16 @@ def orientation_share(
     are those of `orientations_within`.
     """
     p, t = one_position(position), one_tool(tool)
-    n = whole_number("the number of orientations", n, 2, MOST_ORIENTATIONS)
-    seed = whole_number("the seed", seed, 0)
+    n = whole("the number of orientations", n, 2, MOST_ORIENTATIONS)
+    seed = whole("the seed", seed, 0, 2**63)
     sets = min(SETS, n)
     sizes = np.full(sets, n // sets, dtype=np.int64)
     sizes[: n % sets] += 1
     turns = Rotation.random(sets, random_state=np.random.default_rng(seed))
-    quaternions = for_kernel(turns.as_quat(scalar_first=True).reshape(sets, 4))
+    quaternions = arrays.for_kernel(turns.as_quat(scalar_first=True).reshape(sets, 4))
     counts = np.zeros(sets, dtype=np.int64)
     rules = Rules.of(design).without_clearances()
-    share_rows(n, rules.row, rules.demands, for_kernel(p), t, quaternions, sizes, counts)
+    share_rows(n, *rules, arrays.for_kernel(p), t, quaternions, sizes, counts)
     share = float(counts.sum()) / n
     weights = sizes / n
     # The sets differ in size by one orientation at the most.
@@ -120,8 +208,7 @@ def orientations_within(
         raise InputError(f"rotations must have the shape (n, 3, 3); got {r.shape}")
     within = np.empty(len(r), dtype=np.bool_)
     rules = Rules.of(design).without_clearances()
-    positions = p - tool_offset(r, t)
-    valid_rows(len(r), rules.row, rules.demands, positions, for_kernel(r), within)
+    valid_rows(len(r), *rules, p - tool_offset(r, t), arrays.for_kernel(r), within)
     return within
 
 

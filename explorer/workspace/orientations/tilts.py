@@ -1,4 +1,4 @@
-"""The tilts that a position can have: how far the platform tilts before a limit stops it.
+"""Tilts and torsions that a position can have: how far the platform turns until a limit stops it.
 
 The angles are those of `explorer.mechanism.tilt_torsion`. At a torsion the platform tilts from
 tilt zero in each azimuth, b4 or the tool held in its place, until it meets the first limit. That
@@ -17,12 +17,15 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.mechanism.configuration import one_tool
 from explorer.mechanism.design import Design
-from explorer.mechanism.tilt_torsion import tilt_torsion_of
-from explorer.numerics.arrays import FloatArray, finite_array, for_kernel, position_array
+from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion, tilt_torsion_of
+from explorer.numerics import arrays
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.table import by_quantity, demands_of
 from explorer.workspace.limits.valid_poses import Rules
-from explorer.workspace.orientations.least_tilts import least_tilt_rows
-from explorer.workspace.orientations.sets import MOST_ANGLES, even_angles, one_angle, one_position
-from explorer.workspace.orientations.turns import NO_LIMIT, limit_names, tilt_rows
+from explorer.workspace.orientations.least_tilts import least_tilt_rows, tilt_rows
+from explorer.workspace.orientations.share import MOST_ANGLES, even_angles, one_angle, one_position
+from explorer.workspace.orientations.turns import NO_LIMIT, turn_rows
 
 AZIMUTHS = 72
 """Number of azimuths of a map of tilts, and of those between which the least tilt of each of many
@@ -83,12 +86,12 @@ def tilt_map(
     The azimuths are in degrees, shape (n,), or their number, at equal distances from 0 on. The
     other arguments and the errors are those of `greatest_tilt`.
     """
-    p, sigma = one_position(position), checked_torsion(design, torsion)
+    p, sigma = one_position(position), _torsion_of(design, torsion)
     array = np.asarray(azimuths)
     if array.ndim == 0:
-        directions = even_angles("azimuths", array, fewest=1)
+        directions = even_angles("azimuths", array.item(), fewest=1)
     else:
-        directions = finite_array("azimuths", array, ())
+        directions = arrays.finite_array("azimuths", array, ())
         if directions.ndim != 1 or not 1 <= len(directions) <= MOST_ANGLES:
             raise InputError(
                 f"azimuths must be 1 to {MOST_ANGLES:,} angles; got the shape {directions.shape}"
@@ -96,17 +99,8 @@ def tilt_map(
     count = len(directions)
     tilts, limits = np.empty(count), np.empty(count, dtype=np.int64)
     rules = Rules.of(design).without_clearances()
-    tilt_rows(
-        ROWS_OF_TURN * count,
-        rules.row,
-        rules.demands,
-        for_kernel(p),
-        one_tool(tool),
-        math.radians(sigma),
-        np.radians(directions),
-        tilts,
-        limits,
-    )
+    at = arrays.for_kernel(p), one_tool(tool), math.radians(sigma), np.radians(directions)
+    tilt_rows(ROWS_OF_TURN * count, *rules, *at, tilts, limits)
     return TiltMap(sigma, directions, in_degrees(tilts), names_of(design, limits.tolist()))
 
 
@@ -130,7 +124,7 @@ def greatest_tilt(
     Raises:
         InputError: Not a position, not a tool point, or a torsion that is not finite.
     """
-    p, sigma = one_position(position), checked_torsion(design, torsion)
+    p, sigma = one_position(position), _torsion_of(design, torsion)
     sigmas = np.array([sigma])
     tilts, towards, limits = _least_tilts(design, p[None], sigmas, AZIMUTHS_OF_ONE, tool)
     tilt = float(tilts[0])
@@ -148,36 +142,22 @@ def greatest_tilts(
 ) -> FloatArray:
     """Return the greatest tilts of positions in every azimuth, in degrees, shape (...).
 
-    A position whose tilt zero violates a limit has NaN. The search is that of `greatest_tilt`, from
-    fewer azimuths: with 72, a dip by the swing of a joint that is narrower than 5° can be missed.
-
-    Args:
-        design: The manipulator.
-        position: Positions of b4 or the tool in the base frame, in design units, shape (..., 3).
-        torsion: Torsions in degrees, shape (...); that of the home pose if None.
-        azimuths: Number of azimuths from which the least tilt is searched, 3 or more.
-        tool: As in `greatest_tilt`.
+    A position whose tilt zero violates a limit has NaN. Positions have the shape (..., 3), torsions
+    in degrees (...). The search is that of `greatest_tilt`, from fewer azimuths, 3 or more: with
+    72, a dip by the swing of a joint that is narrower than 5° can be missed.
 
     Raises:
         InputError: As there, or positions and torsions that do not broadcast.
     """
-    p = position_array("position", position)
-    sigma = np.asarray(checked_torsion(design, None))
-    if torsion is not None:
-        sigma = finite_array("torsion", torsion, ())
-    try:
-        shape = np.broadcast_shapes(p.shape[:-1], sigma.shape)
-    except ValueError:
-        raise InputError(
-            f"positions of the shape {p.shape[:-1]} do not go with torsions of the shape "
-            f"{sigma.shape}"
-        ) from None
+    p = arrays.position_array("position", position)
+    sigma = arrays.finite_array("torsion", _torsion_of(design) if torsion is None else torsion, ())
+    shape = arrays.batch_shape((p, 1), (sigma, 0))
     positions = np.broadcast_to(p, (*shape, 3)).reshape(-1, 3)
     torsions = np.broadcast_to(sigma, shape).reshape(-1)
     return _least_tilts(design, positions, torsions, azimuths, tool)[0].reshape(shape)
 
 
-def checked_torsion(design: Design, torsion: float | None) -> float:
+def _torsion_of(design: Design, torsion: float | None = None) -> float:
     """Return one torsion in degrees after checking it; that of the home pose if None."""
     if torsion is None:
         return tilt_torsion_of(design.home_pose.rotation).torsion
@@ -195,20 +175,9 @@ def _least_tilts(
     n, directions = len(positions), np.radians(even_angles("azimuths", azimuths))
     count = len(directions)
     least, towards, limits = np.empty(n), np.empty(n), np.empty(n, dtype=np.int64)
-    rules = Rules.of(design).without_clearances()
-    least_tilt_rows(
-        ROWS_OF_TURN * n * count,
-        rules.row,
-        rules.demands,
-        for_kernel(positions),
-        one_tool(tool),
-        np.radians(torsions),
-        directions,
-        np.empty(count),
-        least,
-        towards,
-        limits,
-    )
+    rules, angles = Rules.of(design).without_clearances(), np.radians(torsions)
+    at = arrays.for_kernel(positions), one_tool(tool), angles, directions, np.empty(count)
+    least_tilt_rows(ROWS_OF_TURN * n * count, *rules, *at, least, towards, limits)
     return in_degrees(least), np.degrees(towards), limits.tolist()
 
 
@@ -220,6 +189,169 @@ def in_degrees(angles: FloatArray) -> FloatArray:
 
 
 def names_of(design: Design, limits: list[int]) -> tuple[str | None, ...]:
-    """Return the names of limits by their numbers, as in `limit_names`; None for no limit."""
-    names = limit_names(design)
+    """Return the names of limits by their numbers, two for each demand; None for no limit."""
+    demands = by_quantity(demands_of(design))
+    names = [name for demand in demands for name in demand.end_names()]
     return tuple(None if limit == NO_LIMIT else names[limit] for limit in limits)
+
+
+TORSIONS = 72
+"""Number of torsions at which the greatest tilt is measured."""
+
+# Width in degrees of the interval of torsions at which the search for the best one ends.
+TORSION_WIDTH = 1e-3
+
+
+@dataclass(frozen=True)
+class TorsionRange:
+    """The torsions that lead on from one without a gap, at a tilt; angles in degrees.
+
+    Attributes:
+        low: Least torsion, at most 360° below the one that the range starts from; NaN if that one
+            violates a limit.
+        high: Largest torsion, at most 360° above the one that the range starts from, and above
+            the least one; NaN as `low`. If every torsion is possible, both are 180° away.
+        low_limit: Name of the limit at the least torsion, or that the start violates; None if
+            every torsion is possible.
+        high_limit: Name of the limit at the largest torsion, as `low_limit`.
+    """
+
+    low: float
+    high: float
+    low_limit: str | None
+    high_limit: str | None
+
+
+@dataclass(frozen=True)
+class TiltByTorsion:
+    """The greatest tilt in every azimuth of a position at each of n torsions; angles in degrees.
+
+    Attributes:
+        torsions: Torsions at equal distances once around from −180 on, shape (n,).
+        tilts: Greatest tilts in every azimuth, shape (n,); NaN where tilt zero violates a limit.
+        best: The largest of all; its tilt is NaN if no torsion is possible.
+    """
+
+    torsions: FloatArray
+    tilts: FloatArray
+    best: GreatestTilt
+
+
+def torsion_range(
+    design: Design,
+    position: ArrayLike,
+    torsion: float | None = None,
+    azimuth: float = 0.0,
+    tilt: float = 0.0,
+    tool: ArrayLike | None = None,
+) -> TorsionRange:
+    """Return the torsions that a position can have without a gap from one torsion, at a tilt.
+
+    The azimuth and the tilt, in degrees, stay the same. The range starts from the torsion. Other
+    arguments and errors are those of `greatest_tilt`.
+    """
+    p, sigma = one_position(position), _torsion_of(design, torsion)
+    r = rotation_from_tilt_torsion([one_angle("azimuth", azimuth), one_angle("tilt", tilt), sigma])
+    # For a decreasing torsion the platform's x-axis turns towards its negative y-axis.
+    turns = np.stack([_turn_about_z(r, -1.0), _turn_about_z(r, 1.0)])
+    angles, limits = _end_of_turns(design, p, turns, tool)
+    down, up = in_degrees(angles).tolist()
+    names = names_of(design, limits)
+    if names[0] is None and names[1] is None:
+        return TorsionRange(sigma - 180.0, sigma + 180.0, None, None)
+    if names[0] is None or names[1] is None:
+        # Half a turn one way ends where the other way ends, beyond that half turn.
+        half = r * np.array([-1.0, -1.0, 1.0])
+        rest = np.stack([_turn_about_z(half, -1.0), _turn_about_z(half, 1.0)])
+        angles, limits = _end_of_turns(design, p, rest, tool)
+        # Where the half turn ends on a limit, rounding may make the start of the rest invalid.
+        more, rest_names = np.maximum(np.degrees(angles), 0.0).tolist(), names_of(design, limits)
+        if names[0] is None:
+            down = min(180.0 + more[0], 360.0 - up)
+            names = rest_names[0] or names[1], names[1]
+        else:
+            up = min(180.0 + more[1], 360.0 - down)
+            names = names[0], rest_names[1] or names[0]
+    return TorsionRange(sigma - down, sigma + up, *names)
+
+
+def tilt_by_torsion(
+    design: Design, position: ArrayLike, torsions: int = TORSIONS, tool: ArrayLike | None = None
+) -> TiltByTorsion:
+    """Return the greatest tilt in every azimuth of a position at a number of torsions once around.
+
+    The best of them is searched between the neighbours of the best one of the row. There are three
+    torsions or more. Other arguments and errors are those of `greatest_tilt`.
+    """
+    p = one_position(position)
+    angles = even_angles("torsions", torsions) - 180.0
+    tilts = greatest_tilts(design, p, angles, AZIMUTHS_OF_ONE, tool)
+    if np.isnan(tilts).all():
+        return TiltByTorsion(angles, tilts, greatest_tilt(design, p, float(angles[0]), tool))
+    step, middle = 360.0 / len(angles), float(angles[np.nanargmax(tilts)])
+    best = greatest_tilt(design, p, middle, tool)
+    low, high = middle - step, middle + step
+    while high - low > TORSION_WIDTH:
+        tried = np.linspace(low, high, 9)
+        found = np.nan_to_num(greatest_tilts(design, p, tried, AZIMUTHS_OF_ONE, tool), nan=-1.0)
+        top = int(found.argmax())
+        if found[top] > best.tilt:
+            best = greatest_tilt(design, p, float(tried[top]), tool)
+        low, high = float(tried[max(top - 1, 0)]), float(tried[min(top + 1, 8)])
+    return TiltByTorsion(angles, tilts, best)
+
+
+def _end_of_turns(
+    design: Design, position: FloatArray, turns: FloatArray, tool: ArrayLike | None
+) -> tuple[FloatArray, list[int]]:
+    """Return the angles (n,) in radians at which turns (n, 3, 3, 3) end, and their limits."""
+    angles, limits = np.empty(len(turns)), np.empty(len(turns), dtype=np.int64)
+    rules = Rules.of(design).without_clearances()
+    turn_rows(
+        len(turns), *rules, arrays.for_kernel(position), one_tool(tool), turns, angles, limits
+    )
+    return angles, limits.tolist()
+
+
+def _turn_about_z(rotation: FloatArray, sign: float) -> FloatArray:
+    """Return the turn from a rotation about the platform's z-axis, shape (3, 3, 3)."""
+    x, y, z = rotation.T
+    still = np.column_stack([0.0 * x, 0.0 * y, z])
+    cosine = np.column_stack([x, y, 0.0 * z])
+    sine = sign * np.column_stack([y, -x, 0.0 * z])
+    return np.stack([still + cosine, 2.0 * sine, still - cosine], axis=-1)
+
+
+# Error of an angle that is computed in two ways, in degrees.
+ANGLE_TOLERANCE = 1e-7
+
+
+def is_connected(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    other: ArrayLike | None = None,
+    tool: ArrayLike | None = None,
+) -> bool:
+    """Return whether an orientation is connected to tilt zero by a tilt without a gap.
+
+    The tilt keeps azimuth and torsion. At tilt 180°, where many torsions give one orientation, it
+    is that of torsion 0. With a second orientation the question is whether a tilt from the first
+    one to tilt zero, a change of the torsion there and a tilt to the second one connect the two.
+    Position, tool and errors are those of `greatest_tilt`; orientations are rotations (3, 3).
+    """
+    p = one_position(position)
+    ends = [
+        tilt_torsion_of(checked_rotation(each)) for each in (rotation, other) if each is not None
+    ]
+    for azimuth, tilt, torsion in ends:
+        reached = tilt_map(design, p, torsion, [azimuth], tool).tilts[0]
+        if not reached >= tilt - ANGLE_TOLERANCE:
+            return False
+    if other is None:
+        return True
+    span = torsion_range(design, p, ends[0].torsion, tool=tool)
+    if math.isnan(span.low):
+        return False
+    turn = (ends[1].torsion - span.low + ANGLE_TOLERANCE) % 360.0 - ANGLE_TOLERANCE
+    return turn <= span.high - span.low + ANGLE_TOLERANCE

@@ -10,16 +10,26 @@ of `explorer.workspace.limits.region`.
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 
+from explorer.errors import InputError
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
-from explorer.workspace.slices.arcs import LENGTH, MOMENT_Y, MOMENT_Z, Slicer, slice_area
-from explorer.workspace.slices.breaks import region_size
+from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, SIDE, Region, X, Y, Z
+from explorer.workspace.slices.arcs import (
+    LENGTH,
+    MOMENT_Y,
+    MOMENT_Z,
+    Slicer,
+    region_size,
+    slice_area,
+)
 from explorer.workspace.slices.vertices import find_breaks
 
+# Gauss-Legendre nodes per piece; with fewer nodes more pieces have to be halved.
+NODES = 20
 # The most breaks of one region, and the most pieces.
 MOST_BREAKS, MOST_PIECES = 1000, 1100
 # The most arcs that other curves forbid on one curve; an arc through angle zero counts twice.
@@ -210,3 +220,45 @@ def integrate_slices(
     result[AREA_AT_LOW], _ = slice_area(low, slicer)
     result[AREA_AT_HIGH], _ = slice_area(high, slicer)
     result[TOTAL_ERROR] = total[VOLUME_ERROR] + rounding
+
+
+@cache
+def quadrature() -> FloatArray:
+    """Return the quadrature as `integrate_slices` takes it, shape (10, NODES)."""
+    abscissae, weights = np.polynomial.legendre.leggauss(NODES)
+    # The middle node comes first: a piece that is empty there is empty everywhere.
+    order = np.argsort(np.abs(abscissae), kind="stable")
+    abscissae, weights = abscissae[order], weights[order]
+    degrees = np.arange(NODES - 8, NODES)
+    values = (2.0 * degrees + 1.0) * np.polynomial.legendre.legvander(abscissae, NODES - 1)[:, -8:]
+    return np.stack([0.5 * (abscissae + 1.0), 0.5 * weights, *values.T])
+
+
+def volume_of_slices(region: Region) -> tuple[float, float, dict[str, float]]:
+    """Return the volume of a region without cones, its error, and its derivatives by parameter.
+
+    Raises:
+        InputError: The region has too many surfaces.
+    """
+    if region.box is None:
+        return 0.0, 0.0, {}
+    surfaces = (*region.circle_limits, *region.plane_limits)
+    if len(surfaces) > MOST_SURFACES:
+        raise InputError(
+            f"a volume takes at most {MOST_SURFACES} surfaces; the region has {len(surfaces)}"
+        )
+    result, rates = np.zeros(RESULTS), np.zeros((len(surfaces), 4))
+    ends = region.low, region.high
+    integrate_slices(1, region.circles, region.planes, *ends, quadrature(), result, rates)
+    # An end that moves by dx sweeps the area of its slice; its normal is along x.
+    areas = (region.low_limit, result[AREA_AT_LOW]), (region.high_limit, result[AREA_AT_HIGH])
+    of_ends = [
+        (end, np.array([0.0, 0.0, 0.0, area / abs(float(end.normal[0]))]))
+        for end, area in areas
+        if end is not None
+    ]
+    gradient: dict[str, float] = {}
+    for limit, volume_rate in (*zip(surfaces, rates, strict=True), *of_ends):
+        for name, rate in limit.rates.items():
+            gradient[name] = gradient.get(name, 0.0) + float(volume_rate @ rate)
+    return float(result[TOTAL]), float(result[TOTAL_ERROR]), gradient

@@ -16,7 +16,7 @@ import numpy as np
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
 from explorer.workspace.limits.region import IS_BALL, OFFSET, RADIUS, X, Y, Z
-from explorer.workspace.slices.breaks import (
+from explorer.workspace.slices.arcs import (
     Boundary,
     add_break,
     add_breaks_at_height,

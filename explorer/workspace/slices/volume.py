@@ -11,31 +11,23 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import positive
-from explorer.workspace.limits.constraints import BallOrCylinder, Constraint, HalfSpace, constraints
-from explorer.workspace.limits.region import Region, region_of
-from explorer.workspace.slices import nodes
-from explorer.workspace.slices.integration import (
-    AREA_AT_HIGH,
-    AREA_AT_LOW,
-    MOST_SURFACES,
-    RESULTS,
-    TOTAL,
-    TOTAL_ERROR,
-    integrate_slices,
+from explorer.workspace.limits.constraints import (
+    BallOrCylinder,
+    Constraint,
+    constraints,
+    orientation_of,
 )
+from explorer.workspace.limits.region import Region, column_lengths, mark_nodes, region_of
+from explorer.workspace.slices.integration import volume_of_slices
 
-# Gauss-Legendre nodes per piece; with fewer nodes more pieces have to be halved.
-NODES = 20
 # Columns per axis for workspaces with cones, whose slices are not bounded by circles.
 COLUMNS = 400
 # Columns per axis that are enough to decide whether there is a volume.
@@ -85,11 +77,6 @@ class NodeCount:
     extent: tuple[tuple[float, float, float], tuple[float, float, float]] | None
 
 
-def home_rotation(design: Design) -> FloatArray:
-    """Return the orientation of a design's constant-orientation workspace, shape (3, 3)."""
-    return design.home_pose.rotation
-
-
 def workspace_volume(
     design: Design, rotation: ArrayLike | None = None, *, explain: bool = True
 ) -> Volume:
@@ -103,23 +90,30 @@ def workspace_volume(
     Raises:
         InputError: Not a rotation.
     """
-    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    r = orientation_of(design, rotation)
     limits = constraints(design, r)
-    region = region_of(limits)
-    if len(region.cones):
-        volume, error, gradient = *_volume_of_columns(region), {}
-    else:
-        volume, error, gradient = _volume_of_slices(region)
+    volume, error, gradient = volume_of(region_of(limits))
     because = find_emptying_limits(limits) if explain and volume <= 0.0 else ()
-    return Volume(max(0.0, volume), error, gradient, because)
+    return Volume(volume, error, gradient, because)
 
 
-def volume_within(region: Region, columns: int = COLUMNS) -> tuple[float, float]:
-    """Return the volume of a region and its error; with cones, of a number of columns per axis."""
-    if len(region.cones):
-        return _volume_of_columns(region, columns)
-    volume, error, _ = _volume_of_slices(region)
-    return max(0.0, volume), error
+def volume_of(region: Region, columns: int = COLUMNS) -> tuple[float, float, dict[str, float]]:
+    """Return the volume of a region, its error, and its derivatives by parameter.
+
+    With cones it is that of a number of columns per axis, without derivatives.
+    """
+    if not len(region.cones):
+        volume, error, gradient = volume_of_slices(region)
+        return max(0.0, volume), error, gradient
+    if region.box is None:
+        return 0.0, 0.0, {}
+    lows, highs = region.box
+    volumes: list[float] = []
+    for per_axis in (columns // 2, columns):
+        total, count = np.zeros(1), per_axis * per_axis
+        column_lengths(count, *region.rows, lows, highs, per_axis, total)
+        volumes.append(float(total[0] * np.prod((highs - lows)[:2])) / count)
+    return volumes[1], abs(volumes[1] - volumes[0]), {}
 
 
 def workspace_nodes(
@@ -132,31 +126,26 @@ def workspace_nodes(
     Raises:
         InputError: Not a rotation, a step that is not positive, or a grid of too many nodes.
     """
-    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    r = orientation_of(design, rotation)
     width = node_step_of(design, step)
     region = region_of(constraints(design, r))
-    empty = NodeCount(width, 0, 0.0, None)
     first, number = node_range(region, width)
     check_node_count(number, width, MOST_NODES)
     within = np.zeros(number.astype(np.int64), dtype=np.bool_)
     slack, steps = design.tolerance, np.full(3, width)
-    nodes.mark_nodes(within.size, *region.rows, first * width, steps, slack, within)
+    mark_nodes(within.size, *region.rows, first * width, steps, slack, within)
     # Planes across x are no rows of the region.
     x = (first[0] + np.arange(len(within))) * width
     within[(x < region.low - slack) | (x > region.high + slack)] = False
     count = int(np.count_nonzero(within))
     if not count:
-        return empty
-    others = ((1, 2), (0, 2), (0, 1))
-    taken = [np.flatnonzero(within.any(axis=other)) for other in others]
-    low_x, low_y, low_z = (
-        float((start + index[0]) * width) for start, index in zip(first, taken, strict=True)
-    )
-    high_x, high_y, high_z = (
-        float((start + index[-1]) * width) for start, index in zip(first, taken, strict=True)
-    )
-    extent = (low_x, low_y, low_z), (high_x, high_y, high_z)
-    return NodeCount(width, count, count * width**3, extent)
+        return NodeCount(width, 0, 0.0, None)
+    taken = [
+        start + np.flatnonzero(within.any(axis=others))[[0, -1]]
+        for start, others in zip(first, ((1, 2), (0, 2), (0, 1)), strict=True)
+    ]
+    lows, highs = (width * np.array(taken)).T.tolist()
+    return NodeCount(width, count, count * width**3, (tuple(lows), tuple(highs)))
 
 
 def node_step_of(design: Design, step: float | None = None) -> float:
@@ -185,60 +174,6 @@ def check_node_count(counts: FloatArray, step: float, most: int) -> None:
         )
 
 
-@cache
-def quadrature() -> FloatArray:
-    """Return the quadrature as `integrate_slices` takes it, shape (10, NODES)."""
-    abscissae, weights = np.polynomial.legendre.leggauss(NODES)
-    # The middle node comes first: a piece that is empty there is empty everywhere.
-    order = np.argsort(np.abs(abscissae), kind="stable")
-    abscissae, weights = abscissae[order], weights[order]
-    degrees = np.arange(NODES - 8, NODES)
-    values = (2.0 * degrees + 1.0) * np.polynomial.legendre.legvander(abscissae, NODES - 1)[:, -8:]
-    return np.stack([0.5 * (abscissae + 1.0), 0.5 * weights, *values.T])
-
-
-def _volume_of_slices(region: Region) -> tuple[float, float, dict[str, float]]:
-    if region.box is None:
-        return 0.0, 0.0, {}
-    surfaces = (*region.circle_limits, *region.plane_limits)
-    if len(surfaces) > MOST_SURFACES:
-        raise InputError(
-            f"a volume takes at most {MOST_SURFACES} surfaces; the region has {len(surfaces)}"
-        )
-    result, rates = np.zeros(RESULTS), np.zeros((len(surfaces), 4))
-    ends = region.low, region.high
-    integrate_slices(1, region.circles, region.planes, *ends, quadrature(), result, rates)
-    gradient: dict[str, float] = {}
-    surface_rates: list[tuple[BallOrCylinder | HalfSpace, FloatArray]] = [
-        *zip(surfaces, rates, strict=True)
-    ]
-    # An end that moves by dx sweeps the area of its slice; its normal is along x.
-    for end, area in (
-        (region.low_limit, result[AREA_AT_LOW]),
-        (region.high_limit, result[AREA_AT_HIGH]),
-    ):
-        if end is not None:
-            surface_rates.append((end, np.array([0.0, 0.0, 0.0, area / abs(float(end.normal[0]))])))
-    for limit, volume_rate in surface_rates:
-        for name, rate in limit.rates.items():
-            gradient[name] = gradient.get(name, 0.0) + float(volume_rate @ rate)
-    return float(result[TOTAL]), float(result[TOTAL_ERROR]), gradient
-
-
-def _volume_of_columns(region: Region, columns: int = COLUMNS) -> tuple[float, float]:
-    box = region.box
-    if box is None:
-        return 0.0, 0.0
-    lows, highs = box
-    volumes: list[float] = []
-    for per_axis in (columns // 2, columns):
-        total = np.zeros(1)
-        nodes.column_lengths(per_axis * per_axis, *region.rows, lows, highs, per_axis, total)
-        cell = (highs[0] - lows[0]) * (highs[1] - lows[1]) / (per_axis * per_axis)
-        volumes.append(float(total[0]) * float(cell))
-    return volumes[1], abs(volumes[1] - volumes[0])
-
-
 def find_emptying_limits(limits: Sequence[Constraint]) -> tuple[str, ...]:
     """Return the names of the limits that empty an empty workspace.
 
@@ -254,7 +189,7 @@ def find_emptying_limits(limits: Sequence[Constraint]) -> tuple[str, ...]:
 
     def is_empty(chosen: Collection[str]) -> bool:
         rest = [*(limit for limit in limits if limit.name in chosen), surroundings]
-        return volume_within(region_of(rest), COARSE_COLUMNS)[0] <= 0.0
+        return volume_of(region_of(rest), COARSE_COLUMNS)[0] <= 0.0
 
     sufficient = tuple(name for name in names if not is_empty({*names} - {name}))
     if sufficient:

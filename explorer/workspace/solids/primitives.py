@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -18,18 +18,8 @@ from explorer.errors import InputError
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import BallOrCylinder, Cone, Constraint, HalfSpace
 from explorer.workspace.limits.region import box_of, contract_box, region_of
-from explorer.workspace.solids.facets import (
-    Box,
-    Facets,
-    ball,
-    ball_faces,
-    cone,
-    cylinder,
-    facing_part,
-    half_space,
-    step_of,
-    wedge,
-)
+from explorer.workspace.solids import facets
+from explorer.workspace.solids.facets import Box
 
 # The default tolerance of chords, as a share of the size of the workspace.
 DEFAULT_TOLERANCE = 1.0 / 500.0
@@ -55,7 +45,7 @@ class Primitive:
     name: str
     is_cut: bool
     faces: int
-    tessellate: Callable[[], Facets]
+    tessellate: Callable[[], facets.Facets]
 
 
 @dataclass(frozen=True)
@@ -78,10 +68,6 @@ class Frame:
     def chord(self) -> float:
         """The tolerance in this frame."""
         return self.tolerance / self.scale
-
-    def finer(self, ratio: float) -> Frame:
-        """Return this frame with the tolerance divided by a ratio."""
-        return replace(self, tolerance=self.tolerance / ratio)
 
     def contract(self, limits: Sequence[Constraint]) -> Frame | None:
         """Return a frame of a smaller box that still holds a workspace, at most as coarse.
@@ -137,19 +123,17 @@ def frame_around(lows: FloatArray, highs: FloatArray, tolerance: float) -> Frame
     return Frame(middle, scale, tolerance, Box((lows - middle) / scale, (highs - middle) / scale))
 
 
-def primitives_of(
-    limits: Sequence[Constraint], frame: Frame, *, contracted: bool = False
-) -> list[Primitive]:
+def primitives_of(limits: Sequence[Constraint], frame: Frame) -> list[Primitive]:
     """Return the primitives of a workspace: their intersection, less those that are cut.
 
-    The list is empty if the boxes around the primitives already show that the workspace is. If the
-    frame is contracted, its box holds this workspace more tightly than the box of its region.
+    The list is empty if the boxes around the primitives already show that the workspace is.
     """
     region = region_of(limits)
-    ends = region.box
-    if ends is None:
+    if region.box is None:
         return []
-    box = frame.box if contracted else Box(frame.to_frame(ends[0]), frame.to_frame(ends[1]))
+    # The box of a contracted frame is smaller than that of the region.
+    lows, highs = map(frame.to_frame, region.box)
+    box = Box(np.maximum(lows, frame.box.lows), np.minimum(highs, frame.box.highs))
     # The box ends on surfaces of limits, to rounding. The block extends beyond them, so that
     # rounding does not decide whether all of the block satisfies a limit.
     block = box.surroundings()
@@ -180,7 +164,7 @@ def _half_space(plane: HalfSpace, box: Box, block: Box, frame: Frame) -> Primiti
         return True
     if float((box.corners @ normal).min()) >= offset:
         return False
-    return Primitive(plane.name, False, 12, partial(half_space, normal, offset, frame.box))
+    return Primitive(plane.name, False, 12, partial(facets.half_space, normal, offset, frame.box))
 
 
 def _balls_and_cylinders(
@@ -204,17 +188,21 @@ def _balls_and_cylinders(
                 bounding.append((limit, radius))
         if not bounding:
             continue
-        parts = [facing_part(centre, radius, frame.box, frame.chord) for _, radius in bounding]
+        parts = [
+            facets.facing_part(centre, radius, frame.box, frame.chord) for _, radius in bounding
+        ]
         angle = max(part[1] for part in parts)
-        step = step_of(max(radius for _, radius in bounding), frame.chord)
+        step = facets.step_of(max(radius for _, radius in bounding), frame.chord)
         for limit, radius in bounding:
             towards = parts[0][0]
             if limit.is_ball:
-                faces = ball_faces(angle, step)
-                tessellate = partial(ball, centre, radius, towards, angle, step)
+                faces = facets.ball_faces(angle, step)
+                tessellate = partial(facets.ball, centre, radius, towards, angle, step)
             else:
                 faces = math.ceil(8.0 * angle / step)
-                tessellate = partial(cylinder, centre, radius, towards, angle, step, frame.box)
+                tessellate = partial(
+                    facets.cylinder, centre, radius, towards, angle, step, frame.box
+                )
             yield Primitive(limit.name, not limit.inside, faces, tessellate)
 
 
@@ -235,13 +223,17 @@ def _cone(limit: Cone, frame: Frame) -> Primitive | bool:
     farthest = frame.box.distances(apex)[1]
     if abs(math.cos(angle)) * farthest <= FLAT * frame.chord:
         offset = -float(axis @ apex)
-        return Primitive(limit.name, False, 12, partial(half_space, -axis, offset, frame.box))
+        return Primitive(
+            limit.name, False, 12, partial(facets.half_space, -axis, offset, frame.box)
+        )
     is_cut = angle > 0.5 * math.pi
     if is_cut:
         axis, angle = -axis, math.pi - angle
     if limit.flat:
-        tessellate = partial(wedge, apex[1:], axis[1:], angle, frame.box)
+        tessellate = partial(facets.wedge, apex[1:], axis[1:], angle, frame.box)
         return Primitive(limit.name, is_cut, 16, tessellate)
-    step = step_of(farthest, frame.chord)
+    step = facets.step_of(farthest, frame.chord)
     faces = math.ceil(12.0 * math.pi / step)
-    return Primitive(limit.name, is_cut, faces, partial(cone, apex, axis, angle, step, frame.box))
+    return Primitive(
+        limit.name, is_cut, faces, partial(facets.cone, apex, axis, angle, step, frame.box)
+    )

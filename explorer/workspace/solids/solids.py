@@ -18,30 +18,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.workspace.limits.constraints import (
     Constraint,
     HalfSpace,
     constraints,
     constraints_over,
+    orientation_of,
 )
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import (
-    Volume,
-    find_emptying_limits,
-    home_rotation,
-    volume_within,
-)
-from explorer.workspace.solids.booleans import manifold_of, mesh_of, solid_of, union
-from explorer.workspace.solids.primitives import (
-    MOST_FACES,
-    Frame,
-    Primitive,
-    frame_of,
-    primitives_of,
-)
-from explorer.workspace.solids.solid import Solid
+from explorer.workspace.slices.volume import Volume, find_emptying_limits, volume_of
+from explorer.workspace.solids.primitives import MOST_FACES, Frame, frame_of, primitives_of
+from explorer.workspace.solids.solid import Solid, manifold_of, mesh_of, solid_of, union
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -51,8 +39,9 @@ if TYPE_CHECKING:
 FINER, MOST_ROUNDS, MOST_REFINED = 4.0, 10, 60_000
 # The largest difference of a mesh from the exact volume, as a share of it.
 LARGEST_SHARE = 0.01
-# Columns per axis for the exact volume within cones, which then takes as long as the mesh.
-COLUMNS = 120
+# Columns per axis for the exact volume within cones, which then takes as long as the mesh, and for
+# that within a small box.
+COLUMNS, WITHIN_BOX = 120, 400
 
 
 def workspace_solid(
@@ -80,11 +69,14 @@ def workspace_solid(
         InputError: Not a rotation, or a tolerance that is not positive or too small.
         ExplorerError: A boolean fails.
     """
-    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    r = orientation_of(design, rotation)
     limits = constraints(design, r, signs)
-    solid = _make_agreeing_solid(
-        limits, frame_of([limits], design.reach, tolerance), exact_volume(limits, volume)
+    exact = (
+        exact_volume(limits, COLUMNS)
+        if volume is None
+        else ExactVolume(volume.volume, 2.0 * volume.error)
     )
+    solid = _make_agreeing_solid(limits, frame_of([limits], design.reach, tolerance), exact)
     return replace(solid, empty_because=find_emptying_limits(limits)) if solid.is_empty else solid
 
 
@@ -148,54 +140,47 @@ def _names(families: Sequence[Sequence[Constraint]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(limit.name for limits in families for limit in limits))
 
 
-def _make_solid(limits: Sequence[Constraint], frame: Frame, *, contracted: bool = False) -> Solid:
+def _make_solid(limits: Sequence[Constraint], frame: Frame) -> Solid:
     """Return the positions that satisfy all limits as a mesh."""
     names = _names([limits])
-    bodies, origins = _make_bodies([limits], frame, names, contracted=contracted)
+    bodies, origins = _make_bodies([limits], frame, names)
     return solid_of(bodies[0], origins, frame, names)
 
 
 def _make_agreeing_solid(limits: Sequence[Constraint], frame: Frame, exact: ExactVolume) -> Solid:
     """Return a workspace as a mesh that agrees with the exact volume, if that is possible."""
     best = _make_solid(limits, frame)
-    if exact.is_settled_by(best):
+    if exact.is_met_by(best):
         return replace(best, agrees=True)
     # The tolerance has to suit the smallest box around the workspace.
     finer = frame.contract(limits)
-    if finer is None:
-        return _empty_solid(limits, frame)
-    exact = exact_volume_within(limits, *finer.ends)
-    for _ in range(MOST_ROUNDS):
-        faces = sum(primitive.faces for primitive in primitives_of(limits, finer, contracted=True))
-        if exact.is_settled_by(best) or faces > MOST_REFINED:
-            break
-        solid = _make_solid(limits, finer, contracted=True)
-        if best.is_empty or exact.excess(solid) < exact.excess(best):
-            best = solid
-        finer = finer.finer(FINER)
-    if exact.is_artefact(best):
-        return _empty_solid(limits, frame)
+    if finer is not None:
+        # Within the box columns are closer and rounding is smaller.
+        sides, (lows, highs) = np.concatenate([-np.eye(3), np.eye(3)]), finer.ends
+        ends = [*(-lows).tolist(), *highs.tolist()]
+        walls = (HalfSpace("", side, end) for side, end in zip(sides, ends, strict=True))
+        exact = exact_volume([*limits, *walls], WITHIN_BOX)
+        for _ in range(MOST_ROUNDS):
+            faces = sum(primitive.faces for primitive in primitives_of(limits, finer))
+            if exact.is_met_by(best) or faces > MOST_REFINED:
+                break
+            solid = _make_solid(limits, finer)
+            if best.is_empty or exact.excess(solid) < exact.excess(best):
+                best = solid
+            finer = replace(finer, tolerance=finer.tolerance / FINER)
+    if finer is None or exact.is_artefact(best):
+        empty = replace(best, vertices=best.vertices[:0], faces=best.faces[:0], agrees=True)
+        return replace(empty, limit_of_face=best.limit_of_face[:0], tolerance=frame.tolerance)
     return replace(best, agrees=exact.excess(best) <= 0.0)
 
 
-def _empty_solid(limits: Sequence[Constraint], frame: Frame) -> Solid:
-    """Return an empty solid that agrees with the exact volume."""
-    faces, limit_of_face = np.zeros((0, 3), dtype=np.int32), np.zeros(0, dtype=np.int64)
-    names = _names([limits])
-    return Solid(np.zeros((0, 3)), faces, limit_of_face, names, frame.tolerance, agrees=True)
-
-
 def _make_bodies(
-    families: Sequence[Sequence[Constraint]],
-    frame: Frame,
-    names: tuple[str, ...],
-    *,
-    contracted: bool = False,
+    families: Sequence[Sequence[Constraint]], frame: Frame, names: tuple[str, ...]
 ) -> tuple[list[Manifold], dict[int, int]]:
     """Return each family's workspace as a body, and the indices of names by the ids of faces."""
-    primitives_of_families = [
-        primitives_of(limits, frame, contracted=contracted) for limits in families
-    ]
+    from manifold3d import Manifold, OpType
+
+    primitives_of_families = [primitives_of(limits, frame) for limits in families]
     faces = sum(
         primitive.faces for primitives in primitives_of_families for primitive in primitives
     )
@@ -208,29 +193,20 @@ def _make_bodies(
             f"{MOST_FACES:,} are made, so it must be at least about {least:.2g}{fewer}"
         )
     origins: dict[int, int] = {}
-    return [
-        _make_body(primitives, origins, names) for primitives in primitives_of_families
-    ], origins
-
-
-def _make_body(
-    primitives: Sequence[Primitive], origins: dict[int, int], names: tuple[str, ...]
-) -> Manifold:
-    from manifold3d import Manifold, OpType
-
-    if not primitives:
-        return Manifold()
-    common: list[Manifold] = []
-    cut: list[Manifold] = []
-    for primitive in primitives:
-        face_id = Manifold.reserve_ids(1)
-        if primitive.name:
-            origins[face_id] = names.index(primitive.name)
-        shape = primitive.tessellate()
-        body = manifold_of(shape, (face_id,), (len(shape[1]),))
-        (cut if primitive.is_cut else common).append(body)
-    whole = Manifold.batch_boolean(common, OpType.Intersect)
-    return Manifold.batch_boolean([whole, *cut], OpType.Subtract)
+    bodies: list[Manifold] = []
+    for primitives in primitives_of_families:
+        common: list[Manifold] = []
+        cut: list[Manifold] = []
+        for primitive in primitives:
+            face_id = Manifold.reserve_ids(1)
+            if primitive.name:
+                origins[face_id] = names.index(primitive.name)
+            shape = primitive.tessellate()
+            body = manifold_of(shape, (face_id,), (len(shape[1]),))
+            (cut if primitive.is_cut else common).append(body)
+        whole = Manifold.batch_boolean(common or [Manifold()], OpType.Intersect)
+        bodies.append(Manifold.batch_boolean([whole, *cut], OpType.Subtract))
+    return bodies, origins
 
 
 def _nearest_limits(
@@ -267,7 +243,7 @@ class ExactVolume:
         allowed = min(solid.tolerance * solid.area, LARGEST_SHARE * self.volume)
         return abs(solid.volume - self.volume) - allowed - self.error
 
-    def is_settled_by(self, solid: Solid) -> bool:
+    def is_met_by(self, solid: Solid) -> bool:
         """Return whether a mesh agrees, and is not empty although the exact volume is not zero."""
         return self.excess(solid) <= 0.0 and not (solid.is_empty and self.volume > 0.0)
 
@@ -277,22 +253,7 @@ class ExactVolume:
         return disagrees and abs(solid.volume) <= solid.tolerance * solid.area
 
 
-def exact_volume(limits: Sequence[Constraint], known: Volume | None = None) -> ExactVolume:
-    """Return the exact volume of a workspace, which may have been computed before."""
-    region = region_of(limits)
-    volume, error = volume_within(region, COLUMNS) if known is None else (known.volume, known.error)
-    return ExactVolume(volume, 2.0 * error)
-
-
-def exact_volume_within(
-    limits: Sequence[Constraint], lows: FloatArray, highs: FloatArray
-) -> ExactVolume:
-    """Return the exact volume of a workspace that is known to lie in a box, ends (3,) each.
-
-    The box makes columns closer and rounding smaller than they are without it.
-    """
-    sides = np.concatenate([-np.eye(3), np.eye(3)])
-    ends = [*(-lows).tolist(), *highs.tolist()]
-    walls = [HalfSpace("", side, end) for side, end in zip(sides, ends, strict=True)]
-    volume, error = volume_within(region_of([*limits, *walls]))
+def exact_volume(limits: Sequence[Constraint], columns: int) -> ExactVolume:
+    """Return the exact volume of a workspace; within cones that of some columns per axis."""
+    volume, error, _ = volume_of(region_of(limits), columns)
     return ExactVolume(volume, 2.0 * error)

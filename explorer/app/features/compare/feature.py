@@ -13,11 +13,10 @@ import viser
 from explorer.app.features.compare.scene import ComparedScene
 from explorer.app.features.compare.table import Column, bars, columns_of, notes, table
 from explorer.app.features.compare.work import FEEDS, draw_compared
-from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.session.session import Change
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Open
+from explorer.app.state.actions import Action, Open
 from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import with_value
@@ -25,8 +24,8 @@ from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect, choose, turn
-from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import box, swatch
+from explorer.app.widgets.palette import NO_OPTION
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS

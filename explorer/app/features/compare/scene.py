@@ -13,22 +13,14 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from explorer.app.features.compare.work import (
-    FEEDS,
-    LIVE,
-    ComparedDrawing,
-    CompareFeed,
-    drawing_in,
-    unit_ratio,
-)
+from explorer.app.features.compare import work
 from explorer.app.features.feature import Services
 from explorer.app.scene.creases import Drawn
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
-from explorer.app.scene.shapes import NO_MESH, add_label, add_lines, add_translucent
+from explorer.app.scene.shapes import COMPARED, NO_MESH, add_label, add_lines, add_translucent
 from explorer.app.state.compared import SLOTS
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import COMPARED
-from explorer.measures.size import corners_of
+from explorer.measures.box import corners_of
 from explorer.numerics.arrays import FloatArray
 
 OPACITY = 0.3
@@ -43,7 +35,8 @@ class ComparedScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         self._columns = [
-            _Column(services.scene, column, services.get(feed)) for column, feed in enumerate(FEEDS)
+            _Column(services.scene, column, services.get(feed))
+            for column, feed in enumerate(work.FEEDS)
         ]
 
     def updates(self, placed: Placed) -> Iterator[Update]:
@@ -81,7 +74,7 @@ class _Scaled(NamedTuple):
 
 # Cached, so that updates compare what is drawn by identity.
 @lru_cache(2 * len(NAMES))
-def _scale(drawing: ComparedDrawing, column: int, scale: float) -> _Scaled:
+def _scale(drawing: work.ComparedDrawing, column: int, scale: float) -> _Scaled:
     lines = np.asarray(scale * drawing.outline, dtype=np.float32)
     if drawing.shell is None:
         return _Scaled(lines, None, None, np.zeros(3))
@@ -96,7 +89,7 @@ def _scale(drawing: ComparedDrawing, column: int, scale: float) -> _Scaled:
 class _Column:
     """The workspace of one design, its letter, and its outline."""
 
-    def __init__(self, scene: viser.SceneApi, column: int, feed: CompareFeed) -> None:
+    def __init__(self, scene: viser.SceneApi, column: int, feed: work.CompareFeed) -> None:
         self._column, self._feed = column, feed
         name, colour = f"/compared/{NAMES[column]}", COMPARED[column]
         self._mesh = add_translucent(
@@ -107,10 +100,10 @@ class _Column:
 
     def place(self, placed: Placed) -> tuple[_Scaled, FloatArray] | None:
         """Return the drawing of the design, and its offset in the scene; None without one."""
-        state, drawing = placed.frame.state, drawing_in(self._column, self._feed)
+        state, drawing = placed.frame.state, work.drawing_in(self._column, self._feed)
         if drawing is None:
             return None
-        scale = placed.scale * unit_ratio(drawing.request.design, state.design)
+        scale = placed.scale * work.unit_ratio(drawing.request.design, state.design)
         return _scale(drawing, self._column, scale), scale * drawing.offset(state.view.at)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
@@ -120,7 +113,7 @@ class _Column:
         for handle in (self._mesh, self._label):
             yield handle, "visible", workspace is not None
         # The live design has no outline, since its mechanism is drawn.
-        outlined = compared.look.outlines and column != LIVE and placement is not None
+        outlined = compared.look.outlines and column != work.LIVE and placement is not None
         yield self._lines, "visible", outlined
         if placement is None:
             return
@@ -129,7 +122,7 @@ class _Column:
             yield self._mesh, "position", tuple(offset.tolist())
             yield self._mesh, "vertices", workspace[0]
             yield self._mesh, "faces", workspace[1]
-            design = None if column == LIVE else compared.pinned[column - 1]
+            design = None if column == work.LIVE else compared.pinned[column - 1]
             title = f"{NAMES[column]} {design.name}" if design else NAMES[column]
             yield self._label, "text", title
             yield self._label, "position", tuple((scaled.top + offset).tolist())

@@ -8,22 +8,16 @@ from dataclasses import dataclass
 from html import escape
 
 from explorer.app.features.compare.work import LIVE, CompareFeed, drawing_in
+from explorer.app.scene.shapes import COMPARED
 from explorer.app.state.compared import SLOTS
 from explorer.app.state.state import State
+from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.colours import COMPARED
-from explorer.app.widgets.markup import swatch
-from explorer.measures.catalogue import CATALOGUE, Measure, measures_in
-from explorer.measures.measurements import Measurements
+from explorer.measures.blocks.block import Look
+from explorer.measures.catalogue import CATALOGUE, Measure, Measurements, measures_in
 from explorer.mechanism.design import Design
-from explorer.numerics.number_text import (
-    LEAST_SIZE,
-    MOST_SIZE,
-    decimals_for,
-    format_decimals,
-    format_number,
-)
-from explorer.singularity.colours import Rgb, css
+from explorer.numerics import number_text
+from explorer.singularity.colours import Rgb
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9
@@ -58,14 +52,6 @@ DRAWN = (
 
 LOADS = ("home_load_share", "home_largest_payload", "home_largest_bending", "held_volume")
 """The measures of a further row, each drawn if a design has what it needs."""
-
-# Number of drawings in a row.
-ACROSS = 4
-# Sizes in pixels: a drawing's width, heights of its title, a bar and the gap below it; widths of a
-# letter and a number; the space below a drawing.
-WIDTH, TITLE, BAR, GAP = 148.0, 17.0, 11.0, 3.0
-LETTER, NUMBER, SPACE = 24.0, 52.0, 9.0
-LONGEST = WIDTH - LETTER - NUMBER - 8.0
 
 
 @dataclass(frozen=True)
@@ -142,12 +128,13 @@ def notes(state: State, columns: tuple[Column, ...]) -> list[str]:
     others = [other for other in columns if not math.isclose(other.design.unit_mm, live.unit_mm)]
     if others:
         others_units = ", ".join(
-            f"{other.letter} has {format_number(other.design.unit_mm, 6)} mm" for other in others
+            f"{other.letter} has {number_text.format_number(other.design.unit_mm, 6)} mm"
+            for other in others
         )
         unit = "millimetres" if state.compared.look.millimetres else "units of the live design"
         remarks.append(
-            f"One unit of the live design is {format_number(live.unit_mm, 6)} mm; {others_units}. "
-            f"Lengths are in {unit}, and workspaces are drawn to true size."
+            f"One unit of the live design is {number_text.format_number(live.unit_mm, 6)} mm; "
+            f"{others_units}. Lengths are in {unit}, and workspaces are drawn to true size."
         )
     return remarks
 
@@ -171,15 +158,15 @@ def value_text(measure: Measure, value: float, size: float, *, signed: bool = Fa
     if measure.names:
         return "" if signed else measure.names[round(value) - 1]
     if measure.is_whole:
-        return format_decimals(value, 0, signed=signed)
-    if size != 0.0 and not LEAST_SIZE <= size < MOST_SIZE:
-        return ("+" if signed and value >= 0.0 else "") + format_number(value)
-    decimals = min(MOST_DECIMALS, decimals_for(size, DIGITS)) if size > 0.0 else 1
-    text = format_decimals(value, decimals, signed=signed)
+        return number_text.format_decimals(value, 0, signed=signed)
+    if size != 0.0 and not number_text.LEAST_SIZE <= size < number_text.MOST_SIZE:
+        return ("+" if signed and value >= 0.0 else "") + number_text.format_number(value)
+    decimals = min(MOST_DECIMALS, number_text.decimals_for(size, DIGITS)) if size > 0.0 else 1
+    text = number_text.format_decimals(value, decimals, signed=signed)
     if not text.strip("0."):
         # A difference within rounding counts as none.
         least = SAME * size if signed else 0.0
-        return "0" if abs(value) <= least else format_number(value, 3)
+        return "0" if abs(value) <= least else number_text.format_number(value, 3)
     return text
 
 
@@ -204,7 +191,12 @@ def table(columns: Sequence[Column], *, millimetres: bool) -> str:
     """
     head = "".join(_head(column) for column in columns)
     rows = "".join(
-        _row(measure, columns, millimetres=millimetres)
+        measure_row(
+            measure,
+            columns,
+            millimetres=millimetres,
+            look="ex-first" if measure.name in FIRSTS else "",
+        )
         for measure in measures_in("compare").values()
         if not measure.needs or any(column.has(measure) for column in columns)
     )
@@ -221,7 +213,7 @@ def _head(column: Column) -> str:
     # The differences to the live design have a column of their own.
     span = "" if column.number == LIVE else ' colspan="2"'
     return (
-        f'<td{span} class="ex-head"><div class="ex-whole">{swatch(column.colour)}'
+        f'<td{span} class="ex-head"><div class="ex-whole">{markup.swatch(column.colour)}'
         f"<b>{column.letter}</b> {beside}</div>"
         f'<div class="ex-cut" title="{name}">{name}{wait}</div></td>'
     )
@@ -233,28 +225,47 @@ def _link(column: Column, act: str, words: str, hint: str) -> str:
     )
 
 
-def _row(measure: Measure, columns: Sequence[Column], *, millimetres: bool) -> str:
+def measure_row(
+    measure: Measure,
+    columns: Sequence[Column],
+    *,
+    millimetres: bool = False,
+    label: str = "",
+    hint: str = "",
+    look: str = "",
+    change: Look | None = None,
+) -> str:
+    """Return the row of a measure in HTML: its values, and beside each its change from the first.
+
+    Args:
+        measure: The measure.
+        columns: Columns of the comparison.
+        millimetres: Whether lengths are in millimetres, rather than in design units.
+        label: Name of the row; that of the measure if "".
+        hint: Meaning of the row; that of the measure if "".
+        look: Classes of the stylesheet for the row.
+        change: Whether the changes keep or break a demand, where that is defined.
+    """
     values = [column.value(measure) for column in columns]
-    size, best, live = _size_of(values), best_of(measure, values), values[0]
-    first = ' class="ex-first"' if measure.name in FIRSTS else ""
-    unit = _unit_of(measure, millimetres=millimetres)
+    size, best, first = _size_of(values), best_of(measure, values), values[0]
     cells: list[str] = []
     for index, (column, value) in enumerate(zip(columns, values, strict=True)):
-        look = "ex-number is-best" if index in best else "ex-number"
+        mark = "ex-number is-best" if index in best else "ex-number"
         cells.append(
-            f'<td class="{look}" title="{_exact_text(measure, column)}">'
+            f'<td class="{mark}" title="{_exact_text(measure, column)}">'
             f"{_cell(measure, column, value, size)}</td>"
         )
         if index:
-            change = ""
-            if value is not None and live is not None and value != live:
-                change = value_text(measure, value - live, size, signed=True)
-            cells.append(f'<td class="ex-change">{"" if change == "0" else change}</td>')
+            text = ""
+            if value is not None and first is not None and value != first:
+                text = value_text(measure, value - first, size, signed=True)
+            text = f'<span class="ex-{change}">{text}</span>' if change else text
+            cells.append(f'<td class="ex-change">{"" if text == "0" else text}</td>')
+    unit = _unit_of(measure, millimetres=millimetres)
     unit_html = f' <span class="ex-dim ex-small">{unit}</span>' if unit else ""
     return (
-        f'<tr{first} title="{escape(_hint_of(measure))}">'
-        f"<td>{escape(measure.label)}{unit_html}</td>"
-        f"{''.join(cells)}</tr>"
+        f'<tr class="{look}" title="{escape(hint or _hint_of(measure))}">'
+        f"<td>{escape(label or measure.label)}{unit_html}</td>{''.join(cells)}</tr>"
     )
 
 
@@ -275,62 +286,41 @@ def _exact_text(measure: Measure, column: Column) -> str:
         return ""
     if measure.names:
         return value_text(measure, value, value)
-    own = f"{format_number(value, 12)} {_unit_of(measure, millimetres=False)}".strip()
+    own = f"{number_text.format_number(value, 12)} {_unit_of(measure, millimetres=False)}".strip()
     if measure.power == 0:
         return own
     scaled = value * column.design.unit_mm**measure.power
-    return f"{own} = {format_number(scaled, 12)} {_unit_of(measure, millimetres=True)}"
+    return f"{own} = {number_text.format_number(scaled, 12)} {_unit_of(measure, millimetres=True)}"
 
 
 def bars(columns: Sequence[Column], *, millimetres: bool) -> str:
-    """Return some of the measures as bars from zero, an SVG; arguments as of `table`."""
-    loads = [name for name in LOADS if any(column.has(CATALOGUE[name]) for column in columns)]
-    drawn = (*DRAWN, *loads)
-    height = TITLE + len(columns) * (BAR + GAP) + SPACE
-    drawings = "".join(
-        f'<g transform="translate({(index % ACROSS) * WIDTH:g},{(index // ACROSS) * height:g})">'
-        f"{_drawing(CATALOGUE[name], columns, millimetres=millimetres)}</g>"
-        for index, name in enumerate(drawn)
-    )
-    rows = -(-len(drawn) // ACROSS)
-    return (
-        f'<svg viewBox="0 0 {ACROSS * WIDTH:g} {rows * height:g}" width="100%" '
-        'class="ex-bars" role="img" '
-        f'aria-label="Measures of the designs as bars">{drawings}</svg>'
-    )
+    """Return some of the measures as bars from zero, in HTML; arguments as of `table`."""
+    drawn = [CATALOGUE[name] for name in DRAWN]
+    drawn += [
+        CATALOGUE[name] for name in LOADS if any(each.has(CATALOGUE[name]) for each in columns)
+    ]
+    drawings = (_drawing(measure, columns, millimetres=millimetres) for measure in drawn)
+    return f'<div class="ex-bars">{"".join(drawings)}</div>'
 
 
 def _drawing(measure: Measure, columns: Sequence[Column], *, millimetres: bool) -> str:
     values = [column.value(measure) for column in columns]
-    known = [value for value in values if value is not None]
-    low, high = min([0.0, *known]), max([0.0, *known])
-    scale = LONGEST / (high - low) if high > low else 0.0
-    zero = LETTER - low * scale
     best, size = best_of(measure, values), _size_of(values)
-    unit = _unit_of(measure, millimetres=millimetres)
     arrow = {"more": " ↑", "less": " ↓", None: ""}[measure.sense]
     # How it was measured only the hint has room to say.
     label = measure.label.removesuffix(" at nodes")
     label = label.removesuffix(" at home") if measure.name in LOADS else label
-    title = (
-        f"<title>{escape(_hint_of(measure))}</title>"
-        f'<text x="0" y="11" font-weight="600">{escape(label)}'
-        f'<tspan font-weight="400" fill-opacity="0.6"> {unit}{arrow}</tspan></text>'
-    )
-    parts = [title]
-    for index, (column, value) in enumerate(zip(columns, values, strict=True)):
-        y = TITLE + index * (BAR + GAP)
-        baseline = y + BAR - 2.0
-        parts.append(f'<text x="0" y="{baseline:g}" fill-opacity="0.6">{column.letter}</text>')
-        if value is None:
-            parts.append(f'<text x="{zero + 4.0:.1f}" y="{baseline:g}" fill-opacity="0.6">–</text>')
-            continue
-        start, end = sorted((zero, zero + value * scale))
-        weight = 700 if index in best else 400
-        parts.append(
-            f'<rect x="{start:.2f}" y="{y:g}" width="{max(end - start, 0.8):.2f}" '
-            f'height="{BAR:g}" rx="1.5" fill="{css(column.colour)}"/>'
-            f'<text x="{end + 4.0:.1f}" y="{baseline:g}" font-weight="{weight}">'
-            f"{value_text(measure, value, size)}</text>"
+    rows = [
+        markup.row(
+            markup.dim(column.letter),
+            markup.meter(100.0 * max(0.0, value or 0.0) / (size or 1.0), column.colour),
+            "–" if value is None else value_text(measure, value, size),
+            look="ex-strong" if index in best else "",
         )
-    return "".join(parts)
+        for index, (column, value) in enumerate(zip(columns, values, strict=True))
+    ]
+    unit = markup.dim(f"{_unit_of(measure, millimetres=millimetres)}{arrow}")
+    return (
+        f'<div title="{escape(_hint_of(measure))}"><b>{escape(label)}</b> {unit}'
+        f"{markup.table(rows)}</div>"
+    )

@@ -13,17 +13,15 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from explorer.app.features.workspace.regions import Rows, rows_of
-from explorer.app.features.workspace.tasks import LIVE_TOLERANCE
+from explorer.app.features.workspace.work import LIVE_TOLERANCE, Rows, rows_of
 from explorer.app.scene.bands import Shell
 from explorer.app.scene.placing import outline
 from explorer.app.session.feed import Feed
 from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
 from explorer.errors import ExplorerError
-from explorer.measures.catalogue import measures_in
+from explorer.measures.catalogue import Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.configuration import Point, offset_of
 from explorer.mechanism.design import Design
@@ -93,7 +91,7 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
     shell: Shell | None = None
     problem: str | None = None
     try:
-        measurements = _measure(design)
+        measurements = _measure(design, tuple(measures_in("compare")))
         if request.drawn:
             solid = _solid(design, request.rotation, request.tolerance)
             if not solid.is_empty:
@@ -105,8 +103,8 @@ def draw_compared(request: ComparedRequest) -> ComparedDrawing:
 
 
 @lru_cache(maxsize=CACHED)
-def _measure(design: Design) -> Measurements:
-    return measure_design(Case(design), measures_in("compare"))
+def _measure(design: Design, names: tuple[str, ...]) -> Measurements:
+    return measure_design(Case(design), names)
 
 
 @lru_cache(maxsize=CACHED)
@@ -119,7 +117,7 @@ CompareFeed: TypeAlias = Feed[ComparedRequest, ComparedDrawing]
 
 
 def _feed_of(column: int, services: Services) -> CompareFeed:
-    request, redraw = partial(_request_for, column), services.session.redraw
+    request, redraw = partial(_compared_request, column), services.session.redraw
     return Feed(services.worker, draw_compared, request, redraw, key=("compared", column))
 
 
@@ -129,7 +127,7 @@ FEEDS: tuple[Callable[[Services], CompareFeed], ...] = tuple(
 """The feeds by column: the live design, then the pinned ones."""
 
 
-def _request_for(column: int, frame: Frame) -> ComparedRequest | None:
+def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
     state, compared = frame.state, frame.state.compared
     design = state.design if column == LIVE else compared.pinned[column - 1]
     if compared.is_empty or design is None:

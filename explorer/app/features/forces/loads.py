@@ -9,18 +9,13 @@ import msgspec
 import numpy as np
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.tasks import (
-    NearestDrawing,
-    WeightsRequest,
-    load_of,
-    nearest_position,
-    weights_of_parts,
-)
+from explorer.app.features.forces import tasks
 from explorer.app.scene.placing import round_step
 from explorer.app.session.feed import Feed, feed_of
-from explorer.app.state.action import Action
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.measures.blocks.source import LoadTopic, Source, load_source
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
@@ -76,13 +71,8 @@ def round_force(force: FloatArray, size: float) -> Triple:
         force: The force, shape (3,), in newtons.
         size: The size, in newtons.
     """
-    x, y, z = np.round(force, decimals_of(size)).tolist()
+    x, y, z = np.round(force, 3 - math.floor(math.log10(size))).tolist()
     return x, y, z
-
-
-def decimals_of(size: float) -> int:
-    """Return the decimals of a thousandth of a size."""
-    return 3 - math.floor(math.log10(size))
 
 
 def fitting_scale(force: float, scale: float) -> float:
@@ -97,15 +87,15 @@ def fitting_scale(force: float, scale: float) -> float:
     return round_step(force / FITTING)
 
 
-def _weights_of(frame: Frame) -> WeightsRequest | None:
+def _weights_of(frame: Frame) -> tasks.WeightsRequest | None:
     view = frame.state.view
     if view.forces.weighed != "payload and legs":
         return None
     design = msgspec.structs.replace(frame.state.design, name="")
-    return WeightsRequest(design, view.prototype.density)
+    return tasks.WeightsRequest(design, view.prototype.density)
 
 
-WEIGHTS_FEED = feed_of(weights_of_parts, _weights_of)
+WEIGHTS_FEED = feed_of(tasks.weights_of_parts, _weights_of)
 
 
 class Loads:
@@ -113,6 +103,7 @@ class Loads:
 
     def __init__(self, services: Services) -> None:
         self.weights = services.get(WEIGHTS_FEED)
+        self._session = services.session
         self._last: tuple[State, Weights | None, ToolPrecision] | None = None
 
     def of(self, frame: Frame) -> LoadedPose:
@@ -124,12 +115,21 @@ class Loads:
         state, weights = frame.state, self.weights.drawing
         if self._last is None or self._last[0] is not state or self._last[1] is not weights:
             weighs_payload = state.view.forces.weighed != "none"
-            loaded = LoadedPose(state.design, state.pose, load_of(state), weights, weighs_payload)
+            loaded = LoadedPose(
+                state.design, state.pose, tasks.load_of(state), weights, weighs_payload
+            )
             self._last = state, weights, ToolPrecision(loaded)
         return self._last[2]
 
+    def source(self, topic: LoadTopic) -> Source:
+        """Return how the present answer of a command is computed."""
+        state = self._session.latest_state()
+        loaded = self.of(Frame(state))
+        density = None if loaded.own is None else state.view.prototype.density
+        return load_source(topic, loaded, density)
 
-def nearest_feed(services: Services) -> Feed[LoadedPose, NearestDrawing]:
+
+def nearest_feed(services: Services) -> Feed[LoadedPose, tasks.NearestDrawing]:
     """Return the feed of the nearest position that holds the load, while the pose does not."""
     loads = services.get(Loads)
 
@@ -137,4 +137,4 @@ def nearest_feed(services: Services) -> Feed[LoadedPose, NearestDrawing]:
         loaded = loads.of(frame)
         return loaded if has_limits(loaded.design) and loaded.share > 1.0 else None
 
-    return Feed(services.worker, nearest_position, request_of, services.session.redraw)
+    return Feed(services.worker, tasks.nearest_position, request_of, services.session.redraw)

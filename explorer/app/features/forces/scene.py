@@ -15,27 +15,15 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import Loads, SetForce, fitting_scale, round_force
+from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
-from explorer.app.scene.shapes import (
-    NO_MESH,
-    Instances,
-    Rods,
-    add_label,
-    add_lines,
-    add_translucent,
-    cone,
-    linear_colour,
-    of_one_colour,
-    turned_to,
-)
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.blocks import share_colour
-from explorer.app.widgets.colours import GHOST
 from explorer.measures.blocks.block import Share
-from explorer.measures.blocks.forces import shares_of
+from explorer.measures.blocks.forces import utilisations
 from explorer.mechanism.configuration import position_of
-from explorer.mechanism.design import JOINTS, LENGTH_ROWS
+from explorer.mechanism.design import GUIDE_ROWS, JOINTS, LENGTH_ROWS
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding, format_number
@@ -73,8 +61,8 @@ class ForceArrows:
     """
 
     def __init__(self, scene: viser.SceneApi, name: str, count: int, colour: Rgb) -> None:
-        self._shafts = Rods(scene, f"{name}/shafts", [colour] * count)
-        self._heads = Instances(scene, f"{name}/heads", cone(), [colour] * count)
+        self._shafts = shapes.Rods(scene, f"{name}/shafts", [colour] * count)
+        self._heads = shapes.Instances(scene, f"{name}/heads", shapes.cone(), [colour] * count)
 
     def show(self, visible: bool) -> Iterator[Update]:
         """Yield the updates that show or hide the arrows."""
@@ -98,11 +86,11 @@ class ForceArrows:
         necks = tails + units * (lengths - heads)
         drawn = lengths[:, 0] > NOTHING
         yield from self._shafts.between(tails, necks, np.where(drawn, SHAFT * size, NOTHING))
-        linear = [linear_colour(each) for each in colours]
+        linear = [shapes.linear_colour(each) for each in colours]
         yield from self._shafts.colour(linear)
         radii = np.minimum(HEAD * size, heads * HEAD / HEAD_LENGTH)
         scales = np.maximum(np.concatenate([radii, radii, heads], axis=1), NOTHING)
-        yield from self._heads.place(necks, turned_to(vectors), scales)
+        yield from self._heads.place(necks, shapes.turned_to(vectors), scales)
         yield from self._heads.colour(linear)
 
 
@@ -112,15 +100,19 @@ class ForcesScene(ScenePart):
     def __init__(self, services: Services) -> None:
         scene, self._loads = services.scene, services.get(Loads)
         self._arrows = ForceArrows(scene, "/forces/arrows", 8, LOAD)
-        self._sleeves = Rods(scene, "/forces/sleeves", [GHOST] * 4, opacity=SLEEVE_OPACITY)
+        self._sleeves = shapes.Rods(
+            scene, "/forces/sleeves", [shapes.GHOST] * 4, opacity=SLEEVE_OPACITY
+        )
         self._bending = [
-            add_translucent(scene, f"/forces/bending/{leg}", NO_MESH, 0.35) for leg in (2, 3)
+            shapes.add_translucent(scene, f"/forces/bending/{leg}", shapes.NO_MESH, 0.35)
+            for leg in (2, 3)
         ]
         self._ordinates = [
-            add_lines(scene, f"/forces/ordinates/{leg}", ORDINATES + 1, None, 1.5) for leg in (2, 3)
+            shapes.add_lines(scene, f"/forces/ordinates/{leg}", ORDINATES + 1, None, 1.5)
+            for leg in (2, 3)
         ]
         self._labels = {
-            name: add_label(scene, f"/forces/label/{name}", name, visible=False)
+            name: shapes.add_label(scene, f"/forces/label/{name}", name, visible=False)
             for name in ("load", "weight", *JOINTS, "strut 2", "strut 3")
         }
 
@@ -138,7 +130,7 @@ class ForcesScene(ScenePart):
             yield label, "visible", shown and force.get(name, holds)
         if not shown:
             return
-        shares = shares_of(loaded)
+        shares = utilisations(loaded)
         yield from self._draw_arrows(placed, loaded, shares)
         if not holds:
             return
@@ -146,17 +138,18 @@ class ForcesScene(ScenePart):
         radius = np.full(4, SLEEVE_RADIUS * placed.thickness)
         yield from self._sleeves.between(feet, tips, radius)
         yield from self._sleeves.colour(
-            [linear_colour(share_colour(shares[i])) for i in LENGTH_ROWS]
+            [shapes.linear_colour(share_colour(shares[i])) for i in LENGTH_ROWS]
         )
         for index, leg in enumerate((2, 3)):
             share = _larger(shares[6 + index], shares[10 + index])
             yield from self._draw_bending(placed, loaded, index, leg, share)
         middles = 0.5 * (feet + tips)
         places = (middles[0], feet[1], middles[1], feet[2], middles[2], middles[3])
-        size = float(np.abs(loaded.held.actuators).max())
+        held = loaded.reactions
+        size = float(np.abs(held.actuators).max())
         for index, joint in enumerate(JOINTS):
             label = self._labels[joint]
-            force, more = float(loaded.held.actuators[index]), float(loaded.held.spread[index])
+            force, more = (float(each[index]) for each in (held.actuators, held.spread))
             words = _newtons(drop_rounding(force, size), 3) + (
                 f" ± {_newtons(more, 2)}" if more else ""
             )
@@ -190,8 +183,8 @@ class ForcesScene(ScenePart):
             feet, tips = placed.struts
             tails[2:6], tails[6:8] = tips, feet[1:3]
             forces = np.zeros((6, 3))
-            forces[:4] = loaded.held.joints
-            forces[4:, 0] = loaded.held.actuators[[1, 3]]
+            forces[:4] = loaded.reactions.joints
+            forces[4:, 0] = loaded.reactions.actuators[GUIDE_ROWS]
             vectors[2:] = reaction_vectors(placed, forces)
             l1, d1, d2, d3, d4, l4, *_ = shares
             colours[2:] = [
@@ -206,10 +199,10 @@ class ForcesScene(ScenePart):
         design = placed.frame.state.design
         foot, tip = (ends[leg - 1] for ends in placed.struts)
         # With what the payload's force of any direction adds.
-        moment = float(loaded.held.bending[index] + loaded.held.spread[6 + index])
+        moment = float(loaded.reactions.bending[index] + loaded.reactions.spread[6 + index])
         half = HALF_MOMENT * scale_of(placed) * design.reach
         height = LONGEST_BENDING * placed.reach * moment / (moment + half)
-        towards = math.copysign(1.0, float(loaded.held.actuators[1 + 2 * index]))
+        towards = math.copysign(1.0, float(loaded.reactions.actuators[1 + 2 * index]))
         top = foot + np.array([towards * height, 0.0, 0.0])
         colour = share_colour(share)
         yield self._bending[index], "vertices", np.array([foot, tip, top], dtype=np.float32)
@@ -221,7 +214,7 @@ class ForcesScene(ScenePart):
         lines[:-1, 1] = top + ALONG * (tip - top)
         lines[-1] = top, tip
         yield self._ordinates[index], "points", lines
-        yield self._ordinates[index], "colors", of_one_colour(colour, ORDINATES + 1)
+        yield self._ordinates[index], "colors", shapes.of_one_colour(colour, ORDINATES + 1)
         label = self._labels[f"strut {leg}"]
         words = f"strut {leg} {format_number(moment * 1e-3 * design.unit_mm, 3)} N m"
         yield label, "text", words + _share_suffix(share)

@@ -1,22 +1,32 @@
-"""Help: commands and keys, the theme, the manual and the tour."""
+"""Help: commands and keys, the theme, the tour, and the manual in a panel beside the scene."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+import re
+import threading
+from collections.abc import Callable, Iterable
 from html import escape
 
 import viser
 
 from explorer.app.browser.viser_gaps import run_script_in
 from explorer.app.features.feature import Feature, InBar, Services, Tab
-from explorer.app.features.help.manual import ManualReader
 from explorer.app.features.help.tour import TourGuide
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import open_button, press_button
-from explorer.app.widgets.commands import PAGE, PALETTE_KEY, STEP, Key, shift, with_keys
 from explorer.app.widgets.markup import box, caption, dim
-from explorer.app.widgets.palette import Command, group_of
+from explorer.app.widgets.palette import (
+    PAGE,
+    PALETTE_KEY,
+    STEP,
+    Command,
+    Key,
+    group_of,
+    shift,
+    with_keys,
+)
+from explorer.files.packaged import list_pages, read_page
 
 PRESS = "page"
 KEYS = {"Theme": (shift("L"),), "Keys": (Key("K"),)}
@@ -33,6 +43,11 @@ CAMERA = (
     ("wheel", "Zoom"),
     ("W A S D Q E", "Fly"),
 )
+TURN, CLOSE = "help.page", "help.close"
+# Place and size of the manual's panel, in pixels.
+LEFT, TOP, WIDTH, HEIGHT = 300, 60, 560, 640
+PAGES = {page.title: page.file for page in list_pages()}
+TITLES = {file: title for title, file in PAGES.items()}
 
 
 class HelpButtons:
@@ -78,17 +93,17 @@ class HelpDialog:
 
     def __init__(self, services: Services) -> None:
         buttons = {
-            "Tour": press_button(PRESS, "Tour", "Tour", class_name="ex-button"),
-            "Manual": press_button(PRESS, "Manual", "Manual", class_name="ex-button"),
-            "Keys": open_button("Keys", "Keys", class_name="ex-button"),
+            name: press_button(PRESS, name, name, class_name="ex-button")
+            for name in ("Tour", "Manual")
         }
+        buttons["Keys"] = open_button("Keys", "Keys", class_name="ex-button")
         rows = "".join(
             f'<div class="ex-row">{button}{dim(hint_of(name))}</div>'
             for name, button in buttons.items()
         )
         services.gui.add_html(box(f"<div data-closes>{rows}</div>"))
 
-    def updates(self, _: Frame) -> Iterator[Update]:
+    def updates(self, _: Frame) -> Updates:
         """Yield nothing: the dialog stays as it is."""
         return iter(())
 
@@ -101,7 +116,7 @@ class KeysDialog:
         self._services = services
         self._table = ""
 
-    def updates(self, _: Frame) -> Iterator[Update]:
+    def updates(self, _: Frame) -> Updates:
         """Yield the table of all keys, which are known once all features are made."""
         self._table = self._table or keys_table(self._services.commands())
         yield self._html, "content", self._table
@@ -132,6 +147,61 @@ def keys_table(commands: Iterable[Command]) -> str:
 
 def _row(words: str, caps: str) -> str:
     return f'<div class="ex-line"><span>{escape(words)}</span><span>{caps}</span></div>'
+
+
+class ManualReader:
+    """The manual beside the scene, to read and try at the same time."""
+
+    def __init__(self, services: Services) -> None:
+        # The manual of each browser with its list of pages; presses and leaving browsers come on
+        # threads of their own.
+        self._manuals: dict[int, tuple[viser.PanelHandle, viser.GuiDropdownHandle[str]]] = {}
+        self._lock = threading.Lock()
+        services.buttons.on(TURN, self._turn, values=TITLES)
+        services.buttons.on(CLOSE, lambda _, client: self.toggle(client))
+        services.server.on_client_disconnect(self._forget)
+
+    def toggle(self, client: viser.ClientHandle) -> None:
+        """Open the manual in a browser, or close it there."""
+        with self._lock:
+            manual = self._manuals.pop(client.client_id, None)
+            if manual is None:
+                self._manuals[client.client_id] = _add_manual(client.gui)
+            else:
+                manual[0].remove()
+
+    def _forget(self, client: viser.ClientHandle) -> None:
+        self._manuals.pop(client.client_id, None)
+
+    def _turn(self, file: str, client: viser.ClientHandle) -> None:
+        manual = self._manuals.get(client.client_id)
+        if manual is not None:
+            manual[1].value = TITLES[file]
+
+
+def _add_manual(gui: viser.GuiApi) -> tuple[viser.PanelHandle, viser.GuiDropdownHandle[str]]:
+    panel = gui.add_panel()
+    panel.float(x=LEFT, y=TOP, width=WIDTH, height=HEIGHT)
+    with panel.add_tab("Manual"):
+        choice = gui.add_dropdown("Page", tuple(PAGES), hint="Turn to another page.")
+        page = gui.add_markdown(markdown_of(PAGES[choice.value]))
+        gui.add_html(press_button(CLOSE, "", "Close the manual", class_name="ex-chip"))
+    choice.on_update(lambda _: setattr(page, "content", markdown_of(PAGES[choice.value])))
+    return panel, choice
+
+
+def markdown_of(file: str) -> str:
+    """Return the Markdown of a page with its links to other pages as buttons."""
+
+    def button(match: re.Match[str]) -> str:
+        words, target = match.groups()
+        if target not in TITLES:
+            return match.group()
+        return press_button(TURN, target, words, class_name="ex-link").replace(
+            ' class="', ' className="'
+        )
+
+    return re.sub(r"\[([^\]]+)\]\(([^)#]+)(?:#[^)]*)?\)", button, read_page(file))
 
 
 HELP = Feature(

@@ -12,8 +12,8 @@ import viser
 
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import StartRun
-from explorer.app.state.action import Action
-from explorer.app.state.actions import GoHome, Set, SetPosition, SetVariable
+from explorer.app.features.optimise.state import Optimisation
+from explorer.app.state.actions import Action, GoHome, Set, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import open_button, press_button
 
@@ -93,7 +93,7 @@ STEPS = (
         "Press Optimise, and accept what it finds, or revert to your design. Export, on top of the "
         "page, has files for CAD, simulation and print. Ctrl-Z undoes what you changed.",
         "Optimise",
-        lambda before, now: now.state.optimisation.count > before.state.optimisation.count,
+        lambda before, now: Optimisation.of(now.state).count > Optimisation.of(before.state).count,
         lambda _: StartRun(),
     ),
 )
@@ -134,6 +134,10 @@ class _Card:
     panel: viser.PanelHandle
     html: viser.GuiHtmlHandle
 
+    def show(self, tour: Tour) -> None:
+        if tour != self.tour:
+            self.tour, self.html.content = tour, card_words(tour)
+
 
 class TourGuide(Runner):
     """Leads users through the tour, each in a browser of their own."""
@@ -166,7 +170,7 @@ class TourGuide(Runner):
         """Mark the steps that a frame shows as done."""
         with self._lock:
             for card in tuple(self._cards.values()):
-                _show(card, card.tour.after_frame(frame))
+                card.show(card.tour.after_frame(frame))
 
     def _forget(self, client: viser.ClientHandle) -> None:
         self._cards.pop(client.client_id, None)
@@ -193,23 +197,15 @@ class TourGuide(Runner):
             if name == "Next" and tour.step.after is not None:
                 self._session.do(tour.step.after, who=client.client_id)
             with self._lock:
-                frame = Frame(self._session.state)
-                _show(card, tour.step_by(1 if name == "Next" else -1, frame))
-
-
-def _show(card: _Card, tour: Tour) -> None:
-    if tour != card.tour:
-        card.tour = tour
-        card.html.content = card_words(tour)
+                steps = 1 if name == "Next" else -1
+                card.show(tour.step_by(steps, Frame(self._session.state)))
 
 
 def card_words(tour: Tour) -> str:
     """Return the card as HTML: the progress of the tour, its step, and the buttons."""
     step = tour.step
-    dots = "".join(
-        f'<span class="ex-dot{"" if i <= tour.at else " is-ahead"}"></span>'
-        for i in range(len(STEPS))
-    )
+    looks = ("ex-dot" if i <= tour.at else "ex-dot is-ahead" for i in range(len(STEPS)))
+    dots = "".join(f'<span class="{look}"></span>' for look in looks)
     done = '<span class="ex-within ex-strong">Done</span>' if tour.is_done else ""
     opens = open_button(step.tab, f"Open the tab {escape(step.tab)}", class_name="ex-link")
     first = "" if tour.at == 0 else _button("Back")
@@ -226,10 +222,5 @@ def card_words(tour: Tour) -> str:
 
 
 def _button(name: str, words: str | None = None, *, look: str = "") -> str:
-    return press_button(
-        PRESS,
-        name,
-        escape(words or name),
-        hint=BUTTONS[name],
-        class_name=f"ex-button {look}".rstrip(),
-    )
+    look = f"ex-button {look}".rstrip()
+    return press_button(PRESS, name, escape(words or name), hint=BUTTONS[name], class_name=look)

@@ -1,29 +1,36 @@
-"""The steps of the session: undo, redo, a list to go to any of them, and the last change."""
+"""The steps of the session: undo, redo, a list to go to any of them, and the last change.
+
+The last change of the design is shown by a ghost of what was before, and by the differences.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from html import escape
 
+import numpy as np
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab
-from explorer.app.features.history.change import ChangeCard, ChangeScene, DesignChange
+from explorer.app.features.workspace.feeds import VOLUME_FEED, volume_request
+from explorer.app.features.workspace.work import MeasuredVolume, Selection, measure_volume
+from explorer.app.scene.placing import Placed, ScenePart, outline
+from explorer.app.scene.shapes import GHOST, add_lines
+from explorer.app.session.feed import Feed
 from explorer.app.session.history import History, Step
-from explorer.app.session.session import REDO, UNDO
+from explorer.app.session.session import REDO, UNDO, move_to
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.assigning import Update
+from explorer.app.state.state import State
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import open_button, press_button
-from explorer.app.widgets.commands import Key, with_keys
-from explorer.app.widgets.markup import box
+from explorer.app.widgets.markup import box, dim, row, table
+from explorer.app.widgets.palette import Key, with_keys
+from explorer.numerics.number_text import drop_rounding, format_number
 
 GO = "history.go"
 # Rows of the list; the slider reaches all steps.
 ROWS = 24
 # Rows at most of steps that were undone.
 ROWS_AHEAD = 6
-
-
 MOVE = "history.move"
 KEYS = {
     "Undo": (Key("Z", "cmd/ctrl"),),
@@ -31,6 +38,8 @@ KEYS = {
 }
 MOVES = {"Undo": UNDO, "Redo": REDO}
 ARROWS = {"Undo": "↶", "Redo": "↷"}
+OVER = "change.over"
+DIGITS = 4
 
 
 class HistoryPanel:
@@ -47,11 +56,11 @@ class HistoryPanel:
             hint="Run through all that was done; nothing is lost until something is changed.",
         )
         self._list = gui.add_html("")
-        self._numbers: tuple[int, ...] = ()
+        self._numbers: set[str] = set()
         self._slider.on_update(self._travel)
         services.buttons.on(GO, self._go)
 
-    def updates(self, _: Frame) -> Iterator[Update]:
+    def updates(self, _: Frame) -> Updates:
         """Yield the updates that show the history of the session."""
         history = self._session.history
         steps, here = history.steps, history.step
@@ -63,18 +72,17 @@ class HistoryPanel:
         last = min(len(steps), max(history.at + 1 + ROWS_AHEAD, ROWS))
         # The newest step comes first.
         shown = steps[max(0, last - ROWS) : last][::-1]
-        self._numbers = tuple(step.number for step in shown)
+        self._numbers = {str(step.number) for step in shown}
         yield self._list, "content", box(*(_row(step, here) for step in shown))
 
     async def _travel(self, event: viser.GuiEvent[viser.GuiSliderHandle[int]]) -> None:
         if event.client_id is not None:
             stamp, number = self._slider.update_timestamp, int(self._slider.value)
-            self._session.travel_to(self, number, stamp=stamp, who=event.client_id)
+            self._session.post(self, move_to(number), stamp=stamp, who=event.client_id)
 
     def _go(self, value: str, client: viser.ClientHandle) -> None:
-        number = next((step for step in self._numbers if str(step) == value), None)
-        if number is not None:
-            self._session.travel_to(object(), number, stamp=None, who=client.client_id)
+        if value in self._numbers:
+            self._session.do(move_to(int(value)), who=client.client_id)
 
 
 def _row(step: Step, here: Step) -> str:
@@ -128,13 +136,117 @@ class UndoButtons:
         )
 
     def _move(self, name: str, client: viser.ClientHandle) -> None:
-        self._session.travel(MOVES[name], who=client.client_id)
+        self._session.do(MOVES[name], who=client.client_id)
+
+
+class DesignChange:
+    """The last change of the design, and the frame before it, None if the last step changed none.
+
+    A change counts until another step, undo or redo, or a press outside of the scene.
+    """
+
+    def __init__(self, services: Services) -> None:
+        self.before: Frame | None = None
+        self._session = services.session
+        self._now = services.get(VOLUME_FEED)
+        # Another page of the same state may not have measured the design before the change.
+        self._then = Feed[Selection, MeasuredVolume](
+            services.worker,
+            measure_volume,
+            lambda _: None if self.before is None else volume_request(self.before),
+            services.session.redraw,
+            key="volume before",
+        )
+        self._ended: State | None = None
+        services.buttons.on(OVER, self._end, values=("",))
+
+    def follow(self, frame: Frame) -> None:
+        """Find what was before the change that led to a frame, and request its volume."""
+        history, now = self._session.history, frame.state
+        state = history.steps[history.at - 1].state if history.is_open and history.at else None
+        # Another design that is opened is no change of this one.
+        if state is self._ended or (state is not None and state.base != now.base):
+            state = None
+        if state is None or state.design == now.design:
+            self.before = None
+        elif self.before is None or self.before.state is not state:
+            # What a frame has computed is kept from one value of a slider to the next.
+            self.before = Frame(state)
+        self._then.follow(frame)
+
+    def card(self, frame: Frame) -> str:
+        """Return the values before and now with their differences, HTML; nothing without any."""
+        old, words = self.before, self._session.history.step.words
+        if old is None:
+            return ""
+        lines = [
+            _difference("Volume", _volume(self._then), _volume(self._now), "units³"),
+            _difference("Reach", _reach(old), _reach(frame), "mm"),
+            _difference("Clearance here", _clearance(old), _clearance(frame), "mm"),
+        ]
+        body = table(lines, head=("", "before", "now", ""))
+        return (
+            f'<div class="ex-change-card" role="status" data-until-press="{OVER}">'
+            f"<b>{escape(words)}</b>{body}</div>"
+        )
+
+    def _end(self, _: str, client: viser.ClientHandle) -> None:
+        del client
+        if self.before is not None:
+            self._ended = self.before.state
+            self._session.redraw()
+
+
+def _volume(feed: Feed[Selection, MeasuredVolume]) -> float | None:
+    drawing = feed.drawing
+    return None if drawing is None or not feed.is_current else drawing.measured.volume
+
+
+def _difference(name: str, before: float | None, now: float | None, unit: str) -> str:
+    """Return a row with a value before and now, and the difference; "…" while one is computed."""
+    words = ""
+    if before is not None and now is not None:
+        change = drop_rounding(now - before, max(abs(before), abs(now)))
+        sign = "+" if change > 0.0 else ""
+        words = "same" if change == 0.0 else f"<b>{sign}{format_number(change, 3)}</b>"
+    texts = ("…" if value is None else format_number(value, DIGITS) for value in (before, now))
+    return row(f"{name} {dim(unit)}", *texts, words)
+
+
+def _reach(frame: Frame) -> float:
+    design = frame.state.design
+    return design.reach * design.unit_mm
+
+
+def _clearance(frame: Frame) -> float:
+    clearances = frame.snapshot.clearances
+    return float(clearances.clearance[int(clearances.closest)]) * frame.state.design.unit_mm
+
+
+class ChangeScene(ScenePart):
+    """The outline of base, legs and platform before the change."""
+
+    def __init__(self, services: Services) -> None:
+        self._change = services.get(DesignChange)
+        self._lines = add_lines(services.scene, "/change/before", 1, GHOST, 2.0)
+
+    def updates(self, placed: Placed) -> Updates:
+        """Yield the updates that draw the ghost of this frame."""
+        before = self._change.before
+        yield self._lines, "visible", before is not None
+        if before is not None:
+            ratio = before.state.design.unit_mm / placed.frame.state.design.unit_mm
+            lines = placed.scale * ratio * outline(before.snapshot)
+            yield self._lines, "points", lines.astype(np.float32)
 
 
 HISTORY = Feature(
     "history",
     tabs=(Tab("dialog", "History", HistoryPanel),),
-    bar=(InBar("left", UndoButtons), InBar("left", ChangeCard)),
+    bar=(
+        InBar("left", UndoButtons),
+        InBar("left", lambda services: services.get(DesignChange).card),
+    ),
     scene=(ChangeScene,),
     feeds=(DesignChange,),
 )

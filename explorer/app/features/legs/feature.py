@@ -2,16 +2,231 @@
 
 from __future__ import annotations
 
+import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Tab
-from explorer.app.features.legs.panel import LegsPanel
+from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.legs.scene import ClearanceScene, SweptTetrahedra
-from explorer.app.features.legs.work import RADIUS_FEED, draw_radius_curve
+from explorer.app.features.workspace.feeds import workspace_rows, workspace_start
+from explorer.app.features.workspace.work import Selection, Trouble, draw_radius_curve
+from explorer.app.inputs.controls import Controls
+from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.buttons import figure
+from explorer.app.widgets import charts
+from explorer.app.widgets.assigning import Updates
+from explorer.app.widgets.blocks import render
+from explorer.app.widgets.buttons import CopyButton, figure
+from explorer.app.widgets.markup import alert, box, dim, row, sentence, swatch, table
+from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.legs.clearance import PAIRS, pair_name
+from explorer.measures.blocks.block import Statement
+from explorer.measures.blocks.clearances import move_clearances, pose_clearances
+from explorer.measures.blocks.source import Source, pose_source
+from explorer.mechanism.design import Design
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.singularity.colours import Rgb
+from explorer.workspace.accessible.radii import RadiusCurve, with_radius
+
+# Share of the volume without radii; the largest radius that keeps it is marked.
+SHARE = 0.99
+# End of the chart, as a multiple of the last radius of the curve and of the largest marked one.
+BEYOND_LAST, BEYOND_PRESENT = 1.15, 1.05
+HEIGHT = 190
+MARKS = (
+    ("present radius", charts.ORANGE, 10),
+    ("99 % accessible up to", charts.TEAL, 8),
+    ("no loss up to", charts.VIOLET, 8),
+)
+"""Name, colour and size of each mark on the curve."""
+
+
+def _request_for(frame: Frame) -> Selection | None:
+    if not frame.state.view.radius_curve:
+        return None
+    thin = with_radius(frame.state.design, 0.0)
+    return Selection(thin, workspace_rows(frame), "accessible", workspace_start(frame))
+
+
+RADIUS_FEED = feed_of(draw_radius_curve, _request_for, has_stages=True)
+"""The feed of the accessible volume over the radius of the legs, while it is shown."""
+
+
+class LegsPanel:
+    """The table of clearances, that of the last move, and the radius curve."""
+
+    def __init__(self, services: Services) -> None:
+        gui = services.gui
+        self._pose = gui.add_html("")
+
+        def source() -> Source:
+            state = services.session.latest_state()
+            return pose_source("interference", state.design, state.pose)
+
+        self._copy = CopyButton(services.buttons, "Legs", source)
+        self._controls = Controls(gui, services.session)
+        with gui.add_folder("Last move"):
+            self._controls.checkbox(
+                "Swept tetrahedra",
+                "Draw the tetrahedra that the legs swept in the last move, and compare the paper's "
+                "test for interference with the exact one.",
+                "view.swept",
+            )
+            self._move = gui.add_html("", visible=False)
+        with gui.add_folder("Leg radius"):
+            self._controls.checkbox(
+                "Volume against radius",
+                "Draw the accessible volume over one radius of all four legs, for the orientation "
+                "and the start of the tab Workspace.",
+                "view.radius_curve",
+            )
+            self._chart = charts.add_chart(
+                gui,
+                (charts.line("volume", charts.BLUE), *(charts.dots(*mark) for mark in MARKS)),
+                (
+                    charts.axis("radius of all four legs (units)", label_size=20, size=28),
+                    charts.axis("accessible volume (units³)", label_size=18, size=46),
+                ),
+                height=HEIGHT,
+                padding=(8, 14, 0, 0),
+            )
+            self._words = gui.add_html("", visible=False)
+            self._feed = services.get(RADIUS_FEED)
+            self._under_way = UnderWay(gui, "curve", self._feed)
+
+    def updates(self, frame: Frame) -> Updates:
+        """Yield the updates that make the panel show the frame."""
+        view, drawing = frame.state.view, self._feed.drawing
+        yield self._pose, "content", render(pose_clearances(frame.snapshot), corner=self._copy.html)
+        yield from self._controls.updates(frame)
+        yield self._move, "visible", view.swept
+        if view.swept:
+            yield self._move, "content", move_table(frame)
+        yield from self._under_way.updates()
+        yield self._words, "visible", view.radius_curve
+        if view.radius_curve:
+            yield self._words, "content", radius_words(frame, self._feed)
+        curve = drawing if view.radius_curve and isinstance(drawing, RadiusCurve) else None
+        has_chart = curve is not None and float(curve.radii[-1]) > 0.0
+        yield self._chart, "visible", has_chart
+        if curve is not None and has_chart:
+            columns = chart_columns(curve, common_radius(frame.state.design))
+            across = {"time": False, "range": (0.0, float(columns[0][-1]))}
+            up = {"range": (0.0, 1.08 * float(curve.volumes[0]))}
+            yield self._chart, "scales", {"x": across, "y": up}
+            yield self._chart, "data", columns
+
+
+def move_table(frame: Frame) -> str:
+    """Return the last move by both tests, the paper's and the exact one, as HTML."""
+    move = frame.last_move
+    if move is None:
+        words = "No move yet. Move the platform: a drag without a pause is one move."
+        return render([Statement("", words)])
+    return render(move_clearances(move, frame.state.design))
+
+
+def common_radius(design: Design) -> float | None:
+    """Return the radius of all four legs, None if they differ."""
+    radii = set(design.limits.leg_radii)
+    return radii.pop() if len(radii) == 1 else None
+
+
+def marked_radii(curve: RadiusCurve, radius: float | None) -> tuple[float | None, ...]:
+    """Return the radii of `MARKS` on a curve; that of all legs may be None."""
+    return radius, curve.radius_at(SHARE), curve.harmless
+
+
+def volume_at(curve: RadiusCurve, radius: float) -> float:
+    """Return the accessible volume at a radius; 0 beyond the last radius of the curve."""
+    return float(np.interp(radius, *_without_drop(curve), right=0.0))
+
+
+def _without_drop(curve: RadiusCurve) -> tuple[FloatArray, FloatArray]:
+    """Return distinct radii and their volumes, without the drop to 0 at the last radius."""
+    first = np.append(True, np.diff(curve.radii) > 0.0)
+    return curve.radii[first], curve.volumes[first]
+
+
+def chart_columns(curve: RadiusCurve, radius: float | None) -> tuple[FloatArray, ...]:
+    """Return the columns of the chart: radii, volumes, and the three marks.
+
+    Beyond the last radius the volume is 0.
+    """
+    marks = marked_radii(curve, radius)
+    marked = [mark for mark in marks if mark is not None]
+    last = float(curve.radii[-1])
+    end = max(BEYOND_LAST * last, BEYOND_PRESENT * max(marked))
+    radii, volumes = _without_drop(curve)
+    inner = np.unique([*radii, *(mark for mark in marked if mark <= last)])
+    outer = np.unique([last, *(mark for mark in marked if mark > last), end])
+    x = np.concatenate([inner, outer])
+    y = np.concatenate([np.interp(inner, radii, volumes), np.zeros(len(outer))])
+    columns = [x, y]
+    for mark in marks:
+        column = np.full(len(x), np.nan)
+        if mark is not None:
+            column[np.searchsorted(x, mark)] = volume_at(curve, mark)
+        columns.append(column)
+    return tuple(columns)
+
+
+def radius_words(frame: Frame, feed: Feed[Selection, RadiusCurve | Trouble]) -> str:
+    """Return the numbers below the chart, or why there is no chart, as HTML."""
+    if feed.problem is not None:
+        return problem(feed, "The curve could not be drawn", "Compute the curve")
+    curve = feed.drawing
+    if curve is None:
+        return box(dim(progress(feed).capitalize()))
+    note = "" if feed.is_current else f' <span class="ex-dim ex-small">{progress(feed)}</span>'
+    if not isinstance(curve, RadiusCurve):
+        return alert("Nothing is accessible, even without radii", sentence(curve.reason)) + note
+    if float(curve.volumes[0]) <= 0.0:
+        return box(dim(f"The workspace is empty.{note}"))
+    design = frame.state.design
+    radii = marked_radii(curve, common_radius(design))
+    rows = (
+        _row(name, colour, radius, curve, design.unit_mm)
+        for (name, colour, _), radius in zip(MARKS, radii, strict=True)
+    )
+    return box(
+        f'<div class="ex-line"><b>Accessible volume</b>{note}</div>',
+        table(rows),
+        f'<div class="ex-dim ex-after">{first_collision(curve, design.reach)}</div>',
+    )
+
+
+def first_collision(curve: RadiusCurve, reach: float) -> str:
+    """Return a sentence on the legs that collide first as their radii grow, and where."""
+    least = curve.least
+    closest = float(least.clearance.min())
+    if not np.isfinite(closest):
+        return "No two legs can meet."
+    first = np.flatnonzero(least.clearance <= closest)
+    meetings = [
+        f"legs {i} and {j} at {_position(least.position[pair])}"
+        for pair, (i, j) in ((int(pair), PAIRS[pair]) for pair in first)
+    ]
+    if closest > 0.0:
+        return f"First collision within the limits: {'; '.join(meetings)}."
+    on_base = np.abs(least.position[first, 2]).max() <= 1e-6 * reach
+    where = ", where z = 0" if on_base else ""
+    return f"Even without radii legs touch within the limits{where}: {'; '.join(meetings)}."
+
+
+def _row(name: str, colour: Rgb, radius: float | None, curve: RadiusCurve, unit_mm: float) -> str:
+    value, note = "they differ", ""
+    if radius is not None:
+        value, note = format_number(radius, 3), f"{format_number(radius * unit_mm, 3)} mm"
+        if name == MARKS[0][0]:
+            share = volume_at(curve, radius) / float(curve.volumes[0])
+            note = f"{format_number(100.0 * share, 3)} %"
+    return row(f"{swatch(colour, 'ex-dot')}{name}", value, dim(note))
+
+
+def _position(position: FloatArray) -> str:
+    rounded = np.round(position, 6) + 0.0
+    return "(" + ", ".join(format_number(float(x), 3) for x in rounded) + ")"
 
 
 def clearance_figure(frame: Frame) -> str:

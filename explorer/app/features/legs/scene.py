@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 
 import numpy as np
 
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import (
+    SWEPT,
     TETRAHEDRON_FACES,
+    TUBE,
     Balls,
     Rods,
     add_label,
     add_lines,
     add_translucent,
 )
-from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import SWEPT, TUBE
+from explorer.app.widgets.assigning import Updates
 from explorer.legs.clearance import PAIRS, leg_axes, legs_of, pair_name
 from explorer.legs.interference import swept_tetrahedra
+from explorer.mechanism.configuration import Configuration
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE
 
@@ -44,7 +45,7 @@ class ClearanceScene(ScenePart):
         self._rods = Rods(scene, "/clearance/rods", [TUBE] * 4, opacity=OPACITY)
         self._ends = Balls(scene, "/clearance/ends", [TUBE] * 8, opacity=OPACITY)
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the closest pair and the capsules of this frame."""
         state, snapshot = placed.frame.state, placed.frame.snapshot
         radii = placed.scale * np.array(state.design.limits.leg_radii)
@@ -91,7 +92,7 @@ class SweptTetrahedra(ScenePart):
             (START, add_lines(scene, "/swept/starts", 4, None, 4.0)),
         )
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the tetrahedra of this frame's last move."""
         view = placed.frame.state.view
         move = placed.frame.last_move if view.swept and not view.is_twin else None
@@ -99,14 +100,9 @@ class SweptTetrahedra(ScenePart):
             yield handle, "visible", move is not None
         if move is None:
             return
-        start, end = move.start, move.end
-        tetrahedra = placed.scale * swept_tetrahedra(
-            placed.frame.state.design,
-            np.array(start.position),
-            start.rotation,
-            np.array(end.position),
-            end.rotation,
-        )
+        design = placed.frame.state.design
+        ends = (Configuration.at(design, pose) for pose in (move.start, move.end))
+        tetrahedra = placed.scale * swept_tetrahedra(*ends)
         colours = [OUTLINE if overlaps else SWEPT for overlaps in legs_of(move.overlaps)]
         for mesh, corners, colour in zip(self._meshes, tetrahedra, colours, strict=True):
             yield mesh, "vertices", corners.astype(np.float32)

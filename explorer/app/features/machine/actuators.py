@@ -1,7 +1,4 @@
-"""The controls of the six actuators: forces, positioning errors and stiffness.
-
-`add_field` and `add_switch` serve the other parts of the machine too.
-"""
+"""The controls of the six actuators: forces, positioning errors and stiffness."""
 
 from __future__ import annotations
 
@@ -11,11 +8,9 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 import viser
 
-from explorer.app.inputs.bindings import Bound, Source
-from explorer.app.inputs.control import Condition
+from explorer.app.inputs.control import At, Bound, Condition, Source
 from explorer.app.inputs.controls import Controls
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Set
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import State
 from explorer.mechanism.design import JOINTS
@@ -30,44 +25,72 @@ FORCES: Six = (FORCE, FORCE, FORCE, FORCE, FORCE, FORCE)
 FINE, MEDIUM = 0.001, 0.01
 
 
-def add_field(
-    controls: Controls,
-    label: str,
-    hint: str,
-    at: Source[float],
-    *,
-    step: float = MEDIUM,
-    visible: Condition | None = None,
-) -> None:
-    """Add a field for a number from 0 on; values far below its step count too."""
-    controls.number(label, hint, at, least=0.0, step=step, visible=visible, small=True)
+class MachineControls(Controls):
+    """Controls with fields for numbers from 0 on, and switches for values that may be None."""
 
+    def field(
+        self,
+        label: str,
+        hint: str,
+        at: Source[float],
+        *,
+        step: float = MEDIUM,
+        visible: Condition | None = None,
+    ) -> None:
+        """Add a field for a number from 0 on; values far below its step count too."""
+        self.number(label, hint, at, least=0.0, step=step, visible=visible, small=True)
 
-def add_switch(
-    controls: Controls,
-    label: str,
-    hint: str,
-    path: str,
-    first: Callable[[State], Any],
-    *,
-    disabled: Condition | None = None,
-) -> None:
-    """Add a switch for a value that is None while it is off.
+    def switch(
+        self,
+        label: str,
+        hint: str,
+        path: str,
+        first: Callable[[State], Any],
+        *,
+        is_possible: Condition = lambda _: True,
+    ) -> None:
+        """Add a switch for a value that is None while it is off.
 
-    Args:
-        controls: Controls of the panel.
-        label: Words beside it.
-        hint: Sentence on what it does.
-        path: Path of the value in the state.
-        first: Function that returns the value with which it begins.
-        disabled: Condition in which it is disabled; None for never.
-    """
+        Args:
+            label: Words beside it.
+            hint: Sentence on what it does.
+            path: Path of the value in the state.
+            first: Function that returns the value with which it begins.
+            is_possible: Condition in which there can be a value.
+        """
 
-    def write(state: State, on: bool) -> Action:
-        return Set(path, first(state) if on else None, label, "on" if on else "off")
+        def write(state: State, on: bool) -> Action:
+            return Set(path, first(state) if on else None, label, "on" if on else "off")
 
-    is_on = Bound(lambda frame: value_at(frame.state, path) is not None, write)
-    controls.checkbox(label, hint, is_on, disabled=disabled)
+        is_on = Bound(lambda frame: value_at(frame.state, path) is not None, write)
+        self.checkbox(label, hint, is_on, disabled=lambda state: not is_possible(state))
+
+    def limit(
+        self,
+        label: str,
+        hint: str,
+        field: tuple[str, str],
+        path: str,
+        first: Callable[[State], float],
+        *,
+        is_possible: Condition = lambda _: True,
+    ) -> None:
+        """Add a switch for a limit, and a field for its value while it is on.
+
+        Args:
+            label: Words beside the switch.
+            hint: Sentence on what it does.
+            field: Words beside the field, and its hint.
+            path: Path of the limit in the state.
+            first: Function that returns the limit with which it begins.
+            is_possible: Condition in which there can be a limit.
+        """
+        self.switch(label, hint, path, first, is_possible=is_possible)
+        self.field(
+            *field,
+            At(path, default=first),
+            visible=lambda state: value_at(state, path) is not None and is_possible(state),
+        )
 
 
 class Quantity(NamedTuple):
@@ -103,20 +126,14 @@ class Quantity(NamedTuple):
             return given
         return STIFFNESSES if self is STIFF else PUSH.given(state) or FORCES
 
-    def of_all(self, state: State) -> float:
-        """Return the number that counts for all six: the largest error, the least of the others."""
-        values = self.first(state)
-        return max(values) if self is ERROR else min(values)
-
 
 PUSH = Quantity("push_n", "push", "N", "Largest force that increases a joint's value", MEDIUM)
 PULL = Quantity("pull_n", "pull", "N", "Largest force that decreases it", MEDIUM)
 ERROR = Quantity("error_mm", "error", "mm", "Largest positioning error to either side", FINE)
 STIFF = Quantity("stiffness_n_mm", "stiffness", "N/mm", "Force along the joint per deflection", 1.0)
-QUANTITIES = (PUSH, PULL, ERROR, STIFF)
 
 
-def add_actuators(gui: viser.GuiApi, controls: Controls) -> None:
+def add_actuators(gui: viser.GuiApi, controls: MachineControls) -> None:
     """Add the controls: one number for all six, and in a folder of its own for each."""
     controls.checkbox(
         "Limited forces",
@@ -124,18 +141,16 @@ def add_actuators(gui: viser.GuiApi, controls: Controls) -> None:
         Bound(lambda frame: _is_limited(frame.state), _limit_forces),
     )
     _add_common(controls, PUSH)
-    add_switch(
-        controls,
+    controls.switch(
         "Pull of its own",
         "Give the pull a limit of its own; off, the largest pull is the largest push.",
         PULL.path,
         PUSH.first,
-        disabled=lambda state: not _is_limited(state),
+        is_possible=_is_limited,
     )
     _add_common(controls, PULL)
     _add_common(controls, ERROR)
-    add_switch(
-        controls,
+    controls.switch(
         "Elastic",
         "Give the actuators a stiffness; off, they are rigid.",
         STIFF.path,
@@ -143,20 +158,20 @@ def add_actuators(gui: viser.GuiApi, controls: Controls) -> None:
     )
     _add_common(controls, STIFF)
     with gui.add_folder("Each of the six", expand_by_default=False):
-        for quantity in QUANTITIES:
+        for quantity in (PUSH, PULL, ERROR, STIFF):
             for index, joint in enumerate(JOINTS):
                 _add_one(controls, quantity, index, joint)
 
 
-def _add_common(controls: Controls, quantity: Quantity) -> None:
+def _add_common(controls: MachineControls, quantity: Quantity) -> None:
     label = f"{quantity.word.capitalize()} of each ({quantity.unit})"
-    add_field(
-        controls,
+    # The number that counts for all six.
+    extreme, word = (max, "largest") if quantity is ERROR else (min, "least")
+    controls.field(
         label,
-        f"{quantity.meaning}, the same for all six; of different ones the field shows the "
-        f"{'largest' if quantity is ERROR else 'least'}.",
+        f"{quantity.meaning}, the same for all six; of different ones the field shows the {word}.",
         Bound(
-            lambda frame: quantity.of_all(frame.state),
+            lambda frame: extreme(quantity.first(frame.state)),
             lambda _, value: Set(quantity.path, (value,) * 6, label, format_number(value, 6)),
         ),
         step=quantity.step,
@@ -164,7 +179,7 @@ def _add_common(controls: Controls, quantity: Quantity) -> None:
     )
 
 
-def _add_one(controls: Controls, quantity: Quantity, index: int, joint: str) -> None:
+def _add_one(controls: MachineControls, quantity: Quantity, index: int, joint: str) -> None:
     label = f"{quantity.word} of {joint} ({quantity.unit})"
 
     def write(state: State, value: float) -> Action:
@@ -172,8 +187,7 @@ def _add_one(controls: Controls, quantity: Quantity, index: int, joint: str) -> 
         values[index] = value
         return Set(quantity.path, tuple(values), label, format_number(value, 6))
 
-    add_field(
-        controls,
+    controls.field(
         label,
         f"{quantity.meaning}, of the actuator of {joint}.",
         Bound(lambda frame: quantity.first(frame.state)[index], write),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from html import escape
 
@@ -12,28 +12,18 @@ import msgspec
 import viser
 
 from explorer.app.features.feature import Feature, Services, Tab
-from explorer.app.features.machine.actuators import (
-    FINE,
-    FORCE,
-    add_actuators,
-    add_field,
-    add_switch,
-)
+from explorer.app.features.machine.actuators import FINE, FORCE, MachineControls, add_actuators
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
 from explorer.app.features.machine.words import DIRECTIONS, direction_name, machine_words
-from explorer.app.inputs.bindings import At, Bound
-from explorer.app.inputs.control import Condition
-from explorer.app.inputs.controls import Controls
-from explorer.app.inputs.ranges import platform_span
-from explorer.app.inputs.tracks import Span
-from explorer.app.state.action import Action
-from explorer.app.state.actions import FULL_TURN, Set, check_free
+from explorer.app.inputs.control import At, Bound
+from explorer.app.inputs.ranges import Span, platform_span
+from explorer.app.state.actions import FULL_TURN, Action, Set, check_free
 from explorer.app.state.frame import Frame
-from explorer.app.state.parts import value_at, with_value
+from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import box, note
+from explorer.app.widgets.palette import NO_OPTION
 from explorer.mechanism.machine import Struts, Tolerances
 from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import format_number
@@ -93,20 +83,26 @@ class MachinePanel:
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
-        self._controls = controls = Controls(gui, services.session)
+        self._controls = controls = MachineControls(gui, services.session)
         self._summary = gui.add_html("")
         with gui.add_folder("Tool on the platform (design units, degrees)"):
-            self._add_tool()
+            self._add_point("tool", "the tool point", "design.tool.position")
+            for axis in range(len(ANGLES)):
+                self._add_angle(axis)
         with gui.add_folder("Payload (design units, kg, N)"):
-            add_field(
-                controls,
+            controls.field(
                 "Mass (kg)",
                 "Mass that the platform carries.",
                 "design.payload.mass_kg",
                 step=FINE,
             )
             self._weight = gui.add_html("", visible=False)
-            self._add_payload()
+            self._add_point("centre", "the payload's centre", "design.payload.centre")
+            controls.field(
+                "Force on the tool (N)",
+                "Largest force of the process, which acts at the tool point in any direction.",
+                "design.payload.force_n",
+            )
         with gui.add_folder("Gravity", expand_by_default=False):
             self._add_gravity()
         with gui.add_folder("Actuators", expand_by_default=False):
@@ -130,16 +126,14 @@ class MachinePanel:
         yield self._moment, "content", note(moment_words(design.struts))
         yield from self._controls.updates(frame)
 
-    def _add_tool(self) -> None:
-        for axis, name in enumerate("xyz"):
+    def _add_point(self, name: str, point: str, path: str) -> None:
+        for axis, letter in enumerate("xyz"):
             self._controls.slider(
-                f"tool {name}",
-                f"The {name} coordinate of the tool point in the platform frame, from b4.",
-                f"design.tool.position.{axis}",
+                f"{name} {letter}",
+                f"The {letter} coordinate of {point} in the platform frame, from b4.",
+                f"{path}.{axis}",
                 platform_span,
             )
-        for axis in range(len(ANGLES)):
-            self._add_angle(axis)
 
     def _add_angle(self, axis: int) -> None:
         name, about, edge = ANGLES[axis]
@@ -151,21 +145,6 @@ class MachinePanel:
                 lambda _, value: SetToolAngle(axis, value),
             ),
             Span(-edge, edge, 0.1),
-        )
-
-    def _add_payload(self) -> None:
-        for axis, name in enumerate("xyz"):
-            self._controls.slider(
-                f"centre {name}",
-                f"The {name} coordinate of the payload's centre in the platform frame, from b4.",
-                f"design.payload.centre.{axis}",
-                platform_span,
-            )
-        add_field(
-            self._controls,
-            "Force on the tool (N)",
-            "Largest force of the process, which acts at the tool point in any direction.",
-            "design.payload.force_n",
         )
 
     def _add_gravity(self) -> None:
@@ -202,8 +181,8 @@ class MachinePanel:
             ("Young's modulus (GPa)", "Aluminium 70, steel 210, carbon 130.", "modulus_gpa"),
         ):
             size = At(f"design.struts.{name}", default=lambda _: OUTER)
-            add_field(self._controls, label, hint, size, visible=_is_tube)
-        self._add_limit(
+            self._controls.field(label, hint, size, visible=_is_tube)
+        self._controls.limit(
             "Limited stress",
             "Limit the bending stress of the tube, and with it the moment.",
             ("Largest stress (MPa)", "Largest bending stress of the tube."),
@@ -211,7 +190,7 @@ class MachinePanel:
             lambda _: STRESS,
             is_possible=_is_tube,
         )
-        self._add_limit(
+        self._controls.limit(
             "Moment given directly",
             "Give the largest bending moment itself, in place of that of tube and stress.",
             ("Largest moment (N m)", "Largest bending moment of a strut."),
@@ -220,14 +199,14 @@ class MachinePanel:
         )
 
     def _add_guide(self) -> None:
-        self._add_limit(
+        self._controls.limit(
             "Limited guide force",
             "Limit the force across the guide on each of its two carriages.",
             ("Largest force (N)", "Largest force across the guide on a carriage."),
             "design.guide.force_n",
             lambda _: FORCE,
         )
-        self._add_limit(
+        self._controls.limit(
             "Limited guide moment",
             "Limit the moment on the guide at each of its two carriages.",
             ("Largest moment on it (N m)", "Largest moment on the guide at a carriage."),
@@ -235,47 +214,15 @@ class MachinePanel:
             lambda _: MOMENT,
         )
 
-    def _add_limit(
-        self,
-        switch: str,
-        hint: str,
-        field: tuple[str, str],
-        path: str,
-        first: Callable[[State], float],
-        *,
-        is_possible: Condition = lambda _: True,
-    ) -> None:
-        """Add a switch for a limit, as of `add_switch`, and a field for its value while it is on.
-
-        Args:
-            switch: Words beside the switch.
-            hint: Sentence on what it does.
-            field: Words beside the field, and its hint.
-            path: Path of the limit in the state.
-            first: Function that returns the limit with which it begins.
-            is_possible: Condition in which there can be a limit.
-        """
-        add_switch(
-            self._controls, switch, hint, path, first, disabled=lambda state: not is_possible(state)
-        )
-        add_field(
-            self._controls,
-            *field,
-            At(path, default=first),
-            visible=lambda state: value_at(state, path) is not None and is_possible(state),
-        )
-
     def _add_tolerances(self) -> None:
         """Add one number for all lengths, one for both tilts, and each by itself."""
-        add_field(
-            self._controls,
+        self._controls.field(
             EVERY_LENGTH,
             "Tolerance of all 21 lengths below; the field shows the largest of them.",
             Bound(_largest_length, _set_lengths),
             step=FINE,
         )
-        add_field(
-            self._controls,
+        self._controls.field(
             BOTH_TILTS,
             "Tolerance of both tilts of the guide through a1; the field shows the larger one.",
             Bound(
@@ -295,7 +242,7 @@ class MachinePanel:
         for index, axis in enumerate("yz"):
             hint = f"Tolerance of the guide's turn about {axis} through a1."
             label = f"guide tilt {axis} (± °)"
-            add_field(self._controls, label, hint, f"{TILTS}.{index}", step=FINE)
+            self._controls.field(label, hint, f"{TILTS}.{index}", step=FINE)
 
 
 def _with_units(words: str) -> str:

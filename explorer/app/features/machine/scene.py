@@ -9,17 +9,9 @@ import numpy as np
 
 from explorer.app.features.feature import Services
 from explorer.app.features.machine.words import turn_of
+from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
-from explorer.app.scene.shapes import (
-    Rods,
-    add_label,
-    add_lines,
-    add_translucent,
-    linear_colour,
-    sphere,
-)
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import GHOST
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import Rgb
@@ -39,20 +31,22 @@ class ToolScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
-        self._line = add_lines(scene, "/platform/tool-line", 1, GHOST, THICKNESS)
+        self._line = shapes.add_lines(scene, "/platform/tool-line", 1, shapes.GHOST, THICKNESS)
         # The frame's own axes are too dark for a dark page.
         self._frame = scene.add_frame("/platform/tool", show_axes=False, visible=False)
-        self._axes = Rods(scene, "/platform/tool/axes", list(map(linear_colour, AXIS_COLOURS)))
-        self._label = add_label(scene, "/platform/tool-label", "tool", visible=False)
+        self._axes = shapes.Rods(
+            scene, "/platform/tool/axes", list(map(shapes.linear_colour, AXIS_COLOURS))
+        )
+        self._label = shapes.add_label(scene, "/platform/tool-label", "tool", visible=False)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the tool of this frame."""
-        shown, tool = is_tool_shown(placed), placed.frame.state.design.tool
-        yield self._line, "visible", shown and any(tool.position)
+        visible, tool = _has_tool(placed), placed.frame.state.design.tool
+        yield self._line, "visible", visible and any(tool.position)
         for handle in (self._frame, self._label):
-            yield handle, "visible", shown
-        yield from self._axes.show(shown)
-        if not shown:
+            yield handle, "visible", visible
+        yield from self._axes.show(visible)
+        if not visible:
             return
         tip = placed.scale * np.array(tool.position)
         yield self._line, "points", np.stack([np.zeros(3), tip])[None].astype(np.float32)
@@ -65,7 +59,7 @@ class ToolScene(ScenePart):
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of a cube about the tool point."""
-        if not is_tool_shown(placed):
+        if not _has_tool(placed):
             return NO_POINTS
         return around(placed.on_platform(placed.frame.state.design.tool.position)[None])
 
@@ -75,19 +69,19 @@ class PayloadScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
-        self._ball = add_translucent(
-            scene, "/platform/payload", sphere(), BALL_OPACITY, colour=BRASS, side="front"
+        self._ball = shapes.add_translucent(
+            scene, "/platform/payload", shapes.sphere(), BALL_OPACITY, colour=BRASS, side="front"
         )
-        self._label = add_label(
+        self._label = shapes.add_label(
             scene, "/platform/payload-label", "1 kg", fades=False, visible=False
         )
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the payload of this frame."""
-        shown, payload = is_payload_shown(placed), placed.frame.state.design.payload
+        visible, payload = _has_payload(placed), placed.frame.state.design.payload
         for handle in (self._ball, self._label):
-            yield handle, "visible", shown
-        if not shown:
+            yield handle, "visible", visible
+        if not visible:
             return
         centre = tuple((placed.scale * np.array(payload.centre)).tolist())
         yield self._ball, "position", centre
@@ -97,7 +91,7 @@ class PayloadScene(ScenePart):
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the ends of the ball along the axes of the base."""
-        if not is_payload_shown(placed):
+        if not _has_payload(placed):
             return NO_POINTS
         payload = placed.frame.state.design.payload
         radius = ball_radius(payload.mass_kg)
@@ -110,17 +104,17 @@ def ball_radius(mass: float) -> float:
     return min(max(KILOGRAM_RADIUS * math.cbrt(mass), LEAST_RADIUS), LARGEST_RADIUS)
 
 
-def is_tool_shown(placed: Placed) -> bool:
+def _has_tool(placed: Placed) -> bool:
     """Whether the design has a tool, and it is drawn."""
     tool = placed.frame.state.design.tool
-    return _is_shown(placed) and (any(tool.position) or turn_of(tool) > 0.0)
+    return _is_visible(placed) and (any(tool.position) or turn_of(tool) > 0.0)
 
 
-def is_payload_shown(placed: Placed) -> bool:
+def _has_payload(placed: Placed) -> bool:
     """Whether the design has a payload with a mass, and it is drawn."""
-    return _is_shown(placed) and placed.frame.state.design.payload.mass_kg > 0.0
+    return _is_visible(placed) and placed.frame.state.design.payload.mass_kg > 0.0
 
 
-def _is_shown(placed: Placed) -> bool:
+def _is_visible(placed: Placed) -> bool:
     # Apart, the platform is not where its points are.
     return placed.frame.state.view.machine and not placed.is_apart

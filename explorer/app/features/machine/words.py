@@ -69,10 +69,8 @@ def _payload_words(payload: Payload) -> str:
 
 
 def _gravity_words(gravity: Triple) -> str:
-    name = direction_name(gravity)
-    if name is None:
-        return f"gravity along ({', '.join(map(_text, gravity))})"
-    return "" if gravity == DOWN else f"gravity {name}"
+    along = f"along ({', '.join(map(_text, gravity))})"
+    return "" if gravity == DOWN else f"gravity {direction_name(gravity) or along}"
 
 
 def direction_name(gravity: Triple) -> str | None:

@@ -6,31 +6,30 @@ import viser
 
 from explorer.app.features.designs.feature import DesignName
 from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
-from explorer.app.features.mechanism.bodies import Bodies, Legs, TwinLegs
-from explorer.app.features.mechanism.design_panel import DesignPanel
+from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs, TwinLegs
 from explorer.app.features.mechanism.folds import Leaves
-from explorer.app.features.mechanism.gaps import Gaps, Tetrahedra
-from explorer.app.features.mechanism.incidences import Flags
+from explorer.app.features.mechanism.incidences import Gaps, Tetrahedra
 from explorer.app.features.mechanism.marks import DragHandle, Labels
 from explorer.app.features.mechanism.modes import MODES, Ghosts
-from explorer.app.features.mechanism.pose_panel import MovePanel
+from explorer.app.features.mechanism.panel import DesignPanel, MovePanel
 from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import figure
-from explorer.app.widgets.commands import Key, shift
+from explorer.app.widgets.palette import Key, shift
 
 
 def limits_figure(frame: Frame) -> str:
     """Return how many limits the pose breaks, as HTML."""
     broken = [str(each) for each in frame.snapshot.violations]
     if broken:
-        hint = f"Outside the limits: {'; '.join(broken)}."
-        return figure("Design", "Limits", f"{len(broken)} broken", hint=hint, look="ex-beyond")
-    if frame.snapshot.is_singular:
+        words, look, hint = f"{len(broken)} broken", "ex-beyond", "; ".join(broken)
+        hint = f"Outside the limits: {hint}."
+    elif frame.snapshot.is_singular:
+        words, look = "kept, but singular", ""
         hint = "The pose keeps all limits of the design, but it is singular."
-        return figure("Design", "Limits", "kept, but singular", hint=hint)
-    hint = "The pose keeps all limits of the design."
-    return figure("Design", "Limits", "kept", hint=hint, look="ex-within")
+    else:
+        words, look, hint = "kept", "ex-within", "The pose keeps all limits of the design."
+    return figure("Design", "Limits", words, hint=hint, look=look)
 
 
 MECHANISM = Feature(
@@ -41,18 +40,7 @@ MECHANISM = Feature(
     ),
     bar=(InBar("left", DesignName), InBar("middle", lambda _: limits_figure)),
     # Bodies come first: they make the platform's frame, to which others attach.
-    scene=(
-        Bodies,
-        Flags,
-        Legs,
-        TwinLegs,
-        Tetrahedra,
-        Leaves,
-        Gaps,
-        Labels,
-        Ghosts,
-        DragHandle,
-    ),
+    scene=(Bodies, Flags, Legs, TwinLegs, Tetrahedra, Leaves, Gaps, Labels, Ghosts, DragHandle),
     commands=(
         StateCommand(
             "Pose › Next assembly mode",

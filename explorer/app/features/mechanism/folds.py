@@ -9,23 +9,22 @@ arc goes from where its fold would be 0 to where it is, with the angle beside it
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from functools import partial
 
 import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.control import item
 from explorer.app.inputs.controls import Controls
-from explorer.app.inputs.ranges import length_span
-from explorer.app.inputs.tracks import Span
+from explorer.app.inputs.ranges import Span, length_span
 from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import add_label, add_lines, add_translucent, of_one_colour
+from explorer.app.scene.shapes import LEAVES, add_label, add_lines, add_translucent, of_one_colour
 from explorer.app.state.folds import FIRST_FOLD, HALF_TURN, SetFold
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import LEAVES
+from explorer.app.widgets.assigning import Updates
 from explorer.mechanism.folds import FOLDS
 from explorer.mechanism.margins import signs_of
 from explorer.numerics.arrays import FloatArray
@@ -49,7 +48,6 @@ LEVELS = (0.0, math.nextafter(1.0, 0.0), 1.0, FAR_WARNINGS)
 # Level of a track on which the pose is singular everywhere.
 LEAST_LEVEL = 1e-9
 
-
 OPACITY, WEDGE_OPACITY = 0.34, 0.22
 # Radius of the arcs as a share of the reach.
 RADIUS = 0.13
@@ -66,20 +64,15 @@ FAN = np.array([[0, each, each + 1] for each in range(1, SEGMENTS + 1)])
 
 def add_fold_sliders(controls: Controls) -> None:
     """Add a slider for each of the six coordinates, visible while these are chosen."""
-    for index in range(len(FOLDS)):
-        _add_slider(controls, index)
-
-
-def _add_slider(controls: Controls, index: int) -> None:
-    name = FOLDS[index]
-    controls.slider(
-        name if index == 0 else f"{name} (°)",
-        HINTS[index],
-        Bound(lambda frame: frame.folds[index], lambda _, value: SetFold(index, value)),
-        lambda state: fold_span(state, index),
-        visible=lambda state: state.view.coordinates == "folds",
-        coloured=lambda frame, span: colour_stops(frame, index, span),
-    )
+    for index, name in enumerate(FOLDS):
+        controls.slider(
+            name if index == 0 else f"{name} (°)",
+            HINTS[index],
+            item(lambda frame: frame.folds, index, SetFold),
+            partial(fold_span, index=index),
+            visible=lambda state: state.view.coordinates == "folds",
+            coloured=lambda frame, span, index=index: colour_stops(frame, index, span),
+        )
 
 
 def fold_span(state: State, index: int) -> Span:
@@ -93,13 +86,7 @@ def fold_span(state: State, index: int) -> Span:
 
 
 def colour_stops(frame: Frame, index: int, span: Span) -> str:
-    """Return the colours along the track of a coordinate, as stops of a CSS gradient.
-
-    Args:
-        frame: The frame that is shown.
-        index: Index of the coordinate in `FOLDS`.
-        span: Range of the track.
-    """
+    """Return the colours along the track of one of `FOLDS`, as stops of a CSS gradient."""
     r, *angles = frame.folds
     factors = (r, *(abs(math.sin(math.radians(angle))) for angle in angles))
     # The largest value of a margin along the track: that where its own factor is r's end, or 1.
@@ -127,32 +114,23 @@ class Leaves(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
+        leaf, wedge = (np.zeros((3, 3)), TRIANGLE), (np.zeros((SEGMENTS + 2, 3)), FAN)
         self._leaves = [
-            add_translucent(
-                scene, f"/leaves/{index}", (np.zeros((3, 3)), TRIANGLE), OPACITY, colour=colour
-            )
+            add_translucent(scene, f"/leaves/{index}", leaf, OPACITY, colour=colour)
             for index, colour in enumerate(LEAVES)
         ]
         self._wedges = [
-            add_translucent(
-                scene,
-                f"/leaves/wedge/{index}",
-                (np.zeros((SEGMENTS + 2, 3)), FAN),
-                WEDGE_OPACITY,
-                colour=colour,
-            )
+            add_translucent(scene, f"/leaves/wedge/{index}", wedge, WEDGE_OPACITY, colour=colour)
             for index, colour in enumerate(MARGIN_COLOURS, start=1)
         ]
         self._edges = _add_lines(scene, "/leaves/edges", LEAVES, 3, EDGE)
         self._arcs = _add_lines(scene, "/leaves/arcs", MARGIN_COLOURS, SEGMENTS + 2, ARC)
         self._labels = [
-            add_label(scene, f"/leaves/label/{index}", name, colour=colour, visible=False)
-            for index, (name, colour) in enumerate(
-                zip(FOLDS[FIRST_FOLD:], MARGIN_COLOURS, strict=True), start=1
-            )
+            add_label(scene, f"/leaves/label/{index}", "", colour=colour, visible=False)
+            for index, colour in enumerate(MARGIN_COLOURS, start=1)
         ]
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw leaves and arcs of this frame."""
         state = placed.frame.state
         # They would stand among parts that are drawn apart.

@@ -1,18 +1,17 @@
-"""How near each incidence is, as the scene shows it, and the flags of base and platform.
+"""How near each incidence is: tetrahedra of the trilaterations, gaps between the flags, contacts.
 
 An incidence is shown from twice its warning value on, and fully at the warning value and below:
 first the lines and planes of the flags reach out, and once they have arrived the gap between them
-is drawn. The row of its margin shows it too, while a pointer rests there.
+is drawn, with δ and its length. The row of its margin shows it too, while a pointer rests there.
 
-A flag is a point, a line through it and a plane through the line. Each element has the colour of
-its incidence: a1 and the platform plane that of δ1, the two lines that of δ2, b4 and the base plane
-that of δ3. Lines and planes are drawn as far as the mechanism goes; where an incidence is near they
-reach out to its gap.
+A pose is singular where one of the tetrahedra is flat. The edges of each have the colour of its
+margin; its faces are filled if it is near. A ring with a ball marks where an incidence holds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+import itertools
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -20,12 +19,14 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.bodies import guide_span
+from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
-from explorer.app.scene.shapes import Patch, cylinder, sphere, turned_to
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
+from explorer.mechanism.margins import TETRAHEDRA
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.colours import proximity_colour
+from explorer.numerics.number_text import format_fitted
+from explorer.singularity import colours
+from explorer.singularity.ellipsoids import planes_of_singularity
 
 HOVER = "margins.hover"
 # Level, in warning values, from which on an incidence fades in.
@@ -37,28 +38,42 @@ FARTHEST = 2.0
 # Length of a gap, as a share of the reach, up to which its ends are one point to the eye.
 CLOSED = 1e-6
 
-POINT_RADIUS = 0.36
-LINE_RADIUS = 0.075
-PLANE_OPACITY = 0.2
-# How far lines and planes go on beyond the end of a gap, as a share of the reach.
-BEYOND = 0.06
-# Ends of a gap.
-BASE, PLATFORM = 0, 1
-ALONG_X = turned_to(np.array([[1.0, 0.0, 0.0]]))[0]
+EDGES = np.array(list(itertools.combinations(range(4), 2)))
+OPACITY = 0.26
+# Share by which a tetrahedron is drawn smaller about its centroid, so that edges that two of them
+# share lie beside each other.
+INSET = 0.04
+# Pixels by which the edges of the filled tetrahedron are thicker, and thickness of one that fails.
+FILLED_EDGE, FAILING_EDGE = 1.0, 5.0
+
+# Most dashes of one gap, their period in scene units, and the share that is drawn.
+DASHES, PERIOD, DRAWN = 32, 0.32, 0.6
+# Thickness of the dashes in pixels, when they fade in and in full.
+THIN, THICK = 1.0, 3.0
+FOOT_RADIUS = 0.13
+RING_RADIUS, RING_TUBE, CONTACT_RADIUS = 0.85, 0.09, 0.42
+# Ends of gaps that have no mark of their own, as margin and end: a1 and b4 have one.
+FEET = ((0, 1), (1, 0), (1, 1), (2, 0))
+
+
+class Stroke(NamedTuple):
+    """Dashes of an edge: most of them, their period in scene units, share drawn, and pixels."""
+
+    most: int
+    period: float
+    drawn: float
+    thickness: float
+
+
+# Solid, dashed and dotted, as the lines of the margins in charts; what has gaps is thicker.
+STROKES = (Stroke(1, 1.0, 1.0, 1.8), Stroke(16, 0.9, 0.64, 2.4), Stroke(30, 0.5, 0.36, 3.0))
 
 
 class HoveredRow:
-    """The row of a table on which a pointer rests.
+    """The number of the row of a table on which a pointer rests; None if there is none.
 
-    It is no part of the state: it is neither saved nor undone.
-
-    Args:
-        services: What the page offers.
-        name: Name under which buttons and rows report the pointer, see `press_button`.
-        rows: Numbers of the rows.
-
-    Attributes:
-        row: Number of the row; None if there is none.
+    Buttons and rows report the pointer under a name, see `press_button`. The number is no part of
+    the state: it is neither saved nor undone.
     """
 
     def __init__(self, services: Services, name: str, rows: range) -> None:
@@ -81,6 +96,11 @@ class HoveredRow:
         if row != self.row:
             self.row = row
             self._session.redraw()
+
+
+def margin_hover(services: Services) -> HoveredRow:
+    """Make the record of the margin, 1 to 3, on whose row a pointer rests."""
+    return HoveredRow(services, HOVER, range(1, 4))
 
 
 @dataclass(frozen=True)
@@ -121,24 +141,10 @@ class Approach:
         return self.has_gap and (self.is_filled or self.level < 1.0)
 
 
-def margin_hover(services: Services) -> HoveredRow:
-    """Make the record of the margin, 1 to 3, on whose row a pointer rests."""
-    return HoveredRow(services, HOVER, range(1, 4))
-
-
 def approaches(placed: Placed, hovered: int | None) -> tuple[Approach, Approach, Approach]:
-    """Return how near the three incidences are.
-
-    Args:
-        placed: The frame that is drawn.
-        hovered: Number 1 to 3 of the margin on whose row a pointer rests, if any.
-    """
+    """Return how near the three incidences are; the margin that is hovered is 1 to 3, or None."""
     levels, snapshot = placed.frame.verdict.levels, placed.frame.snapshot
-    nearest = min(range(3), key=levels.__getitem__)
-    if hovered is not None:
-        filled = hovered - 1
-    else:
-        filled = nearest if levels[nearest] < FADE_FROM else None
+    filled = min(range(3), key=levels.__getitem__) if hovered is None else hovered - 1
     gaps, reach = snapshot.gaps, snapshot.design.reach
     ends = placed.scale * np.stack([gaps.base, gaps.platform], axis=1)
     ways = np.stack([gaps.base, gaps.platform - snapshot.points.b4, gaps.platform - gaps.base])
@@ -147,13 +153,13 @@ def approaches(placed: Placed, hovered: int | None) -> tuple[Approach, Approach,
     def approach(index: int) -> Approach:
         level, is_hovered = levels[index], index + 1 == hovered
         is_on = placed.frame.state.view.tetrahedra[index] or is_hovered
-        faded_in = min(1.0, max(0.0, (FADE_FROM - level) / (FADE_FROM - 1.0)))
+        presence = min(1.0, max(0.0, (FADE_FROM - level) / (FADE_FROM - 1.0)))
         return Approach(
             level,
-            1.0 if is_hovered else faded_in,
+            1.0 if is_hovered else presence,
             # Like the flags, it would stand among parts that are drawn apart.
             is_on and not placed.is_apart,
-            index == filled,
+            index == filled and (is_hovered or level < FADE_FROM),
             level == 0.0 and gaps.lengths[index] <= CLOSED * reach,
             ends[index] if farthest[index] <= FARTHEST * reach else None,
         )
@@ -161,127 +167,151 @@ def approaches(placed: Placed, hovered: int | None) -> tuple[Approach, Approach,
     return approach(0), approach(1), approach(2)
 
 
-class Extent(NamedTuple):
-    """The part of a plane that is drawn, in its flag's frame; the line is part of the x-axis."""
+class Tetrahedra(ScenePart):
+    """The edges of three tetrahedra with their names, and the faces of the nearest one.
 
-    low: float
-    high: float
-    bottom: float
-    top: float
-
-    @property
-    def corners(self) -> FloatArray:
-        """The corners, shape (4, 3)."""
-        low, high, bottom, top = self
-        return np.array([[low, bottom, 0], [high, bottom, 0], [high, top, 0], [low, top, 0]], float)
-
-    def towards(self, point: FloatArray, share: float, beyond: float) -> Extent:
-        """Return the extent grown by a share of the way to one with a point (3,) in it."""
-        x, y, _ = point.tolist()
-        grown = (
-            min(self.low, x - beyond),
-            max(self.high, x + beyond),
-            min(self.bottom, y - beyond),
-            max(self.top, y + beyond),
-        )
-        return Extent(*(a + share * (b - a) for a, b in zip(self, grown, strict=True)))
-
-
-class Flag:
-    """One flag in its own frame: the point at the origin, the line along x."""
-
-    def __init__(self, scene: viser.SceneApi, root: str, deltas: tuple[int, int, int]) -> None:
-        # Indices of the margins that colour the point, the line and the plane.
-        self._deltas = deltas
-        self._point = scene.add_mesh_simple(f"{root}/flag/point", *sphere(), scale=POINT_RADIUS)
-        self._line = scene.add_mesh_simple(f"{root}/flag/line", *cylinder(), wxyz=ALONG_X)
-        self._patch = Patch(scene, f"{root}/flag", opacity=PLANE_OPACITY)
-
-    def updates(self, placed: Placed, line: Extent, plane: Extent, size: float) -> Iterator[Update]:
-        """Yield the updates that draw the flag.
-
-        Args:
-            placed: The frame that is drawn.
-            line: Extent whose ends along x are those of the line.
-            plane: Extent of the plane.
-            size: Scale of thicknesses.
-        """
-        levels = placed.frame.verdict.levels
-        point_colour, line_colour, plane_colour = (
-            proximity_colour(levels[index]) for index in self._deltas
-        )
-        visible = _are_visible(placed)
-        for handle in (self._point, self._line):
-            yield handle, "visible", visible
-        yield from self._patch.show(visible)
-        yield self._point, "color", point_colour
-        yield self._point, "scale", POINT_RADIUS * size
-        yield self._line, "color", line_colour
-        yield self._line, "position", (line.low, 0.0, 0.0)
-        yield self._line, "scale", (LINE_RADIUS * size, LINE_RADIUS * size, line.high - line.low)
-        yield from self._patch.span(plane.corners, plane_colour)
-
-
-class Flags(ScenePart):
-    """The base's flag and the platform's."""
+    One that the present lengths cannot close has thick edges in the colour of an alarm.
+    """
 
     def __init__(self, services: Services) -> None:
         scene, self._hovered = services.scene, services.get(margin_hover)
-        self._base = Flag(scene, "/base", deltas=(0, 1, 2))
-        self._platform = Flag(scene, "/platform", deltas=(2, 1, 0))
-
-    def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield the updates that draw the flags of this frame."""
-        beyond = BEYOND * placed.reach
-        to_platform_plane, of_lines, to_base_plane = approaches(placed, self._hovered.row)
-
-        def grown(extent: Extent, approach: Approach, end: int) -> Extent:
-            if approach.ends is None:
-                return extent
-            point = approach.ends[end]
-            if end == PLATFORM:
-                point = (point - placed.points["b4"]) @ placed.frame.snapshot.rotation
-            return extent.towards(point, approach.arrival, beyond)
-
-        base, platform = _base_extent(placed), _platform_extent(placed)
-        yield from self._base.updates(
-            placed, grown(base, of_lines, BASE), grown(base, to_base_plane, BASE), 1.0
+        flat = np.zeros((4, 3)), shapes.TETRAHEDRON_FACES
+        self._faces = shapes.add_translucent(
+            scene, "/tetrahedra/faces", flat, OPACITY, is_flat=True
         )
-        yield from self._platform.updates(
-            placed,
-            grown(platform, of_lines, PLATFORM),
-            grown(platform, to_platform_plane, PLATFORM),
-            max(0.6, placed.thickness),
-        )
+        self._edges = [
+            shapes.add_lines(
+                scene, f"/tetrahedra/{index}/edges", len(EDGES) * each.most, None, each.thickness
+            )
+            for index, each in enumerate(STROKES, start=1)
+        ]
+        self._names = [
+            shapes.add_label(
+                scene, f"/tetrahedra/{index}/name", f"δ{index}", colour=colour, visible=False
+            )
+            for index, colour in enumerate(colours.MARGIN_COLOURS, start=1)
+        ]
+
+    def updates(self, placed: Placed) -> Updates:
+        """Yield the updates that draw the tetrahedra of this frame."""
+        state = placed.frame.state
+        failing = state.unclosed.failing if state.unclosed else ()
+        filled = False
+        for index, approach in enumerate(approaches(placed, self._hovered.row)):
+            corners = np.array([placed.points[name] for name in TETRAHEDRA[index]])
+            centre = corners.mean(axis=0)
+            inner = corners + INSET * (centre - corners)
+            yield from self._draw_edges(index, inner, approach, fails=index in failing)
+            is_named = approach.is_shown and not approach.has_label and state.view.labels
+            yield self._names[index], "visible", is_named
+            yield self._names[index], "position", tuple(centre.tolist())
+            if approach.is_shown and approach.is_filled:
+                filled = True
+                yield self._faces, "vertices", inner.astype(np.float32)
+                yield self._faces, "color", colours.proximity_colour(approach.level)
+                yield self._faces, "opacity", OPACITY * approach.presence
+        yield self._faces, "visible", filled
+
+    def _draw_edges(
+        self, index: int, corners: FloatArray, approach: Approach, *, fails: bool
+    ) -> Updates:
+        edges, stroke = self._edges[index], STROKES[index]
+        segments = shapes.dashes(corners[EDGES], stroke.most, stroke.period, stroke.drawn)
+        yield edges, "visible", approach.is_shown or fails
+        yield edges, "points", segments.astype(np.float32)
+        colour = colours.OUTLINE if fails else colours.MARGIN_COLOURS[index]
+        yield edges, "colors", shapes.of_one_colour(colour, len(segments))
+        thickness = stroke.thickness + FILLED_EDGE * approach.presence * approach.is_filled
+        yield edges, "thickness", FAILING_EDGE if fails else thickness
+
+
+class Gaps(ScenePart):
+    """The gaps that are near, each with its ends and its label, and the contacts."""
+
+    def __init__(self, services: Services) -> None:
+        scene, self._hovered = services.scene, services.get(margin_hover)
+        self._dashes = shapes.add_lines(scene, "/gaps/dashes", 3 * DASHES, None, THICK)
+        self._feet = shapes.Balls(scene, "/gaps/feet", [colours.WARNED] * len(FEET))
+        contacts = [shapes.linear_colour(colours.SINGULAR)] * 3
+        self._contacts = shapes.Instances(scene, "/gaps/contacts", _contact_mark(), contacts)
+        self._labels = [
+            shapes.add_label(scene, f"/gaps/label/{index}", "", fades=False, visible=False)
+            for index in (1, 2, 3)
+        ]
+
+    def updates(self, placed: Placed) -> Updates:
+        """Yield the updates that draw the gaps of this frame."""
+        shown = visible_gaps(placed, self._hovered.row)
+        ends = {i: each.ends for i, each in shown.items() if each.ends is not None}
+        closed = {i: each for i, each in ends.items() if shown[i].is_touching}
+        gaps = {i: each for i, each in ends.items() if i not in closed}
+        yield self._dashes, "visible", bool(gaps)
+        yield from self._feet.show(bool(gaps))
+        yield from self._contacts.show(bool(closed))
+        for index, label in enumerate(self._labels):
+            yield label, "visible", index in shown and shown[index].has_label
+        for index, each in shown.items():
+            corners = [placed.points[name] for name in TETRAHEDRA[index]]
+            at = np.mean(corners if each.ends is None else each.ends, axis=0)
+            yield self._labels[index], "text", gap_text(placed, index, each)
+            yield self._labels[index], "position", tuple(at.tolist())
+        if gaps:
+            yield from self._draw_gaps(gaps, shown)
+        if closed:
+            yield from self._draw_contacts(placed, closed)
 
     def corners(self, placed: Placed) -> FloatArray:
-        """Return the corners of both planes where no incidence is near."""
-        if not _are_visible(placed):
-            return NO_POINTS
-        rotation = placed.frame.snapshot.rotation
-        platform = placed.points["b4"] + _platform_extent(placed).corners @ rotation.T
-        return np.concatenate([_base_extent(placed).corners, platform])
+        """Return the ends of the gaps to incidences that are below their warning value."""
+        shown = visible_gaps(placed, None).values()
+        ends = [each.ends for each in shown if each.ends is not None and each.level < 1.0]
+        return np.concatenate(ends) if ends else NO_POINTS
+
+    def _draw_gaps(self, gaps: dict[int, FloatArray], shown: dict[int, Approach]) -> Updates:
+        ends, feet = np.zeros((3, 2, 3)), np.full(len(FEET), 1e-6)
+        drawn = [colours.WARNED] * 3
+        for index, gap in gaps.items():
+            ends[index], drawn[index] = gap, colours.proximity_colour(shown[index].level)
+        for foot, (index, _) in enumerate(FEET):
+            if index in gaps:
+                feet[foot] = FOOT_RADIUS * shown[index].presence
+        presence = max(shown[index].presence for index in gaps)
+        segments = shapes.dashes(ends, DASHES, PERIOD, DRAWN)
+        each = [shapes.of_one_colour(colour, DASHES) for colour in drawn]
+        yield self._dashes, "points", segments.astype(np.float32)
+        yield self._dashes, "colors", np.concatenate(each)
+        yield self._dashes, "thickness", THIN + (THICK - THIN) * presence
+        yield from self._feet.at(np.array([ends[foot] for foot in FEET]), feet)
+        yield from self._feet.colour([shapes.linear_colour(drawn[index]) for index, _ in FEET])
+
+    def _draw_contacts(self, placed: Placed, closed: dict[int, FloatArray]) -> Updates:
+        positions, scales = np.zeros((3, 3)), np.full((3, 3), 1e-6)
+        for index, ends in closed.items():
+            positions[index], scales[index] = ends.mean(axis=0), 1.0
+        # The mark lies in the plane in which the contact is.
+        normals = planes_of_singularity(placed.frame.snapshot.rotation)
+        yield from self._contacts.place(positions, shapes.turned_to(normals), scales)
 
 
-def _are_visible(placed: Placed) -> bool:
-    # They would stand among parts that are drawn apart.
-    return placed.frame.state.view.flags and not placed.is_apart
+def visible_gaps(placed: Placed, hovered: int | None) -> dict[int, Approach]:
+    """Return the incidences whose gaps are shown, by the index of their margin."""
+    each = enumerate(approaches(placed, hovered))
+    return {index: one for index, one in each if one.has_gap and one.is_shown}
 
 
-def _base_extent(placed: Placed) -> Extent:
-    low, high = guide_span(placed)
-    return _between(low - 1.0, high + 1.0, 1.2 * float(placed.points["a3"][1]))
+def gap_text(placed: Placed, index: int, approach: Approach) -> str:
+    """Return the text beside a gap, such as "δ1 −0.42 · 4.2 mm"."""
+    snapshot = placed.frame.snapshot
+    reach, unit_mm = snapshot.design.reach, snapshot.design.unit_mm
+    if approach.level == 0.0:
+        return f"δ{index + 1} = 0{'' if approach.is_touching else ', lines parallel'}"
+    margin = format_fitted(float(snapshot.margins[index]), reach, 4)
+    length = format_fitted(snapshot.gaps.lengths[index] * unit_mm, reach * unit_mm, 4)
+    return f"δ{index + 1} {margin} · {length} mm"
 
 
-def _platform_extent(placed: Placed) -> Extent:
-    local = placed.platform_points
-    stations = [float(local[name][0]) for name in ("b1", "b2", "b3", "b4")]
-    beyond = 0.16 * placed.reach
-    side = float(local["b1"][1])
-    edge = side + float(np.copysign(0.5 * beyond, side))
-    return _between(min(stations) - beyond, max(stations) + beyond, edge)
-
-
-def _between(low: float, high: float, y: float) -> Extent:
-    """Return the extent between the x-axis and a line at y."""
-    return Extent(low, high, min(0.0, y), max(0.0, y))
+@functools.cache
+def _contact_mark() -> shapes.Mesh:
+    """Return a ring about the z-axis with a ball in its middle."""
+    vertices, faces = shapes.sphere()
+    ring = shapes.torus(RING_RADIUS, RING_TUBE)
+    return shapes.join_meshes((CONTACT_RADIUS * vertices, faces), ring)

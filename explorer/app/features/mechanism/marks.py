@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import viser
@@ -16,13 +15,13 @@ from explorer.app.scene.shapes import add_label
 from explorer.app.session.clock import Timer, now
 from explorer.app.state.actions import SetPose
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.errors import InputError
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 
-BASE_LABELS = ("a1", "a2", "a3")
-PLATFORM_LABELS = ("b1", "b2", "b3", "b4")
+# Names of the points, by the node whose frame their labels have.
+LABELS = {"/base": ("a1", "a2", "a3"), "/platform": ("b1", "b2", "b3", "b4")}
 
 HANDLE_NAME = "/handle"
 HANDLE_SCALE = 1.9
@@ -38,20 +37,18 @@ class Labels(ScenePart):
     """The names of the attachment points."""
 
     def __init__(self, services: Services) -> None:
-        scene = services.scene
         self._handles = {
-            name: add_label(
-                scene, f"{'/base' if name in BASE_LABELS else '/platform'}/label/{name}", name
-            )
-            for name in (*BASE_LABELS, *PLATFORM_LABELS)
+            name: add_label(services.scene, f"{node}/label/{name}", name)
+            for node, names in LABELS.items()
+            for name in names
         }
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the labels of this frame."""
         # The points stay where they are when the parts about them move apart.
         shown = placed.frame.state.view.labels and not placed.is_apart
+        points = placed.points | placed.platform_points
         for name, handle in self._handles.items():
-            points = placed.points if name in BASE_LABELS else placed.platform_points
             yield handle, "visible", shown
             yield handle, "position", tuple(points[name].tolist())
 
@@ -83,7 +80,7 @@ class DragHandle(ScenePart):
         w, i, j, k = np.asarray(self.handle.wxyz, dtype=np.float64).tolist()
         return state.pose_at((x, y, z), Pose(state.pose.position, (w, i, j, k)))
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that keep the gizmo on the platform."""
         state = placed.frame.state
         yield self.handle, "visible", _is_handle_visible(placed)

@@ -31,14 +31,7 @@ TICK = 3.0
 
 
 class Word(NamedTuple):
-    """A text of the sketch.
-
-    Attributes:
-        text: The text; on a dimension the design variable.
-        at: Place of its anchor and of its middle, in pixels, y downwards.
-        anchor: End of the text that stands there.
-        look: Class of the text.
-    """
+    """A text of the sketch, and the place of its anchor and of its middle, y downwards."""
 
     text: str
     at: Xy
@@ -84,15 +77,7 @@ class Dimension(NamedTuple):
 
 
 class Figure(NamedTuple):
-    """One of the two figures, in pixels.
-
-    Attributes:
-        triangle: Its corners.
-        axis: Ends of the line through its origin.
-        points: Its points.
-        words: Its caption and the names of the points.
-        dimensions: Its dimensions.
-    """
+    """One of the two figures, in pixels; its words are its caption and the names of points."""
 
     triangle: tuple[Xy, ...]
     axis: tuple[Xy, Xy]
@@ -120,23 +105,12 @@ def _line(look: str, start: Xy, end: Xy) -> str:
 
 def figures(design: Design) -> tuple[Figure, Figure]:
     """Return the figures of the base and of the platform."""
-    base = _figure(
-        ("Base", 0.0),
-        on_axis={"a1": 0.0, "a2": design.reach},
-        corners=("a1", "a2"),
-        apex=("a3", design.a3),
-        along={},
-        apex_is_away=True,
+    base = {"a1": 0.0, "a2": design.reach}
+    platform = {"b4": 0.0, "b2": design.b2, "b3": design.b3}
+    return (
+        _figure(("Base", 0.0), base, (), ("a3", design.a3)),
+        _figure(("Platform", WIDTH - FIGURE_WIDTH), platform, ("b2", "b3"), ("b1", design.b1)),
     )
-    platform = _figure(
-        ("Platform", WIDTH - FIGURE_WIDTH),
-        on_axis={"b4": 0.0, "b2": design.b2, "b3": design.b3},
-        corners=("b2", "b3"),
-        apex=("b1", design.b1),
-        along={"b2": design.b2, "b3": design.b3},
-        apex_is_away=False,
-    )
-    return base, platform
 
 
 def sketch(design: Design) -> str:
@@ -150,25 +124,19 @@ def sketch(design: Design) -> str:
 
 def _figure(
     caption: tuple[str, float],
-    *,
     on_axis: Mapping[str, float],
-    corners: tuple[str, str],
+    along: tuple[str, ...],
     apex: tuple[str, Xy],
-    along: Mapping[str, float],
-    apex_is_away: bool,
 ) -> Figure:
-    """Return a figure.
+    """Return a figure with points on an axis, the origin first, and the apex of a triangle.
 
-    Args:
-        caption: Its name, and its left end.
-        on_axis: Its points on the axis, the origin first.
-        corners: Those that are corners of the triangle.
-        apex: Name and place of the third corner.
-        along: Dimensions of points on the axis.
-        apex_is_away: Whether the row for the third corner's x is on the side away from it.
+    Its caption comes with its left end; the points `along` the axis have dimensions. The last two
+    points on the axis are the other corners of the triangle.
     """
     name, (apex_x, apex_y) = apex
     title, left = caption
+    # Without dimensions on the axis, the row for the third corner's x is on the side away from it.
+    apex_is_away = not along
     xs = (*on_axis.values(), apex_x)
     # On each side of the axis there are rows: of names, and of dimensions.
     away = OFF_AXIS + ROW * (0.5 + len(along) + apex_is_away)
@@ -188,7 +156,7 @@ def _figure(
     origin, tip = place(0.0), place(apex_x, apex_y)
     points = {each: place(x) for each, x in on_axis.items()}
     dimensions: list[Dimension] = []
-    rows = sorted(along, key=lambda each: abs(along[each]))
+    rows = sorted(along, key=lambda each: abs(on_axis[each]))
     for index, each in enumerate(rows):
         row_y = axis_y - up * (OFF_AXIS + ROW * (1.0 + index))
         dimensions.append(_along(each, origin, points[each], row_y, left))
@@ -214,7 +182,7 @@ def _figure(
     words.append(Word(name, (tip[0], tip[1] + up * OFF_AXIS), look="is-point"))
     ends = sorted((origin[0], *(at[0] for at in points.values())))
     return Figure(
-        triangle=(tip, points[corners[0]], points[corners[1]]),
+        triangle=(tip, *list(points.values())[-2:]),
         axis=((ends[0], axis_y), (ends[-1], axis_y)),
         points=(*points.values(), tip),
         words=tuple(words),

@@ -12,20 +12,25 @@ from typing import ClassVar
 
 import msgspec
 
+from explorer.app.features.optimise.state import (
+    PLACE,
+    Comparison,
+    Optimisation,
+    OptimisationRequest,
+    SearchResult,
+    SearchRun,
+)
 from explorer.app.features.optimise.work import find_refusals, problem_of
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, Set, check_free, move_to
-from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
+from explorer.app.state.actions import Action, Open, Set, check_free, move_to
 from explorer.app.state.parts import parts_kept_on_open, with_value
-from explorer.app.state.state import Optimisation, Run, State
+from explorer.app.state.state import State
 from explorer.app.storage.library import LONGEST_NAME
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
-from explorer.optimise.conflicts import PAPER_BOX, without_limit
-from explorer.optimise.defaults import CLEARANCE, PAPER_VOLUME, paper_start
+from explorer.optimise import conflicts, defaults
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.problem import MAXIMA, SWING_LIMIT, YAW, with_box
+from explorer.optimise.problem import MAXIMA, SWING_LIMIT, YAW
 
 SUFFIX = "-optimised"
 LIMIT_NAMES = {SWING_LIMIT: "bounds of the swing", "margin": "least margin"}
@@ -37,7 +42,7 @@ class SetRequest(Set):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        request = super().apply(state).optimisation.request
+        request = Optimisation.of(super().apply(state)).request
         if request.objective == "largest-margin" and not {YAW, PLACE} & {*request.free}:
             # Only these influence the margins over a box.
             request = replace(request, free=(*request.free, YAW, PLACE))
@@ -59,26 +64,25 @@ class StartRun(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state; refuse if the limits rule out the demands."""
-        optimisation = state.optimisation
+        optimisation = Optimisation.of(state)
         if optimisation.is_on:
             return state
         impossible = find_refusals(state)
         if impossible:
             raise NoAnswerError("; ".join(refusal.message for refusal in impossible))
-        last = optimisation.run
         # A result that is not accepted is not yet a design of the user.
-        own = last.own if last is not None and last.is_undecided else state
-        run = Run(
+        own = optimisation.undecided.own if optimisation.undecided is not None else state
+        run = SearchRun(
             number=optimisation.count + 1,
             problem=problem_of(state),
             starts=optimisation.request.starts,
             own=replace(own, optimisation=Optimisation()),
         )
+        # The run shows its workspace.
         workspace = replace(state.view.workspace, solid=True)
         return replace(
             state,
             optimisation=Optimisation(optimisation.request, run, run.number),
-            # The run shows its workspace.
             view=replace(state.view, workspace=workspace),
         )
 
@@ -91,8 +95,10 @@ class TakePaperProblem(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state; refuse while the design is being optimised."""
-        request = OptimisationRequest(volume=PAPER_VOLUME, clearance=CLEARANCE)
-        return with_value(Open(paper_start()).apply(state), "optimisation.request", request)
+        request = OptimisationRequest(volume=defaults.PAPER_VOLUME, clearance=defaults.CLEARANCE)
+        return with_value(
+            Open(defaults.paper_start()).apply(state), "optimisation.request", request
+        )
 
 
 @dataclass(frozen=True)
@@ -116,22 +122,10 @@ class LiftLimit(Action):
     def apply(self, state: State) -> State:
         """Return the next state; refuse during a run, or if the design has no such limit."""
         check_free(state)
-        design = without_limit(state.design, self.limit)
+        design = conflicts.without_limit(state.design, self.limit)
         if design is None:
             raise InputError(f"the design has no limit named {self.limit!r} to lift")
         return replace(state, design=design)
-
-
-@dataclass(frozen=True)
-class TakePaperBox(Action):
-    """Bound the design by the box of the paper's optimum; its home pose stays where it is."""
-
-    template: ClassVar[str] = "Take the paper's box"
-
-    def apply(self, state: State) -> State:
-        """Return the next state; refuse while the design is being optimised."""
-        check_free(state)
-        return replace(state, design=with_box(state.design, PAPER_BOX))
 
 
 @dataclass(frozen=True)
@@ -154,8 +148,7 @@ class Advance(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        run = state.optimisation.run
-        if run is None or run.number != self.number or not self.iterates:
+        if _number(state) != self.number or not self.iterates:
             return state
         after = _with_run(state, lambda run: replace(run, iterates=run.iterates + self.iterates))
         return _with_design(after, self.iterates[-1].design)
@@ -174,12 +167,12 @@ class EndRun(Action):
     def apply(self, state: State) -> State:
         """Return the next state."""
         state = Advance(self.number, self.iterates).apply(state)
-        run = state.optimisation.run
-        if run is None or run.number != self.number:
+        own = state.optimisation.own
+        if own is None or _number(state) != self.number:
             return state
         after = _with_run(state, lambda run: replace(run, phase="ended", verdict=self.verdict))
         if self.verdict.best is None:
-            return _restore_own(after, run.own)
+            return _restore_own(after, own)
         return _with_design(after, _rename(self.verdict.best.design))
 
 
@@ -194,8 +187,7 @@ class Compare(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        run = state.optimisation.run
-        is_present = run is not None and run.number == self.number
+        is_present = _number(state) == self.number
         path = "optimisation.run.comparison"
         return with_value(state, path, self.comparison) if is_present else state
 
@@ -208,8 +200,7 @@ class Accept(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        run = state.optimisation.run
-        is_undecided = run is not None and run.is_undecided
+        is_undecided = Optimisation.of(state).undecided is not None
         return with_value(state, "optimisation.run.accepted", True) if is_undecided else state
 
 
@@ -221,14 +212,20 @@ class Revert(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        run = state.optimisation.run
-        if run is None or not run.is_undecided:
+        run = Optimisation.of(state).undecided
+        if run is None:
             return state
         return _restore_own(with_value(state, "optimisation.run", None), run.own)
 
 
-def _with_run(state: State, change: Callable[[Run], Run]) -> State:
-    optimisation = state.optimisation
+def _number(state: State) -> int | None:
+    """Return the number of the run; None without a run."""
+    run = Optimisation.of(state).run
+    return None if run is None else run.number
+
+
+def _with_run(state: State, change: Callable[[SearchRun], SearchRun]) -> State:
+    optimisation = Optimisation.of(state)
     if optimisation.run is None or not optimisation.is_on:
         return state
     return replace(state, optimisation=replace(optimisation, run=change(optimisation.run)))

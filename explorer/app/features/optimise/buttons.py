@@ -11,29 +11,22 @@ from functools import partial
 
 import viser
 
-from explorer.app.features.designs.saved_designs import send_design
+from explorer.app.features.designs.feature import send_design
 from explorer.app.features.feature import Services
-from explorer.app.features.optimise.actions import (
-    Accept,
-    CancelRun,
-    LiftLimit,
-    Revert,
-    StartRun,
-    TakePaperBox,
-    TakePaperProblem,
-)
-from explorer.app.features.optimise.work import box_on_offer, find_refusals, liftable_limits
-from explorer.app.features.workspace.feature import send_workspace
+from explorer.app.features.optimise import actions
+from explorer.app.features.optimise.state import Optimisation
+from explorer.app.features.optimise.work import find_refusals, liftable_limits
+from explorer.app.features.workspace.feeds import send_workspace
 from explorer.app.session.session import Who
-from explorer.app.state.action import Action
+from explorer.app.state.actions import Action
 from explorer.app.state.state import State
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.commands import Key, shift, with_keys
-from explorer.optimise.record import encode_record
+from explorer.app.widgets.palette import Key, shift, with_keys
+from explorer.optimise.outcome import encode_record
 
 START, CANCEL = "optimise.start", "optimise.cancel"
 ACCEPT, REVERT = "optimise.accept", "optimise.revert"
-PAPER, PAPER_BOX, LIFT = "optimise.paper", "optimise.box", "optimise.lift"
+PAPER, LIFT = "optimise.paper", "optimise.lift"
 HULL, DESIGN, RECORD = "optimise.hull", "optimise.design", "optimise.record"
 
 
@@ -57,69 +50,49 @@ class Button:
     keys: tuple[Key, ...] = ()
 
 
-def _is_idle(state: State) -> bool:
-    return not state.optimisation.is_on
-
-
-def _is_running(state: State) -> bool:
-    run = state.optimisation.run
-    return run is not None and run.phase == "running"
-
-
 def _is_undecided(state: State) -> bool:
-    run = state.optimisation.run
-    return run is not None and run.is_undecided
+    return Optimisation.of(state).undecided is not None
 
 
 def _has_result(state: State) -> bool:
-    run = state.optimisation.run
+    run = Optimisation.of(state).run
     return run is not None and run.best is not None
-
-
-def _lift(state: State, value: str) -> Action:
-    return LiftLimit(value or next(iter(liftable_limits(state)), ""))
 
 
 BUTTONS: Mapping[str, Button] = {
     START: Button(
         "Optimise",
         "Search for the best design from the present one; its limits hold throughout.",
-        lambda state: _is_idle(state) and not find_refusals(state),
-        lambda _, __: StartRun(),
+        lambda state: not (state.optimisation.is_on or find_refusals(state)),
+        lambda _, __: actions.StartRun(),
         (Key("O"),),
     ),
     CANCEL: Button(
         "Cancel",
         "End the search, and keep the best so far.",
-        _is_running,
-        lambda _, __: CancelRun(),
+        lambda state: (run := Optimisation.of(state).run) is not None and run.phase == "running",
+        lambda _, __: actions.CancelRun(),
         (shift("O"),),
     ),
-    ACCEPT: Button("Accept", "Keep the new design.", _is_undecided, lambda _, __: Accept()),
+    ACCEPT: Button("Accept", "Keep the new design.", _is_undecided, lambda _, __: actions.Accept()),
     REVERT: Button(
         "Revert",
         "Return to your own design in its pose.",
         _is_undecided,
-        lambda _, __: Revert(),
+        lambda _, __: actions.Revert(),
     ),
     PAPER: Button(
         "The paper's problem",
         "Open the paper's initial design within the box of its optimum, and ask for its volume of "
         "8000 with a clearance of 0.2; one undo brings your design back.",
-        _is_idle,
-        lambda _, __: TakePaperProblem(),
-    ),
-    PAPER_BOX: Button(
-        "Take the paper's box",
-        "Bound b4 by the box of the paper's optimum; one undo brings yours back.",
-        lambda state: box_on_offer(state) is not None,
-        lambda _, __: TakePaperBox(),
+        lambda state: not state.optimisation.is_on,
+        lambda _, __: actions.TakePaperProblem(),
     ),
     LIFT: Button(
         "Lift the limit",
         "Take the limit that prevents the search out of the design; one undo brings it back.",
         lambda state: bool(liftable_limits(state)),
-        _lift,
+        lambda state, limit: actions.LiftLimit(limit or next(iter(liftable_limits(state)), "")),
     ),
     HULL: Button(
         "Download the hull",
@@ -142,7 +115,7 @@ def add_buttons(services: Services) -> None:
 
     def send_record(who: Who) -> None:
         state = session.state
-        record = state.optimisation.record
+        record = Optimisation.of(state).record
         if record is None:
             services.complain("a search that had to be ended leaves no record", who)
             return

@@ -1,30 +1,306 @@
-"""The optimiser: its declaration, the search in the bar, and the required box in the scene."""
+"""The optimiser: its tab with problem, search and charts, its part of the bar, the required box."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from html import escape
+from itertools import zip_longest
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
+from viser import uplot
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab
-from explorer.app.features.optimise.buttons import ACCEPT, BUTTONS, PAPER, button
-from explorer.app.features.optimise.panel import OptimisePanel
+from explorer.app.features.optimise.actions import SetObjective, SetRequest
+from explorer.app.features.optimise.buttons import ACCEPT, BUTTONS, PAPER, add_buttons, button
 from explorer.app.features.optimise.runner import Optimiser
-from explorer.app.features.optimise.words import search_notice
-from explorer.app.features.optimise.work import requested_box
+from explorer.app.features.optimise.state import PLACE, Optimisation, SearchRun
+from explorer.app.features.optimise.words import result_words, search_notice
+from explorer.app.features.optimise.work import complete_request, requested_box
+from explorer.app.inputs.control import At, Bound
+from explorer.app.inputs.controls import Controls
 from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import add_lines
+from explorer.app.scene.shapes import JOINT, add_lines
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.widgets import charts
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import open_button, running
-from explorer.app.widgets.colours import JOINT
-from explorer.measures.size import corners_of
+from explorer.measures.box import corners_of
+from explorer.measures.catalogue import CATALOGUE
+from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
-from explorer.numerics.arrays import FloatArray
-from explorer.optimise.demands import Box
+from explorer.mechanism.pose import Triple
+from explorer.numerics.number_text import format_number
+from explorer.optimise.outcome import GOALS, OBJECTIVE_SYMBOLS, Curve, Iterate, curves_of
+from explorer.optimise.problem import OVER_BOX, YAW, Box, ObjectiveName, Problem
+from explorer.singularity.colours import css
+from explorer.statics.compliance import is_elastic
+
+OBJECTIVES: dict[str, ObjectiveName] = {
+    "match a volume": "match-volume",
+    "shortest legs for a volume": "smallest-reach",
+    "largest volume for a leg length": "largest-volume",
+    "largest worst margin over a box": "largest-margin",
+    "smallest load over a box": "smallest-load",
+    "smallest error over a box": "smallest-error",
+    "smallest deflection over a box": "smallest-deflection",
+}
+FREE = {
+    **{name: f"Let {name} change." for name in VARIABLES},
+    YAW: "Let the yaw of home change, and with it the orientation of the workspace.",
+    PLACE: "Let the required box move without changing its size.",
+}
+FREE_LABELS = {YAW: "yaw of home", PLACE: "place of the box"}
+STEP = 0.001
+COLUMNS = '<div class="ex-columns"></div>'
+"""Markup that makes the stylesheet put what follows it in a tab side by side."""
+# Height of a chart, in pixels.
+HEIGHT = 96
+# Padding of an axis beyond the values, as a share of their span.
+PADDING = 0.12
+
+
+class OptimisePanel:
+    """The controls of the problem, the search with its result, and the charts."""
+
+    def __init__(self, services: Services) -> None:
+        gui = services.gui
+        add_buttons(services)
+        self._controls = Controls(gui, services.session)
+        gui.add_html(COLUMNS)
+        with gui.add_folder("Problem, in design units"):
+            self._add_problem()
+            with gui.add_folder("Free variables", expand_by_default=False):
+                for name, hint in FREE.items():
+                    self._add_free(name, hint)
+        self._result = gui.add_html("")
+        self._plots = OptimisePlots(gui)
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that show a frame."""
+        yield from self._controls.updates(frame)
+        yield self._result, "content", result_words(frame.state)
+        yield from self._plots.updates(Optimisation.of(frame.state).run)
+
+    def _add_problem(self) -> None:
+        controls = self._controls
+        controls.dropdown(
+            "Objective",
+            "The measure that the search improves.",
+            OBJECTIVES,
+            At("optimisation.request.objective", action=SetObjective),
+        )
+        self._add_number(
+            "volume",
+            _label("volume"),
+            "The exact volume of the workspace, in units³, at the orientation of home: to match, "
+            "or at least.",
+            default=lambda state: complete_request(state).volume,
+            visible=lambda state: Optimisation.of(state).request.needs_volume,
+        )
+        self._add_number(
+            "reach",
+            _label("longest_leg"),
+            "The largest maximum length of l1, d2, d4 and l4 allowed, in units.",
+            default=lambda state: complete_request(state).reach,
+            visible=lambda state: Optimisation.of(state).request.needs_reach,
+        )
+        self._add_number(
+            "clearance",
+            _label("demanded_clearance"),
+            "The least clearance of any two legs, their radii taken off, in units, wherever in the "
+            "workspace all margins are at least a 20th of the reach that the search starts with; 0 "
+            "for no demand.",
+        )
+        controls.number(
+            "Starts",
+            "Number of designs to start from: the present one, and others spread over the bounds.",
+            At("optimisation.request.starts", convert=round, action=SetRequest),
+            least=1,
+            step=1,
+        )
+        controls.checkbox(
+            "Required box",
+            "Demand that a box lies within the workspace; it is drawn.",
+            Bound(
+                lambda frame: Optimisation.of(frame.state).request.needs_box,
+                lambda _, on: SetRequest("optimisation.request.with_box", on, "Required box"),
+            ),
+            disabled=lambda state: Optimisation.of(state).request.objective in OVER_BOX,
+        )
+        controls.checkbox(
+            "Hold the load",
+            "Demand that the payload's weight and force are held within the limits of actuators, "
+            "struts and guide, wherever in the required box.",
+            At("optimisation.request.held", action=SetRequest),
+        )
+        self._add_number(
+            "error",
+            _label("worst_error"),
+            "The worst displacement of the tool by the actuators' errors allowed in the required "
+            "box, in units; 0 for no demand.",
+            # A demand that another design left behind can be taken back.
+            visible=lambda state: (
+                any(state.design.actuators.error_mm) or Optimisation.of(state).request.error > 0.0
+            ),
+        )
+        self._add_number(
+            "deflection",
+            _label("deflection"),
+            "The largest displacement of the tool under the payload's weight and force allowed in "
+            "the required box, in units; 0 for no demand.",
+            visible=lambda state: (
+                is_elastic(state.design) or Optimisation.of(state).request.deflection > 0.0
+            ),
+        )
+        self._add_number(
+            "tilt",
+            f"{_label('box_tilt')} (°)",
+            "The tilt from the orientation of home that every position of the required box must "
+            "allow in every azimuth, in degrees; 0 for no demand.",
+            step=1.0,
+        )
+        for end, word in enumerate(("from", "to")):
+            self._add_corner(end, f"Box {word}")
+
+    def _add_number(
+        self,
+        field: str,
+        label: str,
+        hint: str,
+        *,
+        step: float = STEP,
+        default: Callable[[State], object] | None = None,
+        visible: Callable[[State], bool] | None = None,
+    ) -> None:
+        at = At(f"optimisation.request.{field}", default=default, action=SetRequest)
+        self._controls.number(label, hint, at, least=0.0, step=step, visible=visible)
+
+    def _add_corner(self, end: int, label: str) -> None:
+        def write(state: State, value: Triple) -> Action:
+            lows, highs = requested_box(state)
+            box = (value, highs) if end == 0 else (lows, value)
+            return SetRequest("optimisation.request.box", box, "Required box")
+
+        self._controls.triple(
+            label,
+            "A corner of the box, in the base frame.",
+            Bound(lambda frame: requested_box(frame.state)[end], write),
+            step=STEP,
+            visible=lambda state: Optimisation.of(state).request.needs_box,
+        )
+
+    def _add_free(self, name: str, hint: str) -> None:
+        def write(state: State, on: bool) -> Action:
+            free = Optimisation.of(state).request.free
+            chosen = tuple(key for key in FREE if (on if key == name else key in free))
+            label = f"Free variable {FREE_LABELS.get(name, name)}"
+            return SetRequest("optimisation.request.free", chosen, label, "on" if on else "off")
+
+        self._controls.checkbox(
+            FREE_LABELS.get(name, name),
+            hint,
+            Bound(lambda frame: name in Optimisation.of(frame.state).request.free, write),
+            disabled=(lambda state: not Optimisation.of(state).request.needs_box)
+            if name == PLACE
+            else None,
+        )
+
+
+def _label(measure: str) -> str:
+    """Return the label of a demand: that of the measure which it bounds."""
+    return CATALOGUE[measure].label.capitalize()
+
+
+class OptimisePlots:
+    """Captions and charts in a folder; hidden until there is a run."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        values: uplot.Series = {
+            "label": "value",
+            "stroke": css(charts.BLUE),
+            "width": 2.0,
+            # uPlot shows points only where they do not touch.
+            "points": {"size": 5, "fill": css(charts.BLUE)},
+        }
+        series = values, charts.line("level", charts.ORANGE, width=1.0, dash=(4, 4))
+        plain: uplot.Axis = {"gap": 3, "ticks": {"size": 4}, "font": charts.FONT}
+        axes: tuple[uplot.Axis, ...] = (
+            {**plain, "size": 20, "space": 40},
+            {**plain, "size": 50, "space": 16},
+        )
+        self._folder = gui.add_folder("Course of the search", visible=False)
+        with self._folder:
+            self._charts = [
+                (
+                    gui.add_html("", visible=False),
+                    charts.add_chart(gui, series, axes, height=HEIGHT, padding=(6, 14, 0, 0)),
+                )
+                for _ in range(3)
+            ]
+
+    def updates(self, run: SearchRun | None) -> Iterator[Update]:
+        """Yield the updates that show a run."""
+        iterates = [] if run is None else charted_iterates(run)
+        drawn = [] if run is None or not iterates else curves_of(run.problem, iterates)
+        yield self._folder, "visible", bool(drawn)
+        for (caption, chart), curve in zip_longest(self._charts, drawn):
+            yield caption, "visible", curve is not None
+            yield chart, "visible", curve is not None
+            if run is not None and curve is not None:
+                name = escape(_name(run.problem, iterates[-1], curve))
+                yield caption, "content", f'<div class="ex-note ex-dim ex-cut">{name}</div>'
+                yield chart, "scales", _scales(curve)
+                yield chart, "data", data_of(curve)
+
+
+def charted_iterates(run: SearchRun) -> list[Iterate]:
+    """Return the iterates of the present start; once the run has ended, of the best one."""
+    if not run.iterates:
+        return []
+    start = (run.best or run.iterates[-1]).run
+    return [iterate for iterate in run.iterates if iterate.run == start]
+
+
+def _name(problem: Problem, last: Iterate, curve: Curve) -> str:
+    """Return the name of the values of a curve, with the last one."""
+    if curve.kind == "spare":
+        return f"Worst constraint, broken below 0: {last.worst or 'none'}"
+    if curve.kind == "volume":
+        target = "" if curve.level is None else f", required {format_number(curve.level, 6)}"
+        return f"Volume (units³): {format_number(last.volume, 6)}{target}"
+    if curve.powers:
+        value = format_number(last.value, 2, size=1.0)
+        return f"log10 of F = |1 − V / V′|; F = {value}"
+    name = OBJECTIVE_SYMBOLS[problem.objective].capitalize()
+    unit = CATALOGUE[GOALS[problem.objective]].unit_in("units")
+    return f"{name}{f' ({unit})' if unit else ''}: {format_number(last.value, 6)}"
+
+
+def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:
+    """Return the columns of a chart: iterations, values, and the level or nothing."""
+    x = np.arange(len(curve.values), dtype=np.float64)
+    level = np.full(len(x), np.nan if curve.level is None else curve.level)
+    return x, curve.values, level
+
+
+def _scales(curve: Curve) -> dict[str, uplot.Scale]:
+    last = max(1.0, len(curve.values) - 1.0)
+    levels = [] if curve.level is None else [curve.level]
+    heights = [value for value in (*curve.values.tolist(), *levels) if math.isfinite(value)]
+    low, high = min(heights, default=0.0), max(heights, default=0.0)
+    if curve.powers:
+        low = math.floor(low)
+        edges = float(low), float(max(math.ceil(high), low + 1))
+    else:
+        room = PADDING * (high - low) or 0.05 * abs(high) or 1.0
+        edges = low - room, high + room
+    return {"x": {"time": False, "range": (0.0, last)}, "y": {"range": edges}}
+
 
 TAB = "Optimise"
 # The twelve edges of a cube by its corners, whose bits are the axes.
@@ -38,7 +314,7 @@ def search_chip(frame: Frame) -> str:
     if notice is not None:
         buttons = "".join(button(name, state, is_main=name == ACCEPT) for name in notice.buttons)
         return running(TAB, notice.title, notice.text, notice.share, buttons)
-    if state.optimisation.run is None and state.design in PRESETS.values():
+    if Optimisation.of(state).run is None and state.design in PRESETS.values():
         paper = BUTTONS[PAPER]
         words = escape(paper.label)
         return open_button(
@@ -58,23 +334,18 @@ class RequiredBox(ScenePart):
         box = visible_box(placed.frame.state)
         yield self._edges, "visible", box is not None
         if box is not None:
-            edges = placed.scale * edges_of(box)
+            edges = placed.scale * corners_of(box)[np.array(EDGES)]
             yield self._edges, "points", edges.astype(np.float32)
 
 
 def visible_box(state: State) -> Box | None:
     """Return the box of the present run, else that of the problem, if any."""
-    run = state.optimisation.run
+    run = Optimisation.of(state).run
     if run is not None and run.iterates and not run.accepted:
         if run.problem.demands.required_box is None:
             return None
         return run.problem.required_box_at((run.best or run.iterates[-1]).values)
-    return requested_box(state) if state.optimisation.request.needs_box else None
-
-
-def edges_of(box: Box) -> FloatArray:
-    """Return the edges of a box, shape (12, 2, 3)."""
-    return corners_of(box)[np.array(EDGES)]
+    return requested_box(state) if Optimisation.of(state).request.needs_box else None
 
 
 OPTIMISE = Feature(

@@ -12,14 +12,16 @@ import time
 
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import Advance, Compare, EndRun
+from explorer.app.features.optimise.state import Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import compare, optimise
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
-from explorer.app.session.jobs import Worker
-from explorer.app.state.action import Action
+from explorer.app.session.worker import Worker
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
-from explorer.app.state.optimisation import SearchResult, killed_result, result_of
-from explorer.app.state.state import Run, State
-from explorer.optimise.outcome import Iterate, Outcome
+from explorer.app.state.state import State
+from explorer.numerics.number_text import format_number
+from explorer.optimise.outcome import Iterate, Outcome, Settings, record_of
+from explorer.optimise.search.sqp import Trail
 
 # Least seconds between two iterates on the page, and most to wait for the drawing of one.
 PACE, LONGEST = 0.07, 0.25
@@ -57,7 +59,7 @@ class Optimiser(Runner):
 
     def follow(self, frame: Frame) -> None:
         """Start, cancel or compare as a frame requests, once."""
-        run = frame.state.optimisation.run
+        run = Optimisation.of(frame.state).run
         if run is None:
             return
         if run.phase == "running" and run.number != self._number:
@@ -85,7 +87,7 @@ class Optimiser(Runner):
         self._stopped.set()
         self.worker.stop()
 
-    def _begin(self, run: Run) -> None:
+    def _begin(self, run: SearchRun) -> None:
         number = run.number
         with self._lock:
             self._number, self._waiting, self._ending = number, [], None
@@ -127,7 +129,7 @@ class Optimiser(Runner):
 
     def _advance(self, state: State) -> Action | None:
         """Return the action that shows the next iterates, or the end once all are shown."""
-        run = state.optimisation.run
+        run = Optimisation.of(state).run
         with self._lock:
             if run is None or run.number != self._number or run.phase == "ended":
                 return None
@@ -140,10 +142,11 @@ class Optimiser(Runner):
             if not is_over or self._ending is None:
                 return Advance(run.number, iterates)
             self._number = 0
-            verdict = _verdict_of(run, run.iterates + iterates, self._ending, self._is_cancelled)
-            return EndRun(run.number, verdict, iterates)
+            every, is_cancelled = run.iterates + iterates, self._is_cancelled
+            result = result_of(run, self._ending, every, is_cancelled=is_cancelled)
+            return EndRun(run.number, result, iterates)
 
-    def _compare(self, run: Run) -> None:
+    def _compare(self, run: SearchRun) -> None:
         best, problem = run.best, run.problem
         if best is None:
             return
@@ -160,11 +163,26 @@ class Optimiser(Runner):
         )
 
 
-def _verdict_of(
-    run: Run, iterates: tuple[Iterate, ...], ending: Outcome | str, is_cancelled: bool
+def result_of(
+    run: SearchRun, ending: Outcome | str, iterates: tuple[Iterate, ...], *, is_cancelled: bool
 ) -> SearchResult:
+    """Return the result of a run by its outcome, or without one by its iterates or a problem."""
     if isinstance(ending, Outcome):
-        return result_of(ending, run.starts)
-    if is_cancelled:
-        return killed_result(run.problem, iterates)
-    return SearchResult("failed", ending)
+        best = ending.run
+        return SearchResult(
+            status=best.status,
+            message=best.message,
+            best=best.best,
+            starts=len(ending.runs),
+            converged=sum(tried.status == "converged" for tried in ending.runs),
+            seconds=ending.seconds,
+            record=record_of(ending, Settings(starts=run.starts)),
+        )
+    if not is_cancelled:
+        return SearchResult("failed", ending)
+    if not iterates:
+        return SearchResult("cancelled", "cancelled before the first iterate")
+    found = min(iterates, key=Trail(run.problem).rank)
+    value = format_number(found.value, 6)
+    message = f"cancelled: {value} is the best of {len(iterates)} iterates"
+    return SearchResult("cancelled", message, found, starts=iterates[-1].run + 1)

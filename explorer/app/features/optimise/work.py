@@ -3,38 +3,26 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import msgspec
 import numpy as np
 
+from explorer.app.features.optimise.state import (
+    PLACE,
+    Comparison,
+    Optimisation,
+    OptimisationRequest,
+)
 from explorer.app.session.worker import Channel
-from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
-from explorer.measures.catalogue import measures_in
-from explorer.measures.measure import Case
-from explorer.measures.measurements import measure_design
-from explorer.measures.size import longest_leg
+from explorer.measures.catalogue import measure_design, measures_in
+from explorer.measures.measure import Case, longest_leg
 from explorer.mechanism.design import VARIABLES, Design
-from explorer.optimise.conflicts import (
-    BOX_LIMIT,
-    Conflict,
-    find_conflicts,
-    paper_box,
-    without_limit,
-)
-from explorer.optimise.defaults import make_problem
-from explorer.optimise.demands import Box
+from explorer.optimise import conflicts, defaults, problem as problems, solver
 from explorer.optimise.outcome import Outcome
-from explorer.optimise.problem import (
-    SHIFTS,
-    YAW,
-    ObjectiveName,
-    Problem,
-    StartError,
-)
-from explorer.optimise.solver import optimise_design
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.slices.volume import workspace_volume
 
@@ -46,44 +34,46 @@ SHARE_OF_BOX = 0.5
 TRIED, HALVINGS = 5, 30
 
 
-def requested_volume(state: State) -> float:
-    """Return the required volume."""
-    request = state.optimisation.request
-    return request.volume or _default_volume(state.base, request.objective)
+def complete_request(state: State) -> OptimisationRequest:
+    """Return the request with values that suit the design where the user gives none."""
+    return _complete(Optimisation.of(state).request, state.base)
 
 
-def requested_reach(state: State) -> float:
-    """Return the longest leg allowed."""
-    return state.optimisation.request.reach or longest_leg(state.base)
+@lru_cache(maxsize=16)
+def _complete(request: OptimisationRequest, base: Design) -> OptimisationRequest:
+    return replace(
+        request,
+        volume=request.volume or _default_volume(base, request.objective),
+        reach=request.reach or longest_leg(base),
+        box=request.box or box_within(base),
+    )
 
 
-def requested_box(state: State) -> Box:
+def requested_box(state: State) -> problems.Box:
     """Return the required box."""
-    return state.optimisation.request.box or box_within(state.base)
+    return Optimisation.of(state).request.box or box_within(state.base)
 
 
-def problem_of(state: State) -> Problem:
+def problem_of(state: State) -> problems.Problem:
     """Return the problem of the present design.
 
     Raises:
         ExplorerError: The values make no problem.
     """
-    return _problem(state.design, state.base, state.optimisation.request)
+    return _problem(state.design, complete_request(state))
 
 
-def _problem(design: Design, base: Design, request: OptimisationRequest) -> Problem:
-    free = [name for name in request.free if name in (*VARIABLES, YAW)]
+def _problem(design: Design, request: OptimisationRequest) -> problems.Problem:
+    free = [name for name in request.free if name != PLACE]
     if request.needs_box and PLACE in request.free:
-        free += SHIFTS
-    problem = make_problem(
+        free += problems.SHIFTS
+    problem = defaults.make_problem(
         design,
         request.objective,
-        volume=(request.volume or _default_volume(base, request.objective))
-        if request.needs_volume
-        else None,
-        reach=(request.reach or longest_leg(base)) if request.needs_reach else None,
+        volume=request.volume if request.needs_volume else None,
+        reach=request.reach if request.needs_reach else None,
         clearance=request.clearance or None,
-        required_box=(request.box or box_within(base)) if request.needs_box else None,
+        required_box=request.box if request.needs_box else None,
         held=request.held,
         error=request.error or None,
         deflection=request.deflection or None,
@@ -94,22 +84,20 @@ def _problem(design: Design, base: Design, request: OptimisationRequest) -> Prob
     return msgspec.structs.replace(problem, variables=variables)
 
 
-def find_refusals(state: State) -> tuple[Conflict, ...]:
+def find_refusals(state: State) -> tuple[conflicts.Conflict, ...]:
     """Return why no search can start: demands that the limits rule out, or no problem at all."""
-    return _find_refusals(state.design, state.base, state.optimisation.request)
+    return _find_refusals(state.design, complete_request(state))
 
 
 @lru_cache(maxsize=16)
-def _find_refusals(
-    design: Design, base: Design, request: OptimisationRequest
-) -> tuple[Conflict, ...]:
+def _find_refusals(design: Design, request: OptimisationRequest) -> tuple[conflicts.Conflict, ...]:
     try:
-        problem = _problem(design, base, request)
-    except StartError as error:
-        return (Conflict(error.limit, str(error)),)
+        problem = _problem(design, request)
+    except problems.StartError as error:
+        return (conflicts.Conflict(error.limit, str(error)),)
     except ExplorerError as error:
-        return (Conflict("", str(error)),)
-    return find_conflicts(problem)
+        return (conflicts.Conflict("", str(error)),)
+    return conflicts.find_conflicts(problem)
 
 
 def liftable_limits(state: State) -> tuple[str, ...]:
@@ -119,31 +107,18 @@ def liftable_limits(state: State) -> tuple[str, ...]:
     refusals = find_refusals(state)
     liftable: list[str] = []
     for limit in dict.fromkeys(refusal.limit for refusal in refusals):
-        lifted = without_limit(state.design, limit)
+        lifted = conflicts.without_limit(state.design, limit)
         if lifted is None:
             continue
-        after = _find_refusals(lifted, state.base, state.optimisation.request)
+        after = _find_refusals(lifted, complete_request(state))
         messages = {refusal.message for refusal in refusals if refusal.limit == limit}
         if all(left.limit != limit and left.message not in messages for left in after):
             liftable.append(limit)
     return tuple(liftable)
 
 
-def box_on_offer(state: State) -> Box | None:
-    """Return the box of the paper's optimum in place of one that is too small, if it may do."""
-    if BOX_LIMIT not in liftable_limits(state):
-        return None
-    box = _box_on_offer(state.design, state.base, state.optimisation.request)
-    return None if box == state.design.limits.box else box
-
-
 @lru_cache(maxsize=8)
-def _box_on_offer(design: Design, base: Design, request: OptimisationRequest) -> Box | None:
-    return paper_box(_problem(design, base, request))
-
-
-@lru_cache(maxsize=8)
-def box_within(design: Design) -> Box:
+def box_within(design: Design) -> problems.Box:
     """Return a box in the workspace about the home position; a small one if home is outside."""
     home = design.home_pose
     limits = constraints(design, home.rotation)
@@ -166,7 +141,7 @@ def box_within(design: Design) -> Box:
 
 
 @lru_cache(maxsize=8)
-def _default_volume(design: Design, objective: ObjectiveName) -> float:
+def _default_volume(design: Design, objective: problems.ObjectiveName) -> float:
     """Return the next larger round volume to match; else that of a design, to six digits."""
     volume = workspace_volume(design).volume or design.reach**3
     if objective != "match-volume":
@@ -175,26 +150,27 @@ def _default_volume(design: Design, objective: ObjectiveName) -> float:
     return math.ceil(MORE * volume / power) * power
 
 
-def optimise(problem: Problem, starts: int, channel: Channel) -> Outcome:
+def optimise(problem: problems.Problem, starts: int, channel: Channel) -> Outcome:
     """Search for the best design from a number of starts, and send each iterate to the parent."""
-    return optimise_design(problem, starts=starts, watch=channel.send, stop=channel.is_cancelled)
+    return solver.optimise_design(
+        problem, starts=starts, watch=channel.send, stop=channel.is_cancelled
+    )
 
 
 def compare(
     before: Design,
     after: Design,
     demanded_margin: float | None,
-    boxes: tuple[Box | None, Box | None],
+    boxes: tuple[problems.Box | None, problems.Box | None],
 ) -> Comparison:
     """Return the measures of two designs.
 
     The margin is that from which on a clearance is demanded, None without a demand; the boxes are
     those of each design for its least margin.
     """
+    names = (*measures_in("optimise"), *VARIABLES)
     first, second = (
-        measure_design(
-            Case(design, demanded_margin=demanded_margin, box=box), measures_in("optimise")
-        )
+        measure_design(Case(design, demanded_margin=demanded_margin, box=box), names)
         for design, box in zip((before, after), boxes, strict=True)
     )
     return Comparison(first, second)

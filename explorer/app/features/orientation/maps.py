@@ -17,8 +17,7 @@ from explorer.app.widgets.markup import caption, dim, reading, row, swatch, tabl
 from explorer.mechanism.tilt_torsion import TiltTorsion
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import MARGIN_COLOURS, Rgb, css
-from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap
-from explorer.workspace.orientations.torsions import TiltByTorsion
+from explorer.workspace.orientations.tilts import GreatestTilt, TiltByTorsion, TiltMap
 
 WIDTH, HEIGHT = 316.0, 268.0
 CENTRE, RADIUS = (158.0, 134.0), 112.0
@@ -32,9 +31,7 @@ FREE: Rgb = (140, 150, 160)
 """Colour where the platform tilts by 180° without a limit."""
 
 COLOURS: dict[str, Rgb] = {
-    "margin δ1": MARGIN_COLOURS[0],
-    "margin δ2": MARGIN_COLOURS[1],
-    "margin δ3": MARGIN_COLOURS[2],
+    **{f"margin δ{index}": colour for index, colour in enumerate(MARGIN_COLOURS, 1)},
     "carriage order": (0, 150, 150),
     "gap": (120, 200, 200),
     "l1": (24, 74, 150),
@@ -50,7 +47,6 @@ COLOURS: dict[str, Rgb] = {
 OTHER: Rgb = (120, 70, 40)
 """Colour of other limits, such as those of swings."""
 
-
 # The strip, in pixels.
 STRIP_HEIGHT = 96.0
 LEFT, RIGHT, TOP, BOTTOM = 34.0, 306.0, 8.0, 72.0
@@ -58,13 +54,7 @@ TICKS = (-180, -90, 0, 90, 180)
 # Difference of tilts in degrees below which they count as one.
 SAME_TILT = 0.05
 
-STOPS: tuple[Rgb, ...] = (
-    (68, 1, 84),
-    (59, 82, 139),
-    (33, 145, 140),
-    (94, 201, 98),
-    (253, 231, 37),
-)
+STOPS: tuple[Rgb, ...] = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))
 """Colours from no tilt to the largest: those of Matplotlib's viridis, of even lightness."""
 
 # The end of the scale is a multiple of this, in degrees.
@@ -80,7 +70,12 @@ def _svg(label: str, data: str, facts: object, pieces: Iterable[str], height: fl
     )
 
 
-def _rounded_up(tilt: float) -> float:
+def _circle(look: str, at: tuple[float, float], radius: float) -> str:
+    x, y = at
+    return f'<circle class="{look}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>'
+
+
+def _round_up(tilt: float) -> float:
     """Return the next ring from a tilt on, in degrees."""
     return RING * math.ceil(tilt / RING - 1e-9)
 
@@ -97,7 +92,7 @@ def edge_of(tilts: TiltMap, here: TiltTorsion, home: TiltTorsion) -> float:
     """Return the tilt at the edge of the map, in degrees."""
     finite = [tilt for tilt in tilts.tilts.tolist() if math.isfinite(tilt)]
     largest = max([LEAST_EDGE, here.tilt, home.tilt, *finite])
-    return min(180.0, _rounded_up(largest))
+    return min(180.0, _round_up(largest))
 
 
 def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: TiltTorsion) -> str:
@@ -110,8 +105,7 @@ def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: Tilt
     pieces = [*_rings(edge), *_region(tilts, edge), *_least(least, edge), *_labels(edge)]
     is_other = abs(math.remainder(home.torsion - here.torsion, 360.0)) > SAME_TORSION
     look = f"home{' is-other' if is_other else ''}"
-    x, y = _place(home.azimuth, home.tilt, edge)
-    pieces.append(f'<circle class="{look}" cx="{x:.1f}" cy="{y:.1f}" r="5"/>')
+    pieces.append(_circle(look, _place(home.azimuth, home.tilt, edge), 5.0))
     x, y = _place(here.azimuth, here.tilt, edge)
     arms = f"M{x - 6:.1f} {y:.1f}h12M{x:.1f} {y - 6:.1f}v12"
     pieces.append(f'<path class="cross casing" d="{arms}"/><path class="cross" d="{arms}"/>')
@@ -146,22 +140,17 @@ def _rings(edge: float) -> Iterator[str]:
     x, y = CENTRE
     count = round(edge / RING)
     for ring in range(1, count + 1):
-        radius = RADIUS * ring / count
-        look = "frame" if ring == count else "ring"
-        yield f'<circle class="{look}" cx="{x}" cy="{y}" r="{radius:.1f}"/>'
+        yield _circle("frame" if ring == count else "ring", CENTRE, RADIUS * ring / count)
     yield f'<path class="ring" d="M{x - RADIUS} {y}h{2 * RADIUS}M{x} {y - RADIUS}v{2 * RADIUS}"/>'
 
 
 def _labels(edge: float) -> Iterator[str]:
     """Yield the labels of the circles and axes."""
-    x, y = CENTRE
     count = round(edge / RING)
     for ring in range(1, count + 1):
-        at = RADIUS * ring / count * math.sqrt(0.5)
-        yield (
-            f'<text class="angle" x="{x + at + 2:.1f}" y="{y + at + 10:.1f}">'
-            f"{RING * ring:.0f}°</text>"
-        )
+        x, y = _place(-45.0, RING * ring, edge)
+        yield f'<text class="angle" x="{x + 2:.1f}" y="{y + 10:.1f}">{RING * ring:.0f}°</text>'
+    x, y = CENTRE
     for words, dx, dy, anchor in (
         ("x", RADIUS + 8, 4, "start"),
         ("−x", -RADIUS - 8, 4, "end"),
@@ -173,13 +162,10 @@ def _labels(edge: float) -> Iterator[str]:
 
 def _least(least: GreatestTilt, edge: float) -> Iterator[str]:
     """Yield the circle of the greatest tilt in every azimuth, and a dot where it ends."""
-    if math.isnan(least.tilt):
-        return
-    x, y = CENTRE
-    yield f'<circle class="least" cx="{x}" cy="{y}" r="{RADIUS * least.tilt / edge:.1f}"/>'
-    if least.limit is not None:
-        x, y = _place(least.azimuth, least.tilt, edge)
-        yield f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="3"/>'
+    if not math.isnan(least.tilt):
+        yield _circle("least", CENTRE, RADIUS * least.tilt / edge)
+        if least.limit is not None:
+            yield _circle("dot", _place(least.azimuth, least.tilt, edge), 3.0)
 
 
 def _region(tilts: TiltMap, edge: float) -> Iterator[str]:
@@ -217,18 +203,14 @@ def torsion_strip(by_torsion: TiltByTorsion, torsion: float, tilt: float) -> str
     """
     best = by_torsion.best
     largest = 0.0 if math.isnan(best.tilt) else best.tilt
-    top = max(RING, _rounded_up(largest))
+    top = max(RING, _round_up(largest))
     tilts = [round(t, 1) if math.isfinite(t) else None for t in by_torsion.tilts.tolist()]
     facts = {"left": LEFT, "right": RIGHT, "tilts": tilts}
     pieces = [*_axes(top), *_area(by_torsion.torsions, tilts, top)]
-    x = _across(torsion)
-    pieces.append(f'<path class="here" d="M{x:.1f} {TOP}V{BOTTOM}"/>')
-    if not math.isnan(by_torsion.best.tilt) and not by_torsion.best.tilt - tilt <= SAME_TILT:
-        x, y = (
-            _across(math.remainder(by_torsion.best.torsion, 360.0)),
-            _up(by_torsion.best.tilt, top),
-        )
-        pieces.append(f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="3"/>')
+    pieces.append(f'<path class="here" d="M{_across(torsion):.1f} {TOP}V{BOTTOM}"/>')
+    if not math.isnan(best.tilt) and not best.tilt - tilt <= SAME_TILT:
+        at = _across(math.remainder(best.torsion, 360.0)), _up(best.tilt, top)
+        pieces.append(_circle("dot", at, 3.0))
     return (
         caption("Greatest tilt in every azimuth by torsion")
         + _svg("Greatest tilt by torsion", "torsions", facts, pieces, STRIP_HEIGHT)
@@ -253,10 +235,8 @@ def _axes(top: float) -> Iterator[str]:
     for tick in TICKS:
         x, words = _across(tick), f"{tick}°".replace("-", "−")
         anchor = "end" if tick == TICKS[-1] else "middle"
-        yield (
-            f'<text class="angle" x="{x:.1f}" y="{BOTTOM + 15}" text-anchor="{anchor}">'
-            f"{words}</text>"
-        )
+        place = f'x="{x:.1f}" y="{BOTTOM + 15}" text-anchor="{anchor}"'
+        yield f'<text class="angle" {place}>{words}</text>'
         yield f'<path class="ring" d="M{x:.1f} {TOP}V{BOTTOM}"/>'
 
 
@@ -284,8 +264,7 @@ def most_of(drawing: TiltsDrawing) -> float:
 def colours_of(tilts: FloatArray, most: float) -> NDArray[np.uint8]:
     """Return the colours of tilts (n,) on a scale from 0 to `most`, shape (n, 3)."""
     places = np.linspace(0.0, most, len(STOPS))
-    stops = np.array(STOPS, dtype=np.float64)
-    channels = [np.interp(tilts, places, stops[:, k]) for k in range(3)]
+    channels = [np.interp(tilts, places, channel) for channel in zip(*STOPS, strict=True)]
     return np.column_stack(channels).round().astype(np.uint8)
 
 

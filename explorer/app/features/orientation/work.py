@@ -9,11 +9,10 @@ from typing import Literal, TypeAlias
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from explorer.app.features.workspace.tasks import LIVE_TOLERANCE
+from explorer.app.features.workspace.work import LIVE_TOLERANCE
 from explorer.app.session.feed import Feed, feed_of, watch_of
 from explorer.app.session.worker import Channel
-from explorer.app.state.action import Action
-from explorer.app.state.actions import move_to
+from explorer.app.state.actions import Action, move_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.mechanism.configuration import tool_offset
@@ -27,10 +26,12 @@ from explorer.mechanism.tilt_torsion import (
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.workspace.extremes import extent_of
-from explorer.workspace.orientations.sets import cone_of_directions
-from explorer.workspace.orientations.share import OrientationShare, orientation_share
-from explorer.workspace.orientations.tilts import greatest_tilts
-from explorer.workspace.orientations.torsions import TiltByTorsion, tilt_by_torsion
+from explorer.workspace.orientations.share import (
+    OrientationShare,
+    cone_of_directions,
+    orientation_share,
+)
+from explorer.workspace.orientations.tilts import TiltByTorsion, greatest_tilts, tilt_by_torsion
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import inclusive_solid, total_solid
 

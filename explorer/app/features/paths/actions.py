@@ -8,8 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from explorer.app.state.action import Action
-from explorer.app.state.actions import move_to
+from explorer.app.state.actions import Action, move_to
 from explorer.app.state.paths import End, Journey, Paths
 from explorer.app.state.state import Joints, State, joints_of
 from explorer.errors import InputError
@@ -34,7 +33,7 @@ class Go(Action):
                 lengths do not have.
         """
         start, goal = ends_of(state)
-        if is_same(state.design, start, goal):
+        if _is_same(state.design, start, goal):
             raise InputError(
                 "the start and the goal are the same pose: choose another goal, or press Play to "
                 "see the last path again"
@@ -107,8 +106,8 @@ def _legs(state: State) -> Joints:
     return joints_of(state.design, state.pose)
 
 
-def is_same(design: Design, start: Pose, goal: Pose) -> bool:
-    """Whether two poses are the same, to rounding."""
+def _is_same(design: Design, start: Pose, goal: Pose) -> bool:
+    """Return whether two poses are the same, to rounding."""
     apart = np.abs(np.subtract(start.position, goal.position)).max() / design.reach
     return bool(max(apart, np.abs(start.rotation - goal.rotation).max()) <= SAME)
 

@@ -1,30 +1,40 @@
-"""Paths between two poses: their declaration, what runs in the bar, and the line in the scene."""
+"""Paths between two poses: their declaration, the line in the scene, and the runner that plays."""
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Iterator
 
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Services, StateCommand, Tab
-from explorer.app.features.paths.actions import Play
+from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab
+from explorer.app.features.forces.tasks import load_of
+from explorer.app.features.paths.actions import Advance, Play, TakePlan
 from explorer.app.features.paths.panel import PathsPanel
-from explorer.app.features.paths.runner import PathRunner
+from explorer.app.features.paths.work import PlanRequest, plan
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_lines
+from explorer.app.session.worker import Worker
 from explorer.app.state.frame import Frame
+from explorer.app.state.paths import Journey
+from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button, running
-from explorer.app.widgets.commands import Key
+from explorer.app.widgets.palette import Key
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import rotation_from_quaternion
 from explorer.numerics.number_text import format_decimals, format_number
+from explorer.paths.planning import PlannedPath
 from explorer.singularity.colours import FAR, SINGULAR
 
 # Number of crossings that are drawn at most.
 MOST_CROSSINGS = 24
 RADIUS = 0.2
+# Time between two frames of a path, in seconds, and the longest step between them along it.
+FRAME_SECONDS, LONGEST_STEP = 0.04, 0.25
+DIED = "the planner's process ended; Go starts it again"
 
 
 class PathScene(ScenePart):
@@ -70,6 +80,98 @@ def path_chip(frame: Frame) -> str:
     pause = press_button("paths.play", "off", "Pause", class_name="ex-button")
     share = journey.at / journey.trajectory.duration
     return running("Paths", "Playing", f"{format_decimals(journey.at, 1)} s", share, pause)
+
+
+class PathRunner(Runner):
+    """Plays and plans paths as the frames request."""
+
+    def __init__(self, services: Services) -> None:
+        self.worker = Worker(services.tell, preload=[plan.__module__], died=DIED)
+        self._session = services.session
+        services.at_end(self.stop)
+        self._stopped = threading.Event()
+        self._playing = threading.Event()
+        self._advanced_at = 0.0
+        self._thread: threading.Thread | None = None
+        # The last request to plan: its number, and its order at the worker, None once it is done.
+        self._request = 0
+        self._order: int | None = None
+
+    def follow(self, frame: Frame) -> None:
+        """Start or stop playing and planning as a frame requests."""
+        journey, paths = frame.state.journey, frame.state.paths
+        if journey is not None and journey.is_playing:
+            self._play()
+        else:
+            self._playing.clear()
+        if paths.is_planning and paths.request != self._request:
+            self._request = paths.request
+            self._plan(frame.state)
+        elif not paths.is_planning and self._order is not None:
+            self.worker.cancel(self._order, 0.0)
+            self._order = None
+
+    def stop(self) -> None:
+        """End the planner's process and the thread that plays."""
+        self._stopped.set()
+        self._playing.set()
+        self.worker.stop()
+        if self._thread is not None:
+            self._thread.join(timeout=5.0)
+
+    def _plan(self, state: State) -> None:
+        number, design, paths = self._request, state.design, state.paths
+        if paths.planning is None:
+            return
+        tool, view = state.tool, state.view
+        request = PlanRequest(
+            design,
+            *paths.planning,
+            paths.seconds,
+            tool,
+            load_of(state) if paths.holds_load else None,
+            view.forces.weighed,
+            view.prototype.density,
+        )
+
+        def take_path(path: PlannedPath) -> None:
+            moves = len(path.poses) - 1
+            title = f"Planned path of {moves} {'move' if moves == 1 else 'moves'}"
+            journey = Journey("planned", title, design, path.poses, is_playing=True, tool=tool)
+            self._finish(number, journey, None)
+
+        self._order = self.worker.submit(
+            "plan",
+            plan,
+            (request,),
+            take_path,
+            lambda problem: self._finish(number, None, problem),
+        )
+
+    def _finish(self, request: int, journey: Journey | None, problem: str | None) -> None:
+        if request == self._request:
+            self._order = None
+        self._session.do(TakePlan(request, journey, problem))
+
+    def _play(self) -> None:
+        if self._playing.is_set():
+            return
+        self._advanced_at = time.monotonic()
+        self._playing.set()
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name="player", daemon=True)
+            self._thread.start()
+
+    def _run(self) -> None:
+        while self._playing.wait() and not self._stopped.wait(FRAME_SECONDS):
+            # A step that still waits will cover the time until the session handles it.
+            if self._playing.is_set() and not self._session.is_waiting(self):
+                self._session.post(self, self._advance)
+
+    def _advance(self, _: State) -> Advance:
+        now = time.monotonic()
+        passed, self._advanced_at = min(now - self._advanced_at, LONGEST_STEP), now
+        return Advance(passed)
 
 
 PATHS = Feature(

@@ -10,39 +10,19 @@ from typing import Literal
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.paths.actions import (
-    CancelPlan,
-    Go,
-    Play,
-    SetPathTime,
-    ends_of,
-    goal_of,
-    pose_of_end,
-)
-from explorer.app.features.paths.plots import (
-    FOLDS,
-    MARGINS,
-    IncidencePlot,
-    JourneyLoads,
-    LoadPlot,
-    PathShares,
-    crossing_words,
-    demand_note,
-    load_words,
-)
-from explorer.app.inputs.bindings import Bound
+from explorer.app.features.paths import actions, plots
+from explorer.app.inputs.control import Bound
 from explorer.app.inputs.controls import Controls
-from explorer.app.inputs.tracks import Span
+from explorer.app.inputs.ranges import Span
 from explorer.app.session.session import Who
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Set
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import End, PathKind
 from explorer.app.state.state import State, angles_of
+from explorer.app.widgets import markup
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chip, Chips, choose
-from explorer.app.widgets.markup import alert, beside, box, dim, note, sentence
 from explorer.errors import InputError
 from explorer.export.tables import trajectory_csv
 from explorer.mechanism.configuration import position_of
@@ -87,14 +67,14 @@ class PathsPanel:
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
-        self._downloads, self._shares = services.downloads, PathShares(services)
+        self._downloads, self._shares = services.downloads, plots.PathShares(services)
         self._controls = Controls(gui, services.session)
         kinds = {
             kind: Chip(words, f"Paths › {words}", hint, choose("paths.kind", kind, "Path"))
             for kind, (words, hint) in KINDS.items()
         }
         self._kind_chips = Chips(services.buttons, services.session, "paths.kind", "", kinds)
-        gui.add_html(beside(2))
+        gui.add_html(markup.beside(2))
         with gui.add_folder("Path"):
             self._numbers: dict[EndName, viser.GuiHtmlHandle] = {
                 end: self._add_end(gui, end) for end in ENDS
@@ -111,7 +91,7 @@ class PathsPanel:
             self.go = self._controls.button(
                 "Go",
                 "Make the path from the start to the goal, and play it.",
-                Go,
+                actions.Go,
                 icon=viser.Icon.ROUTE,
                 main=True,
             )
@@ -131,15 +111,15 @@ class PathsPanel:
                 "actuator moves a tenth of the reach per second.",
                 Bound(
                     lambda frame: 0.0 if frame.state.journey is None else frame.state.journey.at,
-                    lambda _, value: SetPathTime(value),
+                    lambda _, value: actions.SetPathTime(value),
                 ),
                 _time_span,
                 disabled=lambda state: state.journey is None,
             )
             self._plots = (
-                IncidencePlot(gui, MARGINS, has_times=False),
-                IncidencePlot(gui, FOLDS),
-                LoadPlot(gui, self._shares),
+                plots.IncidencePlot(gui, plots.MARGINS, has_times=False),
+                plots.IncidencePlot(gui, plots.FOLDS),
+                plots.LoadPlot(gui, self._shares),
             )
         self._add_buttons(services.buttons)
 
@@ -152,10 +132,11 @@ class PathsPanel:
             if not is_typed:
                 yield handle, "content", end_numbers(state, end)
         chips = f'<div class="ex-flow">{self._kind_chips.buttons(state)}</div>'
-        yield self._kinds, "content", box(chips, f'<div class="ex-small">{kind_note(state)}</div>')
+        kinds = markup.box(chips, f'<div class="ex-small">{kind_note(state)}</div>')
+        yield self._kinds, "content", kinds
         yield self.go, "disabled", state.paths.is_planning
         yield self._title, "content", plan_words(state) or path_title(state, self._shares.of(frame))
-        demand = demand_note(state)
+        demand = plots.demand_note(state)
         yield self._demand, "visible", bool(demand)
         yield self._demand, "content", demand
         for plot in self._plots:
@@ -197,14 +178,15 @@ class PathsPanel:
         return numbers
 
     def _add_buttons(self, buttons: Buttons) -> None:
-        def play(value: str, client: viser.ClientHandle) -> None:
-            self._session.do(Play(value == "on"), who=client.client_id)
+        def do(action: Action, client: viser.ClientHandle) -> None:
+            self._session.do(action, who=client.client_id)
+
+        def play(word: str, client: viser.ClientHandle) -> None:
+            do(actions.Play(word == "on"), client)
 
         buttons.on("paths.play", play, values=("on", "off"))
         buttons.on("paths.export", lambda _, client: self._export(client.client_id))
-        buttons.on(
-            "paths.cancel", lambda _, client: self._session.do(CancelPlan(), who=client.client_id)
-        )
+        buttons.on("paths.cancel", lambda _, client: do(actions.CancelPlan(), client))
         buttons.offer(
             "Paths › Cancel planning",
             "Stop the search for a path.",
@@ -228,26 +210,28 @@ class PathsPanel:
 def end_numbers(state: State, end: EndName) -> str:
     """Return the six numbers of an end that is not typed, as HTML."""
     try:
-        pose = pose_of_end(state, _end(state, end))
+        pose = actions.pose_of_end(state, _end(state, end))
     except InputError as error:
-        return f'<div class="ex-note ex-close">{escape(sentence(str(error)))}</div>'
+        return f'<div class="ex-note ex-close">{escape(markup.sentence(str(error)))}</div>'
     there = position_of(state.design, pose, state.view.at)
     position = ", ".join(format_decimals(coordinate, 2) for coordinate in there)
     angles = ", ".join(f"{format_decimals(angle, 1)}°" for angle in angles_of(pose))
     hint = f"x, y, z of {state.point} in design units; yaw, pitch, roll"
-    return note(f'<span title="{hint}">{position} · {angles}</span>')
+    return markup.note(f'<span title="{hint}">{position} · {angles}</span>')
 
 
 def kind_note(state: State) -> str:
     """Return whether a path of the chosen kind exists between the ends, as HTML."""
     if state.paths.kind == "straight":
-        return dim("May pass singular poses, which are marked.")
+        return markup.dim("May pass singular poses, which are marked.")
     try:
-        start, goal = (int(mode_of(margins(e.position, e.rotation))) for e in ends_of(state))
+        start, goal = (
+            int(mode_of(margins(e.position, e.rotation))) for e in actions.ends_of(state)
+        )
     except InputError:
         return ""
     if start == goal:
-        return dim(f"Both ends are in mode {start} ({mode_name(start)}).")
+        return markup.dim(f"Both ends are in mode {start} ({mode_name(start)}).")
     return (
         f'<span class="ex-close" title="Every path between two modes is singular">'
         f"There is none from mode {start} to mode {goal}.</span>"
@@ -261,18 +245,18 @@ def plan_words(state: State) -> str | None:
         cancel = press_button(
             "paths.cancel", "", "Cancel", hint="Stop the search", class_name="ex-button"
         )
-        words = dim(f"Planning, for {format_number(paths.seconds)} s at most …")
-        return box(f'<div class="ex-line">{words}{cancel}</div>')
+        words = markup.dim(f"Planning, for {format_number(paths.seconds)} s at most …")
+        return markup.box(f'<div class="ex-line">{words}{cancel}</div>')
     if paths.problem is not None:
-        return alert("No path", sentence(paths.problem))
+        return markup.alert("No path", markup.sentence(paths.problem))
     return None
 
 
-def path_title(state: State, loads: JourneyLoads | None) -> str:
+def path_title(state: State, loads: plots.JourneyLoads | None) -> str:
     """Return the title of the path, its crossings and loads, and its buttons, as HTML."""
     journey = state.journey
     if journey is None:
-        return box(dim("No path yet. Choose a goal and press Go."))
+        return markup.box(markup.dim("No path yet. Choose a goal and press Go."))
     on, words, hint = (
         ("off", "Pause", "Stop here") if journey.is_playing else ("on", "Play", "Move along it")
     )
@@ -286,16 +270,16 @@ def path_title(state: State, loads: JourneyLoads | None) -> str:
         class_name="ex-button",
     )
     title = escape(journey.title)
-    return box(
+    return markup.box(
         f'<div class="ex-line">{play}<span class="ex-cut ex-fill" title="{title}">{title}</span>'
         f"{export}</div>",
-        crossing_words(journey),
-        "" if loads is None else load_words(loads),
+        plots.crossing_words(journey),
+        "" if loads is None else plots.load_words(loads),
     )
 
 
 def _end(state: State, end: EndName) -> End:
-    return state.paths.start if end == "start" else goal_of(state)
+    return state.paths.start if end == "start" else actions.goal_of(state)
 
 
 def _option(state: State, end: EndName) -> str:
@@ -310,7 +294,7 @@ def _choose(state: State, end: EndName, option: str) -> Action:
     if option in MODES:
         value = MODES.index(option)
     elif option == TYPED:
-        value = pose_of_end(state, _end(state, end))
+        value = actions.pose_of_end(state, _end(state, end))
     elif end == "goal":
         # It is of use once the platform has moved away.
         value = state.pose
@@ -338,7 +322,7 @@ def typed_numbers(state: State, end: EndName) -> tuple[Triple, Triple]:
 def _set_typed(
     state: State, end: EndName, position: Triple | None, angles: Triple | None
 ) -> Action:
-    pose = pose_of_end(state, _end(state, end))
+    pose = actions.pose_of_end(state, _end(state, end))
     there = position_of(state.design, pose, state.view.at) if position is None else position
     if angles is not None:
         pose = Pose.of_yaw_pitch_roll(pose.position, angles)

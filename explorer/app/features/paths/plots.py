@@ -53,36 +53,48 @@ MOST_LISTED = 4
 LEAST_TOP, MOST_TOP = 120.0, 250.0
 
 
-def add_time_chart(
-    gui: viser.GuiApi,
-    series: tuple[uplot.Series, ...],
-    vertical: uplot.Axis,
-    levels: uplot.Axis,
-    *,
-    height: int,
-    has_times: bool = True,
-) -> viser.GuiUplotHandle:
-    """Add a chart without words at its axis of time, which the slider above it names.
+class TimeChart:
+    """A chart over time, whose axis has no words: the slider above the chart names it.
 
     Args:
         gui: Controls of the page.
         series: Its lines and dots, without the line at the present time.
-        vertical: Its vertical axis.
-        levels: The axis of its levels, at the right.
+        axes: Its vertical axis, and that of its levels, at the right.
         height: Height between its axes, in pixels.
         has_times: Whether the axis of time has numbers; those of a chart below serve it too.
     """
-    room = 26 if has_times else 8
-    time = axis("", label_size=0, size=room)
-    if not has_times:
-        time["values"] = ()
-    return add_chart(
-        gui,
-        (*series, line("now", NEUTRAL, width=1.5)),
-        (time, vertical, levels),
-        height=8 + height + room,
-        padding=(8, 0, 0, 0),
-    )
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        series: tuple[uplot.Series, ...],
+        axes: tuple[uplot.Axis, uplot.Axis],
+        height: int,
+        *,
+        has_times: bool = True,
+    ) -> None:
+        room = 26 if has_times else 8
+        time = axis("", label_size=0, size=room)
+        if not has_times:
+            time["values"] = ()
+        self._handle = add_chart(
+            gui,
+            (*series, line("now", NEUTRAL, width=1.5)),
+            (time, *axes),
+            height=8 + height + room,
+            padding=(8, 0, 0, 0),
+        )
+
+    def show(self, columns: tuple[NDArray[Any], ...], *, is_visible: bool) -> Iterator[Update]:
+        """Yield the updates that make the chart show its columns."""
+        duration = max(float(columns[0][-1]), 1e-9)
+        span = float(np.nanmin(columns[-1])), float(np.nanmax(columns[-1]))
+        scales = {"x": {"time": False, "range": (0.0, duration)}, "y": {"range": span}}
+        yield self._handle, "scales", scales
+        yield self._handle, "data", columns
+        # viser's chart draws no numbers below it if it appears while it is given data time after
+        # time; so it does not wait for a path that is played at once.
+        yield self._handle, "visible", is_visible
 
 
 def time_columns(
@@ -90,11 +102,8 @@ def time_columns(
 ) -> tuple[NDArray[Any], ...]:
     """Return the columns of a chart: times in their order, the curves, the line at the present.
 
-    Args:
-        times: Times of the rows, shape (n,), in seconds.
-        curves: Values of the rows, and twice that at the present time, shape (n + 2,) each.
-        now: The present time, in seconds.
-        span: Values at the bottom and the top of the chart, between which the line goes.
+    A curve has a value for each time, and twice that at the present; the line goes from the bottom
+    to the top of the chart, its span.
     """
     x = np.concatenate([times, [now, now]])
     order = np.argsort(x, kind="stable")
@@ -106,16 +115,6 @@ def time_columns(
 def blank_columns(curves: int, span: tuple[float, float]) -> tuple[NDArray[Any], ...]:
     """Return the columns of a chart while there is no path: a second without values."""
     return time_columns(np.ones(1), np.full((curves, 3), np.nan), 0.0, span)
-
-
-def time_updates(
-    chart: viser.GuiUplotHandle, columns: tuple[NDArray[Any], ...]
-) -> Iterator[Update]:
-    """Yield the updates that make a chart show its columns."""
-    duration = max(float(columns[0][-1]), 1e-9)
-    span = float(np.nanmin(columns[-1])), float(np.nanmax(columns[-1]))
-    yield chart, "scales", {"x": {"time": False, "range": (0.0, duration)}, "y": {"range": span}}
-    yield chart, "data", columns
 
 
 class JourneyLoads(NamedTuple):
@@ -221,22 +220,18 @@ class IncidencePlot:
             line(quantity.name.format(index), colour, dash=dash)
             for index, colour, dash in zip((1, 2, 3), MARGIN_COLOURS, DASHES, strict=True)
         )
-        self._chart = add_time_chart(
+        self._chart = TimeChart(
             gui,
             (*lines, dots("singular", ORANGE, 9)),
-            quantity.vertical,
-            level_axis(quantity.flat, "flat", ORANGE),
-            height=INCIDENCE_HEIGHT,
+            (quantity.vertical, level_axis(quantity.flat, "flat", ORANGE)),
+            INCIDENCE_HEIGHT,
             has_times=has_times,
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the chart and its legend show the frame."""
         journey, quantity = frame.state.journey, self._quantity
-        yield from time_updates(self._chart, incidence_columns(journey, quantity))
-        # viser's chart draws no numbers below it if it appears while it is given data time after
-        # time; so it does not wait for a path that is played at once.
-        yield self._chart, "visible", True
+        yield from self._chart.show(incidence_columns(journey, quantity), is_visible=True)
         yield self._legend, "visible", journey is not None
         if journey is not None:
             yield self._legend, "content", legend(journey.pose, quantity)
@@ -318,12 +313,12 @@ class LoadPlot:
 
     def __init__(self, gui: viser.GuiApi, shares: PathShares) -> None:
         self._shares = shares
-        self._chart = add_time_chart(
+        vertical = axis("share (%)", label_size=18, size=40, space=22)
+        self._chart = TimeChart(
             gui,
             (line("share", BLUE), line("beyond the limit", ORANGE)),
-            axis("share (%)", label_size=18, size=40, space=22),
-            level_axis((100.0,), "limit", NEUTRAL),
-            height=LOAD_HEIGHT,
+            (vertical, level_axis((100.0,), "limit", NEUTRAL)),
+            LOAD_HEIGHT,
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -333,9 +328,7 @@ class LoadPlot:
             columns = blank_columns(2, (0.0, LEAST_TOP))
         else:
             columns = load_columns(loads, journey.at)
-        yield from time_updates(self._chart, columns)
-        # It does not wait for a path, as those of margins and folds.
-        yield self._chart, "visible", has_limits(frame.state.design)
+        yield from self._chart.show(columns, is_visible=has_limits(frame.state.design))
 
 
 def load_columns(loads: JourneyLoads, now: float) -> tuple[NDArray[Any], ...]:

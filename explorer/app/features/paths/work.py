@@ -36,19 +36,11 @@ class PlanRequest:
 
 def plan(request: PlanRequest) -> PlannedPath:
     """Return a path between two poses, see `explorer.paths.planning`."""
-    design, start, load = request.design, request.start, request.load
-    weights = None
+    design, ends, load = request.design, (request.start, request.goal), request.load
+    weights = own = None
     if load is not None:
-        own = None
         if request.weighed == "payload and legs":
             own = weights_of_parts(WeightsRequest(design, request.density))
-        weights = LoadedPose(design, start, load, own, request.weighed != "none").weights
-    return plan_path(
-        design,
-        start,
-        request.goal,
-        seconds=request.seconds,
-        tool=request.tool,
-        load=load,
-        weights=weights,
-    )
+        weights = LoadedPose(design, ends[0], load, own, request.weighed != "none").weights
+    seconds, tool = request.seconds, request.tool
+    return plan_path(design, *ends, seconds=seconds, tool=tool, load=load, weights=weights)

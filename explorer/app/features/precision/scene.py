@@ -11,17 +11,9 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import Loads
 from explorer.app.features.forces.scene import tool_point
 from explorer.app.features.mechanism.bodies import platform_plate
+from explorer.app.scene import shapes
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.placing import Placed, ScenePart, round_step
-from explorer.app.scene.shapes import (
-    NO_MESH,
-    Balls,
-    Rods,
-    add_label,
-    add_lines,
-    add_translucent,
-    linear_colour,
-)
 from explorer.app.widgets.assigning import Update
 from explorer.measures.blocks.precision import DIGITS
 from explorer.numerics.arrays import FloatArray
@@ -80,13 +72,15 @@ class DeflectedScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene, self._loads = services.scene, services.get(Loads)
-        self._plate = add_translucent(
-            scene, "/precision/platform", NO_MESH, PLATE_OPACITY, colour=DEFLECTED
+        self._plate = shapes.add_translucent(
+            scene, "/precision/platform", shapes.NO_MESH, PLATE_OPACITY, colour=DEFLECTED
         )
-        self._legs = Rods(scene, "/precision/legs", [linear_colour(DEFLECTED)] * (2 + 2 * PIECES))
-        self._balls = Balls(scene, "/precision/balls", [linear_colour(DEFLECTED)] * 5)
-        self._way = add_lines(scene, "/precision/way", 1, DEFLECTED, 2.5)
-        self._label = add_label(scene, "/precision/label", "0 mm", visible=False)
+        self._legs = shapes.Rods(
+            scene, "/precision/legs", [shapes.linear_colour(DEFLECTED)] * (2 + 2 * PIECES)
+        )
+        self._balls = shapes.Balls(scene, "/precision/balls", [shapes.linear_colour(DEFLECTED)] * 5)
+        self._way = shapes.add_lines(scene, "/precision/way", 1, DEFLECTED, 2.5)
+        self._label = shapes.add_label(scene, "/precision/label", "0 mm", visible=False)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the deflection of this frame."""

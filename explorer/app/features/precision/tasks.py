@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from explorer.export.tables import tolerance_csv
-from explorer.measures.size import PositionSet, positions_over
+from explorer.measures.box import PositionSet, positions_over
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
-from explorer.statics.budget.allocation import ToleranceBudget, costs_or_budget
-from explorer.statics.budget.costs import SourceCosts
+from explorer.statics.budget import SourceCosts, ToleranceBudget, source_costs, tolerance_budget
 
 
 @dataclass(frozen=True)
@@ -57,18 +57,15 @@ def budget_of(request: BudgetRequest) -> BudgetDrawing:
         ExplorerError: Errors are infinite at the positions, no position is within the limits, or
             the errors of the actuators alone exceed what is wanted.
     """
-    design, tool = request.design, request.design.tool.position
-    positions = positions_over(design, request.over, request.pose, request.box)
-    costs, found = costs_or_budget(
-        design,
-        positions,
-        request.pose.rotation,
-        request.wanted,
-        request.wanted_turn,
-        tool=tool,
-        keep_actuators=request.keep_actuators,
+    design, pose = request.design, request.pose
+    positions = positions_over(design, request.over, pose, request.box)
+    at = Configuration(design, positions, pose.rotation, design.tool.position)
+    if request.wanted is None:
+        return BudgetDrawing(request, source_costs(at), None)
+    found = tolerance_budget(
+        at, request.wanted, request.wanted_turn, keep_actuators=request.keep_actuators
     )
-    return BudgetDrawing(request, costs, found)
+    return BudgetDrawing(request, found.costs, found)
 
 
 def budget_table(request: BudgetRequest) -> bytes:

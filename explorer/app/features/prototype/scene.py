@@ -13,13 +13,12 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import colliding_legs
-from explorer.app.features.prototype.work import PARTS_FEED, Parts, drawn_parts
+from explorer.app.features.prototype.work import PARTS_FEED, Parts, parts_to_draw
 from explorer.app.scene.creases import Drawn
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
-from explorer.app.scene.shapes import NO_MESH
+from explorer.app.scene.shapes import BALL, CARRIAGE, NO_MESH, PLATFORM_BODY, RAIL, ROD, TUBE
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import BALL, CARRIAGE, PLATFORM_BODY, RAIL, ROD, TUBE
-from explorer.measures.size import corners_of
+from explorer.measures.box import corners_of
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import exploded_offsets
@@ -61,7 +60,7 @@ class PrototypeScene(ScenePart):
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the parts of a frame."""
-        view, parts = placed.frame.state.view, drawn_parts(self._feed)
+        view, parts = placed.frame.state.view, parts_to_draw(self._feed)
         for name, node in self._nodes.items():
             switch = view.bodies if name in ON_BODIES or name in BALLS else view.legs
             yield node, "visible", switch and parts is not None
@@ -77,7 +76,7 @@ class PrototypeScene(ScenePart):
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of boxes about the parts."""
-        parts = drawn_parts(self._feed)
+        parts = parts_to_draw(self._feed)
         if parts is None:
             return NO_POINTS
         places, seen = places_of(placed, parts), list[FloatArray]()

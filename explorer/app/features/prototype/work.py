@@ -5,7 +5,6 @@ They are made again when the design changes, not when the pose does.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
@@ -57,40 +56,19 @@ class Line:
         return self.count * density * self.volume * 1e-6
 
 
-@dataclass(frozen=True)
-class PartsList:
-    """Parts and actuators of a prototype."""
-
-    lines: tuple[Line, ...]
-    actuators: tuple[Actuator, ...]
-
-    def mass(self, density: float) -> float:
-        """Return the mass of all parts in grams, at a density in kg/m³."""
-        return sum(line.mass(density) for line in self.lines)
-
-    def moving_mass(self, density: float) -> float:
-        """Return the mass of all but the base in grams, at a density in kg/m³."""
-        return sum(line.mass(density) for line in self.lines if line.kind != "base")
-
-
-def parts_list(prototype: Prototype) -> PartsList:
+def lines_of(prototype: Prototype) -> tuple[Line, ...]:
     """Return the list of a prototype's parts, one line for those that are alike."""
     bill = bill_of_materials(prototype, 1.0)
     lines: dict[object, Line] = {}
     for part, item in zip(prototype.parts, bill.items, strict=True):
         stock = stock_of(part, prototype.design.unit_mm)
-        rounded = (
-            round(value, DIGITS - 1 - math.floor(math.log10(value)))
-            for value in (item.volume, *stock)
-        )
-        key = part.kind, *rounded
+        key = part.kind, *(f"{value:.{DIGITS - 1}e}" for value in (item.volume, *stock))
         legs = lines[key].legs if key in lines else ()
         leg = part.name.partition(" ")[2]
         if leg:
             legs = (*legs, int(leg))
         lines[key] = Line(part.kind, legs, stock, item.volume)
-    in_order = sorted(lines.values(), key=lambda line: ORDER.index(line.kind))
-    return PartsList(tuple(in_order), bill.actuators)
+    return tuple(sorted(lines.values(), key=lambda line: ORDER.index(line.kind)))
 
 
 def stock_of(part: Part, unit_mm: float) -> tuple[float, ...]:
@@ -114,11 +92,19 @@ class PartsRequest:
 
 @dataclass(frozen=True)
 class Parts:
-    """The parts of a design, with their meshes in their order and frames, in design units."""
+    """The parts of a design, and their list.
+
+    Attributes:
+        prototype: The parts.
+        meshes: Meshes of the parts in their order and frames, in design units.
+        lines: Lines of the list of parts.
+        actuators: The actuators.
+    """
 
     prototype: Prototype
     meshes: tuple[Drawn, ...]
-    listed: PartsList
+    lines: tuple[Line, ...]
+    actuators: tuple[Actuator, ...]
 
     @cached_property
     def floor(self) -> float:
@@ -133,7 +119,8 @@ def parts_drawing(request: PartsRequest) -> Parts | ExplorerError:
     except ExplorerError as error:
         return error
     meshes = tuple(with_creases(part.vertices, part.faces) for part in prototype.parts)
-    return Parts(prototype, meshes, parts_list(prototype))
+    actuators = bill_of_materials(prototype, 1.0).actuators
+    return Parts(prototype, meshes, lines_of(prototype), actuators)
 
 
 def _request_for(frame: Frame) -> PartsRequest | None:
@@ -146,7 +133,7 @@ PartsFeed: TypeAlias = Feed[PartsRequest, Parts | ExplorerError]
 PARTS_FEED = feed_of(parts_drawing, _request_for)
 
 
-def drawn_parts(feed: PartsFeed) -> Parts | None:
+def parts_to_draw(feed: PartsFeed) -> Parts | None:
     """Return the parts to draw; None while there are none or none are requested."""
     return feed.drawing if isinstance(feed.drawing, Parts) else None
 
@@ -159,11 +146,6 @@ def export_assembly(design: Design, file_format: str) -> bytes:
     """
     from explorer.export.assembly import assembly_bytes
 
-    if file_format == "step":
-        from explorer.export.step import assembly_step
-        from explorer.prototype.fitting import sizes_of
-
-        return assembly_step(sizes_of(design))
     return assembly_bytes(make_prototype(design), file_format)
 
 

@@ -11,16 +11,9 @@ import viser
 
 from explorer.app.browser.downloads import File
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
-from explorer.app.features.mechanism.marks import HANDLE_NAME
+from explorer.app.features.optimise.state import Optimisation
+from explorer.app.features.sharing import scene_files
 from explorer.app.features.sharing.reporting import ReportFormat, make_report
-from explorer.app.features.sharing.scene_html import FileCamera, scene_html
-from explorer.app.features.sharing.view_picture import (
-    LEAST,
-    MOST,
-    check_size,
-    scaled_size,
-    view_picture,
-)
 from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
@@ -52,9 +45,9 @@ def send_picture(
     """
 
     def make(client: viser.ClientHandle) -> File:
-        sides = check_size(*size) if isinstance(size, tuple) else scaled_size(client, size)
+        sides = scene_files.picture_size(client, size)
         background = None if transparent else BACKGROUNDS[services.theme.is_dark]
-        data = view_picture(client, sides, background, without=(HANDLE_NAME,))
+        data = scene_files.view_picture(client, sides, background)
         return f"{services.session.state.design.name}-{sides[0]}x{sides[1]}.png", data
 
     services.downloads.make(who, "Drawing the picture", make)
@@ -65,7 +58,8 @@ def send_scene(services: Services, who: Who) -> None:
 
     def make(client: viser.ClientHandle) -> File:
         state, date = services.session.latest_state(), dt.datetime.now().astimezone().date()
-        data = scene_html(services.server, state, FileCamera.of(client), date=date)
+        camera = scene_files.FileCamera.of(client)
+        data = scene_files.scene_html(services.server, state, camera, date=date)
         return f"{state.design.name}-scene.html", data
 
     services.downloads.make(who, "Packing the scene", make)
@@ -78,7 +72,7 @@ def send_report(services: Services, file_format: ReportFormat, who: Who) -> None
         who,
         f"{state.design.name}-report.{file_format}",
         make_report,
-        (state.design, state.pose, state.optimisation.record, file_format),
+        (state.design, state.pose, Optimisation.of(state).record, file_format),
         ("Writing the report", "This takes some seconds."),
     )
 
@@ -98,14 +92,14 @@ class ExportDialog:
         buttons.on(PRESS, lambda value, client: sends[value](client.client_id), values=sends)
         gui.add_html(box("".join(_row(each) for each in services.exports)))
         with gui.add_folder("Picture of another size", expand_by_default=False):
-            hint = f"{LEAST} to {MOST} pixels."
+            least, most = scene_files.LEAST, scene_files.MOST
+            hint = f"{least} to {most} pixels."
             sides = [
-                gui.add_number(f"{side} (px)", pixels, min=LEAST, max=MOST, step=1, hint=hint)
+                gui.add_number(f"{side} (px)", pixels, min=least, max=most, step=1, hint=hint)
                 for side, pixels in (("Width", 1600), ("Height", 1200))
             ]
-            transparent = gui.add_checkbox(
-                "Transparent", initial_value=False, hint="Leave out the background."
-            )
+            hint = "Leave out the background."
+            transparent = gui.add_checkbox("Transparent", initial_value=False, hint=hint)
             button = gui.add_button(
                 "Download picture",
                 icon=viser.Icon.PHOTO,

@@ -11,7 +11,7 @@ from typing import Literal
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
-from explorer.optimise.record import Record
+from explorer.optimise.outcome import Record
 
 ReportFormat = Literal["html", "pdf"]
 
@@ -37,10 +37,11 @@ def make_report(
         MissingExtraError: PDF without Playwright or a Chromium.
         PictureError: The browser did not start.
     """
-    from explorer.export.report.data import gather_report_data
+    from explorer.export.report.data import ReportData
     from explorer.export.report.document import report_html
 
-    html = report_html(gather_report_data(design, pose, record), date or dt.date.today())
+    data = ReportData(design, pose=pose, record=record)
+    html = report_html(data, date or dt.date.today())
     if file_format == "html":
         return html.encode()
     # Playwright refuses calls on a thread with an event loop, such as a notebook's.

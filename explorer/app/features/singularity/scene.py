@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.bodies import platform_plate
+from explorer.app.features.mechanism import bodies
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import NO_MESH, add_label, add_lines, add_translucent, sphere
+from explorer.app.scene.shapes import GHOST, NO_MESH, add_label, add_lines, add_translucent, sphere
 from explorer.app.session.clock import Timer, now
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.colours import GHOST
 from explorer.measures.blocks.block import Number
 from explorer.measures.blocks.singularity import finite_gain
 from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import FAR, SINGULAR, Rgb, proximity_colour
 from explorer.singularity.freedoms import FreeTurn
@@ -57,29 +54,18 @@ class PlatformGhost:
         )
         self._legs = add_lines(scene, f"{name}/legs", 4, GHOST, 1.5)
 
-    def show(self, visible: bool) -> Iterator[Update]:
+    def show(self, visible: bool) -> Updates:
         """Yield the updates that show or hide the ghost."""
         yield self._plate, "visible", visible
         yield self._legs, "visible", visible
 
-    def draw(self, placed: Placed, pose: Pose) -> Iterator[Update]:
+    def draw(self, placed: Placed, pose: Pose) -> Updates:
         """Yield the updates that draw the ghost in a pose."""
-        vertices, faces = platform_plate(placed)
-        yield self._plate, "vertices", vertices.astype(np.float32)
-        yield self._plate, "faces", faces.astype(np.uint32)
+        yield from bodies.draw_mesh(self._plate, bodies.platform_plate(placed))
         yield self._plate, "position", tuple((placed.scale * np.array(pose.position)).tolist())
         yield self._plate, "wxyz", pose.quaternion
-        tips = platform_tips(placed, pose)
-        bases = np.zeros((4, 3))
-        bases[1:3, 0] = tips[1:3, 0]
-        bases[3] = placed.points["a3"]
-        yield self._legs, "points", np.stack([bases, tips], axis=1).astype(np.float32)
-
-
-def platform_tips(placed: Placed, pose: Pose) -> FloatArray:
-    """Return b1 to b4 in a pose, in scene units, shape (4, 3)."""
-    local = np.array(list(placed.platform_points.values()))
-    return placed.scale * np.array(pose.position) + local @ pose.rotation.T
+        joints = bodies.platform_joints(placed, np.array([pose.position]), pose.rotation[None])
+        yield self._legs, "points", bodies.leg_lines(placed, joints).astype(np.float32)
 
 
 class NearestGhost(ScenePart):
@@ -91,7 +77,7 @@ class NearestGhost(ScenePart):
         self._displacements = add_lines(scene, "/nearest/ways", 4, SINGULAR, 3.0)
         self._label = add_label(scene, "/nearest/label", "δ1 = 0", visible=False)
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the singular pose of this frame."""
         nearest = chosen_ghost(placed)
         yield from self._ghost.show(nearest is not None)
@@ -99,8 +85,9 @@ class NearestGhost(ScenePart):
             yield handle, "visible", nearest is not None
         if nearest is None:
             return
-        yield from self._ghost.draw(placed, nearest.pose)
-        tips = platform_tips(placed, nearest.pose)
+        pose = nearest.pose
+        yield from self._ghost.draw(placed, pose)
+        (tips,) = bodies.platform_joints(placed, np.array([pose.position]), pose.rotation[None])
         here = np.array([placed.points[name] for name in placed.platform_points])
         yield self._displacements, "points", np.stack([here, tips], axis=1).astype(np.float32)
         distance = format_number(nearest.distance, size=placed.frame.state.design.reach)
@@ -110,14 +97,11 @@ class NearestGhost(ScenePart):
 
 def chosen_ghost(placed: Placed) -> NearestSingularity | None:
     """Return the singular pose that the view requests; None if it is the present one."""
-    ghost = placed.frame.state.view.singular.ghost
+    ghost, poses = placed.frame.state.view.singular.ghost, placed.frame.snapshot.nearest
     if ghost == "none":
         return None
-    poses = placed.frame.snapshot.nearest
-    if ghost == "nearest":
-        chosen = min(poses, key=lambda pose: pose.distance)
-    else:
-        chosen = poses[int(ghost[1]) - 1]
+    is_any = ghost == "nearest"
+    chosen = min(poses, key=lambda pose: pose.distance) if is_any else poses[int(ghost[1]) - 1]
     return chosen if chosen.distance > 0.0 else None
 
 
@@ -127,23 +111,19 @@ class EllipsoidScene(ScenePart):
     def __init__(self, services: Services) -> None:
         self._ellipsoid = Ellipsoid(services.scene, "/ellipsoid")
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ellipsoid of this frame."""
         kind = placed.frame.state.view.singular.ellipsoid
         yield from self._ellipsoid.show(kind != "none")
         if kind == "none":
             return
         gains = placed.frame.performance.translation
-        gain = gains.velocity if kind == "speed" else gains.force
-        colour, unit = (SPEED, SPEED_UNIT) if kind == "speed" else (FORCE, FORCE_UNIT)
+        gain, colour, unit = gains.gain, SPEED, SPEED_UNIT
+        if kind == "force":
+            gain, colour, unit = gains.force, FORCE, FORCE_UNIT
         words = f"{kind} ≤ {Number(finite_gain(float(gain.max())), digits=3).text} per unit"
-        lengths = drawn_axes(gain, unit)
+        lengths = np.clip(unit * gain, THINNEST, LONGEST)
         yield from self._ellipsoid.draw(placed.point, gains.axes, lengths, colour, words)
-
-
-def drawn_axes(gain: FloatArray, unit: float) -> FloatArray:
-    """Return the semi-axes to draw for gains, in scene units, within the drawn lengths."""
-    return np.clip(unit * gain, THINNEST, LONGEST)
 
 
 class BallScene(ScenePart):
@@ -163,7 +143,7 @@ class BallScene(ScenePart):
         self._line = add_lines(scene, "/ball/radius", 1, SINGULAR, 2.5)
         self._label = add_label(scene, "/ball/label", "δ1 = 0", visible=False)
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ball of this frame."""
         frame = placed.frame
         is_visible = frame.state.view.singular.ball and not frame.snapshot.is_singular
@@ -203,7 +183,6 @@ class _Swing:
 
     @property
     def angle(self) -> float:
-        """The angle of the ghost at present, in radians."""
         points = self.frame.snapshot.points
         arms = np.array([points.b1, points.b2, points.b3, points.b4]) - self.turn.point
         longest = float(np.linalg.norm(np.cross(arms, self.turn.direction), axis=1).max())
@@ -237,7 +216,7 @@ class FreeMotion(ScenePart):
             )
         services.at_end(lambda: setattr(self, "_swing", None))
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the motion at this time."""
         self._frame, swing = placed.frame, self._swing
         if swing is not None and (swing.is_over or not swing.is_of(placed.frame.state)):

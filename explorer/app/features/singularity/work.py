@@ -6,17 +6,17 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from explorer.app.session.feed import Feed, feed_of
-from explorer.app.state.action import Action
-from explorer.app.state.actions import move_to
+from explorer.app.state.actions import Action, move_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
 from explorer.singularity.nearest import nearest_singularities
-from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_stratum, seen_stratum
-from explorer.singularity.strata import Stratum, codimension, describe_stratum
+from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_stratum
+from explorer.singularity.strata import Stratum, codimension, describe_stratum, stratum_of
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class GoToStratum(Action):
                 "generic poses lie arbitrarily close to every pose; choose a singular stratum, or "
                 "move any margin off zero"
             )
-        here = seen_stratum(state.design, state.pose)
+        here = stratum_of(Configuration.at(state.design, state.pose))
         if here == goal:
             raise InputError(
                 f"the pose lies in {stratum_name(goal)} already: {describe_stratum(goal)}"
@@ -89,29 +89,20 @@ def stratum_name(stratum: Stratum) -> str:
     return f"({', '.join(map(str, stratum))})"
 
 
-@dataclass(frozen=True)
-class StrataRequest:
-    """A request for the distances of a pose to all strata."""
-
-    design: Design
-    pose: Pose
-
-
-def strata_distances(request: StrataRequest) -> dict[Stratum, float]:
-    """Return the distances of a pose to all strata, in design units.
+def strata_distances(request: tuple[Design, Pose]) -> dict[Stratum, float]:
+    """Return the distances of a design in a pose to all strata, in design units.
 
     A distance is the root-mean-square displacement of b1 to b4 to the nearest pose in the stratum.
     """
-    poses = nearest_in_strata(request.design, request.pose)
-    return {stratum: pose.distance for stratum, pose in poses.items()}
+    return {stratum: pose.distance for stratum, pose in nearest_in_strata(*request).items()}
 
 
-def _request_for(frame: Frame) -> StrataRequest | None:
+def _request_for(frame: Frame) -> tuple[Design, Pose] | None:
     if not frame.state.view.singular.strata and not frame.snapshot.is_singular:
         return None
-    return StrataRequest(frame.state.design, frame.state.pose)
+    return frame.state.design, frame.state.pose
 
 
-StrataFeed: TypeAlias = Feed[StrataRequest, dict[Stratum, float]]
+StrataFeed: TypeAlias = Feed[tuple[Design, Pose], dict[Stratum, float]]
 STRATA_FEED = feed_of(strata_distances, _request_for)
 """The distances to the strata, for the diagram; at a singular pose the list needs some too."""

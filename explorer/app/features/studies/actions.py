@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Open
+from explorer.app.features.studies.state import Brush, Studies, label_of
+from explorer.app.state.actions import Action, Open
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
-from explorer.app.state.studies import Brush, Studies, label_of
 from explorer.errors import InputError
 from explorer.numerics.number_text import format_number
 
@@ -26,9 +25,9 @@ class OpenStudy(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state, without the brushes and the pick of another study."""
-        if self.name == state.studies.name:
+        if self.name == Studies.of(state).name:
             return state
-        return replace(state, studies=Studies(name=self.name, plan=state.studies.plan))
+        return replace(state, studies=Studies(name=self.name, plan=Studies.of(state).plan))
 
     def words(self) -> str:
         """Return what the action does."""
@@ -47,7 +46,7 @@ class BrushAxes(Action):
         Raises:
             InputError: Too many ranges, or one without numbers.
         """
-        studies = state.studies
+        studies = Studies.of(state)
         for brush in self.brushes:
             _check_ranges(brush)
             studies = studies.with_ranges(brush.axis, brush.ranges)
@@ -61,7 +60,7 @@ class BrushAxes(Action):
 
 def free_axes(state: State) -> BrushAxes:
     """Return the action that frees all axes."""
-    return BrushAxes(tuple(Brush(brush.axis, ()) for brush in state.studies.brushes))
+    return BrushAxes(tuple(Brush(brush.axis, ()) for brush in Studies.of(state).brushes))
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ class PickDesign(Open):
         Raises:
             InputError: The design is being optimised, or another study is open by now.
         """
-        if state.studies.name != self.study:
+        if Studies.of(state).name != self.study:
             raise InputError(f"the study {self.study!r} is not open any more")
         return with_value(super().apply(state), "studies.picked", self.index)
 

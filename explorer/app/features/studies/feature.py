@@ -5,6 +5,7 @@ from __future__ import annotations
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab
+from explorer.app.features.studies.folders import study_folders
 from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.features.studies.words import BUTTONS
 from explorer.app.features.studies.work import study_runner
@@ -40,5 +41,5 @@ STUDIES = Feature(
     "studies",
     tabs=(Tab("work", "Studies", StudiesPanel, viser.Icon.CHART_DOTS),),
     bar=(InBar("right", StudyChip),),
-    is_offered=lambda services: services.studies is not None,
+    is_offered=lambda services: services.has(study_folders),
 )

@@ -12,20 +12,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
-from explorer.app.features.studies.figures import encode, parallel, scatter
-from explorer.app.features.studies.plot_rows import PlotRows, select_rows, sort_front
+from explorer.app.features.studies.figures import Figure, PlotRows, parallel, scatter, select_rows
+from explorer.app.features.studies.folders import StudyFolders, study_in
+from explorer.app.features.studies.state import Studies, StudyPlan
 from explorer.app.session.latest import LatestWins
 from explorer.app.state.frame import Frame
-from explorer.app.state.studies import Studies, StudyPlan
-from explorer.app.storage.study_folders import StudyFolders, study_in
 from explorer.errors import ExplorerError, InputError
 from explorer.numerics.arrays import BoolArray, IntArray
 from explorer.numerics.number_text import format_number
 from explorer.sweep.parts import pyarrow
-from explorer.sweep.results import Results, load_results
-from explorer.sweep.rows import columns_of
+from explorer.sweep.results import Results, costs, load_results
 from explorer.sweep.study import Study
 
 MOST_ON_PAGE = 100_000
@@ -35,14 +34,14 @@ NO_PLAN = StudyPlan()
 
 
 class PlotJson:
-    """A figure that is JSON already, in the form that viser takes."""
+    """A figure in the form that viser takes, encoded at once."""
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self, figure: Figure) -> None:
+        self._text = msgspec.json.encode(figure).decode()
 
     def to_json(self) -> str:
         """Return the figure as JSON."""
-        return self.text
+        return self._text
 
 
 @dataclass(frozen=True)
@@ -160,7 +159,7 @@ class StudyFeed:
 
     def follow(self, frame: Frame, *, dark: bool = False) -> None:
         """Draw the study of a frame, unless it is drawn already."""
-        studies = frame.state.studies
+        studies = Studies.of(frame.state)
         if studies.name is None:
             self._request = self._drawing = self.problem = None
             return
@@ -202,18 +201,14 @@ class StudyFeed:
 
     def _draw(self, request: Request) -> StudyDrawing:
         results, front = self._results(str(request.studies.name), request.version)
-        seen = select_rows(results, front, request.studies)
-        if seen is None:
-            plots, inside = None, np.ones(results.count, dtype=np.bool_)
-        else:
+        seen, plots = select_rows(results, front, request.studies), None
+        inside = np.ones(results.count, dtype=np.bool_) if seen is None else seen.inside
+        if seen is not None:
             revision = next(self._revision)
-            plots, inside = (
-                (
-                    PlotJson(encode(parallel(seen, revision, dark=request.dark))),
-                    PlotJson(encode(scatter(seen, revision, dark=request.dark))),
-                ),
-                seen.inside,
+            lines, points = (
+                draw(seen, revision, dark=request.dark) for draw in (parallel, scatter)
             )
+            plots = PlotJson(lines), PlotJson(points)
         ordered = sort_front(results, front)
         return StudyDrawing(request, results, ordered, inside, seen, plots, reasons(results))
 
@@ -239,14 +234,7 @@ def results_in(folder: Path) -> Results:
             f"{study.name} has {format_number(study.count)} designs and the page shows studies of "
             f"up to {format_number(MOST_ON_PAGE)}; explorer sweep --summary prints its front"
         )
-    try:
-        return load_results(folder)
-    except InputError:
-        if any(folder.glob("part-*")):
-            raise
-    types = {"count": np.int64, "number": np.float64, "flag": np.float64, "text": object}
-    kinds = columns_of(study)
-    return Results(study, {name: np.zeros(0, dtype=types[kind]) for name, kind in kinds.items()})
+    return load_results(folder, study)
 
 
 def reasons(results: Results) -> tuple[tuple[str, str, int], ...]:
@@ -258,3 +246,17 @@ def reasons(results: Results) -> tuple[tuple[str, str, int], ...]:
     )
     counted = Counter((str(status), str(reason or "")) for status, reason in pairs)
     return tuple((*pair, count) for pair, count in counted.most_common())
+
+
+def sort_front(results: Results, front: BoolArray) -> IntArray:
+    """Return the rows on the front, the best in the first objective first.
+
+    Args:
+        results: All rows.
+        front: Whether each row is on the front, shape (n,).
+    """
+    rows = np.flatnonzero(front)
+    if not len(rows):
+        return rows
+    first = costs(results.columns, results.study.objectives[:1])[rows, 0]
+    return rows[np.argsort(first, kind="stable")]

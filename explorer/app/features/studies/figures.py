@@ -1,6 +1,7 @@
-"""The two plots of a study as plain data for Plotly, made without Plotly itself.
+"""The two plots of a study as plain data for Plotly, limited to what a browser can draw.
 
-Numbers go as pack arrays (`bdata`), which is a tenth of the work of text.
+They are made without Plotly itself. Numbers go as pack arrays (`bdata`), which is a tenth of the
+work of text.
 """
 
 from __future__ import annotations
@@ -8,18 +9,35 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.app.features.studies.plot_rows import PlotRows
-from explorer.app.state.studies import Range, label_of, short_title_of, title_of, unit_of
-from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.app.features.studies.state import (
+    Range,
+    Studies,
+    label_of,
+    short_title_of,
+    title_of,
+    unit_of,
+    within,
+)
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.number_text import format_number
+from explorer.sweep.results import Results
 
 Figure: TypeAlias = dict[str, Any]
+
+MOST_ROWS = 5000
+"""Largest number of rows drawn; of more rows, the front and some of the others."""
+
+# Statuses of designs that have measures.
+MEASURED = ("done", "not converged")
+
+# Least spread of an axis as a share of the size of its values; one with less is left out.
+NO_SPREAD = 1e-9
 
 # With more points than this the graphics processor draws the scatter plot.
 MOST_AS_SVG = 1500
@@ -48,6 +66,119 @@ OTHERS, ON_FRONT, ON_PICKED = 0.8, 0.9, 1.0
 MOST_LEVEL, TILT = 7, 24
 # Widths of a character of a title and of a scroll bar, in pixels.
 CHARACTER, SCROLL_BAR = 6.2, 14
+
+
+@dataclass(frozen=True)
+class PlotRows:
+    """Rows and axes of the plots of a study.
+
+    Attributes:
+        results: All rows.
+        front: Whether each row is on the Pareto front, shape (n,).
+        inside: Whether each row lies within all brushes, shape (n,).
+        studies: Open study, brushes, axes and pick.
+        axes: Variables and measures that differ between rows.
+        across, up: Axes of the scatter plot, from left to right and from bottom to top.
+        colour: Axis that colours the plots.
+        rows: Rows with values on both axes of the scatter plot, ascending.
+        lines: Rows with values on all axes of the parallel lines, ascending.
+        count: Number of rows with values on both axes of the scatter plot, drawn or not.
+        lacking: Number of measured rows without a line, and the axes that they lack.
+        picked: Row of the picked design, none or one, shape (0 or 1,).
+    """
+
+    results: Results
+    front: BoolArray
+    inside: BoolArray
+    studies: Studies
+    axes: tuple[str, ...]
+    across: str
+    up: str
+    colour: str
+    rows: IntArray
+    lines: IntArray
+    count: int
+    lacking: tuple[int, tuple[str, ...]]
+    picked: IntArray
+
+    def column(self, name: str) -> FloatArray:
+        """Return the values of all rows."""
+        return np.asarray(self.results.columns[name], dtype=np.float64)
+
+
+def select_rows(results: Results, front: BoolArray, studies: Studies) -> PlotRows | None:
+    """Return the rows and axes of the plots; None while there is nothing to draw.
+
+    Args:
+        results: All rows.
+        front: Whether each row is on the Pareto front, shape (n,).
+        studies: Open study, brushes, axes and pick.
+    """
+    columns, study = results.columns, results.study
+    is_measured = np.isin(columns["status"].astype(str), MEASURED)
+    has_value = {
+        name: is_measured & np.isfinite(np.asarray(columns[name], dtype=np.float64))
+        for name in (*study.varied, *study.measures)
+    }
+    axes = tuple(name for name, rows in has_value.items() if _has_spread(columns[name][rows]))
+    if len(axes) < 2:
+        return None
+    # Without a choice: the first objectives, then measures, then variables.
+    objectives = [objective.measure for objective in study.objectives]
+    order = dict.fromkeys((*objectives, *study.measures, *study.varied))
+    first, second = [name for name in order if name in axes][:2]
+    across = studies.across if studies.across in axes else first
+    up = studies.up if studies.up in axes else second
+    on_lines = np.all([has_value[name] for name in axes], axis=0)
+    points, lines = np.flatnonzero(has_value[across] & has_value[up]), np.flatnonzero(on_lines)
+    picked = np.flatnonzero(columns["index"] == (-1 if studies.picked is None else studies.picked))
+    keep = front.copy()
+    keep[picked] = True
+    return PlotRows(
+        results,
+        front,
+        within(columns, studies.brushes),
+        studies,
+        axes,
+        across,
+        up,
+        studies.colour if studies.colour in axes else first,
+        thin_out(points, keep[points], MOST_ROWS),
+        thin_out(lines, keep[lines], MOST_ROWS),
+        len(points),
+        (
+            int((is_measured & ~on_lines).sum()),
+            tuple(name for name in axes if (is_measured & ~has_value[name]).any()),
+        ),
+        picked,
+    )
+
+
+def thin_out(rows: IntArray, keep: BoolArray, most: int) -> IntArray:
+    """Return at most `most` rows, ascending, preferring those to keep.
+
+    Args:
+        rows: Rows, ascending, shape (n,).
+        keep: Whether each is to stay, shape (n,); they are thinned out too if more than `most`.
+        most: Largest number of rows returned.
+    """
+    if len(rows) <= most:
+        return rows
+    kept = _spread(rows[keep], most)
+    others = _spread(rows[~keep], most - len(kept))
+    return np.sort(np.concatenate([kept, others]))
+
+
+def _spread(rows: IntArray, most: int) -> IntArray:
+    """Return at most so many of some rows, evenly from the first to the last."""
+    if len(rows) <= most:
+        return rows
+    return rows[np.linspace(0, len(rows) - 1, max(most, 0)).round().astype(np.int64)]
+
+
+def _has_spread(values: FloatArray) -> bool:
+    low, high = _ends(values)
+    return len(values) > 0 and high - low > NO_SPREAD * max(abs(low), abs(high))
 
 
 def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
@@ -137,36 +268,21 @@ def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
             "nticks": 5,
         },
     }
+    others = inside & ~front
+    coloured = {"size": 6, "color": pack(colours[others & is_coloured]), **gradient}
+    disc = {"size": 8, "color": FRONT, "line": {"width": 1, "color": PAPER[dark]}}
+    ring: Figure = {"size": 15, "symbol": "circle-open", "color": PICKED}
+    ring["line"] = {"width": 3, "color": PICKED}
     traces = [
         _points(plotted, ~inside & ~front, {"size": 5, "color": LEFT_OUT}),
-        _points(
-            plotted,
-            inside & ~front & is_coloured,
-            {"size": 6, "color": pack(colours[inside & ~front & is_coloured]), **gradient},
-        ),
+        _points(plotted, others & is_coloured, coloured),
         _points(plotted, ~inside & front, {"size": 6, "color": FRONT, "opacity": 0.25}),
     ]
     if not is_coloured.all():
-        traces.append(_points(plotted, inside & ~front & ~is_coloured, {"size": 6, "color": PLAIN}))
+        traces.append(_points(plotted, others & ~is_coloured, {"size": 6, "color": PLAIN}))
     if (line := _front_line(plotted)) is not None:
         traces.append(line)
-    traces += [
-        _points(
-            plotted,
-            inside & front,
-            {"size": 8, "color": FRONT, "line": {"width": 1, "color": PAPER[dark]}},
-        ),
-        _points(
-            plotted,
-            is_picked,
-            {
-                "size": 15,
-                "symbol": "circle-open",
-                "color": PICKED,
-                "line": {"width": 3, "color": PICKED},
-            },
-        ),
-    ]
+    traces += [_points(plotted, inside & front, disc), _points(plotted, is_picked, ring)]
     layout = _layout(plotted, "scatter", {"l": 62, "r": 10, "t": 12, "b": 42}, dark=dark)
     layout |= {
         "xaxis": _axis(plotted.across),
@@ -179,11 +295,6 @@ def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
         "shapes": _boxes(plotted),
     }
     return _figure(traces, layout)
-
-
-def encode(figure: Figure) -> str:
-    """Return a figure as JSON."""
-    return msgspec.json.encode(figure).decode()
 
 
 def pack(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:

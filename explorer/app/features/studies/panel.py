@@ -19,19 +19,7 @@ from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
 from explorer.app.features.studies.feed import PlotJson, StudyDrawing
-from explorer.app.features.studies.words import ALONG, BUTTONS, acts, chips, head, legend, table
-from explorer.app.features.studies.work import StudyRun, study_runner
-from explorer.app.inputs.bindings import At, Bound
-from explorer.app.inputs.control import Control
-from explorer.app.inputs.controls import Controls
-from explorer.app.inputs.tracks import Span
-from explorer.app.look import read_script
-from explorer.app.session.session import Who
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Set
-from explorer.app.state.frame import Frame
-from explorer.app.state.state import State
-from explorer.app.state.studies import (
+from explorer.app.features.studies.state import (
     FEWEST,
     LEAST_PERCENT,
     MOST,
@@ -41,20 +29,29 @@ from explorer.app.state.studies import (
     StudyPlan,
     label_of,
 )
+from explorer.app.features.studies.words import ALONG, BUTTONS, acts, chips, head, legend, table
+from explorer.app.features.studies.work import study_runner
+from explorer.app.inputs.control import At, Bound, Control
+from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.ranges import Span
+from explorer.app.look import read_script
+from explorer.app.session.session import Who
+from explorer.app.state.actions import Action, Set
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, PressHandler
-from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import alert, beside
+from explorer.app.widgets.palette import NO_OPTION
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import measures_in
-from explorer.mechanism.design import Design
 from explorer.sweep.study import NAMES
 
 # Height over width.
 PARALLEL_ASPECT, SCATTER_ASPECT = 0.28, 0.42
 HINT = 'Plots of studies need the extra study: pip install "flagged-explorer[study]"'
-EMPTY = '{"data":[],"layout":{}}'
 
+HAS_PLOTLY = find_spec("plotly") is not None
 
 Axis = Literal["across", "up", "colour"]
 AXES: dict[Axis, tuple[str, str]] = {
@@ -62,72 +59,6 @@ AXES: dict[Axis, tuple[str, str]] = {
     "up": ("Up", "Measure or variable from bottom to top in the scatter plot."),
     "colour": ("Coloured by", "Measure or variable that colours the designs in both plots."),
 }
-
-
-class StudyPlots:
-    """Parallel lines and a scatter plot.
-
-    They are added when first needed, since each browser then loads Plotly, some 5 MB.
-
-    Args:
-        services: Services of the page.
-        pick: Function that opens the design with an index in the open study.
-        before: Elements of the tab after which the lines and the points come.
-    """
-
-    def __init__(
-        self,
-        services: Services,
-        pick: Callable[[int, Who], None],
-        before: tuple[viser.GuiHtmlHandle, viser.GuiHtmlHandle],
-    ) -> None:
-        self._server = services.server
-        self._tab = services.tab
-        self._session = services.session
-        self._pick = pick
-        self._before = before
-        services.buttons.on("studies.plot", self._receive)
-        self.handles: tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle] | None = None
-
-    @property
-    def is_possible(self) -> bool:
-        """Whether Plotly is installed."""
-        return find_spec("plotly") is not None
-
-    def updates(self, drawing: StudyDrawing | None) -> Iterator[Update]:
-        """Yield the updates that show a drawing."""
-        plots = None if drawing is None else drawing.plots
-        if plots is not None and self.handles is None and self.is_possible:
-            self.handles = self._add()
-        if self.handles is None:
-            return
-        for handle in self.handles:
-            yield handle, "visible", plots is not None
-        if plots is not None:
-            for handle, plot in zip(self.handles, plots, strict=True):
-                yield handle, "figure", plot
-
-    def _add(self) -> tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle]:
-        gui = self._server.gui
-        # viser only calls `to_json` of a figure.
-        empty = cast("Any", PlotJson(EMPTY))
-        # Each plot comes between the elements before and after it.
-        after_lines, after_points = (handle.order + 0.5 for handle in self._before)
-        with self._tab or contextlib.nullcontext():
-            lines = gui.add_plotly(empty, aspect=PARALLEL_ASPECT, order=after_lines)
-            points = gui.add_plotly(empty, aspect=SCATTER_ASPECT, order=after_points)
-        run_script(self._server, read_script("plots"))
-        return lines, points
-
-    def _receive(self, line: str, client: viser.ClientHandle) -> None:
-        event = event_of(line)
-        # An event in the plot of another study is out of date.
-        if event is None or event.study != self._session.state.studies.name:
-            return
-        if event.index is not None:
-            self._pick(event.index, client.client_id)
-        elif event.brushes:
-            self._session.do(BrushAxes(event.brushes), who=client.client_id)
 
 
 class PlotEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -158,7 +89,7 @@ class StudiesPanel:
     def __init__(self, services: Services) -> None:
         gui, session, none = services.gui, services.session, (NO_OPTION,)
         gui.add_html(beside(2))
-        self._services = services
+        self._services, self._tab = services, services.tab
         self._session = session
         self._complain = services.complain
         # Whether a new study was asked for while another is open.
@@ -172,7 +103,7 @@ class StudiesPanel:
             session,
             self.choice,
             Bound(
-                lambda frame: frame.state.studies.name or NO_OPTION,
+                lambda frame: Studies.of(frame.state).name or NO_OPTION,
                 lambda _, name: OpenStudy(None if name == NO_OPTION else name),
             ),
         )
@@ -186,21 +117,22 @@ class StudiesPanel:
         self._axes: list[tuple[viser.GuiDropdownHandle[str], Control[str]]] = []
         for axis, (label, hint) in AXES.items():
             handle = gui.add_dropdown(label, none, hint=hint, visible=False)
-            bound = Bound(self._read_axis(axis), self._write_axis(axis))
-            self._axes.append((handle, Control[str](session, handle, bound)))
+            self._axes.append((handle, Control[str](session, handle, self._bind_axis(axis))))
         self.legend = gui.add_html("")
         points_after = gui.add_html(beside(2, wide=True))
-        self.plots = StudyPlots(services, self.pick, (lines_after, points_after))
+        self._plots_after = lines_after, points_after
+        self.plots: tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle] | None = None
         self.table = gui.add_html("")
         self.runner = services.get(study_runner)
         self.feed = self.runner.feed
+        services.buttons.on("studies.plot", self._receive)
         self._add_buttons(services.buttons)
         self._key: tuple[object, ...] = ()
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
         self.feed.follow(frame, dark=self._services.theme.is_dark)
-        studies, drawing, run = frame.state.studies, self.feed.drawing, self.runner.run
+        studies, drawing, run = Studies.of(frame.state), self.feed.drawing, self.runner.run
         names = (NO_OPTION, *dict.fromkeys((*self.feed.names, *filter(None, (studies.name,)))))
         yield self.choice, "options", names
         yield from self._control.updates(frame)
@@ -215,12 +147,26 @@ class StudiesPanel:
         yield self.form, "visible", is_new
         yield from self._controls.updates(frame)
         # The texts are made again only after a change.
-        design = frame.state.design
-        key = (drawing, studies, run, self.feed.problem, is_new, design)
+        key = (drawing, studies, run, self.feed.problem, is_new, frame.state.design)
         if len(key) == len(self._key) and all(a is b for a, b in zip(key, self._key, strict=True)):
             return
         self._key = key
-        yield from self._texts(studies, drawing, run, design, is_new=is_new)
+        can_go_on = drawing is not None and not drawing.is_complete
+        yield self._acts, "content", acts(studies, run, is_new=is_new, can_go_on=can_go_on)
+        problem = None
+        if not is_new and self.feed.problem is not None:
+            problem = alert("This study cannot be shown", self.feed.problem)
+        elif not is_new and not HAS_PLOTLY:
+            problem = alert("No plots", HINT)
+        plan = studies.plan if is_new else None
+        lines = head(None if problem else drawing, run, plan, frame.state.design.name)
+        yield self._head, "content", lines + (problem or "")
+        # While a new study is set up, the open one waits.
+        seen = None if is_new else drawing
+        yield from self._plots(seen)
+        yield self.legend, "content", "" if seen is None else legend(seen)
+        yield self.table, "content", "" if seen is None else table(seen)
+        yield self.chips, "content", chips(studies.plan, frame.state.design)
 
     def pick(self, index: int, who: Who) -> None:
         """Open the design with an index in the open study."""
@@ -235,46 +181,48 @@ class StudiesPanel:
         name = str(drawing.request.studies.name)
         self._session.do(PickDesign(design, index=index, study=name), who=who)
 
-    def _texts(
-        self,
-        studies: Studies,
-        drawing: StudyDrawing | None,
-        run: StudyRun | None,
-        design: Design,
-        *,
-        is_new: bool,
-    ) -> Iterator[Update]:
-        can_go_on = drawing is not None and not drawing.is_complete
-        yield self._acts, "content", acts(studies, run, is_new=is_new, can_go_on=can_go_on)
-        problem = None
-        if not is_new and self.feed.problem is not None:
-            problem = alert("This study cannot be shown", self.feed.problem)
-        elif not is_new and not self.plots.is_possible:
-            problem = alert("No plots", HINT)
-        plan = studies.plan if is_new else None
-        lines = head(None if problem else drawing, run, plan, design.name)
-        yield self._head, "content", lines + (problem or "")
-        # While a new study is set up, the open one waits.
-        seen = None if is_new else drawing
-        yield from self.plots.updates(seen)
-        yield self.legend, "content", "" if seen is None else legend(seen)
-        yield self.table, "content", "" if seen is None else table(seen)
-        yield self.chips, "content", chips(studies.plan, design)
+    def _plots(self, drawing: StudyDrawing | None) -> Iterator[Update]:
+        plots = None if drawing is None else drawing.plots
+        if plots is not None and self.plots is None and HAS_PLOTLY:
+            self.plots = self._add_plots()
+        for handle in self.plots or ():
+            yield handle, "visible", plots is not None
+        for handle, plot in zip(self.plots or (), plots or (), strict=False):
+            yield handle, "figure", plot
 
-    def _read_axis(self, axis: Axis) -> Callable[[Frame], str]:
+    def _add_plots(self) -> tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle]:
+        """Add the plots when they are first needed: each browser then loads Plotly, some 5 MB."""
+        gui = self._services.gui
+        # viser only calls `to_json` of a figure.
+        empty = cast("Any", PlotJson({"data": [], "layout": {}}))
+        # Each plot comes between the elements before and after it.
+        after_lines, after_points = (handle.order + 0.5 for handle in self._plots_after)
+        with self._tab or contextlib.nullcontext():
+            lines = gui.add_plotly(empty, aspect=PARALLEL_ASPECT, order=after_lines)
+            points = gui.add_plotly(empty, aspect=SCATTER_ASPECT, order=after_points)
+        run_script(self._services.server, read_script("plots"))
+        return lines, points
+
+    def _receive(self, line: str, client: viser.ClientHandle) -> None:
+        event = event_of(line)
+        # An event in the plot of another study is out of date.
+        if event is None or event.study != Studies.of(self._session.state).name:
+            return
+        if event.index is not None:
+            self.pick(event.index, client.client_id)
+        elif event.brushes:
+            self._session.do(BrushAxes(event.brushes), who=client.client_id)
+
+    def _bind_axis(self, axis: Axis) -> Bound[str]:
         def read(_: Frame) -> str:
-            drawing = self.feed.drawing
-            if drawing is None or drawing.plotted is None:
-                return NO_OPTION
-            return str(getattr(drawing.plotted, axis))
+            plotted = None if self.feed.drawing is None else self.feed.drawing.plotted
+            return NO_OPTION if plotted is None else str(getattr(plotted, axis))
 
-        return read
+        def write(_: State, name: str) -> Action:
+            path, label = f"studies.{axis}", AXES[axis][0]
+            return Set(path, None if name == NO_OPTION else name, label, label_of(name))
 
-    def _write_axis(self, axis: Axis) -> Callable[[State, str], Action]:
-        label, _ = AXES[axis]
-        return lambda _, name: Set(
-            f"studies.{axis}", None if name == NO_OPTION else name, label, label_of(name)
-        )
+        return Bound(read, write)
 
     def _add_new_study(self, gui: viser.GuiApi) -> None:
         self._controls = controls = Controls(gui, self._session)
@@ -301,7 +249,7 @@ class StudiesPanel:
             "cancel": (lambda _, __: self.runner.cancel(), lambda: self.runner.run is not None),
             "continue": (self._go_on, self._can_go_on),
             "new": (self._ask_for_new, lambda: True),
-            "clear": (self._clear, lambda: bool(self._session.state.studies.brushes)),
+            "clear": (self._clear, lambda: bool(Studies.of(self._session.state).brushes)),
         }
         for name, (handle, is_ready) in handlers.items():
             words, hint = BUTTONS[name]
@@ -326,10 +274,10 @@ class StudiesPanel:
     def _start(self, _: str, client: viser.ClientHandle) -> None:
         self._is_new_asked = False
         state = self._session.latest_state()
-        self.runner.start(state.design, state.studies.plan, client.client_id)
+        self.runner.start(state.design, Studies.of(state).plan, client.client_id)
 
     def _go_on(self, _: str, client: viser.ClientHandle) -> None:
-        name = self._session.state.studies.name
+        name = Studies.of(self._session.state).name
         if name is not None:
             self.runner.go_on(name, client.client_id)
 
@@ -350,7 +298,7 @@ class StudiesPanel:
         drawing = self.feed.drawing
         index = None
         if drawing is not None:
-            index = drawing.beside(self._session.state.studies.picked, int(step))
+            index = drawing.beside(Studies.of(self._session.state).picked, int(step))
         if index is not None:
             self.pick(index, client.client_id)
 
@@ -365,7 +313,7 @@ class StudiesPanel:
         def press(name: str, client: viser.ClientHandle) -> None:
             self._session.do(
                 lambda state: Set(
-                    "studies.plan", turn(state.studies.plan, name), "New study", label_of(name)
+                    "studies.plan", turn(Studies.of(state).plan, name), "New study", label_of(name)
                 ),
                 who=client.client_id,
             )

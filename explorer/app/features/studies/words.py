@@ -8,10 +8,8 @@ from html import escape
 import numpy as np
 
 from explorer.app.features.studies.feed import StudyDrawing
-from explorer.app.features.studies.figures import FRONT, PICKED, SCALE
-from explorer.app.features.studies.plot_rows import MOST_ROWS
-from explorer.app.features.studies.work import StudyRun
-from explorer.app.state.studies import (
+from explorer.app.features.studies.figures import FRONT, MOST_ROWS, PICKED, SCALE
+from explorer.app.features.studies.state import (
     RADIUS,
     Studies,
     StudyPlan,
@@ -19,6 +17,7 @@ from explorer.app.state.studies import (
     label_of,
     title_of,
 )
+from explorer.app.features.studies.work import StudyRun
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import box, by_theme, dim, meter
 from explorer.measures.catalogue import measures_in
@@ -27,7 +26,7 @@ from explorer.numerics.arrays import IntArray
 from explorer.numerics.number_text import decimals_for, format_decimals, format_number
 from explorer.optimise.problem import REACH, YAW
 from explorer.sweep.machine import MACHINE
-from explorer.sweep.study import NAMES, Study
+from explorer.sweep.study import NAMES, Sense, Study
 
 ROWS = 10
 """Rows of the table of the front."""
@@ -290,39 +289,40 @@ def chips(plan: StudyPlan, design: Design) -> str:
     """
     variables, measures = choices_for(design, plan)
     varying = "".join(
-        press_button(
-            "studies.vary",
+        _chip(
+            "vary",
             name,
-            escape(label_of(name)),
-            hint=f"{'Keep' if name in plan.variables else 'Vary'} {_variable_words(name)}",
-            class_name="ex-chip",
+            f"{'Keep' if name in plan.variables else 'Vary'} {_variable_words(name)}",
             is_on=name in plan.variables,
         )
         for name in variables
     )
     measured = "".join(
-        press_button(
-            "studies.measure",
-            name,
-            escape(label_of(name)) + (f" <b>{ARROWS[sense]}</b>" if sense else ""),
-            hint=_hint(name),
-            class_name="ex-chip",
-            is_on=name in plan.measures,
-        )
-        for name, sense in ((name, plan.sense_of(name)) for name in measures)
+        _chip("measure", name, _hint(name), plan.sense_of(name), is_on=name in plan.measures)
+        for name in measures
+    )
+    groups = (
+        ("Variables that vary; press to choose", varying),
+        ("Measures; press to measure, again to maximise ↑, to minimise ↓, to leave out", measured),
     )
     return box(
         *(
             f'<div class="ex-caption ex-small ex-after">{title}</div>'
             f'<div class="ex-flow">{switches}</div>'
-            for title, switches in (
-                ("Variables that vary; press to choose", varying),
-                (
-                    "Measures; press to measure, again to maximise ↑, to minimise ↓, to leave out",
-                    measured,
-                ),
-            )
-        ),
+            for title, switches in groups
+        )
+    )
+
+
+def _chip(press: str, name: str, hint: str, sense: Sense | None = None, *, is_on: bool) -> str:
+    arrow = f" <b>{ARROWS[sense]}</b>" if sense else ""
+    return press_button(
+        f"studies.{press}",
+        name,
+        escape(label_of(name)) + arrow,
+        hint=hint,
+        class_name="ex-chip",
+        is_on=is_on,
     )
 
 

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.features.studies.feed import StudyFeed
-from explorer.app.session.jobs import Worker
+from explorer.app.features.studies.folders import keep_study, study_folders, study_in
+from explorer.app.features.studies.state import StudyPlan, study_around
 from explorer.app.session.session import Session, Who
-from explorer.app.session.worker import Channel
-from explorer.app.state.studies import StudyPlan, study_around
-from explorer.app.storage.study_folders import keep_study, study_in
+from explorer.app.session.worker import Channel, Worker
 from explorer.errors import ExplorerError, InputError
 from explorer.mechanism.design import Design
 from explorer.sweep.run import Progress, run_study
@@ -81,14 +80,8 @@ def run_in_worker(study: Study, folder: Path, channel: Channel) -> Progress:
 
 
 def study_runner(services: Services) -> StudyRunner:
-    """Return the runner of the studies of a page, and with it their drawings; for `Services.get`.
-
-    Raises:
-        RuntimeError: The page offers no studies.
-    """
-    if services.studies is None:
-        raise RuntimeError("a page without folders of studies draws none")
-    feed = StudyFeed(services.studies, services.session.redraw)
+    """Return the runner of the studies of a page, with their drawings; for `Services.get`."""
+    feed = StudyFeed(services.get(study_folders), services.session.redraw)
     runner = StudyRunner(services.session, feed, services.complain)
     services.at_end(feed.stop)
     services.at_end(runner.stop)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import viser
 
@@ -10,16 +10,15 @@ from explorer.app.features.feature import Feature, InBar, Services, StateCommand
 from explorer.app.features.view.ground import Ground
 from explorer.app.inputs.controls import Controls
 from explorer.app.scene.camera import VIEWS, ViewName
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Set, draw_as
+from explorer.app.state.actions import Action, Set, draw_as
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import DrawnAs
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect
-from explorer.app.widgets.commands import Key, shift, with_keys
 from explorer.app.widgets.markup import box
+from explorer.app.widgets.palette import Key, shift, with_keys
 from explorer.mechanism.margins import TETRAHEDRA
 
 FORMS: Mapping[DrawnAs, tuple[str, tuple[Key, ...]]] = {
@@ -32,42 +31,30 @@ FORMS: Mapping[DrawnAs, tuple[str, tuple[Key, ...]]] = {
 }
 """Hint and keys of each form of the mechanism."""
 
-LAYERS = (
-    (
-        "flags",
-        "Flags",
-        "Points, lines and planes, coloured by proximity; they reach out to near gaps.",
-    ),
-    ("bodies", "Bodies", "The plates of base and platform."),
-    ("legs", "Legs", "Actuators, joints, carriages and guide."),
-    (
-        "labels",
-        "Labels",
-        "The names a1 … b4 of the attachment points, and δ1 … δ3 of the tetrahedra.",
-    ),
-    (
-        "handle",
-        "Drag handle",
-        "Arrows and arcs that move the platform when dragged; small where they hide a gap.",
-    ),
-    ("grid", "Grid", "The ground grid; a corner of the scene tells the size of its squares."),
-    (
-        "leaves",
-        "Leaves",
-        "The planes of the guide with b4 and of a1 with the line b2b3, and the three folds.",
-    ),
-    (
-        "clearance",
-        "Closest pair",
-        "Mark the two legs that are closest to each other, and their clearance.",
-    ),
-    (
-        "machine",
-        "Tool and payload",
-        "The axes of the tool and a ball for the payload; the tab Machine sets both.",
-    ),
-)
+LAYERS = {
+    "Flags": "flags",
+    "Bodies": "bodies",
+    "Legs": "legs",
+    "Labels": "labels",
+    "Drag handle": "handle",
+    "Grid": "grid",
+    "Leaves": "leaves",
+    "Closest pair": "clearance",
+    "Tool and payload": "machine",
+}
+"""The layers of the scene, and the field of the view that switches each."""
 
+LAYER_HINTS = {
+    "flags": "Points, lines and planes, coloured by proximity; they reach out to near gaps.",
+    "bodies": "The plates of base and platform.",
+    "legs": "Actuators, joints, carriages and guide.",
+    "labels": "The names a1 … b4 of the attachment points, and δ1 … δ3 of the tetrahedra.",
+    "handle": "Arrows and arcs that move the platform when dragged; small where they hide a gap.",
+    "grid": "The ground grid; a corner of the scene tells the size of its squares.",
+    "leaves": "The planes of the guide with b4 and of a1 with the line b2b3, and the three folds.",
+    "clearance": "Mark the two legs that are closest to each other, and their clearance.",
+    "machine": "The axes of the tool and a ball for the payload; the tab Machine sets both.",
+}
 
 PRESS = "view.camera"
 FIT = "Fit"
@@ -77,13 +64,7 @@ CAMERA_HINTS = {
     "Isometric": "Look at the mechanism from a corner.",
     FIT: "Show the whole mechanism from where you look.",
 }
-VIEW_KEYS = {
-    "Isometric": (Key("0"),),
-    "Front": (Key("1"),),
-    "Side": (Key("3"),),
-    "Top": (Key("7"),),
-    FIT: (Key("F"),),
-}
+VIEW_KEYS = {"Isometric": "0", "Front": "1", "Side": "3", "Top": "7", FIT: "F"}
 
 
 class ViewPanel:
@@ -95,8 +76,8 @@ class ViewPanel:
         self._form_row = gui.add_html("")
         self._controls = controls = Controls(gui, services.session)
         with gui.add_folder("Layers"):
-            for name, label, hint in LAYERS:
-                controls.checkbox(label, hint, f"view.{name}")
+            for label, name in LAYERS.items():
+                controls.checkbox(label, LAYER_HINTS[name], f"view.{name}")
         with gui.add_folder("Tetrahedra"):
             for index, points in enumerate(TETRAHEDRA):
                 controls.checkbox(
@@ -106,7 +87,7 @@ class ViewPanel:
                     f"view.tetrahedra.{index}",
                 )
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         yield self._form_row, "content", box(self._forms.html(frame.state))
         yield from self._controls.updates(frame)
@@ -115,16 +96,14 @@ class ViewPanel:
 def _form_chips(services: Services) -> Chips:
     """Return the options of what the mechanism is drawn as; a press on one again goes back."""
 
-    def chip(form: DrawnAs) -> Chip:
-        hint, keys = FORMS[form]
-
+    def chip(form: DrawnAs, hint: str, keys: tuple[Key, ...]) -> Chip:
         def is_on(state: State) -> bool:
             return state.view.drawn_as == form
 
         effect = Effect(lambda state: draw_as("schematic" if is_on(state) else form), is_on)
         return Chip(form.capitalize(), f"Show › Drawn as › {form}", hint, effect, keys=keys)
 
-    chips = {form: chip(form) for form in FORMS}
+    chips = {form: chip(form, *words) for form, words in FORMS.items()}
     return Chips(services.buttons, services.session, "view.form", "Drawn as", chips)
 
 
@@ -136,10 +115,10 @@ class CameraButtons:
         services.buttons.on(PRESS, self._point, values=CAMERA_HINTS)
         self._markup = ""
         for label, hint in CAMERA_HINTS.items():
-            keys = VIEW_KEYS[label]
+            keys = (Key(VIEW_KEYS[label]),)
             services.buttons.offer(f"View › {label}", hint, PRESS, label, keys=keys)
-            told = with_keys(hint, keys)
-            self._markup += press_button(PRESS, label, label, hint=told, class_name="ex-tool")
+            words = with_keys(hint, keys)
+            self._markup += press_button(PRESS, label, label, hint=words, class_name="ex-tool")
 
     def __call__(self, _: Frame) -> str:
         """Return the buttons as HTML."""

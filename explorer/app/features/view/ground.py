@@ -7,25 +7,15 @@ and go. The shadow is the outline of each body as the sun projects it on the gro
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.bodies import (
-    BASE_RADIUS,
-    PLATE_THICKNESS,
-    PLATE_TOP,
-    PLATFORM_RADIUS,
-    PLATFORM_SHIFT,
-    ROD_RADIUS,
-    TUBE_RADIUS,
-    TWIN,
-)
+from explorer.app.features.mechanism import bodies
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import add_label
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.numerics.arrays import FloatArray
+from explorer.reproduce.six_legs import TWIN
 from explorer.singularity.colours import Rgb
 
 TO_SUN = np.array([-0.22, 0.3, 1.0])
@@ -98,12 +88,11 @@ class Ground(ScenePart):
             material="toon3",
         )
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ground of this frame."""
-        view = placed.frame.state.view
-        lowest = ground_of(placed)
-        yield self._grid, "visible", view.grid
-        yield self._scale, "visible", view.grid
+        view, lowest = placed.frame.state.view, ground_of(placed)
+        for handle in (self._grid, self._scale):
+            yield handle, "visible", view.grid
         # Of the sides of the squares, in millimetres.
         yield self._scale, "text", f"{placed.square_mm:.6g}"
         cell, section = GRID[placed.dark]
@@ -126,44 +115,34 @@ class Ground(ScenePart):
 def ground_of(placed: Placed) -> float:
     """Return the height at which the base stands, in scene units."""
     if placed.floor is None:
-        return PLATE_TOP - PLATE_THICKNESS
+        return bodies.PLATE_TOP - bodies.PLATE_THICKNESS
     return placed.scale * placed.floor
 
 
 def shadow_outlines(placed: Placed, ground: float) -> list[FloatArray]:
-    """Return the shadows of the bodies and legs that are drawn, convex polygons (CORNERS, 2).
-
-    Args:
-        placed: What is drawn.
-        ground: Height of the ground, in scene units.
-    """
+    """Return the shadows of the drawn bodies and legs on a height, convex polygons (CORNERS, 2)."""
     view, p, size = placed.frame.state.view, placed.points, placed.thickness
     outlines: list[FloatArray] = []
     if view.bodies and placed.is_schematic:
         feet = np.array([p[name] * [1.0, 1.0, 0.0] for name in ("a1", "a2", "a3")])
-        discs = np.concatenate([feet + [0.0, 0.0, PLATE_TOP - t] for t in (0.0, PLATE_THICKNESS)])
-        outlines.append(_outline(discs, BASE_RADIUS * np.eye(3)[:, :2], ground))
+        depths = (0.0, bodies.PLATE_THICKNESS)
+        discs = np.concatenate([feet + [0.0, 0.0, bodies.PLATE_TOP - t] for t in depths])
+        outlines.append(_outline(discs, bodies.BASE_RADIUS * np.eye(3)[:, :2], ground))
         rotation = placed.frame.snapshot.rotation
         local = np.array(list(placed.platform_points.values()))
-        centres = local + [0.0, 0.0, PLATFORM_SHIFT * size * placed.facing]
-        axes = PLATFORM_RADIUS * size * rotation[:, :2]
+        centres = local + [0.0, 0.0, bodies.PLATFORM_SHIFT * size * placed.facing]
+        axes = bodies.PLATFORM_RADIUS * size * rotation[:, :2]
         outlines.append(_outline(p["b4"] + centres @ rotation.T, axes, ground))
     if view.legs and (placed.is_schematic or view.is_twin):
         twin = [(p[base], p[tip]) for base, tip in TWIN]
         legs = twin if view.is_twin else list(zip(*placed.struts, strict=True))
-        radius = 0.5 * (TUBE_RADIUS + ROD_RADIUS) * size * np.eye(3)[:, :2]
+        radius = 0.5 * (bodies.TUBE_RADIUS + bodies.ROD_RADIUS) * size * np.eye(3)[:, :2]
         outlines += [_outline(np.stack(leg), radius, ground) for leg in legs]
     return outlines
 
 
 def _outline(centres: FloatArray, axes: FloatArray, ground: float) -> FloatArray:
-    """Return the outline of the hull of equal discs, projected on the ground, (CORNERS, 2).
-
-    Args:
-        centres: Centres of the discs, (n, 3).
-        axes: Two perpendicular radii of a disc, (3, 2).
-        ground: Height of the ground.
-    """
+    """Return the shadow of n equal discs with two radii as `axes` (3, 2), shape (CORNERS, 2)."""
     flat = (centres - [0.0, 0.0, ground]) @ PROJECTION.T
     # Farthest point of an ellipse in each direction, seen from its centre.
     ellipse = PROJECTION @ axes

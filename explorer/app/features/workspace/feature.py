@@ -1,106 +1,318 @@
-"""The workspace: its volume, its solid and slices, its numbers, and files of it."""
+"""The workspace: its volume, what is shown of it, its cut with a map, its numbers, its files."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Literal
+from dataclasses import replace
+from typing import Annotated, Literal
 
+import msgspec
 import viser
 
+from explorer.app.browser.browser_facts import decode_text
+from explorer.app.browser.viser_gaps import run_script, run_script_in
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
-from explorer.app.features.forces.tasks import load_of
-from explorer.app.features.workspace.feeds import (
-    VOLUME_FEED,
-    WORKSPACE_FEED,
-    loaded_design,
-    orientation_word,
-    tolerance_of,
-    turned_suffix,
-    workspace_rows,
-    workspace_start,
-)
-from explorer.app.features.workspace.panel import WorkspacePanel
-from explorer.app.features.workspace.regions import Selection, rows_of
+from explorer.app.features.workspace import feeds, words as texts, work
 from explorer.app.features.workspace.scene import WorkspaceScene
-from explorer.app.features.workspace.tasks import (
-    STEP,
-    draw_workspace,
-    export_mesh,
-    file_words,
-    measure_volume,
-)
-from explorer.app.features.workspace.words import volume_text
+from explorer.app.features.workspace.slice_map import Axis, SliceMap, level_within, map_picture
+from explorer.app.inputs.control import At, Bound
+from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.ranges import Span, coordinate_span, fine_step, round_up
+from explorer.app.look import call_script, read_script
+from explorer.app.scene.bands import Measure
 from explorer.app.session.session import Who
+from explorer.app.state.actions import Action, Set, SetPose, StartThere
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.app.state.view import WorkspaceView
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import figure
-from explorer.mechanism.pose import Triple
+from explorer.app.widgets.chips import Chip, Chips, Effect, turn
+from explorer.app.widgets.markup import alert, box, note, sentence
+from explorer.app.widgets.palette import Key, shift
+from explorer.app.widgets.under_way import UnderWay, look_of
+from explorer.measures.verdict import warnings
+from explorer.mechanism.margins import MARGIN_KINDS
+from explorer.mechanism.pose import Pose, Triple
+from explorer.workspace.position_bands import LOAD_MEASURES, MEASURE_WORDS
 
-# The hull consists of facets, which STEP does not take.
-HULL_FORMATS = ("3mf", "stl", "glb", "obj", "ply")
-FORMATS = (*HULL_FORMATS, STEP)
-"""The formats of files; `STEP` takes the workspace within the limits only."""
+SHOWN = {
+    "solid": ("Solid", "Draw the positions within all limits at one orientation.", Key("V")),
+    "hull": ("Convex hull", "Draw the convex hull of the workspace.", shift("V")),
+    "planes": (
+        "Singular planes",
+        "Draw the planes of singular positions, up to three, at the present orientation.",
+        shift("P"),
+    ),
+}
+"""Words, hint and key of each part that can be shown."""
 
-Exported = Literal["workspace", "hull"]
+REGIONS: dict[str, tuple[work.Region, Literal["home", "pose"]]] = {
+    "within the limits": ("limits", "home"),
+    "accessible from home": ("accessible", "home"),
+    "accessible from the present position": ("accessible", "pose"),
+    "holds the load": ("held", "home"),
+}
+"""Region and start of the paths."""
+
+COLOURINGS: dict[str, Measure] = {
+    "one colour": "plain",
+    "smallest margin": "margin",
+    "1 / cond J": "condition",
+    **{words: measure for measure, (words, _, _) in MEASURE_WORDS.items()},
+}
+ORIENTATIONS = {"of the present pose": "pose", "of the home pose": "home"}
+CUTS: dict[str, Axis | None] = {"none": None, "x": "x", "y": "y", "z": "z"}
+"""Axis of the cut by the words on its button."""
+
+_Coordinate = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
+_POSITION = msgspec.json.Decoder(tuple[_Coordinate, _Coordinate, _Coordinate])
 
 
-def send_workspace(
-    services: Services, what: Exported, file_format: str, who: Who, *, at_home: bool = False
-) -> None:
-    """Send a client a file of the workspace that is shown, or of its hull.
+class WorkspacePanel:
+    """The panel of the workspace."""
 
-    Args:
-        services: Services of the page.
-        what: The workspace or its hull.
-        file_format: One of `FORMATS`.
-        who: The client.
-        at_home: Whether it is that within the limits at the orientation of home instead.
-    """
-    state = services.session.latest_state()
-    frame, region, start = Frame(state), state.view.workspace.region, None
-    if at_home:
-        region, rows = "limits", rows_of(state.design.home_pose.rotation)
-    else:
-        rows = workspace_rows(frame)
-    if region == "accessible":
-        start = workspace_start(frame)
-    design, load = state.design, None
-    if region == "held":
-        design, load = loaded_design(state), load_of(state)
-    offset: Triple | None = None
-    if state.view.at == "tool":
-        x, y, z = state.offset(rows).tolist()
-        offset = x, y, z
-    words = file_words(region, what, offset).replace(" ", "-")
-    selection = Selection(design, rows, region, start, load)
-    services.downloads.compute(
-        who,
-        f"{design.name}-{words}.{file_format}",
-        export_mesh,
-        (selection, tolerance_of(state), what, file_format, offset),
+    def __init__(self, services: Services) -> None:
+        gui, session, buttons = services.gui, services.session, services.buttons
+        self._controls = controls = Controls(gui, session)
+        self._session = session
+        self._feed = services.get(feeds.WORKSPACE_FEED)
+        self._volumes = services.get(feeds.VOLUME_FEED)
+        self._nearest_start: Pose | None = None
+        # The drawing whose solid is cut, and its map where the page shows it.
+        self._drawing: work.WorkspaceDrawing | None = None
+        self._mapped: SliceMap | None = None
+        self._show, self._cuts = _part_chips(services), _cut_chips(services)
+        self._top = gui.add_html("")
+        controls.dropdown(
+            "Region",
+            "All positions within the limits, those that a path without a collision of legs leads "
+            "to, from home or from the present position, or those at which the load of the tab "
+            "Forces is held.",
+            REGIONS,
+            Bound(_region, _set_region),
+        )
+        self._under_way = UnderWay(gui, "workspace", self._feed)
+        self._trouble = gui.add_html("", visible=False)
+        self._go = gui.add_button(
+            "Go there",
+            icon=viser.Icon.MAP_PIN,
+            hint="Move the platform to that position and let the paths start from it.",
+            visible=False,
+        )
+        self._go.on_click(self._go_there)
+        controls.dropdown(
+            "Orientation",
+            "The orientation of the platform all over the workspace.",
+            ORIENTATIONS,
+            "view.workspace.orientation",
+        )
+        controls.dropdown(
+            "Colour by",
+            f"One colour, the smallest margin |δ| ({MARGIN_KINDS}), 1 / cond J, what the load of "
+            "Forces asks of actuators and struts, or how far errors of actuators or that load move "
+            "the tool.",
+            COLOURINGS,
+            "view.workspace.colour",
+        )
+        self._legend = gui.add_html("", visible=False)
+        self._cut = gui.add_html("")
+        controls.slider(
+            "Cut at",
+            "Position of the cutting plane on its axis, in design units.",
+            Bound(
+                lambda frame: self._level(frame.state),
+                lambda _, value: Set("view.workspace.level", value, "Cut at"),
+            ),
+            self._cut_span,
+            disabled=lambda state: state.view.workspace.cut is None,
+        )
+        self._map = gui.add_html("", visible=False)
+        with gui.add_folder("Details", expand_by_default=False):
+            self._details = gui.add_html("")
+            controls.slider(
+                "Mesh tolerance",
+                "Largest distance of a facet from the true surface, in design units.",
+                At("view.workspace.tolerance", default=feeds.tolerance_of),
+                _tolerance_span,
+            )
+        buttons.on("workspace.go", self._go_to)
+        buttons.on("workspace.read", self._read)
+        run_script(services.server, read_script("map"))
+
+    def updates(self, frame: Frame) -> Updates:
+        """Yield the updates that show a frame."""
+        drawing = self._drawing = self._feed.drawing
+        state, view = frame.state, frame.state.view.workspace
+        top = texts.volume_headline(frame, self._volumes), texts.drawing_words(frame, self._feed)
+        yield self._top, "content", box(*top, self._show.html(state))
+        yield from self._controls.updates(frame)
+        yield from self._under_way.updates()
+        yield from self._show_trouble(drawing)
+        mapped = None if drawing is None or view.cut is None else drawing.slice_map
+        colour = feeds.drawn_measure(state)
+        yield self._legend, "visible", view.colour != "plain" or mapped is not None
+        words = texts.missing_input(view.colour) if colour != view.colour else ""
+        if colour != "plain" or mapped is not None:
+            measure = work.map_measure(state.design, colour, holds=view.region == "held")
+            warn = warnings(state.design.reach, state.warn_below)
+            warn_below = warn.condition if measure == "condition" else warn.margin
+            words += texts.legend(measure, warn_below, drawing)
+        if colour in LOAD_MEASURES and view.region != "held":
+            any_direction = colour != "deflection"
+            words += note(f"{texts.load_words(state, any_direction=any_direction)}.")
+        yield self._legend, "content", words
+        yield self._cut, "content", box(self._cuts.html(state))
+        if mapped is not None:
+            mapped = mapped.shift(state.offset(mapped.colouring.rotation))
+            picture = map_picture(mapped, state.position, state.design.reach)
+            yield self._map, "content", box(picture)
+        self._mapped = mapped
+        yield self._map, "visible", mapped is not None
+        yield self._details, "content", texts.workspace_details(frame, self._feed)
+
+    def _level(self, state: State) -> float:
+        """Return the level of the cut, or the level that a cut would have."""
+        level, ends = state.view.workspace.level, self._ends(state)
+        return (level or 0.0) if ends is None else level_within(*ends, level)
+
+    def _cut_span(self, state: State) -> Span:
+        """Return the extent of the workspace on the axis across which it is cut."""
+        span, ends = coordinate_span(state), self._ends(state)
+        if ends is None:
+            return span
+        low, high = math.ceil(ends[0] / span.step), math.floor(ends[1] / span.step)
+        return Span(low * span.step, high * span.step, span.step) if low < high else span
+
+    def _ends(self, state: State) -> tuple[float, float] | None:
+        """Return the extent of the drawn workspace on the axis of the cut; None without either."""
+        axis = state.view.workspace.cut
+        if axis is None or self._drawing is None or self._drawing.extent is None:
+            return None
+        index = "xyz".index(axis)
+        offset = float(state.offset(self._drawing.request.rotation)[index])
+        low, high = (float(end[index]) + offset for end in self._drawing.extent)
+        return low, high
+
+    def _show_trouble(self, drawing: work.WorkspaceDrawing | None) -> Updates:
+        """Yield why nothing is accessible, and the nearest position to start from."""
+        trouble = None if drawing is None else drawing.trouble
+        self._nearest_start = None
+        yield self._trouble, "visible", trouble is not None
+        if drawing is not None and trouble is not None:
+            if trouble.nearest is not None:
+                self._nearest_start = Pose.of(trouble.nearest, drawing.request.rotation)
+            title = texts.nothing_words(drawing)
+            yield self._trouble, "content", alert(title, sentence(trouble.reason))
+        yield self._go, "visible", self._nearest_start is not None
+
+    def _go_there(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+        if self._nearest_start is not None:
+            self._session.do(StartThere(self._nearest_start), who=event.client_id)
+
+    def _go_to(self, text: str, client: viser.ClientHandle) -> None:
+        """Move the point to a position that a page sent, in the orientation of the map."""
+        position: Triple | None = decode_text(text, _POSITION)
+        if position is not None:
+            self._session.do(
+                lambda state: SetPose(state.pose_at(position, feeds.workspace_pose(Frame(state)))),
+                who=client.client_id,
+            )
+
+    def _read(self, text: str, client: viser.ClientHandle) -> None:
+        """Answer a browser that asks for the words at a position on the map."""
+        position: Triple | None = decode_text(text, _POSITION)
+        mapped = self._mapped
+        if position is not None and mapped is not None:
+            run_script_in(client, call_script("map", text, mapped.words_at(position)))
+
+
+def _part_chips(services: Services) -> Chips:
+    """Return the switches of what is shown."""
+    chips: dict[str, Chip] = {}
+    for name, (words, hint, key) in SHOWN.items():
+        effect = turn(f"view.workspace.{name}", words)
+        chips[name] = Chip(words, f"Workspace › {words}", hint, effect, keys=(key,))
+    return Chips(services.buttons, services.session, "workspace.show", "Show", chips)
+
+
+def _cut_chips(services: Services) -> Chips:
+    """Return the options of the cut, and the switch of the side that it keeps."""
+
+    def chip(words: str, axis: Axis | None) -> Chip:
+        option, hint, key = "no cut", "Show the whole solid.", Key("C")
+        if axis is not None:
+            option, key = f"across {axis}", Key(axis.upper())
+            hint = f"Cut the workspace open {option}, in its middle, and show the map of the slice."
+        effect = Effect(
+            lambda state: _set_cut(state.view.workspace, axis, option),
+            lambda state: state.view.workspace.cut == axis,
+        )
+        return Chip(words, f"Workspace › Cut open › {option}", hint, effect, keys=(key,))
+
+    chips = {words: chip(words, axis) for words, axis in CUTS.items()}
+    chips["flip"] = Chip(
+        "other side",
+        "Workspace › Cut open › other side",
+        "Keep the other side of the cut.",
+        turn("view.workspace.flipped", "Other side of the cut"),
+        lambda state: state.view.workspace.cut is not None,
+    )
+    return Chips(services.buttons, services.session, "workspace.cut", "Cut", chips)
+
+
+def _set_cut(view: WorkspaceView, axis: Axis | None, words: str) -> Action:
+    """Return the action that cuts the workspace open; a new cut shows the solid, in its middle."""
+    level = view.level if axis in (None, view.cut) else None
+    new = replace(view, cut=axis, level=level, solid=view.solid or axis is not None)
+    return Set("view.workspace", new, "Cut open", words)
+
+
+def _region(frame: Frame) -> str:
+    view = frame.state.view.workspace
+    return next(
+        words
+        for words, (region, start) in REGIONS.items()
+        if region == view.region and (region != "accessible" or start == view.start)
     )
 
 
-def _sender(what: Exported) -> Callable[[Services], Callable[[str, Who], None]]:
-    return lambda services: lambda name, who: send_workspace(services, what, name.lower(), who)
+def _set_region(state: State, words: str) -> Action:
+    region, start = REGIONS[words]
+    view = replace(state.view.workspace, region=region, start=start)
+    return Set("view.workspace", view, "Region", words)
+
+
+def _tolerance_span(state: State) -> Span:
+    reach = state.base.reach
+    step = fine_step(reach, 5e3)
+    return Span(step, round_up(0.05 * reach), step)
+
+
+def _sender(what: feeds.Exported) -> Callable[[Services], Callable[[str, Who], None]]:
+    return lambda services: (
+        lambda name, who: feeds.send_workspace(services, what, name.lower(), who)
+    )
 
 
 class VolumeFigure:
     """The volume of the workspace within the limits, dim while a newer one is computed."""
 
     def __init__(self, services: Services) -> None:
-        self._feed = services.get(VOLUME_FEED)
+        self._feed = services.get(feeds.VOLUME_FEED)
 
     def __call__(self, frame: Frame) -> str:
         """Return the figure for a frame, as HTML."""
         drawing, name = self._feed.drawing, "Volume"
-        which = orientation_word(frame)
+        which = feeds.orientation_word(frame)
         hint = f"Exact volume of the workspace within the limits, in the {which} orientation."
         if drawing is not None:
-            name += turned_suffix(drawing.request.design, drawing.request.rotation)
+            name += feeds.turned_suffix(drawing.request.design, drawing.request.rotation)
             if drawing.measured.volume <= 0.0:
                 hint += f" It is emptied by: {', '.join(drawing.measured.empty_because)}."
-        look = "" if self._feed.is_current else "is-outdated"
-        return figure("Workspace", name, volume_text(drawing), hint=hint, look=look)
+        look = look_of(self._feed)
+        return figure("Workspace", name, texts.volume_text(drawing), hint=hint, look=look)
 
 
 WORKSPACE = Feature(
@@ -112,18 +324,18 @@ WORKSPACE = Feature(
             "Workspace",
             "All positions of b4, or of the tool point if the tab Pose shows it, in the region and "
             "orientation of the tab Workspace; STEP has exact faces.",
-            tuple(map(str.upper, FORMATS)),
+            tuple(map(str.upper, feeds.FORMATS)),
             _sender("workspace"),
         ),
         Export(
             "Convex hull",
             "The convex hull of that workspace.",
-            tuple(map(str.upper, HULL_FORMATS)),
+            tuple(map(str.upper, feeds.HULL_FORMATS)),
             _sender("hull"),
         ),
     ),
     scene=(WorkspaceScene,),
-    feeds=(VOLUME_FEED, WORKSPACE_FEED),
-    tasks=(measure_volume, draw_workspace),
+    feeds=(feeds.VOLUME_FEED, feeds.WORKSPACE_FEED),
+    tasks=(work.measure_volume, work.draw_workspace),
     lists=("Region", "Orientation", "Colour by"),
 )

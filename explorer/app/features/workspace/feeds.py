@@ -1,4 +1,4 @@
-"""The requests for the workspace of a frame: its orientation, load and start, and the feeds.
+"""The requests for the workspace of a frame: its orientation, load and start, feeds and files.
 
 The workspace of the tool point is that of b4, moved by the vector between them. While one drawing
 is computed, only the newest request waits.
@@ -6,28 +6,24 @@ is computed, only the newest request waits.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Literal
+
 import msgspec
 import numpy as np
 
 from explorer.app.features.forces.tasks import load_of
-from explorer.app.features.workspace.regions import Rows, Selection, rows_of
-from explorer.app.features.workspace.tasks import (
-    LIVE_TOLERANCE,
-    PART_TOLERANCE,
-    WorkspaceDrawing,
-    WorkspaceRequest,
-    WorkspaceSurface,
-    draw_workspace,
-    measure_volume,
-)
+from explorer.app.features.workspace import work
 from explorer.app.scene.bands import Measure
 from explorer.app.session.feed import Feed, feed_of
+from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray
 from explorer.workspace.position_bands import LOAD_MEASURES, is_unstated
+
+if TYPE_CHECKING:
+    from explorer.app.features.feature import Services
 
 # Rotations whose entries differ by less are the same.
 SAME = 1e-9
@@ -36,8 +32,7 @@ SAME = 1e-9
 def workspace_pose(frame: Frame) -> Pose:
     """Return the pose whose orientation the workspace has: the present one, or that of home."""
     state = frame.state
-    is_home = state.view.workspace.orientation == "home"
-    return state.design.home_pose if is_home else state.pose
+    return state.design.home_pose if orientation_word(frame) == "home" else state.pose
 
 
 def orientation_word(frame: Frame) -> str:
@@ -45,20 +40,15 @@ def orientation_word(frame: Frame) -> str:
     return "home" if frame.state.view.workspace.orientation == "home" else "present"
 
 
-def turned_suffix(design: Design, rotation: Rows) -> str:
+def turned_suffix(design: Design, rotation: work.Rows) -> str:
     """Return what follows the names of a workspace's measures; "" in the orientation of home."""
     is_home = np.allclose(rotation, design.home_pose.rotation, atol=SAME)
     return "" if is_home else ", turned"
 
 
-def workspace_rotation(frame: Frame) -> FloatArray:
-    """Return the orientation of the workspace that is shown, shape (3, 3)."""
-    return workspace_pose(frame).rotation
-
-
-def workspace_rows(frame: Frame) -> Rows:
-    """Return the rows of `workspace_rotation` as plain numbers."""
-    return rows_of(workspace_rotation(frame))
+def workspace_rows(frame: Frame) -> work.Rows:
+    """Return the orientation of the workspace that is shown, as the rows of its matrix."""
+    return work.rows_of(workspace_pose(frame).rotation)
 
 
 def workspace_position(frame: Frame) -> Triple:
@@ -76,7 +66,7 @@ def workspace_start(frame: Frame) -> Triple | None:
 def tolerance_of(state: State) -> float:
     """Return the chord tolerance of what is drawn and written to files, in design units."""
     view = state.view.workspace
-    share = LIVE_TOLERANCE if view.region == "limits" else PART_TOLERANCE
+    share = work.LIVE_TOLERANCE if view.region == "limits" else work.PART_TOLERANCE
     return view.tolerance or share * state.base.reach
 
 
@@ -99,12 +89,12 @@ def drawn_measure(state: State) -> Measure:
     return "plain" if colour != "plain" and is_unstated(state.design, colour) else colour
 
 
-def volume_request(frame: Frame) -> Selection:
+def volume_request(frame: Frame) -> work.Selection:
     """Return the request for the volume of a frame's design."""
-    return Selection(frame.state.design, workspace_rows(frame))
+    return work.Selection(frame.state.design, workspace_rows(frame))
 
 
-VOLUME_FEED = feed_of(measure_volume, volume_request)
+VOLUME_FEED = feed_of(work.measure_volume, volume_request)
 """The feed of the volume within the limits, whether or not the solid is drawn.
 
 It takes a tenth of the time of a drawing, and is followed before `WORKSPACE_FEED`, so that it
@@ -112,14 +102,16 @@ never waits for the drawing of the same state.
 """
 
 
-def surface_of(feed: Feed[WorkspaceRequest, WorkspaceDrawing]) -> WorkspaceSurface | None:
+def surface_of(
+    feed: Feed[work.WorkspaceRequest, work.WorkspaceDrawing],
+) -> work.WorkspaceSurface | None:
     """Return the newest surface; None if there is none, none is requested, or it was cancelled."""
-    if isinstance(feed.part, WorkspaceSurface):
+    if isinstance(feed.part, work.WorkspaceSurface):
         return feed.part
     return None if feed.drawing is None else feed.drawing.surface
 
 
-def workspace_request(frame: Frame) -> WorkspaceRequest | None:
+def workspace_request(frame: Frame) -> work.WorkspaceRequest | None:
     """Return the request for the workspace of a frame; None if none is shown."""
     view = frame.state.view.workspace
     if not (view.solid or view.hull):
@@ -127,12 +119,12 @@ def workspace_request(frame: Frame) -> WorkspaceRequest | None:
     is_cut, level = view.cut is not None, view.level
     if view.cut is not None and level is not None:
         # The worker counts in coordinates of b4.
-        level -= float(frame.state.offset(workspace_rotation(frame))["xyz".index(view.cut)])
+        level -= float(frame.state.offset(workspace_pose(frame).rotation)["xyz".index(view.cut)])
     coloured = view.colour == "margin" or is_cut
     colour = drawn_measure(frame.state)
     # The load changes no drawing that does not show it.
     is_loaded = colour in LOAD_MEASURES or view.region == "held"
-    return WorkspaceRequest(
+    return work.WorkspaceRequest(
         design=loaded_design(frame.state) if is_loaded else frame.state.design,
         rotation=workspace_rows(frame),
         region=view.region,
@@ -149,5 +141,43 @@ def workspace_request(frame: Frame) -> WorkspaceRequest | None:
     )
 
 
-WORKSPACE_FEED = feed_of(draw_workspace, workspace_request, has_stages=True)
+WORKSPACE_FEED = feed_of(work.draw_workspace, workspace_request, has_stages=True)
 """The feed of the drawn workspace, whose surface arrives before the numbers."""
+
+
+# The hull consists of facets, which STEP does not take.
+HULL_FORMATS = ("3mf", "stl", "glb", "obj", "ply")
+FORMATS = (*HULL_FORMATS, work.STEP)
+"""The formats of files; `work.STEP` takes the workspace within the limits only."""
+
+Exported = Literal["workspace", "hull"]
+
+
+def send_workspace(
+    services: Services, what: Exported, file_format: str, who: Who, *, at_home: bool = False
+) -> None:
+    """Send a client a file of the workspace that is shown, or of its hull, in one of `FORMATS`.
+
+    If it is `at_home`, it is that within the limits at the orientation of home instead.
+    """
+    state = services.session.latest_state()
+    frame, region = Frame(state), state.view.workspace.region
+    rows = workspace_rows(frame)
+    if at_home:
+        region, rows = "limits", work.rows_of(state.design.home_pose.rotation)
+    start = workspace_start(frame) if region == "accessible" else None
+    design, load = state.design, None
+    if region == "held":
+        design, load = loaded_design(state), load_of(state)
+    offset: Triple | None = None
+    if state.view.at == "tool":
+        x, y, z = state.offset(rows).tolist()
+        offset = x, y, z
+    words = work.file_words(region, what, offset).replace(" ", "-")
+    selection = work.Selection(design, rows, region, start, load)
+    services.downloads.compute(
+        who,
+        f"{design.name}-{words}.{file_format}",
+        work.export_mesh,
+        (selection, tolerance_of(state), what, file_format, offset),
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -10,33 +9,19 @@ import viser
 from numpy.typing import NDArray
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.feeds import (
-    WORKSPACE_FEED,
-    surface_of,
-    workspace_position,
-    workspace_rotation,
-)
-from explorer.app.features.workspace.tasks import (
-    WorkspaceDrawing,
-    WorkspaceRequest,
-    WorkspaceSurface,
-)
+from explorer.app.features.workspace import feeds, work
 from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Shell
 from explorer.app.scene.creases import Drawn
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH, Patch, add_label, add_lines, add_translucent
-from explorer.app.widgets.assigning import Update
-from explorer.measures.size import corners_of
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.assigning import Updates
+from explorer.measures.box import corners_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, Rgb, band_colours, proximity_colour
-from explorer.workspace.limits.constraints import (
-    BallOrCylinder,
-    Cone,
-    HalfSpace,
-    Never,
-    constraints,
-)
+from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.workspace.limits import constraints as limits
 from explorer.workspace.position_bands import SHARE_COLOURS, STEP_COLOURS
 
 # Each ray passes at least two faces: the mechanism stays readable within the solid.
@@ -62,7 +47,7 @@ class WorkspaceScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
-        self._feed = services.get(WORKSPACE_FEED)
+        self._feed = services.get(feeds.WORKSPACE_FEED)
         # Collisions are added first and so drawn first: surfaces before them let them through.
         colours = (COLLIDING, AT_LIMIT, PLAIN, *band_colours(), *SHARE_COLOURS, *STEP_COLOURS)
         self._colours: tuple[Rgb, ...] = tuple(dict.fromkeys(colours))
@@ -83,10 +68,10 @@ class WorkspaceScene(ScenePart):
         self._broken = add_lines(scene, "/workspace/broken/lines", 1, OUTLINE, 4.0)
         self._broken_label = add_label(scene, "/workspace/broken/label", "limit", visible=False)
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the workspace of a frame."""
         view = placed.frame.state.view.workspace
-        drawing, surface = self._feed.drawing, surface_of(self._feed)
+        drawing, surface = self._feed.drawing, feeds.surface_of(self._feed)
         shells: dict[Rgb, Drawn] = {}
         edges = hull = None
         if surface is not None:
@@ -103,8 +88,9 @@ class WorkspaceScene(ScenePart):
             shell = shells.get(colour) if view.solid else None
             yield handle, "visible", shell is not None
             if shell is not None:
-                yield handle, "opacity", _opacity(colour, is_cut=is_cut)
-                yield handle, "side", _side(colour, is_cut=is_cut)
+                opacity, side = _look(colour, is_cut=is_cut)
+                yield handle, "opacity", opacity
+                yield handle, "side", side
                 yield handle, "vertices", shell[0]
                 yield handle, "faces", shell[1]
         yield self._edges, "visible", view.solid and edges is not None
@@ -127,30 +113,37 @@ class WorkspaceScene(ScenePart):
         offset = placed.frame.state.offset(drawing.request.rotation)
         return corners_of(placed.scale * (np.array(drawing.extent) + offset))
 
-    def _broken_limit(self, placed: Placed) -> Iterator[Update]:
-        """Yield the updates that draw a line from p to the surface of the limit it breaks most.
-
-        Both are moved as the workspace is.
-        """
-        frame = placed.frame
-        shown = frame.state.view.workspace.solid and frame.state.unclosed is None
-        worst: tuple[float, str, FloatArray] | None = None
-        if shown and frame.snapshot.violations:
-            p = np.array(workspace_position(frame))
-            for limit in constraints(frame.state.design, workspace_rotation(frame)):
-                if isinstance(limit, Never | Cone):
-                    continue
-                slack = float(limit.slack(p))
-                if slack < -frame.state.design.tolerance and (worst is None or slack < worst[0]):
-                    worst = slack, limit.name, _nearest(limit, p)
+    def _broken_limit(self, placed: Placed) -> Updates:
+        """Yield the updates that draw a line from p to the surface of the limit it breaks most."""
+        broken = _most_broken(placed.frame)
         for handle in (self._broken, self._broken_label):
-            yield handle, "visible", worst is not None
-        if worst is not None:
-            offset = frame.state.offset(workspace_rotation(frame))
-            ends = placed.scale * (np.array([workspace_position(frame), worst[2]]) + offset)
-            yield self._broken, "points", ends[None].astype(np.float32)
-            yield self._broken_label, "text", f"{worst[1]}: {format_number(-worst[0], 3)} beyond"
-            yield self._broken_label, "position", tuple(ends[1].tolist())
+            yield handle, "visible", broken is not None
+        if broken is not None:
+            name, slack, ends = broken
+            yield self._broken, "points", (placed.scale * ends)[None].astype(np.float32)
+            yield self._broken_label, "text", f"{name}: {format_number(-slack, 3)} beyond"
+            yield self._broken_label, "position", tuple((placed.scale * ends[1]).tolist())
+
+
+def _most_broken(frame: Frame) -> tuple[str, float, FloatArray] | None:
+    """Return the limit that p breaks most, its slack, and p and its nearest point of the surface.
+
+    Both are moved as the workspace is, in design units. None if no limit is broken, or drawn.
+    """
+    state = frame.state
+    if not state.view.workspace.solid or state.unclosed or not frame.snapshot.violations:
+        return None
+    rotation = feeds.workspace_pose(frame).rotation
+    p = np.array(feeds.workspace_position(frame))
+    broken = [
+        (float(limit.slack(p)), limit)
+        for limit in limits.constraints(state.design, rotation)
+        if isinstance(limit, limits.BallOrCylinder | limits.HalfSpace)
+    ]
+    slack, limit = min(broken, key=lambda pair: pair[0])
+    if slack >= -state.design.tolerance:
+        return None
+    return limit.name, slack, np.array([p, _nearest(limit, p)]) + state.offset(rotation)
 
 
 class _SingularPlane:
@@ -163,48 +156,40 @@ class _SingularPlane:
             scene, f"/singular/{index + 1}/label", f"δ{index + 1} = 0", visible=False
         )
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the plane of a frame."""
         state, snapshot = placed.frame.state, placed.frame.snapshot
-        normal = self._normal(snapshot.rotation) if state.view.workspace.planes else None
-        yield from self._patch.show(normal is not None)
-        yield self._label, "visible", normal is not None
-        if normal is None:
+        normal, length = NO_POINTS, 0.0
+        if state.view.workspace.planes:
+            normal = planes_of_singularity(snapshot.rotation)[self._index]
+            length = float(np.linalg.norm(normal))
+        # If the lines are parallel every position is singular.
+        is_drawn = length > 1e-9
+        yield from self._patch.show(is_drawn)
+        yield self._label, "visible", is_drawn
+        if not is_drawn:
             return
-        colour = proximity_colour(placed.frame.verdict.levels[self._index])
-        along = np.cross(normal, [0.0, 1.0, 0.0])
+        along = np.cross(normal / length, [0.0, 1.0, 0.0])
         if np.linalg.norm(along) < 0.1:
             along = np.array([1.0, 0.0, 0.0])
         along /= np.linalg.norm(along)
-        across = np.cross(normal, along)
-        half = 1.1 * placed.reach
-        corners = half * np.array([a * along + b * across for a, b in CORNERS]) + placed.offset
+        across = np.cross(normal / length, along)
+        corners = np.array([a * along + b * across for a, b in CORNERS])
+        corners = 1.1 * placed.reach * corners + placed.offset
+        colour = proximity_colour(placed.frame.verdict.levels[self._index])
         yield from self._patch.span(corners, colour)
         yield self._label, "position", tuple(corners[2].tolist())
 
-    def _normal(self, rotation: FloatArray) -> FloatArray | None:
-        """Return the unit normal; None if the lines are parallel and every position is singular."""
-        x = rotation[:, 0]
-        normal = (-rotation[:, 2], np.array([0.0, -x[2], x[1]]), np.array([0.0, 0.0, 1.0]))[
-            self._index
-        ]
-        length = float(np.linalg.norm(normal))
-        return normal / length if length > 1e-9 else None
 
-
-def _opacity(colour: Rgb, *, is_cut: bool) -> float | None:
+def _look(colour: Rgb, *, is_cut: bool) -> tuple[float | None, str]:
+    """Return the opacity and the visible sides of faces: of translucent bands those in front."""
     if is_cut:
-        return None
+        return None, "double"
     opacities = {PLAIN: PLAIN_OPACITY, COLLIDING: COLLIDING_OPACITY, AT_LIMIT: AT_LIMIT_OPACITY}
-    return opacities.get(colour, BAND_OPACITY)
+    return opacities.get(colour, BAND_OPACITY), "double" if colour in opacities else "front"
 
 
-def _side(colour: Rgb, *, is_cut: bool) -> str:
-    """Return which sides of faces are drawn: of translucent bands only those in front."""
-    return "double" if is_cut or colour in (PLAIN, COLLIDING, AT_LIMIT) else "front"
-
-
-def _place(placed: Placed, request: WorkspaceRequest) -> tuple[float, ...]:
+def _place(placed: Placed, request: work.WorkspaceRequest) -> tuple[float, ...]:
     offset = placed.frame.state.offset(request.rotation)
     return tuple((placed.scale * offset).tolist())
 
@@ -212,7 +197,7 @@ def _place(placed: Placed, request: WorkspaceRequest) -> tuple[float, ...]:
 # Both are cached, so that updates compare what is drawn by identity.
 @lru_cache(2)
 def _scale_surface(
-    surface: WorkspaceSurface, scale: float
+    surface: work.WorkspaceSurface, scale: float
 ) -> tuple[dict[Rgb, Drawn], NDArray[np.float32] | None]:
     """Return the shells of a surface in scene units, by colour, and its edges; None for none."""
     shells = {shell.colour: _scale_shell(shell, scale) for shell in surface.shells}
@@ -221,7 +206,7 @@ def _scale_surface(
 
 
 @lru_cache(2)
-def _scale_hull(drawing: WorkspaceDrawing, scale: float) -> Drawn | None:
+def _scale_hull(drawing: work.WorkspaceDrawing, scale: float) -> Drawn | None:
     return None if drawing.hull is None else _scale_shell(drawing.hull, scale)
 
 
@@ -230,9 +215,9 @@ def _scale_shell(shell: Shell, scale: float) -> Drawn:
     return vertices, np.asarray(shell.faces, dtype=np.uint32)
 
 
-def _nearest(limit: BallOrCylinder | HalfSpace, p: FloatArray) -> FloatArray:
+def _nearest(limit: limits.BallOrCylinder | limits.HalfSpace, p: FloatArray) -> FloatArray:
     """Return the position nearest to p on the surface of a limit."""
-    if isinstance(limit, HalfSpace):
+    if isinstance(limit, limits.HalfSpace):
         excess = float(limit.normal @ p) - limit.offset
         return p - limit.normal * excess / float(limit.normal @ limit.normal)
     axes = np.array([1.0 if limit.is_ball else 0.0, 1.0, 1.0])

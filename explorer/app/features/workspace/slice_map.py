@@ -18,8 +18,7 @@ import numpy as np
 from explorer.app.scene.bands import Colouring
 from explorer.app.widgets.markup import reading
 from explorer.export.drawings.markup import as_html, coordinate, element
-from explorer.export.drawings.slice_drawing import cross, placing, ruler
-from explorer.export.drawings.slices import Slices, in_plane
+from explorer.export.drawings.slices import Slices, cross, in_plane, map_transform, ruler
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import decimals_for, format_decimals, format_number
@@ -77,7 +76,7 @@ class SliceMap:
         first, second = in_plane(self.axis)
         return first, second
 
-    def shifted(self, offset: FloatArray) -> SliceMap:
+    def shift(self, offset: FloatArray) -> SliceMap:
         """Return the map of positions moved by a vector in design units, shape (3,)."""
         across, (first, second) = AXES.index(self.axis), self.plane
         du, dv, dw = offset[[first, second, across]].tolist()
@@ -165,12 +164,7 @@ def slice_map(
 
 
 def cut_loops(solid: Solid, axes: tuple[int, int]) -> list[FloatArray]:
-    """Return the polygons around the faces of a cut, each of shape (n, 2).
-
-    Args:
-        solid: Solid that was cut; its cut faces have the limit `CUT`.
-        axes: Two axes of the plane.
-    """
+    """Return the polygons around the faces with the limit `CUT` in a plane of two axes, (n, 2)."""
     if CUT not in solid.limits:
         return []
     faces: IntArray = solid.faces[solid.limit_of_face == solid.limits.index(CUT)].astype(np.int64)
@@ -195,13 +189,7 @@ def cut_loops(solid: Solid, axes: tuple[int, int]) -> list[FloatArray]:
 
 
 def map_picture(mapped: SliceMap, position: Triple, reach: float) -> str:
-    """Return the map between its axes as SVG, with the present position as a cross, for a panel.
-
-    Args:
-        mapped: The map.
-        position: The present position of the point of which the map is.
-        reach: Reach of the design, in design units.
-    """
+    """Return the map between its axes as SVG, with the present position of its point as a cross."""
     (u0, v0), (u1, v1) = mapped.lows, mapped.highs
     first, second = mapped.plane
     scale = min((WIDTH - LEFT - RIGHT) / (u1 - u0), (MOST_HEIGHT - TOP - BOTTOM) / (v1 - v0))
@@ -231,15 +219,9 @@ def map_picture(mapped: SliceMap, position: Triple, reach: float) -> str:
         # Another number if the measure may be another one anywhere: then the page asks again.
         "measure": hash(repr(mapped.colouring)),
     }
-    frame = element(
-        "rect",
-        x=left,
-        y=bottom - scale * (v1 - v0),
-        width=scale * (u1 - u0),
-        height=scale * (v1 - v0),
-        class_="frame",
-    )
-    size = placing(scale / mapped.own_scale, left, bottom)
+    wide, high = scale * (u1 - u0), scale * (v1 - v0)
+    frame = element("rect", x=left, y=bottom - high, width=wide, height=high, class_="frame")
+    size = map_transform(scale / mapped.own_scale, left, bottom)
     words = f"Map of the slice at {mapped.axis} = {format_number(mapped.level, 4)}"
     return (
         f'<svg class="ex-map" viewBox="0 0 {coordinate(WIDTH)} {coordinate(height)}" role="img" '

@@ -4,58 +4,35 @@ from __future__ import annotations
 
 import numpy as np
 
+from explorer.app.features.workspace import work
 from explorer.app.features.workspace.feeds import orientation_word, turned_suffix
-from explorer.app.features.workspace.regions import Part, Selection
-from explorer.app.features.workspace.tasks import (
-    MeasuredVolume,
-    WorkspaceDrawing,
-    WorkspaceRequest,
-)
 from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Measure
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.widgets import markup
 from explorer.app.widgets.blocks import content_of
-from explorer.app.widgets.markup import (
-    alert,
-    box,
-    caption,
-    dim,
-    meter,
-    note,
-    row,
-    swatch,
-    table,
-    ticks,
-)
-from explorer.app.widgets.under_way import problem, progress
+from explorer.app.widgets.under_way import look_of, problem, progress
 from explorer.export.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
 from explorer.measures.blocks.clearances import workspace_clearances
-from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import BAND_EDGES, band_colours, css
 from explorer.statics.reactions import has_limits
-from explorer.workspace.position_bands import (
-    MEASURE_WORDS,
-    SHARE_COLOURS,
-    SHARES,
-    STEP_COLOURS,
-)
+from explorer.workspace.position_bands import MEASURE_WORDS, SHARE_COLOURS, SHARES, STEP_COLOURS
 
 
-def volume_headline(frame: Frame, feed: Feed[Selection, MeasuredVolume]) -> str:
+def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume]) -> str:
     """Return the volume within the limits in large type as HTML."""
     newest = feed.drawing
     if feed.problem is not None:
-        return alert("The volume could not be computed", feed.problem)
+        return markup.alert("The volume could not be computed", feed.problem)
     if newest is None:
         return '<div class="ex-large ex-dim">computing …</div>'
     measured, design = newest.measured, newest.request.design
     if measured.volume <= 0.0:
-        content = alert(
-            "The workspace is empty", f"Emptied by: {', '.join(measured.empty_because)}."
-        )
+        causes = ", ".join(measured.empty_because)
+        content = markup.alert("The workspace is empty", f"Emptied by: {causes}.")
     else:
         litres, size = (0.01 * design.unit_mm) ** 3, design.reach**3
         cubic_cm, text = (
@@ -64,56 +41,47 @@ def volume_headline(frame: Frame, feed: Feed[Selection, MeasuredVolume]) -> str:
         )
         where = f"within the limits, in the {orientation_word(frame)} orientation"
         of_tool = ", of the tool" if frame.state.view.at == "tool" else ""
-        error = dim(f"± {format_number(measured.error, 1)}")
+        error = markup.dim(f"± {format_number(measured.error, 1)}")
         content = (
             f'<div class="ex-line"><span class="ex-large">{volume_text(newest)}</span>{error}</div>'
-            + caption(f"{cubic_cm} cm³ ({text} l) {where}{of_tool}")
+            + markup.caption(f"{cubic_cm} cm³ ({text} l) {where}{of_tool}")
         )
-    look = "" if feed.is_current else "is-outdated"
-    return f'<div class="{look}">{content}</div>'
+    return f'<div class="{look_of(feed)}">{content}</div>'
 
 
-def drawing_words(frame: Frame, feed: Feed[WorkspaceRequest, WorkspaceDrawing]) -> str:
+def drawing_words(frame: Frame, feed: Feed[work.WorkspaceRequest, work.WorkspaceDrawing]) -> str:
     """Return why nothing is drawn, or the volume of the part that is drawn, as HTML; "" for none.
 
     While that part is computed, its progress is told.
     """
     if feed.problem is not None:
         return problem(feed, "The workspace could not be drawn", "Compute the workspace")
-    region = frame.state.view.workspace.region
+    region, drawing = frame.state.view.workspace.region, feed.drawing
     if region == "limits" or feed.request is None:
         return ""
-    drawing = feed.drawing
     waiting = "" if feed.is_current else progress(feed)
-    if drawing is None or drawing.request.region != region:
-        return dim(waiting.capitalize())
-    return _part_words(frame.state, drawing, waiting)
-
-
-def _part_words(state: State, drawing: WorkspaceDrawing, waiting: str) -> str:
-    """Return the volume of the part of the workspace that is drawn, as HTML."""
-    region, part = drawing.request.region, drawing.part
-    if part is None:
-        # The alert of the panel tells the trouble.
-        return dim(waiting.capitalize())
+    part = None if drawing is None or drawing.request.region != region else drawing.part
+    if drawing is None or part is None:
+        # If nothing is in the region, the alert of the panel tells the trouble.
+        return markup.dim(waiting.capitalize())
     if drawing.volume <= 0.0:
         return ""
     percent = 100.0 * part.volume / drawing.volume
-    does, rest = (
-        ("accessible", COLLIDING) if region == "accessible" else ("hold the load", AT_LIMIT)
-    )
+    is_accessible = region == "accessible"
+    does, rest = ("accessible", COLLIDING) if is_accessible else ("hold the load", AT_LIMIT)
     words = (
         f'<div class="ex-line"><span>{format_number(part.volume, 6)} units³ {does}, '
-        f"{format_number(percent, 4)} %</span>{dim(waiting)}</div>" + meter(percent, PLAIN, rest)
+        f"{format_number(percent, 4)} %</span>{markup.dim(waiting)}</div>"
+        f"{markup.meter(percent, PLAIN, rest)}"
     )
-    if region == "accessible":
-        return words
-    if not has_limits(state.design):
-        return words + caption("The design has no limits of forces, so that it holds any load.")
-    return words + caption(f"{load_words(state)}.")
+    if not is_accessible:
+        unlimited = "The design has no limits of forces, so that it holds any load."
+        has_any = has_limits(frame.state.design)
+        words += markup.caption(f"{load_words(frame.state)}." if has_any else unlimited)
+    return words
 
 
-def nothing_words(drawing: WorkspaceDrawing) -> str:
+def nothing_words(drawing: work.WorkspaceDrawing) -> str:
     """Return that the region of a drawing is empty, without a full stop."""
     if drawing.request.region == "held":
         return "No position holds the load"
@@ -124,9 +92,7 @@ def nothing_words(drawing: WorkspaceDrawing) -> str:
 def load_words(state: State, *, any_direction: bool = True) -> str:
     """Return what loads the platform over the workspace, without a full stop.
 
-    Args:
-        state: The state.
-        any_direction: Whether the payload's force of any direction counts.
+    The payload's force counts if it may have `any_direction`.
     """
     forces, payload = state.view.forces, state.design.payload
 
@@ -146,7 +112,7 @@ def load_words(state: State, *, any_direction: bool = True) -> str:
     return words
 
 
-def volume_text(drawing: MeasuredVolume | None) -> str:
+def volume_text(drawing: work.MeasuredVolume | None) -> str:
     """Return a volume with its unit, "empty", or "–" before the first one."""
     if drawing is None:
         return "–"
@@ -156,43 +122,40 @@ def volume_text(drawing: MeasuredVolume | None) -> str:
     return f"{format_number(drawing.measured.volume, 6, size=size)} units³"
 
 
-def workspace_details(frame: Frame, feed: Feed[WorkspaceRequest, WorkspaceDrawing]) -> str:
+def workspace_details(
+    frame: Frame, feed: Feed[work.WorkspaceRequest, work.WorkspaceDrawing]
+) -> str:
     """Return the numbers of the drawn workspace as HTML."""
     drawing = feed.drawing
     if drawing is None:
-        return note("Show the solid or the hull to see its numbers.")
-    view = frame.state.view.workspace
-    parts: list[str] = []
+        return markup.note("Show the solid or the hull to see its numbers.")
+    part = drawing.part
+    parts = [_numbers(drawing, frame.state)]
     if drawing.mesh_agrees is False:
-        parts.append(
-            alert(
+        parts.insert(
+            0,
+            markup.alert(
                 "The solid is not quite the workspace",
                 "The workspace is too thin for its triangles: their volume is not the exact one.",
-            )
+            ),
         )
-    parts.append(_numbers(drawing, frame.state))
-    if drawing.part is not None and drawing.part.pairs and drawing.volume > 0.0:
-        parts.append(
-            _pairs(drawing.part, drawing.request.design, is_coloured=view.colour == "plain")
-        )
-    coarse_edge = drawing.surface.coarse_edge
-    if coarse_edge is not None:
-        parts.append(
-            '<div class="ex-dim ex-after">The workspace is large beside the reach: its condition '
-            f"number is computed at corners up to {format_number(coarse_edge, 3)} units "
-            "apart.</div>"
-        )
-    return box(*parts)
+    if part is not None and part.pairs and drawing.volume > 0.0:
+        clearances = workspace_clearances(part.pairs, drawing.request.design)
+        parts += [content_of(block, {}) for block in clearances]
+        is_coloured = frame.state.view.workspace.colour == "plain"
+        if is_coloured and any(pair.blocked_volume > 0.0 for pair in part.pairs):
+            parts.append(f'<div class="ex-dim">{markup.swatch(COLLIDING)}legs collide</div>')
+    return markup.box(*parts)
 
 
-def _numbers(drawing: WorkspaceDrawing, state: State) -> str:
+def _numbers(drawing: work.WorkspaceDrawing, state: State) -> str:
     """Return the table of nodes, extent and volumes."""
     nodes, part, request = drawing.nodes, drawing.part, drawing.request
     suffix = turned_suffix(request.design, request.rotation)
     rows: list[str] = []
 
     def add(name: str, value: str, hint: str) -> None:
-        rows.append(row(dim(name + suffix), value, hint=hint))
+        rows.append(markup.row(markup.dim(name + suffix), value, hint=hint))
 
     if nodes is not None:
         count, volume, which = format_number(nodes.count), nodes.volume, "Node"
@@ -217,24 +180,13 @@ def _numbers(drawing: WorkspaceDrawing, state: State) -> str:
             add(f"{name} {axis}", text, "Extent of the workspace, in design units")
     if drawing.hull_volume is not None:
         add("Hull volume", format_number(drawing.hull_volume, 6), "Volume of the convex hull")
-    return table(rows)
+    return markup.table(rows)
 
 
-def _pairs(part: Part, design: Design, *, is_coloured: bool) -> str:
-    """Return the clearance of each pair of legs, and the volume that it blocks."""
-    blocks = workspace_clearances(part.pairs, design)
-    is_marked = is_coloured and any(pair.blocked_volume > 0.0 for pair in part.pairs)
-    mark = f'<div class="ex-dim">{swatch(COLLIDING)}legs collide</div>' if is_marked else ""
-    return "".join(content_of(block, {}) for block in blocks) + mark
-
-
-def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None) -> str:
+def legend(measure: Measure, warn_below: float, drawing: work.WorkspaceDrawing | None) -> str:
     """Return the bands of colours with the values at their edges, and the colours of the map.
 
-    Args:
-        measure: The measure that is coloured.
-        warn_below: Warning value of that measure.
-        drawing: The workspace that is drawn; None for none.
+    Margins and conditions raise a warning below a value; other levels are those of the drawing.
     """
     if measure in MEASURE_WORDS:
         words, unit, factor = MEASURE_WORDS[measure]
@@ -261,30 +213,26 @@ def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None
     marks = ""
     if drawing is not None and drawing.slice_map is not None:
         if any(drawing.request.design.limits.leg_radii):
-            marks += f"<span>{swatch(COLLIDING)}legs collide</span>"
+            marks += f"<span>{markup.swatch(COLLIDING)}legs collide</span>"
         if drawing.part is not None:
             faint = f"--opacity:{NOT_ACCESSIBLE_OPACITY:g}"
             left_out = "not held" if drawing.request.region == "held" else "not accessible"
-            mark = f'<span class="ex-faint" style="{faint}">{swatch(NOT_ACCESSIBLE)}</span>'
+            mark = f'<span class="ex-faint" style="{faint}">{markup.swatch(NOT_ACCESSIBLE)}</span>'
             marks += f"<span>{mark}{left_out}</span>"
-    return box(
+    return markup.box(
         f'<div class="ex-line"><span class="ex-dim">{name}</span>'
         f'<span class="ex-flow ex-dim">{marks}</span></div>'
-        f'<div class="ex-legend" style="--colours:{stops}"></div>{ticks(*edges)}'
+        f'<div class="ex-legend" style="--colours:{stops}"></div>{markup.ticks(*edges)}'
     )
 
 
 def missing_input(measure: Measure) -> str:
     """Return a hint on the missing input that makes a measure zero over the whole workspace."""
-    match measure:
-        case "error":
-            words = "The actuators of the design have no errors: state them in the tab Machine."
-        case "deflection":
-            words = (
-                "The design is rigid: state the stiffness of its actuators or the tubes of its "
-                "struts in the tab Machine."
-            )
-        case _:
-            force, bending = MEASURE_WORDS["force"][0], MEASURE_WORDS["bending"][0]
-            words = f"The design has no limits of forces: colour by the {force} or the {bending}."
-    return note(words)
+    force, bending = MEASURE_WORDS["force"][0], MEASURE_WORDS["bending"][0]
+    words = f"The design has no limits of forces: colour by the {force} or the {bending}."
+    if measure == "error":
+        words = "The actuators of the design have no errors: state them in the tab Machine."
+    elif measure == "deflection":
+        lacking = "the stiffness of its actuators or the tubes of its struts"
+        words = f"The design is rigid: state {lacking} in the tab Machine."
+    return markup.note(words)

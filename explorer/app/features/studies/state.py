@@ -1,0 +1,287 @@
+"""The open study, and how it is shown: the studies' part of the state.
+
+A study is known by its name, not by its folder: only the server knows the folders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from explorer.app.state.state import StudiesPart
+from explorer.errors import InputError
+from explorer.measures.catalogue import CATALOGUE, measures_in, unmet_needs
+from explorer.measures.measure import Case
+from explorer.mechanism.design import VARIABLES, Design
+from explorer.numerics.arrays import BoolArray
+from explorer.numerics.number_text import format_number
+from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
+from explorer.sweep.machine import MACHINE
+from explorer.sweep.study import (
+    DEFAULT_MEASURES,
+    LONGEST_NAME,
+    NAMES,
+    RADIUS,
+    Objective,
+    Sampling,
+    Sense,
+    Study,
+)
+
+Range: TypeAlias = tuple[float, float]
+
+FEWEST, MOST = 16, 2000
+"""Smallest and largest number of designs of a study from the page."""
+
+LEAST_PERCENT, MOST_PERCENT = 1.0, 95.0
+"""Least and most that variables may vary, in per cent; with more a3y or b1y could be zero."""
+
+# A variable near zero varies as if it were this share of the reach; an angle by a share of this.
+LEAST_SHARE, RIGHT_ANGLE = 0.05, 90.0
+# Number of parts of a study from the page, about; each is shown as soon as it is computed.
+PARTS = 40
+
+
+@dataclass(frozen=True)
+class Brush:
+    """A filter on one axis: values must lie within one of its ranges, ends included.
+
+    Attributes:
+        axis: The name of a variable or measure.
+        ranges: Low and high end of each range; at least one range.
+    """
+
+    axis: str
+    ranges: tuple[Range, ...]
+
+
+@dataclass(frozen=True)
+class StudyPlan:
+    """A small study around the live design.
+
+    Attributes:
+        count: Number of designs.
+        percent: How far each variable varies, in per cent.
+        variables: Names of the variables that vary, out of `NAMES`.
+        measures: Names of the measures.
+        objectives: Measures that span the Pareto front, each with its sense.
+    """
+
+    count: int = 256
+    percent: float = 20.0
+    variables: tuple[str, ...] = VARIABLES
+    measures: tuple[str, ...] = DEFAULT_MEASURES
+    objectives: tuple[tuple[str, Sense], ...] = (
+        ("volume", "max"),
+        ("reach", "min"),
+        ("clearance", "max"),
+    )
+
+    def sense_of(self, measure: str) -> Sense | None:
+        """Return the sense of a measure that is an objective; None if it is none."""
+        return dict(self.objectives).get(measure)
+
+    def with_variable_toggled(self, name: str) -> StudyPlan:
+        """Return the plan in which a variable varies if it did not, and else stays fixed."""
+        return replace(self, variables=_toggle(NAMES, self.variables, name))
+
+    def with_measure_advanced(self, name: str) -> StudyPlan:
+        """Return the plan with the next use of a measure.
+
+        The uses in order: it is measured, then maximised, then minimised, then left out again.
+        """
+        senses = dict(self.objectives)
+        measures = self.measures
+        if name not in measures:
+            measures = _toggle(tuple(measures_in("studies")), measures, name)
+        elif name not in senses:
+            senses[name] = "max"
+        elif senses[name] == "max":
+            senses[name] = "min"
+        else:
+            del senses[name]
+            measures = _toggle(tuple(measures_in("studies")), measures, name)
+        ordered = tuple((other, senses[other]) for other in CATALOGUE if other in senses)
+        return replace(self, measures=measures, objectives=ordered)
+
+
+@dataclass(frozen=True)
+class Studies(StudiesPart):
+    """The open study, and how it is shown.
+
+    Attributes:
+        name: Name of the open study; None if none is.
+        brushes: The filters, at most one for each axis.
+        across, up: Names of the axes of the scatter plot; None for the first two objectives.
+        colour: Name of what colours both plots; None for the first objective.
+        picked: Index of the design that was picked last.
+        plan: The small study that can be started.
+    """
+
+    name: str | None = None
+    brushes: tuple[Brush, ...] = ()
+    across: str | None = None
+    up: str | None = None
+    colour: str | None = None
+    picked: int | None = None
+    plan: StudyPlan = StudyPlan()
+
+    def with_ranges(self, axis: str, ranges: tuple[Range, ...]) -> Studies:
+        """Return the studies with new ranges of one axis; with none the axis has no filter."""
+        others = tuple(brush for brush in self.brushes if brush.axis != axis)
+        return replace(self, brushes=(*others, Brush(axis, ranges)) if ranges else others)
+
+    def ranges_of(self, axis: str) -> tuple[Range, ...]:
+        """Return the ranges of an axis; none if it has no filter."""
+        return next((brush.ranges for brush in self.brushes if brush.axis == axis), ())
+
+
+def within(columns: Mapping[str, Any], brushes: tuple[Brush, ...]) -> BoolArray:
+    """Return which rows lie within all brushes, shape (n,).
+
+    A row lies within a brush if its value lies in one of the ranges, ends included; a missing
+    value (NaN) lies in none. Brushes of axes that a study does not have are passed over.
+
+    Args:
+        columns: Columns by name, shape (n,) each, with the index among them.
+        brushes: The filters, at most one for each axis.
+    """
+    chosen = np.ones(len(columns["index"]), dtype=np.bool_)
+    for brush in brushes:
+        if brush.axis not in columns:
+            continue
+        values = np.asarray(columns[brush.axis], dtype=np.float64)
+        inside = np.zeros(len(values), dtype=np.bool_)
+        for low, high in brush.ranges:
+            inside |= (values >= low) & (values <= high)
+        chosen &= inside
+    return chosen
+
+
+def range_around(design: Design, name: str, percent: float) -> Range:
+    """Return the range of a variable of a study around its value in a design.
+
+    The range extends to both sides by a percentage of the value, or of a 20th of the reach where
+    that is larger; for the yaw, of a right angle. A radius stays at zero or above.
+
+    Raises:
+        InputError: No such variable, or a part of the machine that the design does not have.
+    """
+    share = percent / 100.0
+    if name == YAW:
+        value, span = start_value(design, YAW), share * RIGHT_ANGLE
+    elif name in MACHINE:
+        found = MACHINE[name].value_in(design)
+        if found is None:
+            raise InputError(f"the design has no {label_of(name)} that could vary")
+        value, span = found, share * abs(found)
+        if MACHINE[name].bound == "any":
+            span = share * max(abs(value), LEAST_SHARE * design.reach)
+    elif name == RADIUS:
+        value = max(design.limits.leg_radii)
+        span = share * max(value, LEAST_SHARE**2 * design.reach)
+        return max(0.0, value - span), value + span
+    else:
+        value = start_value(design, name)
+        span = share * max(abs(value), LEAST_SHARE * design.reach)
+    low = value - span
+    if name == REACH:
+        # The reach goes at most halfway down to the longest minimum.
+        low = max(low, 0.5 * (value + longest_minimum(design)))
+    return low, value + span
+
+
+def study_around(design: Design, plan: StudyPlan, name: str) -> Study:
+    """Return a small study around a design.
+
+    Args:
+        design: The design.
+        plan: The variables and measures.
+        name: Name of the study.
+
+    Raises:
+        InputError: No variable or no measure, or a number that is out of its range.
+    """
+    if not FEWEST <= plan.count <= MOST:
+        raise InputError(
+            f"a study from the page has {FEWEST} to {format_number(MOST)} designs; "
+            f"got {format_number(plan.count)}"
+        )
+    if not LEAST_PERCENT <= plan.percent <= MOST_PERCENT:
+        raise InputError(
+            f"variables vary by {format_number(LEAST_PERCENT)} to {format_number(MOST_PERCENT)} %; "
+            f"got {format_number(plan.percent)} %"
+        )
+    if not plan.variables:
+        raise InputError("choose at least one variable that varies")
+    measures = tuple(measure for measure in plan.measures if measure not in plan.variables)
+    if not measures:
+        raise InputError("choose at least one measure")
+    if lacking := unmet_needs([Case(design)], measures):
+        raise InputError(f"the design has {lacking}")
+    ranges = {v: range_around(design, v, plan.percent) for v in plan.variables}
+    return Study(
+        name=name[:LONGEST_NAME],
+        design=design,
+        variables=ranges,
+        sampling=Sampling(method="sobol", count=plan.count),
+        measures=measures,
+        objectives=tuple(Objective(measure, sense) for measure, sense in plan.objectives),
+        chunk=max(4, -(-plan.count // PARTS)),
+    )
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a variable or measure as the page writes it; "" for a plain number."""
+    if name in CATALOGUE:
+        return CATALOGUE[name].unit_in("units")
+    if name in MACHINE:
+        return MACHINE[name].unit
+    return "°" if name == YAW else "units" if name in NAMES else ""
+
+
+def choices_for(design: Design, plan: StudyPlan) -> tuple[list[str], list[str]]:
+    """Return the variables and the measures that a plan has or a design allows, in their order."""
+    case = Case(design)
+    variables = [
+        name
+        for name in NAMES
+        if name in plan.variables
+        or name not in MACHINE
+        or MACHINE[name].value_in(design) is not None
+    ]
+    measures = [
+        name
+        for name, measure in measures_in("studies").items()
+        if name in plan.measures or all(map(case.has, measure.needs))
+    ]
+    return variables, measures
+
+
+def label_of(name: str) -> str:
+    """Return the name of a variable or measure on the page."""
+    is_measure = name in measures_in("studies")
+    return CATALOGUE[name].label if is_measure else name.replace("_", " ")
+
+
+def title_of(name: str) -> str:
+    """Return the title of an axis, with its unit."""
+    unit = unit_of(name)
+    return f"{label_of(name)} [{unit}]" if unit else label_of(name)
+
+
+def short_title_of(name: str) -> str:
+    """Return the title of an axis where there is little room, with its unit: u is one unit."""
+    unit = unit_of(name).replace("units", "u")
+    words = label_of(name).replace("inverse condition", "inv. cond.")
+    return f"{words} [{unit}]" if unit else words
+
+
+def _toggle(order: tuple[str, ...], chosen: tuple[str, ...], name: str) -> tuple[str, ...]:
+    if name not in order:
+        raise InputError(f"there is no {name!r}; there are {', '.join(order)}")
+    toggled = {*chosen} ^ {name}
+    return tuple(other for other in order if other in toggled)

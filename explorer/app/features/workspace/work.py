@@ -1,0 +1,410 @@
+"""The worker's tasks for the workspace: measure it, draw it or its parts, write files of it.
+
+A part is what is accessible, or what holds a load. Lengths are in design units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from explorer.app.features.workspace import slice_map as maps
+from explorer.app.scene.bands import PLAIN, Colouring, Measure, Shell
+from explorer.app.scene.creases import creased_faces
+from explorer.app.session.feed import watch_of
+from explorer.app.session.worker import Channel
+from explorer.errors import ExplorerError, InputError
+from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
+from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
+from explorer.numerics.search import Watch, ignore_stage
+from explorer.statics.reactions import has_limits
+from explorer.workspace.accessible.nodes import StartError
+from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
+from explorer.workspace.accessible.workspace import PairCost, accessible_workspace
+from explorer.workspace.carried_region import carried_region
+from explorer.workspace.extremes import extent_of
+from explorer.workspace.faces.faces import Faces, workspace_faces
+from explorer.workspace.limits.constraints import HalfSpace, constraints
+from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
+from explorer.workspace.solids.solid import Solid, convex_hull, cut_solid
+from explorer.workspace.solids.solids import workspace_solid
+
+Rows: TypeAlias = tuple[tuple[float, ...], ...]
+"""Rows of a matrix."""
+
+Region = Literal["limits", "accessible", "held"]
+
+# Number of cached workspaces, so that a cut or another colour takes no time.
+CACHED = 4
+# Most nodes of the paper's grid whose steps are checked for a drawing.
+MOST_LIVE_NODES = 200_000
+# Chord tolerances of a live solid, and of an accessible or a carried part, over the reach.
+LIVE_TOLERANCE, PART_TOLERANCE = 0.004, 0.001
+# The format with exact faces rather than facets.
+STEP = "step"
+
+
+def rows_of(matrix: FloatArray) -> Rows:
+    """Return the rows of a matrix (n, m) as plain numbers, which can be compared and hashed."""
+    return tuple(tuple(row) for row in matrix.tolist())
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The workspace or the part of it that is drawn or exported.
+
+    Attributes:
+        design: The manipulator.
+        rotation: Rows of the matrix, platform to base.
+        region: All that is within the limits, its accessible part, or the part that holds the load.
+        start: Position where paths start; None for home.
+        load: (F; M) at the tool point besides the payload, base axes, in N and N × unit; None if
+            it does not matter.
+    """
+
+    design: Design
+    rotation: Rows
+    region: Region = "limits"
+    start: Triple | None = None
+    load: Six | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """The volume of a part of a workspace, and of an accessible one what legs block.
+
+    Attributes:
+        node_count: Number of accessible nodes of the paper's grid; None if the grid is too fine.
+        pairs: Clearance and blocked volume of each pair of legs, in the order of `PAIRS`.
+    """
+
+    volume: float
+    node_count: int | None = None
+    pairs: tuple[PairCost, ...] = ()
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """Why nothing is accessible, or holds the load; the nearest position to start from, if any."""
+
+    reason: str
+    nearest: Triple | None = None
+
+
+def trouble_of(error: ExplorerError) -> Trouble:
+    """Return an error of the library as a trouble."""
+    nearest = error.nearest if isinstance(error, StartError) else None
+    if nearest is None:
+        return Trouble(str(error))
+    x, y, z = nearest.tolist()
+    return Trouble(str(error), (x, y, z))
+
+
+_parts: dict[tuple[Selection, float], tuple[Part, Solid] | Trouble] = {}
+
+
+def find_part(selection: Selection, tolerance: float, watch: Watch) -> tuple[Part, Solid] | Trouble:
+    """Return the part of a workspace that a region names, "accessible" or "held", or its trouble.
+
+    The newest few parts are cached. The tolerance is that of chords; `watch` gets each stage.
+    """
+    key = selection, tolerance
+    part = _parts.pop(key, None)
+    if part is None:
+        find = _find_accessible if selection.region == "accessible" else _find_carried
+        part = find(selection, tolerance, watch)
+    _parts[key] = part
+    if len(_parts) > CACHED:
+        del _parts[next(iter(_parts))]
+    return part
+
+
+def _find_accessible(
+    selection: Selection, tolerance: float, watch: Watch
+) -> tuple[Part, Solid] | Trouble:
+    try:
+        accessible = accessible_workspace(
+            selection.design,
+            np.array(selection.rotation),
+            start=selection.start,
+            most_nodes=MOST_LIVE_NODES,
+            tolerance=tolerance,
+            watch=watch,
+        )
+    except ExplorerError as error:
+        return trouble_of(error)
+    nodes = accessible.accessible_node_count
+    return Part(accessible.accessible_volume, nodes, accessible.pairs), accessible.solid
+
+
+def _find_carried(selection: Selection, tolerance: float, _: Watch) -> tuple[Part, Solid] | Trouble:
+    load = (0.0,) * 6 if selection.load is None else selection.load
+    region = carried_region(
+        selection.design, np.array(selection.rotation), load, tolerance=tolerance
+    )
+    # Without a factor something holds the load, or the workspace is empty.
+    if region.factor is None:
+        return Part(region.held_volume), region.solid
+    if region.factor >= 1.0:
+        return Trouble("the positions that hold it are too few to be drawn")
+    (limit,) = region.solid.empty_because
+    percent = format_number(100.0 * region.factor, 3)
+    return Trouble(
+        f"the best position found holds {percent} % of load and payload; {limit} is at its limit "
+        "there"
+    )
+
+
+@lru_cache(2 * CACHED)
+def _exact_volume(design: Design, rotation: Rows) -> Volume:
+    """Return the exact volume of a workspace, computed once for its number and its drawing."""
+    return workspace_volume(design, np.array(rotation))
+
+
+@dataclass(frozen=True)
+class MeasuredVolume:
+    """The volume of a workspace within the limits with its error, in cubed design units."""
+
+    request: Selection
+    measured: Volume
+
+
+def measure_volume(request: Selection) -> MeasuredVolume:
+    """Return the exact volume of a workspace within the limits."""
+    return MeasuredVolume(request, _exact_volume(request.design, request.rotation))
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorkspaceRequest(Selection):
+    """Request to draw and measure a workspace.
+
+    Attributes:
+        colour: Measure that colours the surface.
+        cut: Axis across which the solid is cut open, or None.
+        level: Coordinate of the cut; None, or one beyond the extent, for the middle.
+        flipped: Whether the side is kept that faces the isometric camera.
+        tolerance: Chord tolerance, in design units.
+        hull: Whether to make the convex hull.
+        warn_below: Length below which margins raise a warning.
+    """
+
+    colour: Measure
+    cut: maps.Axis | None
+    level: float | None
+    flipped: bool
+    tolerance: float
+    hull: bool
+    warn_below: float
+
+    @property
+    def selection(self) -> Selection:
+        """The workspace alone, without how it is drawn; a load that only colours it left out."""
+        load = self.load if self.region == "held" else None
+        return Selection(self.design, self.rotation, self.region, self.start, load)
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceSurface:
+    """The surface of a workspace by colour, and the edges where its faces meet, (k, 2, 3)."""
+
+    request: WorkspaceRequest
+    shells: tuple[Shell, ...]
+    edges: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceDrawing:
+    """A workspace drawn and measured.
+
+    Attributes:
+        hull: Convex hull, if requested.
+        slice_map: Map of the slice, if the solid is cut.
+        volume: Exact volume within the limits, see `explorer.workspace.slices.volume`.
+        part: Numbers of the part that is drawn; None for all within the limits.
+        trouble: Why nothing is accessible or holds the load, if all within the limits is drawn
+            instead.
+        mesh_volume: Volume of the uncut solid.
+        mesh_agrees: Whether the volume of the solid within the limits agrees with the exact one.
+        hull_volume: Volume of the hull, if requested.
+        extent: (lows, highs) of the solid; None if it is empty.
+        nodes: The paper's node count within the limits; None if the grid is too fine.
+        levels: The measure that colours the map at the edge of each band, see
+            `explorer.workspace.position_bands.PositionBands`.
+    """
+
+    request: WorkspaceRequest
+    surface: WorkspaceSurface
+    hull: Shell | None
+    slice_map: maps.SliceMap | None
+    volume: float
+    part: Part | None
+    trouble: Trouble | None
+    mesh_volume: float
+    mesh_agrees: bool | None
+    hull_volume: float | None
+    extent: tuple[FloatArray, FloatArray] | None
+    nodes: NodeCount | None
+    levels: tuple[float, ...]
+
+
+def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) -> WorkspaceDrawing:
+    """Return the workspace, drawn and measured.
+
+    The parent at a channel gets each `Stage`, and the `WorkspaceSurface` as soon as it is known,
+    and may cancel.
+    """
+    design, rotation = request.design, np.array(request.rotation)
+    load = (0.0,) * 6 if request.load is None else request.load
+    colouring = Colouring(design, rotation, request.colour, request.warn_below, np.array(load))
+    holds = request.region == "held"
+    on_map = replace(colouring, measure=map_measure(design, request.colour, holds=holds))
+    limits = constraints(design, rotation)
+
+    def draw(faces: Faces) -> WorkspaceSurface:
+        shells = colouring.shells(faces, holds=holds and trouble is None)
+        surface = WorkspaceSurface(request, shells, faces.edges)
+        if channel is not None:
+            channel.send(surface)
+        return surface
+
+    measured = _exact_volume(design, request.rotation)
+    surface = None
+    if request.region == "limits" and request.cut is None:
+        # It is waited for; it needs none of what follows.
+        surface = draw(workspace_faces(limits))
+    whole = workspace_solid(design, rotation, request.tolerance, volume=measured)
+    solid, part, trouble = whole, None, None
+    if request.region != "limits":
+        answer = find_part(request.selection, request.tolerance, watch_of(channel))
+        if isinstance(answer, Trouble):
+            trouble = answer
+        else:
+            part, solid = answer
+    whole_extent = extent = None if whole.is_empty else extent_of(design, rotation)
+    if part is not None:
+        corners = solid.vertices
+        extent = None if solid.is_empty else (corners.min(axis=0), corners.max(axis=0))
+    shown, mapped, cut, level = solid, None, None, 0.0
+    if request.cut is not None and extent is not None:
+        axis = maps.AXES.index(request.cut)
+        level = maps.level_within(float(extent[0][axis]), float(extent[1][axis]), request.level)
+        side = -1.0 if maps.keeps_above(request.cut, request.flipped) else 1.0
+        cut = HalfSpace(maps.CUT, side * np.eye(3)[axis], side * level)
+        limits = (*limits, cut)
+        shown = solid if part is None else cut_solid(solid, cut)
+    if surface is None:
+        surface = draw(workspace_faces(limits) if part is None else creased_faces(shown))
+    if cut is not None and request.cut is not None and whole_extent is not None:
+        cut_solids = (None, None) if part is None else (cut_solid(whole, cut), shown)
+        left_out = "load not held" if holds else "not accessible"
+        mapped = maps.slice_map(on_map, whole_extent, request.cut, level, *cut_solids, left_out)
+    hull = convex_hull(solid) if request.hull and not solid.is_empty else None
+    try:
+        nodes = workspace_nodes(design, rotation)
+    except InputError:
+        nodes = None
+    return WorkspaceDrawing(
+        request=request,
+        surface=surface,
+        hull=None if hull is None else Shell(PLAIN, hull.vertices, hull.faces),
+        slice_map=mapped,
+        volume=measured.volume,
+        part=part,
+        trouble=trouble,
+        mesh_volume=solid.volume,
+        mesh_agrees=solid.agrees,
+        hull_volume=None if hull is None else hull.volume,
+        extent=extent,
+        nodes=nodes,
+        levels=on_map.bands.levels,
+    )
+
+
+def draw_radius_curve(request: Selection, channel: Channel | None = None) -> RadiusCurve | Trouble:
+    """Return the accessible volume over the radius of all legs, or why there is no curve.
+
+    The legs of the design have no radii.
+    """
+    design, rotation = request.design, np.array(request.rotation)
+    try:
+        return radius_curve(design, rotation, start=request.start, watch=watch_of(channel))
+    except ExplorerError as error:
+        return trouble_of(error)
+
+
+def map_measure(design: Design, colour: Measure, *, holds: bool) -> Measure:
+    """Return the measure of the map of a slice, "plain" for the margins.
+
+    It is that which colours the surface, or the share of limits in what `holds` the load.
+    """
+    return "share" if colour == "plain" and holds and has_limits(design) else colour
+
+
+def export_mesh(
+    selection: Selection,
+    tolerance: float,
+    what: str,
+    file_format: str,
+    offset: Triple | None = None,
+) -> bytes:
+    """Return a file of the "workspace" or of its "hull", in millimetres.
+
+    Args:
+        selection: The workspace or the part of it.
+        tolerance: Chord tolerance.
+        what: The workspace or its hull.
+        file_format: A format of `explorer.export.mesh`, or `STEP` for the workspace itself.
+        offset: Vector from b4 to the tool point, of which the positions are; None for b4.
+
+    Raises:
+        ExplorerError: An empty workspace, nothing accessible, a load that nothing holds, a missing
+            library, or STEP of a solid without exact faces.
+    """
+    design, region = selection.design, selection.region
+    rotation, name = np.array(selection.rotation), file_words(region, what, offset)
+    if file_format == STEP:
+        if region != "limits":
+            cause = "legs begin to collide" if region == "accessible" else "a part takes its limit"
+            raise InputError(
+                f"STEP takes exact faces, and the surface along which {cause} consists of facets; "
+                "export it as 3mf, stl, glb, obj or ply, or choose the region "
+                '"within the limits"'
+            )
+        from explorer.export.step import exact_workspace, step_bytes
+
+        exact = exact_workspace(design, rotation)
+        if offset is not None:
+            exact = exact.shifted(design.unit_mm * np.array(offset))
+        return step_bytes(exact, f"{name} of {design.name}")
+    from explorer.export.mesh import mesh_bytes
+
+    if region == "limits":
+        solid = workspace_solid(design, rotation, tolerance)
+    else:
+        answer = find_part(selection, tolerance, ignore_stage)
+        if isinstance(answer, Trouble):
+            cause = "nothing holds the load: " if region == "held" else ""
+            raise InputError(cause + answer.reason)
+        _, solid = answer
+    solid = convex_hull(solid) if what == "hull" else solid
+    if offset is not None:
+        solid = solid.shifted(np.array(offset))
+    return mesh_bytes(solid, file_format, design, f"{design.name} {name}")
+
+
+def file_words(region: Region, what: str, offset: Triple | None = None) -> str:
+    """Return the name of a file with a "workspace" or a "hull", of b4 or of the tool point."""
+    what = what if offset is None else f"{what} of the tool"
+    match region:
+        case "limits":
+            return what
+        case "accessible":
+            return f"accessible {what}"
+        case "held":
+            return f"{what} that holds the load"

@@ -1,1 +1,0 @@
-"""Rules for who may connect to the server."""

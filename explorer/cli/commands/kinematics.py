@@ -1,0 +1,272 @@
+"""`explorer inverse`, `forward` and `singularity`: joints, modes, and margins of poses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from explorer.cli import output
+from explorer.cli.options import JsonOptions, PointOptions, PoseOptions
+from explorer.cli.values import numbers
+from explorer.errors import NoAnswerError
+from explorer.mechanism import kinematics
+from explorer.mechanism.configuration import Configuration, tool_offset
+from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
+from explorer.mechanism.folds import FOLDS
+from explorer.mechanism.machine import Six
+from explorer.mechanism.margins import TETRAHEDRA, margins, mode_name, signs_of
+from explorer.mechanism.pose import Triple, quaternion_from_rotation, yaw_pitch_roll_from_rotation
+from explorer.mechanism.tilt_torsion import tilt_torsion_from_rotation
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity import ellipsoids
+from explorer.singularity.strata import incidences
+
+if TYPE_CHECKING:
+    from explorer.measures.snapshot import Snapshot
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inverse(JsonOptions, PoseOptions):
+    """Compute the joints of a pose.
+
+    Their order is l1 d1 d2 d3 d4 l4. The violated limits of the design are listed.
+    """
+
+    def run(self) -> None:
+        """Write the joints of the pose."""
+        from explorer.measures.snapshot import evaluate
+
+        design = self.read_design()
+        snapshot, tool = evaluate(design, self.pose(design)), self.tool(design)
+        self.write(lambda: _inverse_json(snapshot, tool), _inverse_lines(snapshot, tool))
+
+
+def _inverse_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
+    folds = output.folds_in_degrees(snapshot.pose.position, snapshot.rotation)
+    answer = {"joints": snapshot.joints, "folds": folds, **output.limits_json(snapshot)}
+    return answer if tool is None else {**answer, **output.pose_json(snapshot.pose, tool)}
+
+
+def _inverse_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
+    from explorer.workspace.limits.table import joint_ranges
+
+    design, ranges = snapshot.design, joint_ranges(snapshot.design)
+    rows = [("joint", "units", "mm", "limits")]
+    for name, value in zip(JOINTS, snapshot.joints.tolist(), strict=True):
+        bounds = ranges.get(name)
+        allowed = f"{bounds[0]:.6g} to {bounds[1]:.6g}" if bounds else "none"
+        rows.append((name, *output.lengths(design, value, design.reach), allowed))
+    pose = output.pose_table(design, snapshot.pose, tool)
+    yield from (output.heading(design), pose, "", output.table(rows, "<>><"), "")
+    yield from output.limits_lines(snapshot)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forward(JsonOptions, PointOptions):
+    """Compute the eight assembly modes of the joints.
+
+    All eight are real or none is. If none is, the exit status is 1 and the message names the
+    failing trilateration and the smallest change of a joint that makes it feasible.
+    """
+
+    joints: Annotated[Six, numbers(" ".join(JOINTS))]
+    """Values of the joints, in design units."""
+
+    def run(self) -> None:
+        """Write all eight poses of the joints."""
+        design = self.read_design()
+        joints = np.array(self.joints)
+        squares, modes = (
+            kinematics.discriminants(design, joints),
+            kinematics.forward(design, joints),
+        )
+        if not modes.feasible:
+            if self.json:
+                output.write_json({"feasible": False, "discriminants": squares, "modes": []})
+            raise NoAnswerError(_failure_message(design, joints, squares))
+        tool = design.tool.position
+        shown_tool = tool if self.at == "tool" or any(tool) else None
+        rows = [("joint", *JOINTS), ("units", *output.figures(self.joints))]
+        self.write(
+            lambda: {
+                "feasible": True,
+                "discriminants": squares,
+                "modes": _modes_json(modes, shown_tool),
+            },
+            chain(
+                (output.heading(design), output.table(rows, "<>>>>>>")),
+                _mode_lines(modes, shown_tool),
+            ),
+        )
+
+
+def _modes_json(
+    modes: kinematics.ForwardKinematics, tool: Triple | None
+) -> list[dict[str, object]]:
+    quaternion = quaternion_from_rotation(modes.rotation)
+    tilt_torsion = tilt_torsion_from_rotation(modes.rotation)
+    margin = margins(modes.position, modes.rotation)
+    folds = output.folds_in_degrees(modes.position, modes.rotation)
+    at_tool = modes.position + tool_offset(modes.rotation, tool)
+    return [
+        {
+            "mode": mode,
+            "signs": signs_of(mode),
+            "position": modes.position[mode],
+            **({} if tool is None else {"tool_position": at_tool[mode]}),
+            "quaternion": quaternion[mode],
+            "tilt_torsion": tilt_torsion[mode],
+            "margins": margin[mode],
+            "folds": folds[mode],
+        }
+        for mode in range(len(margin))
+    ]
+
+
+def _mode_lines(modes: kinematics.ForwardKinematics, tool: Triple | None) -> Iterator[str]:
+    angles = yaw_pitch_roll_from_rotation(modes.rotation)
+    margin = margins(modes.position, modes.rotation)
+    folds = output.folds_in_degrees(modes.position, modes.rotation)
+    r, *between = folds[0, :3].tolist()
+    first = "  ".join([output.figure(r), *output.degrees(between)])
+    yield f"{' '.join(FOLDS[:3])}  {first}, in every mode"
+    at_tool = modes.position + tool_offset(modes.rotation, tool)
+    names = () if tool is None else ("tool x", "tool y", "tool z")
+    heads = *names, "yaw", "pitch", "roll", "δ1", "δ2", "δ3", *FOLDS[3:]
+    rows = [("mode", "signs", *"xyz", *heads)]
+    rows += [
+        (
+            str(mode),
+            mode_name(mode),
+            *output.figures(modes.position[mode].tolist()),
+            *(output.figures(at_tool[mode].tolist()) if names else ()),
+            *output.degrees(angles[mode].tolist()),
+            *output.figures(margin[mode].tolist()),
+            *output.degrees(folds[mode, 3:].tolist()),
+        )
+        for mode in range(len(margin))
+    ]
+    yield from ("", output.table(rows, "<<" + ">" * (len(rows[0]) - 2)))
+
+
+def _failure_message(design: Design, joints: FloatArray, squares: FloatArray) -> str:
+    failures = [
+        f"trilateration {index + 1} (tetrahedron {' '.join(TETRAHEDRA[index])}) has "
+        f"δ{index + 1}² = {square:.4g}"
+        for index, square in enumerate(squares.tolist())
+        if square < 0.0
+    ]
+    return (
+        f"the lengths do not close: {' and '.join(failures)}, which must not be negative; "
+        f"{_least_change(design, joints)}"
+    )
+
+
+def _least_change(design: Design, joints: FloatArray) -> str:
+    """Return the smallest change of a single joint with which the lengths close, in words."""
+    moves: list[tuple[float, str]] = []
+    for index, intervals in enumerate(feasible_intervals(design, joints)):
+        nearest = nearest_feasible(design, joints, index, intervals)
+        if nearest is None:
+            continue
+        value, closing = float(joints[index]), _shortest_text(design, joints, index, nearest)
+        moves.append((abs(nearest - value), f"{JOINTS[index]} from {value:.10g} to {closing}"))
+    if not moves:
+        return "no change of a single joint closes them"
+    return f"the least change of one joint that closes them is {min(moves)[1]}"
+
+
+def _shortest_text(design: Design, joints: FloatArray, joint: int, closing: float) -> str:
+    """Return a closing value of a joint in the fewest digits with which it still closes."""
+    trial = joints.copy()
+    for digits in range(6, 17):
+        written = f"{closing:.{digits}g}"
+        trial[joint] = float(written)
+        if kinematics.forward(design, trial).feasible:
+            return written
+    return repr(closing)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Singularity(JsonOptions, PoseOptions):
+    """Measure how near a pose is to a singularity, and to which.
+
+    A margin is zero where its tetrahedron is flat; δ1 and δ3 are distances, δ2 is a distance times
+    a sine. The signs of the three margins name the assembly mode. The nearest singular poses
+    minimise the root-mean-square displacement of the platform's points b1 to b4, Nawratil's metric.
+    With `--at tool` the ellipsoids of speeds and forces at the tool
+    follow; the singular poses themselves do not depend on the tool.
+    """
+
+    def run(self) -> None:
+        """Write the margins of the pose and the measures of singularity."""
+        from explorer.measures.snapshot import evaluate
+
+        design = self.read_design()
+        snapshot, tool = evaluate(design, self.pose(design)), self.tool(design)
+        self.write(lambda: _singularity_json(snapshot, tool), _singularity_lines(snapshot, tool))
+
+
+def _singularity_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
+    indices = "inverse_condition smallest_singular_value manipulability transmissions"
+    names = f"margins volumes determinant {indices} transmission_index proximity"
+    return {
+        **output.attributes(snapshot, f"{names} stratum stratum_dimension mode signs"),
+        "folds": output.folds_in_degrees(snapshot.pose.position, snapshot.rotation),
+        "incidences": incidences(snapshot.stratum),
+        "nearest": [
+            {
+                **output.attributes(nearest, "incidence distance"),
+                **output.pose_json(nearest.pose, tool),
+            }
+            for nearest in snapshot.nearest
+        ],
+        **({} if tool is None else _tool_json(snapshot, tool)),
+    }
+
+
+def _tool_json(snapshot: Snapshot, tool: Triple) -> dict[str, object]:
+    """Return the tool's position, and the condition of J and the ellipsoids at the tool."""
+    found = ellipsoids.performance(snapshot.design, snapshot.pose, tool)
+    both = {"translation": found.translation, "rotation": found.rotation}
+    return {
+        **output.tool_json(snapshot.pose, tool),
+        "tool_inverse_condition": _condition_at(snapshot, tool),
+        "tool_ellipsoids": {
+            name: {"gain": [*map(output.finite, each.gain.tolist())], "axes": each.axes.T}
+            for name, each in both.items()
+        },
+    }
+
+
+def _condition_at(snapshot: Snapshot, tool: Triple) -> float:
+    return float(Configuration.at(snapshot.design, snapshot.pose, tool).inverse_condition)
+
+
+def _singularity_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
+    from explorer.cli.blocks import lines
+    from explorer.measures.blocks import singularity as blocks
+    from explorer.measures.blocks.block import Statement
+    from explorer.measures.verdict import verdict
+
+    design, here = snapshot.design, verdict(snapshot)
+    yield from (output.heading(design), output.pose_table(design, snapshot.pose, tool))
+    yield from lines(
+        (
+            Statement(here.title, here.reason(design.unit_mm)),
+            *blocks.freedoms(snapshot),
+            blocks.margin_table(snapshot),
+            blocks.tetrahedra(snapshot),
+            blocks.conditioning(snapshot),
+            blocks.nearest_poses(snapshot),
+        )
+    )
+    if tool is not None:
+        found = ellipsoids.performance(design, snapshot.pose, tool)
+        yield from lines(blocks.ellipsoids(found, "the tool"))
+        yield from lines([blocks.tool_condition(_condition_at(snapshot, tool))])

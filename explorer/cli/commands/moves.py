@@ -1,0 +1,318 @@
+"""`explorer interference` and `path`: clearances of poses and moves, and planned paths."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import tyro
+
+from explorer.cli import output, values
+from explorer.cli.options import (
+    EndOptions,
+    JsonOptions,
+    PointOptions,
+    PoseOptions,
+    RadiiOptions,
+    check_has_limits,
+    make_pose,
+    write_files,
+)
+from explorer.errors import InputError
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose, Triple
+from explorer.statics.reactions import LIMITED, PART_NAMES
+
+if TYPE_CHECKING:
+    from explorer.legs.moves import MoveClearance
+    from explorer.measures.snapshot import Snapshot
+    from explorer.paths.loads import PathLoads
+    from explorer.paths.planning import PlannedPath
+    from explorer.paths.trajectory import Trajectory
+
+MOST_STEPS = 100_000
+END_OPTIONS = "with --to, --to-quaternion, --to-yaw-pitch-roll, --to-tilt-torsion or --to-folds"
+INSTEAD = values.hint("instead of --from-quaternion")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interference(JsonOptions, RadiiOptions, EndOptions, PoseOptions):
+    """Measure the clearances of the legs, in a pose or over a move.
+
+    Legs are capsules about their axes; the clearance of two legs is the distance of the axes minus
+    both radii, and below zero they collide. A straight move is tested twice: exactly, and by the
+    paper's test of swept tetrahedra, which ignores radii and depends on the number of steps.
+    """
+
+    to: Annotated[values.Position, values.OPTIONAL] = None
+    """Move b4, or the tool, straight to this position, in design units."""
+
+    steps: Annotated[
+        int | None,
+        values.whole_number(1, MOST_STEPS),
+        values.hint("default: none longer than the node step"),
+    ] = None
+    """Number of steps of the move in the paper's test."""
+
+    def run(self) -> None:
+        """Write the clearances of the pose or of the move."""
+        from explorer.measures.snapshot import evaluate
+
+        design = self.with_radii(self.read_design())
+        start, tool = self.pose(design), self.tool(design)
+        here, end = evaluate(design, start), self.end(start, self.to, tool)
+        if end is None:
+            if self.steps is not None:
+                raise InputError(f"--steps divides a move; say where it goes {END_OPTIONS}")
+            self.write(lambda: _pose_json(here, tool), _pose_lines(here, tool))
+            return
+        from explorer.legs.moves import move_clearance
+
+        steps = self.steps or _steps_of(design, start, end, tool)
+        move = move_clearance(design, start, end, steps=steps, tool=tool)
+        there = evaluate(design, end)
+        self.write(lambda: _move_json(move, here, there), _move_lines(move, here, there))
+
+
+def _steps_of(design: Design, start: Pose, end: Pose, tool: Triple | None) -> int:
+    """Return the number of steps in which no leg's end moves farther than a node step."""
+    from explorer.legs.moves import StraightMoves
+    from explorer.workspace.slices.volume import node_step_of
+
+    step, move = node_step_of(design), StraightMoves.along((start, end), tool)
+    arm = float(np.linalg.norm(design.platform_points - move.tool, axis=1).max())
+    way = float(np.linalg.norm(move.step) + arm * np.linalg.norm(move.turn))
+    count = math.ceil(way / step * (1.0 - 1e-9))
+    if count > MOST_STEPS:
+        raise InputError(
+            f"in steps of {step:g}, the node step, this move takes {count:.3g}; at most "
+            f"{MOST_STEPS} are tested: give their number with --steps"
+        )
+    return max(1, count)
+
+
+def _pose_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
+    from explorer.cli.blocks import lines
+    from explorer.measures.blocks.clearances import pose_clearances
+
+    design = snapshot.design
+    yield from (output.heading(design), output.pose_table(design, snapshot.pose, tool))
+    yield output.radii_line(design)
+    yield from (*lines(pose_clearances(snapshot)), "")
+    yield from output.limits_lines(snapshot, "the pose is ")
+
+
+def _move_lines(move: MoveClearance, start: Snapshot, end: Snapshot) -> Iterator[str]:
+    from explorer.cli.blocks import lines
+    from explorer.measures.blocks.clearances import move_clearances
+
+    design = start.design
+    yield from (output.heading(design), *_end_lines(design, move.start, move.end, move.tool))
+    yield output.radii_line(design)
+    yield from (*lines(move_clearances(move, design)), "")
+    yield from output.limits_lines(start, "the start is ")
+    yield from output.limits_lines(end, "the end is ")
+
+
+def _end_lines(design: Design, start: Pose, end: Pose, tool: Triple | None) -> Iterator[str]:
+    for name, pose in (("from", start), ("to", end)):
+        yield from (name, *output.indent(output.pose_table(design, pose, tool)))
+
+
+def _pose_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
+    from explorer.legs.clearance import PAIRS
+
+    legs = snapshot.clearances
+    return {
+        "pairs": [
+            {
+                "legs": pair,
+                "distance": output.finite(float(legs.distance[index])),
+                "clearance": output.finite(float(legs.clearance[index])),
+                "points": legs.points[index],
+                "collides": legs.clearance[index] < 0.0,
+            }
+            for index, pair in enumerate(PAIRS)
+        ],
+        "closest": PAIRS[int(legs.closest)],
+        "is_clear": (legs.clearance > 0.0).all(),
+        "radii": snapshot.design.limits.leg_radii,
+        **output.tool_json(snapshot.pose, tool),
+        **output.limits_json(snapshot),
+    }
+
+
+def _move_json(move: MoveClearance, start: Snapshot, end: Snapshot) -> dict[str, object]:
+    from explorer.legs.clearance import PAIRS
+
+    def place(pose: Pose) -> dict[str, object]:
+        return output.attributes(pose, "position quaternion") | output.tool_json(pose, move.tool)
+
+    poses = [Pose.of(position, rotation) for position, rotation in zip(*move.poses, strict=True)]
+    return {
+        "pairs": [
+            {
+                "legs": pair,
+                "clearance": output.finite(float(move.clearance[index])),
+                "bound": output.finite(float(move.bound[index])),
+                "share": move.share[index],
+                **place(pose),
+                "points": move.points[index],
+                "overlaps": move.overlaps[index],
+            }
+            for index, (pair, pose) in enumerate(zip(PAIRS, poses, strict=True))
+        ],
+        "closest": PAIRS[move.closest],
+        **output.attributes(move, "is_clear is_free steps tolerance"),
+        "radii": start.design.limits.leg_radii,
+        "within_limits": not (start.violations or end.violations),
+        "start": place(start.pose) | output.limits_json(start),
+        "end": place(end.pose) | output.limits_json(end),
+    }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Path(JsonOptions, RadiiOptions, EndOptions, PointOptions):
+    """Plan a path between two poses within limits, margins and clearances.
+
+    Both poses must have the same assembly mode. A pose is a position x y z, or a position and yaw
+    pitch roll in degrees, or a position and a quaternion w x y z. With `--at tool` positions are
+    those of the tool, which then goes straight in each move. Needs the extra `planning`.
+    """
+
+    from_: Annotated[
+        values.PoseNumbers,
+        tyro.conf.arg(name="from", help_behavior_hint="(default: the home pose)"),
+    ] = None
+    """Start of the path; lengths are in design units."""
+
+    from_quaternion: Annotated[values.Quaternion, values.OF_HOME] = None
+    """Orientation of the platform at the start."""
+
+    from_yaw_pitch_roll: Annotated[values.YawPitchRoll, INSTEAD] = None
+    """Orientation of the platform at the start, in degrees."""
+
+    from_tilt_torsion: Annotated[values.TiltTorsion, INSTEAD] = None
+    """Azimuth, tilt and torsion of the platform at the start, in degrees."""
+
+    from_folds: Annotated[values.Folds, values.hint("instead of --from")] = None
+    """Folds of the pose at the start; r in design units, angles in degrees."""
+
+    to: Annotated[values.PoseNumbers, values.OPTIONAL] = None
+    """End of the path; lengths are in design units."""
+
+    load: Annotated[values.Load, values.OPTIONAL] = None
+    """Force in N and moment in N × unit at the tool, along the axes of the base, besides the
+    payload: the path holds them within the limits of actuators, struts and guide."""
+
+    seconds: Annotated[float, values.POSITIVE] = 2.0
+    """Longest time to search for a path, in seconds."""
+
+    speed: Annotated[values.Positive, values.hint("default: a tenth of the reach")] = None
+    """Speed of the fastest actuator, in design units per second."""
+
+    samples: Annotated[int, values.whole_number(2, 100_000)] = 201
+    """Number of rows of the trajectory."""
+
+    out: Annotated[File | None, values.hint("optional", "FILE.csv")] = None
+    """File for the trajectory as CSV: time, joints and pose, and the tool's position with `--at
+    tool`."""
+
+    def run(self) -> None:
+        """Write the path."""
+        from explorer.export.tables import trajectory_csv
+        from explorer.files.writing import check_writable
+        from explorer.paths.loads import path_loads
+        from explorer.paths.planning import NoPathError, plan_path
+        from explorer.paths.trajectory import trajectory
+
+        design = self.with_radii(self.read_design())
+        tool = self.tool(design)
+        start = make_pose(self, "from_", design.home_pose, self.from_, tool)
+        goal = self.end(start, self.to, tool)
+        if goal is None:
+            raise InputError(f"say where the path ends {END_OPTIONS}")
+        if self.load is not None:
+            check_has_limits(design)
+        if self.out is not None:
+            check_writable(self.out)
+        try:
+            path = plan_path(design, start, goal, seconds=self.seconds, tool=tool, load=self.load)
+        except NoPathError as error:
+            if self.json:
+                output.write_json({"found": False, "reason": error.reason, "poses": []})
+            raise
+        timed = trajectory(design, path.poses, speed=self.speed, samples=self.samples, tool=tool)
+        loads = None
+        if self.load is not None:
+            loads = path_loads(design, path.poses, self.load, tool=tool)
+        files = {} if self.out is None else {self.out: trajectory_csv(timed).encode()}
+        written, errors = write_files(files)
+        out = next(iter(written), None)
+        self.write(
+            lambda: _path_json(path, timed, loads, out),
+            _path_lines(design, path, timed, loads, out),
+            errors,
+        )
+
+
+def _path_json(
+    path: PlannedPath, timed: Trajectory, loads: PathLoads | None, out: File | None
+) -> dict[str, object]:
+    names = "time joints position quaternion" + (" tool_position" if path.tool else "")
+    largest = loads and {
+        "largest_share": loads.share,
+        "largest_share_bound": loads.bound,
+        "largest_share_part": None if loads.part is None else LIMITED[loads.part],
+        "largest_share_at": loads.place,
+    }
+    return {
+        "found": True,
+        "reason": None,
+        "poses": [output.pose_json(pose, path.tool) for pose in path.poses],
+        **output.attributes(path, "length margin clearance seconds checked"),
+        "duration": timed.duration,
+        "trajectory": output.attributes(timed, names),
+        **(largest or {}),
+        **({} if out is None else {"file": out}),
+    }
+
+
+def _path_lines(
+    design: Design,
+    path: PlannedPath,
+    timed: Trajectory,
+    loads: PathLoads | None,
+    out: File | None,
+) -> Iterator[str]:
+    from explorer.paths.crossings import path_margins
+
+    least = path_margins(path.poses, tool=path.tool).least
+    plural = "" if path.checked == 1 else "s"
+    yield output.heading(design)
+    yield from _end_lines(design, path.poses[0], path.poses[-1], path.tool)
+    rows = [
+        ("moves", f"{len(path.poses) - 1}, each proved to keep limits and clearances"),
+        ("length", f"{output.figure(path.length)} (root mean square of b1 to b4)"),
+        (
+            "keeps",
+            f"|δ| {output.figure(path.margin)}, clearance {output.figure(path.clearance)} or more",
+        ),
+        ("planned in", f"{path.seconds:.3g} s, {path.checked} line{plural} tried"),
+        ("takes", f"{output.figure(timed.duration)} s"),
+        ("least |δ|", "  ".join(f"δ{i + 1} {output.figure(v)}" for i, v in enumerate(least))),
+    ]
+    if loads is not None:
+        words = f"held, with {100.0 * loads.share:.1f} % of a limit"
+        words += f" at {len(loads.at)} samples and {100.0 * loads.bound:.1f} % at most between them"
+        if loads.part is not None:
+            seconds = float(np.interp(loads.place, timed.at, timed.time))
+            words += f": {PART_NAMES[loads.part]}, at {output.figure(seconds)} s"
+        rows.append(("load", words))
+    yield from ("", output.table(rows, "<<"))
+    if out is not None:
+        yield from ("", f"{len(timed.time)} rows in {out}")

@@ -1,0 +1,229 @@
+"""`explorer forces` and `accuracy`: what a load asks of the parts, and errors and deflection."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Annotated
+
+import numpy as np
+
+from explorer.cli import output, values
+from explorer.cli.blocks import lines
+from explorer.cli.options import JsonOptions, PoseOptions, TypicalOptions, replace_given
+from explorer.errors import InputError, NoAnswerError
+from explorer.measures.blocks import forces as blocks
+from explorer.measures.blocks.precision import deflections, tool_errors
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.machine import DIMENSIONS, Six
+from explorer.mechanism.margins import INCIDENCES, margins
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.statics import forces, loaded
+from explorer.statics.accuracy import error_by_geometry
+from explorer.statics.reactions import LIMITED
+from explorer.statics.weights import Weights
+
+B4: Triple = (0.0, 0.0, 0.0)
+PARTS = ("guide", "struts", "actuators")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadOptions(JsonOptions, PoseOptions):
+    """The options for a load on the platform in a pose."""
+
+    load: Annotated[Six, values.LOAD, values.hint("default: none")] = (*B4, *B4)
+    """Force in N and moment in N × unit on the platform, along the axes of the base."""
+
+    payload: Annotated[values.NotNegative, values.OF_DESIGN] = None
+    """Mass of the payload, in kg; its weight is added to the load."""
+
+    def read_loaded_design(self) -> Design:
+        """Return the design with the given mass of the payload."""
+        design = self.read_design()
+        return replace_given(design, payload=replace_given(design.payload, mass_kg=self.payload))
+
+
+def check_regular(pose: Pose, values: FloatArray, infinite: str) -> None:
+    """Check that results of a pose are finite, and name what is infinite in a singular one."""
+    if np.isfinite(values).all():
+        return
+    least = forces.SINGULAR * float(np.linalg.norm(pose.position))
+    margin = np.abs(margins(pose.position, pose.rotation))
+    zero = [f"δ{k + 1} = 0: {INCIDENCES[k]}" for k in np.flatnonzero(margin <= least)]
+    named = "; ".join(zero) or "a margin vanishes to rounding"
+    raise NoAnswerError(f"the pose is singular ({named}): {infinite} are infinite")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forces(LoadOptions):
+    """Compute the forces of actuators and struts under a load, and their limits.
+
+    Positive forces push a joint's value up. Legs 2 and 3 carry a force along the guide too, which
+    bends their struts. Limits, payload and gravity are those of the design; without limits there
+    is no largest force.
+    """
+
+    most: Annotated[values.OfActuators, values.OF_DESIGN] = None
+    """Largest forces of the actuators in N for the largest force in every direction, or one for
+    all."""
+
+    force: Annotated[values.Positive, values.hint("default: none")] = None
+    """Size of an added force in N, of which the worst direction is told."""
+
+    density: Annotated[values.Positive, values.hint("default: no weight")] = None
+    """Density of the legs and the platform in kg/m³, as bars with the legs' radii."""
+
+    parts: bool = False
+    """Whether the parts of the prototype have this density, in place of bars."""
+
+    def run(self) -> None:
+        """Write the forces, the bending and the shares of the limits."""
+        if self.parts and self.density is None:
+            raise InputError("--parts needs the density of the parts: add --density KG_PER_M3")
+        design = self.read_loaded_design()
+        pose, tool = self.pose(design), self.tool(design)
+        configuration = Configuration.at(design, pose, tool)
+        check_regular(
+            pose, forces.twists_of_actuators(configuration), "the forces that hold a load"
+        )
+        weights = self._own_weights(design)
+        found = loaded.LoadedPose(design, pose, self.load, weights, point=tool or B4)
+        most = np.minimum(*design.actuators.limits) if self.most is None else self.most
+        nearest = None
+        if found.share > 1.0:
+            from explorer.workspace.nearest_carrying import nearest_carrying_pose
+
+            nearest = nearest_carrying_pose(found)
+        worst = forces.worst_direction(configuration, most)
+        added = None if self.force is None else found.worst_force(self.force)
+        self.write(
+            lambda: {
+                **_forces_json(found, worst, added),
+                "nearest_held": None if nearest is None else output.pose_json(nearest, tool),
+            },
+            _force_lines(found, worst, added, nearest, tool),
+        )
+
+    def _own_weights(self, design: Design) -> Weights:
+        """Return the weights of legs and platform."""
+        if self.density is None:
+            return Weights()
+        from explorer.prototype.weights import bar_masses, machine_weights
+
+        if self.parts:
+            from explorer.prototype.assembly import make_prototype
+
+            masses = make_prototype(design).masses(self.density)
+        else:
+            masses = bar_masses(design, self.density)
+        return machine_weights(design, masses, payload=False)
+
+
+def _forces_json(
+    found: loaded.LoadedPose, worst: forces.WorstDirection, added: loaded.WorstForce | None
+) -> dict[str, object]:
+    reactions, share, by_unit = found.reactions, float(worst.share), found.unit_force.share
+    is_limiting = added is not None and added.share > 0.0
+    return {
+        "actuator_forces": reactions.actuators,
+        "strut_bending": reactions.bending,
+        "largest_force": 1.0 / share if share else None,
+        "worst_direction": worst.direction if share else None,
+        "worst_actuator": JOINTS[int(worst.actuator)] if share else None,
+        "joint_forces": reactions.joints,
+        "guide_force": reactions.guide_force,
+        "guide_moment": reactions.guide_moment,
+        # What the payload's force of any direction may add either way.
+        "process": dict(zip(LIMITED, reactions.spread.tolist(), strict=True)),
+        "shares": dict(zip(LIMITED, found.shares.tolist(), strict=True)),
+        "largest_payload": output.finite(found.largest_payload),
+        "largest_force_by_all_parts": 1.0 / by_unit if by_unit else None,
+        "worst_force": added
+        and {
+            "direction": added.direction if is_limiting else None,
+            "part": LIMITED[added.part] if is_limiting else None,
+            "share": added.share,
+        },
+    }
+
+
+def _force_lines(
+    found: loaded.LoadedPose,
+    worst: forces.WorstDirection,
+    added: loaded.WorstForce | None,
+    nearest: Pose | None,
+    tool: Triple | None,
+) -> Iterator[str]:
+    yield from (output.heading(found.design), output.pose_table(found.design, found.pose, tool))
+    yield f"load acts at          {'b4' if tool is None else 'the tool'}"
+    facts = blocks.largest_loads(found)
+    if added is not None:
+        more = blocks.worst_force(added, "the added force")
+        facts = replace(facts, facts=(*facts.facts, *more))
+    refused = (blocks.nearest_carrying(found, nearest, tool),) if found.share > 1.0 else ()
+    yield from lines((blocks.verdict(found), *refused, *blocks.reaction_tables(found)))
+    yield from lines((blocks.most_of_actuators(worst), facts))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Accuracy(TypicalOptions, LoadOptions):
+    """Compute the errors and the deflection of the tool in a pose.
+
+    Errors, stiffness, struts and tolerances are those of the design; a design without them is
+    exact and rigid. The model is linear, without preload. RMS errors are those of independent
+    errors, each uniform within its bounds.
+    """
+
+    errors: Annotated[values.OfActuators, values.OF_DESIGN] = None
+    """Largest errors of the actuators in mm, or one for all."""
+
+    stiffness: Annotated[values.OfActuators, values.OF_DESIGN] = None
+    """Stiffness of the actuators in N/mm, or one for all."""
+
+    def run(self) -> None:
+        """Write the errors, the compliance and the deflection."""
+        design = self.read_loaded_design()
+        given = {"error_mm": self.errors, "stiffness_n_mm": self.stiffness}
+        design = replace_given(design, actuators=replace_given(design.actuators, **given))
+        design, assumed = self.with_typical(design)
+        pose, tool = self.pose(design), self.tool(design)
+        found = loaded.ToolPrecision(loaded.LoadedPose(design, pose, self.load, point=tool or B4))
+        check_regular(pose, found.by_source, "errors and compliance")
+        self.write(
+            lambda: {**_accuracy_json(found), "assumed": assumed},
+            chain(
+                [output.heading(design)],
+                output.assumed_lines(assumed),
+                [output.pose_table(design, pose, tool)],
+                lines(tool_errors(found, listed=None)),
+                lines(deflections(found, "the load and the payload's weight")),
+            ),
+        )
+
+
+def _accuracy_json(found: loaded.ToolPrecision) -> dict[str, object]:
+    principal, alone = found.principal, found.alone
+    shares = [output.finite(float(share)) for share in found.shares]
+    totals: dict[str, float] = {}
+    for group, sources in loaded.GROUPS.items():
+        suffix = "" if group == "actuators" else f"_of_{group}"
+        for kind, error in (("worst", found.worst(sources)), ("rms", found.rms(sources))):
+            totals[f"{kind}_displacement{suffix}"] = float(error.displacement)
+            totals[f"{kind}_turn{suffix}"] = float(error.turn)
+    names = "displacement force_directions turn moment_directions"
+    return {
+        "compliance": found.compliance,
+        "deflection": found.deflection,
+        "deflection_shares": dict(zip(PARTS, shares, strict=True)),
+        "principal_compliances": output.attributes(principal, names),
+        **totals,
+        "displacement_by_actuator": alone.displacement[loaded.BY_ACTUATORS],
+        "turn_by_actuator": alone.turn[loaded.BY_ACTUATORS],
+        "dimensions": list(DIMENSIONS),
+        "pose_error_by_geometry": error_by_geometry(found.loaded.configuration),
+        "displacement_by_geometry": alone.displacement[loaded.BY_DIMENSIONS],
+        "turn_by_geometry": alone.turn[loaded.BY_DIMENSIONS],
+    }

@@ -1,0 +1,400 @@
+"""Tolerances: what each costs in precision, and those of least effort that keep a wanted precision.
+
+Costs are in the units of drawings: millimetres, and degrees for tilts of the guide and for turns of
+the tool. The effort of a tolerance t is 1 / t, the reciprocal model of cost of tolerance
+allocation: Chase, Greenwood, Loosli and Hauglund, Least Cost Tolerance Allocation for Mechanical
+Assemblies with Automated Process Selection, Manufacturing Review 3(1), 1990. The least sum of
+efforts is a convex problem. In a unit direction n the tool moves by up to Σ t_i |n · v_i|, which is
+a linear bound; the direction of the exact worst error at the worst position is added until none
+exceeds what is wanted.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from explorer.errors import InputError, NoAnswerError
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.machine import DIMENSIONS, Actuators, Tolerances
+from explorer.mechanism.margins import INCIDENCES
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.checks import positive
+from explorer.statics import accuracy
+from explorer.statics.accuracy import IS_TILT, SOURCES
+
+PARTS: tuple[str, ...] = (
+    *("cylinder 1, rod 1", "carriage 2", "cylinder 2, rod 2"),
+    *("carriage 3", "cylinder 3, rod 3", "cylinder 4, rod 4"),
+    *("platform" if name.startswith("b") else "base" for name in DIMENSIONS),
+)
+"""Parts of the prototype that carry each source, in the order of `SOURCES`."""
+
+
+@dataclass(frozen=True)
+class SourceCosts:
+    """What errors of the sources cost in precision, at worst over positions.
+
+    Arrays of shape (29,) have the order of `SOURCES`. Errors are in mm, and in degrees for a tilt.
+
+    Attributes:
+        displacement, turn: Largest displacement (mm) and turn (degrees) of the tool per error.
+        lengths: Length that counts for a unit of error, in mm, see `error_lengths`.
+        tolerances: Largest errors to either side; infinite for any.
+        worst_displacement, worst_turn: Largest within the tolerances, exact over all signs.
+        rms_displacement, rms_turn: Largest RMS ones, for errors uniform within the tolerances.
+        shares, turn_shares: Parts of the worst displacement and turn that each source causes where
+            it is largest; they add up to 1, or are all 0.
+        position: Position of the worst displacement, shape (3,), in design units.
+        count: Number of positions.
+    """
+
+    displacement: FloatArray
+    turn: FloatArray
+    lengths: FloatArray
+    tolerances: FloatArray
+    worst_displacement: float
+    worst_turn: float
+    rms_displacement: float
+    rms_turn: float
+    shares: FloatArray
+    turn_shares: FloatArray
+    position: FloatArray
+    count: int
+
+    @property
+    def displacement_within(self) -> FloatArray:
+        """Largest displacement by each source alone within its tolerance, shape (29,), in mm."""
+        return self.displacement * _finite(self.tolerances)
+
+    @property
+    def turn_within(self) -> FloatArray:
+        """Largest turn by each source alone within its tolerance, shape (29,), in degrees."""
+        return self.turn * _finite(self.tolerances)
+
+    @property
+    def ranking(self) -> IntArray:
+        """Sources from the costliest, shape (29,): at its tolerance, then by counted length."""
+        return np.lexsort([-self.displacement / self.lengths, -self.displacement_within])
+
+
+def source_costs(configuration: Configuration) -> SourceCosts:
+    """Return what the errors and tolerances of a design cost in precision over positions.
+
+    The poses have one orientation; for the errors raised see `source_influences`.
+    """
+    c = configuration
+    return costs_of(c, source_influences(c), accuracy.stated_tolerances(c.design))
+
+
+def costs_of(
+    configuration: Configuration, influences: FloatArray, tolerances: FloatArray
+) -> SourceCosts:
+    """Return the costs, given `source_influences` of a configuration and tolerances (29,)."""
+    bounds = _finite(tolerances)
+    worst = accuracy.largest_error(influences, bounds)
+    rms = accuracy.rms_of_sources(influences, bounds)
+    halves = influences.reshape(-1, 2, 3, len(SOURCES))
+    alone = np.sqrt((halves**2).sum(axis=2)).max(axis=0)
+    places = [int(worst.displacement.argmax()), int(worst.turn.argmax())]
+    shares: list[FloatArray] = []
+    for half, place in enumerate(places):
+        # The worst error is the sum of the parts along its own direction.
+        along = worst.vectors[place, half] @ halves[place, half]
+        parts = np.abs(along) * bounds
+        shares.append(parts / (parts.sum() or 1.0))
+    return SourceCosts(
+        displacement=alone[0],
+        turn=alone[1],
+        lengths=error_lengths(configuration.design),
+        tolerances=tolerances,
+        worst_displacement=float(worst.displacement[places[0]]),
+        worst_turn=float(worst.turn[places[1]]),
+        rms_displacement=float(rms.displacement.max()),
+        rms_turn=float(rms.turn.max()),
+        shares=shares[0],
+        turn_shares=shares[1],
+        position=configuration.positions[places[0]],
+        count=len(influences),
+    )
+
+
+def source_influences(configuration: Configuration) -> FloatArray:
+    """Return displacement (mm) and turn (degrees) of the tool per error, shape (n, 6, 29).
+
+    Raises:
+        InputError: There is no position.
+        NoAnswerError: A position is singular, or singular ones lie between them.
+    """
+    c, unit_mm = configuration, configuration.design.unit_mm
+    signs = np.sign(c.margins).reshape(-1, 3)
+    if not len(signs):
+        raise InputError("costs of tolerances need at least one position; got none")
+    crossed = np.flatnonzero(np.abs(signs.sum(axis=0)) < len(signs))
+    by_source = accuracy.error_by_source(c).reshape(-1, 6, len(SOURCES))
+    if len(crossed) or not np.isfinite(by_source).all():
+        where = "; ".join(f"δ{k + 1} = 0: {INCIDENCES[k]}" for k in crossed)
+        singular = (
+            f"some of the {len(signs):,} positions are singular, or singular ones lie between"
+            if len(signs) > 1
+            else "the pose is singular"
+        )
+        raise NoAnswerError(
+            f"errors are infinite: {singular} ({where or 'a margin vanishes to rounding'})"
+        )
+    rows = np.repeat([unit_mm, float(np.degrees(1.0))], 3)
+    columns = np.where(IS_TILT, np.radians(1.0), 1.0 / unit_mm)
+    return by_source * rows[:, None] * columns
+
+
+def error_lengths(design: Design) -> FloatArray:
+    """Return the length that counts for a unit of error of each source, shape (29,), in mm.
+
+    A length counts as itself. A tilt counts as what it moves the far end of the guide: the carriage
+    position of the larger magnitude that the limits of the guide allow, or, without these, a
+    point at the distance of the reach.
+    """
+    far = max(map(abs, design.limits.guide or (0.0,))) or design.reach
+    return np.where(IS_TILT, np.radians(1.0) * far * design.unit_mm, 1.0)
+
+
+def with_tolerances(design: Design, tolerances: FloatArray) -> Design:
+    """Return a design with other errors of its actuators and tolerances, (29,), in mm and degrees.
+
+    Where they are infinite, so that any will do, the design keeps what it states.
+    """
+    stated = accuracy.stated_tolerances(design)
+    values = iter(np.where(np.isfinite(tolerances), tolerances, stated).tolist())
+
+    def fill(part: Actuators | Tolerances, *fields: str) -> Any:
+        new = {name: tuple(next(values) for _ in getattr(part, name)) for name in fields}
+        return msgspec.structs.replace(part, **new)
+
+    actuators = fill(design.actuators, "error_mm")
+    found = fill(design.tolerances, *Tolerances.__struct_fields__)
+    return msgspec.structs.replace(design, actuators=actuators, tolerances=found)
+
+
+def _finite(tolerances: FloatArray) -> FloatArray:
+    """Return tolerances with 0 in place of infinite ones, whose sources move nothing."""
+    return np.where(np.isfinite(tolerances), tolerances, 0.0)
+
+
+# Least share of its bound that a variable is given.
+LEAST = 1e-15
+
+
+class Cuts:
+    """Bounds A x ≤ 1 with A ≥ 0 of variables from 0 to 1, and the least Σ c_i / x_i for c > 0."""
+
+    def __init__(self, costs: FloatArray) -> None:
+        self.least = float(costs.sum())
+        """Lower bound of Σ c_i / x_i, from the multipliers of the bounds so far."""
+        self._costs = costs
+        self._rows: list[FloatArray] = []
+        self._guess = np.sqrt(costs) / np.sqrt(costs).sum()
+
+    def effort(self, x: FloatArray) -> float:
+        """Return Σ c_i / x_i."""
+        return float((self._costs / x).sum())
+
+    def add(self, row: FloatArray, right: float) -> None:
+        """Add the bound row · x ≤ right, with right > 0."""
+        self._rows.append(row / right)
+
+    def solve(self) -> FloatArray:
+        """Return the x of least Σ c_i / x_i, shape (m,), and improve the lower bound.
+
+        With u_i ≥ 1 / x_i, that is |(2, x_i − u_i)| ≤ x_i + u_i, the sum is linear in u. All x
+        are taken over the last ones, so that they are near 1 whatever the range of the costs.
+        """
+        from scipy import sparse
+
+        # The solver has no types.
+        clarabel: Any = importlib.import_module("clarabel")
+
+        m, k = len(self._costs), len(self._rows)
+        costs = self._costs / self._guess
+        size = float(costs.max())
+        costs = costs / size
+        one, none = sparse.eye_array(m), sparse.csc_array((m, m))
+        # Rows x + u, 2 and x − u of all cones, then in the order of the cones.
+        halves = sparse.block_array([[-one, -one], [none, none], [-one, one]], format="csr")
+        order = np.arange(3 * m).reshape(3, m).T.ravel()
+        rows = np.array(self._rows) * self._guess
+        bounds = sparse.block_array(
+            [[sparse.csr_array(rows), sparse.csr_array((k, m))], [one, none]]
+        )
+        matrix = sparse.vstack([bounds, halves[order]], format="csc")
+        rights = np.concatenate([np.ones(k), 1.0 / self._guess, np.tile([0.0, 2.0, 0.0], m)])
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.tol_gap_rel = settings.tol_gap_abs = settings.tol_feas = 1e-11
+        cones = [clarabel.NonnegativeConeT(k + m), *(clarabel.SecondOrderConeT(3),) * m]
+        solution = clarabel.DefaultSolver(
+            sparse.csc_array((2 * m, 2 * m)),
+            np.concatenate([np.zeros(m), costs]),
+            matrix,
+            rights,
+            cones,
+            settings,
+        ).solve()
+        multipliers = np.maximum(np.array(solution.z)[: k + m], 0.0)
+        # The dual function bounds the sum from below for any multipliers.
+        slopes = rows.T @ multipliers[:k] + multipliers[k:]
+        bound = 2.0 * np.sqrt(costs * slopes).sum() - multipliers @ rights[: k + m]
+        self.least = max(self.least, size * float(bound))
+        x = np.clip(np.array(solution.x)[:m] * self._guess, LEAST, 1.0)
+        if np.isfinite(x).all():
+            self._guess = x
+        return x
+
+
+# Share of the largest influence up to which that of a source is rounding.
+NO_INFLUENCE = 1e-12
+# Largest excess of the effort over its lower bound, as a share, and the most rounds.
+GAP, MOST_ROUNDS = 1e-6, 100
+# Room for the rounding of a sum of 29 errors, as a share of what is wanted.
+ROOM = 1e-9
+
+
+@dataclass(frozen=True)
+class ToleranceBudget:
+    """Tolerances that keep a wanted precision, with the least effort.
+
+    Attributes:
+        tolerances: Tolerances of the sources in the order of `SOURCES`, shape (29,), in mm and
+            degrees, rounded down to two significant digits; those kept are as stated, and those of
+            sources that move nothing are infinite.
+        costs: What these tolerances cost in precision.
+        effort: Sum of the reciprocals of the tolerances found, in 1/mm. A tilt counts as
+            the length that it moves the far end of the guide, see `error_lengths`.
+        least_effort: Lower bound of the effort of all tolerances that keep the wanted precision,
+            rounded or not.
+    """
+
+    tolerances: FloatArray
+    costs: SourceCosts
+    effort: float
+    least_effort: float
+
+    @property
+    def excess(self) -> float:
+        """Effort above its lower bound, mostly by rounding, as a share of that bound."""
+        return self.effort / self.least_effort - 1.0 if self.least_effort else 0.0
+
+
+def tolerance_budget(
+    configuration: Configuration,
+    wanted: float,
+    wanted_turn: float | None = None,
+    *,
+    keep_actuators: bool = False,
+) -> ToleranceBudget:
+    """Return the tolerances of least effort that keep a wanted precision at all positions.
+
+    The worst error within them is exact for the linear model, over all combinations of signs.
+
+    Args:
+        configuration: Design and poses of one orientation, with the tool point.
+        wanted: Largest displacement of the tool, in mm.
+        wanted_turn: Largest turn of the tool, in degrees; None for any.
+        keep_actuators: Whether the errors of the actuators stay as the design states them.
+
+    Raises:
+        InputError: What is wanted is not positive or too large, or there is no position.
+        NoAnswerError: A position is singular, or singular ones lie between them, or the errors of
+            the actuators alone exceed what is wanted.
+    """
+    for name, value in (("displacement", wanted), ("turn", wanted_turn)):
+        if value is not None:
+            positive(f"the wanted {name}", value)
+    influences = source_influences(configuration)
+    stated = accuracy.stated_tolerances(configuration.design)
+    kept = (np.arange(len(SOURCES)) < len(JOINTS)) & keep_actuators
+    held = np.where(kept, stated, 0.0)
+    _check_kept(costs_of(configuration, influences, held), wanted, wanted_turn)
+    # Errors as shares of what is wanted; a turn that may be any is no demand.
+    shares = influences / np.repeat([wanted, wanted_turn or math.inf], 3)[:, None]
+    lengths = error_lengths(configuration.design)
+    found, least = _allocate(shares, lengths, held, ~kept)
+    tolerances = np.where(kept, stated, _round_down(found))
+    efforts = 1.0 / (tolerances * lengths)[~kept]
+    costs = costs_of(configuration, influences, tolerances)
+    return ToleranceBudget(tolerances, costs, float(efforts.sum()), least)
+
+
+def _allocate(
+    shares: FloatArray, lengths: FloatArray, held: FloatArray, is_free: BoolArray
+) -> tuple[FloatArray, float]:
+    """Return the tolerances of least effort, shape (29,), and a lower bound of the effort.
+
+    Shares (n, 6, 29) are displacement and turn per error, over what is wanted. Lengths (29,) count
+    for a unit of error. Errors that are kept are `held` (29,), with a worst error below 1.
+    """
+    halves = shares.reshape(-1, 2, 3, len(SOURCES))
+    largest = np.sqrt((halves**2).sum(axis=2)).max(axis=(0, 1))
+    by_length = np.where(is_free, largest / lengths, 0.0)
+    free = np.flatnonzero(by_length > NO_INFLUENCE * by_length.max())
+    tolerances = np.full(len(SOURCES), np.inf)
+    if not len(free):
+        return tolerances, 0.0
+    # A tolerance over the one at which its source alone uses up what is wanted is from 0 to 1.
+    scales = 1.0 / largest[free]
+    cuts = Cuts(1.0 / (lengths[free] * scales))
+    bounds, best = held.copy(), math.inf
+    at_rest = _sizes(shares, held)[0]
+    x = np.full(len(free), 1.0 / len(free))
+    for _ in range(MOST_ROUNDS):
+        bounds[free] = x * scales
+        sizes, vectors = _sizes(shares, bounds)
+        # The error is convex in the tolerances, so that this part of them is allowed.
+        part = (1.0 - ROOM - at_rest) / np.maximum(sizes - at_rest, 1.0 - ROOM - at_rest)
+        allowed = float(part.min()) * x
+        effort = cuts.effort(allowed)
+        if effort < best:
+            best, tolerances[free] = effort, allowed * scales
+        if effort <= (1.0 + GAP) * cuts.least:
+            break
+        for half in range(2):
+            place = int(sizes[:, half].argmax())
+            size = sizes[place, half]
+            if size > 0.0:
+                along = np.abs(vectors[place, half] @ halves[place, half]) / size
+                cuts.add(along[free] * scales, 1.0 - float(along @ held))
+        x = cuts.solve()
+        if not np.isfinite(x).all():
+            break  # The solver has run out of precision; the best so far keeps what is wanted.
+    return tolerances, cuts.least
+
+
+def _sizes(shares: FloatArray, bounds: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the largest displacement and turn, shape (n, 2), and their vectors, (n, 2, 3)."""
+    found = accuracy.largest_error(shares, bounds)
+    return np.stack([found.displacement, found.turn], axis=1), found.vectors
+
+
+def _check_kept(costs: SourceCosts, wanted: float, wanted_turn: float | None) -> None:
+    """Check that errors that are kept leave room for others; else raise a NoAnswerError."""
+    for worst, most, moves, unit in (
+        (costs.worst_displacement, wanted, "move", " mm"),
+        (costs.worst_turn, wanted_turn or math.inf, "turn", "°"),
+    ):
+        if worst >= most * (1.0 - 2.0 * ROOM):
+            raise NoAnswerError(
+                f"the errors of the actuators alone {moves} the tool by up to {worst:.4g}{unit}, "
+                f"which leaves nothing of the wanted {most:.4g}{unit} (it is {worst - most:.3g}"
+                f"{unit} more): allow a larger error of the tool, or let their errors change"
+            )
+
+
+def _round_down(values: FloatArray) -> FloatArray:
+    """Return positive values with their first two significant digits; infinite ones as they are."""
+    texts = (f"{value:.12e}".partition("e") for value in values.tolist())
+    return np.array([float(f"{digits[:3]}{e}{exponent}") for digits, e, exponent in texts])

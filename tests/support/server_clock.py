@@ -1,0 +1,56 @@
+"""The clock of the server in tests, which advance it, slow it down or end all its pauses."""
+
+from __future__ import annotations
+
+import time
+from unittest import mock
+
+from explorer.app.page import Page
+from explorer.app.session import clock
+from explorer.app.widgets import assigning
+
+# Seconds of the clock in a second of the machine's, and when that began there.
+_pace, _paced_at = 1.0, 0.0
+# Seconds by which the clock was ahead then.
+_ahead = 0.0
+
+
+def advance(seconds: float) -> None:
+    """Advance the clock, which ends the pauses that are over by then."""
+    global _ahead  # noqa: PLW0603 - the clock is one for the whole process
+    with clock.changed:
+        _ahead += seconds
+        clock.changed.notify_all()
+
+
+def set_pace(pace: float) -> None:
+    """Make so many seconds, at most one, pass on the clock in a second of the machine's."""
+    global _ahead, _pace, _paced_at
+    with clock.changed:
+        _ahead, _pace, _paced_at = _shift(), pace, time.monotonic()
+        clock.changed.notify_all()
+
+
+def _shift() -> float:
+    return _ahead + (_pace - 1.0) * (time.monotonic() - _paced_at)
+
+
+def settle(page: Page, timeout: float) -> bool:
+    """Wait until all is drawn and no pause is pending; return whether that is so.
+
+    What waits for a pause of the user happens at once.
+    """
+    deadline = time.monotonic() + timeout
+    with mock.patch.object(assigning, "QUIET_SECONDS", 0.0):
+        while page.wait_until_drawn(deadline - time.monotonic()):
+            for pause in page.pauses:
+                pause.finish()
+            if not clock.wait_until_quiet(deadline - time.monotonic()):
+                return False
+            # What happened after a pause may have changed more.
+            if page.session.wait_until_idle(0.0) and clock.wait_until_quiet(0.0):
+                return True
+    return False
+
+
+setattr(clock, "ahead", _shift)  # noqa: B010 - a function in the place of another
