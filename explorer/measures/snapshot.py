@@ -24,7 +24,7 @@ from explorer.mechanism.kinematics import (
 )
 from explorer.mechanism.margins import describe_modes, mode_name, mode_of, signs_of
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import FloatArray, lengths_of
+from explorer.numerics.arrays import FloatArray, lengths_of, triple
 from explorer.singularity.freedoms import Freedoms, freedoms
 from explorer.singularity.gaps import FlagGaps, flag_gaps, least_turns
 from explorer.singularity.nearest import (
@@ -136,8 +136,7 @@ class Snapshot(PoseIndices):
     @cached_property
     def least_turns(self) -> tuple[float, float, float]:
         """The least turns that lead to each incidence, in radians, in the order δ1, δ2, δ3."""
-        first, second, third = least_turns(self.position, self.rotation).tolist()
-        return first, second, third
+        return triple(least_turns(self.position, self.rotation))
 
     @property
     def worst_conditioned(self) -> int:
@@ -219,8 +218,7 @@ class Snapshot(PoseIndices):
     @cached_property
     def nearest_distances(self) -> tuple[float, float, float]:
         """The distances of `nearest`, computed in a third of the time of the poses."""
-        first, second, third = self._nearest_poses.distance.tolist()
-        return first, second, third
+        return triple(self._nearest_poses.distance)
 
     @cached_property
     def nearest(self) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:

@@ -163,25 +163,19 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
     """
     warn = warnings(snapshot.design.reach, warn_below)
     holding, condition = incidences(snapshot.stratum), float(snapshot.inverse_condition)
+    distances, turns = snapshot.nearest_distances, snapshot.least_turns
     worst_conditioned = snapshot.worst_conditioned
 
     def measures(incidence: int) -> dict[Cause, float]:
         index = incidence - 1
-        size, distance = abs(float(snapshot.margins[index])), snapshot.nearest_distances[index]
+        size = abs(float(snapshot.margins[index]))
         levels: dict[Cause, float] = {
-            "distance": min(size / warn.margin, distance / warn.distance),
-            "turn": snapshot.least_turns[index] / warn.turn,
+            "distance": min(size / warn.margin, distances[index] / warn.distance),
+            "turn": turns[index] / warn.turn,
         }
         if incidence == worst_conditioned:
             levels["condition"] = condition / warn.condition
         return levels
-
-    def verdict_of(kind: Kind, named: tuple[int, ...], cause: Cause = "distance") -> Verdict:
-        index = named[0] - 1
-        distance, turn = snapshot.nearest_distances[index], snapshot.least_turns[index]
-        if kind == "singular":
-            distance = turn = 0.0
-        return Verdict(kind, levels, named, distance, turn, condition, cause)
 
     each = {incidence: measures(incidence) for incidence in (1, 2, 3)}
     level_1, level_2, level_3 = (
@@ -189,15 +183,17 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
     )
     levels = level_1, level_2, level_3
     if holding:
-        return verdict_of("singular", holding)
-    by_distance = sorted(each, key=lambda incidence: snapshot.nearest_distances[incidence - 1])
-    near = [incidence for incidence in by_distance if levels[incidence - 1] < 1.0]
-    if not near:
-        return verdict_of("clear", (by_distance[0],))
-    cause = _cause(each[min(near, key=lambda incidence: levels[incidence - 1])])
-    # The nearest of those with the cause first; sorting keeps the order of the others.
-    near.sort(key=lambda incidence: _cause(each[incidence]) != cause)
-    return verdict_of("near", tuple(near), cause)
+        return Verdict("singular", levels, holding, 0.0, 0.0, condition)
+    named = sorted(each, key=lambda incidence: distances[incidence - 1])
+    near = [incidence for incidence in named if levels[incidence - 1] < 1.0]
+    kind, cause = "clear", "distance"
+    if near:
+        kind, cause = "near", _cause(each[min(near, key=lambda number: levels[number - 1])])
+        # The nearest of those with the cause first; sorting keeps the order of the others.
+        near.sort(key=lambda incidence: _cause(each[incidence]) != cause)
+    named = tuple(near or named[:1])
+    index = named[0] - 1
+    return Verdict(kind, levels, named, distances[index], turns[index], condition, cause)
 
 
 def _cause(levels: dict[Cause, float]) -> Cause:

@@ -66,7 +66,7 @@ DEGENERATE_RATIO = 1e-12
 DOWN: Triple = (0.0, 0.0, -1.0)
 """The default direction of gravity."""
 
-_MACHINE = {
+_PARTS: dict[str, type] = {
     "tool": Tool,
     "payload": Payload,
     "actuators": Actuators,
@@ -229,11 +229,13 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             raise DesignError(f"schema must be 2; got {self.schema!r}")
         _set(self, "schema", 2)
         checks.instance("name", self.name, str)
+        checks.instance("limits", self.limits, Limits)
         _set(self, "name", str(self.name))
         if len(self.name) > 100 or not self.name.isprintable():
             raise DesignError("name must be one printable line of at most 100 characters")
-        checks.instance("limits", self.limits, Limits)
         checks.instance("home", self.home, Pose, type(None))
+        for name, kind in _PARTS.items():
+            checks.instance(name, getattr(self, name), kind)
         _set(self, "a3", tuple(checks.numbers("a3", self.a3, 2)))
         _set(self, "b1", tuple(checks.numbers("b1", self.b1, 2)))
         _set(self, "b2", checks.number("b2", self.b2))
@@ -256,13 +258,6 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
                     f"variable ({size:g}) in magnitude",
                     name[:2],
                 )
-        self._check_machine()
-
-    def _check_machine(self) -> None:
-        for name, kind in _MACHINE.items():
-            part = getattr(self, name)
-            if type(part) is not kind:
-                checks.instance(name, part, kind)
         # Searches make thousands of designs that differ in their variables only.
         if self.gravity is not DOWN:
             gravity = checked_gravity(self.gravity)

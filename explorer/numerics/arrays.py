@@ -102,6 +102,12 @@ def batch_shape(*arrays: tuple[FloatArray, int]) -> tuple[int, ...]:
         raise InputError(f"batch axes {shapes} do not broadcast") from None
 
 
+def triple(values: FloatArray) -> tuple[float, float, float]:
+    """Return an array (3,) as three plain numbers."""
+    x, y, z = values.tolist()
+    return x, y, z
+
+
 def dot(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the inner product over the last axis."""
     return np.asarray(np.einsum("...i,...i->...", a, b), dtype=np.float64)

@@ -31,7 +31,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTH_ROWS
 from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import FloatArray, lengths_of
+from explorer.numerics.arrays import FloatArray, lengths_of, triple
 from explorer.singularity.strata import incidences, stratum_of
 
 
@@ -68,8 +68,7 @@ class UncoupledMotion:
             raise InputError(f"a motion {self.name} needs a finite amount; got {amount}")
         point, direction = self.line(pose)
         if self.kind == "translation":
-            x, y, z = (np.array(pose.position) + amount * direction).tolist()
-            return Pose((x, y, z), pose.quaternion)
+            return Pose(triple(np.array(pose.position) + amount * direction), pose.quaternion)
         return pose.turn(point, amount * direction)
 
 

@@ -38,6 +38,9 @@ from explorer.singularity.strata import (
 )
 
 X, _, Z = np.eye(3)
+# Directions of lines and normals of planes that contain b4, and which of these the platform has.
+_AXES = {"platform": Z, "base": Z, "u": X, "guide": X}
+_ON_PLATFORM, _PLANES = ("platform", "u"), ("platform", "base")
 
 
 @dataclass(frozen=True)
@@ -165,16 +168,13 @@ class _Target:
         free = self.goal - rotation @ self.centroid
         if place == "a1":
             return np.zeros(3)
-        if place in ("platform", "base"):
-            normal = rotation[:, 2] if place == "platform" else Z
-            return free - float(free @ normal) * normal
-        along = X
-        if place == "u":
-            along = rotation[:, 0]
-        elif place == "node":
+        if place == "node":
             # The first turn is about the base's normal, the second about this line.
-            along = np.array([math.cos(angles[0]), math.sin(angles[0]), 0.0])
-        return float(free @ along) * along
+            axis = np.array([math.cos(angles[0]), math.sin(angles[0]), 0.0])
+        else:
+            axis = rotation @ _AXES[place] if place in _ON_PLATFORM else _AXES[place]
+        along = float(free @ axis) * axis
+        return free - along if place in _PLANES else along
 
     def coefficients(self, closure: _Closure, flip: str) -> tuple[FloatArray, float]:
         """Return the coefficients (2, 3, 3, 3) of L and S in the squared distance, and s.
@@ -185,31 +185,22 @@ class _Target:
         basis = _rotation_coefficients(closure.axes, flip)
         goal, centroid, place = self.goal, self.centroid, closure.place
         square = np.zeros((3, 3, 3))
-        sign = 0.0
-        if place in ("platform", "base"):
+        if place in _PLANES:
             # Across a plane only the distance from it counts.
             sign, matrix, constant = 1.0, self.rotated_scatter, 2.0
-            if place == "platform":
-                square += _contract(basis, np.outer(goal, Z))
-                square[2, 2, 2] -= centroid[2]
-            else:
-                square -= _contract(basis, np.outer(Z, centroid))
-                square[2, 2, 2] += goal[2]
         else:
-            matrix = self.about_a1
+            # Along a line the distance from a1 to the projection does not count.
+            sign, matrix = 0.0 if place == "a1" else -1.0, self.about_a1
             constant = 2.0 + float(goal @ goal + centroid @ centroid)
-            if place != "a1":
-                # Along a line the distance from a1 to the projection does not count.
-                sign = -1.0
-            if place == "u":
-                square += _contract(basis, np.outer(goal, X))
-                square[2, 2, 2] -= centroid[0]
-            elif place == "guide":
-                square -= _contract(basis, np.outer(X, centroid))
-                square[2, 2, 2] += goal[0]
-            elif place == "node":
-                square[0, 2, 2], square[1, 2, 2] = goal[0], goal[1]
-                square[2, 2, 0], square[2, 2, 1] = -centroid[0], centroid[1]
+        if place == "node":
+            square[0, 2, 2], square[1, 2, 2] = goal[0], goal[1]
+            square[2, 2, 0], square[2, 2, 1] = -centroid[0], centroid[1]
+        elif place in _ON_PLATFORM:
+            square = _contract(basis, np.outer(goal, _AXES[place]))
+            square[2, 2, 2] -= _AXES[place] @ centroid
+        elif place != "a1":
+            square = -_contract(basis, np.outer(_AXES[place], centroid))
+            square[2, 2, 2] += _AXES[place] @ goal
         linear = -2.0 * _contract(basis, matrix)
         linear[2, 2, 2] += constant
         return np.stack([linear, square]), sign

@@ -36,7 +36,12 @@ def inversions(permutation: tuple[int, ...]) -> int:
 
 def ranks(permutation: tuple[int, ...]) -> IntArray:
     """Return r_ij, shape (3, 3): how many of a permutation's first i entries are at most j."""
-    return np.array([[sum(v <= j for v in permutation[:i]) for j in (1, 2, 3)] for i in (1, 2, 3)])
+    return _all_ranks(permutation)[1:4, 1:4]
+
+
+def _all_ranks(permutation: tuple[int, ...]) -> IntArray:
+    """Return r_ij, shape (5, 5), for i and j from 0 to 4."""
+    return np.array([[sum(v <= j for v in permutation[:i]) for j in range(5)] for i in range(5)])
 
 
 STRATA: tuple[tuple[int, ...], ...] = tuple(
@@ -157,7 +162,7 @@ def is_below(lower: Stratum, upper: Stratum) -> bool:
 
 def conditions(stratum: Stratum) -> tuple[Condition, ...]:
     """Return the essential conditions (i, j, r), r_ij ≥ r, of a stratum; none if it is generic."""
-    r = _all_ranks(stratum)
+    r: list[list[int]] = _all_ranks(stratum).tolist()
 
     def is_redundant(i: int, j: int) -> bool:
         value = r[i][j]
@@ -181,11 +186,6 @@ def incidences(stratum: Stratum) -> tuple[int, ...]:
     return tuple(
         index for index, closure in enumerate(OF_INCIDENCES, 1) if is_below(stratum, closure)
     )
-
-
-def _all_ranks(stratum: Stratum) -> list[list[int]]:
-    """Return r_ij, shape (5, 5), for i and j from 0 to 4."""
-    return [[sum(v <= j for v in stratum[:i]) for j in range(5)] for i in range(5)]
 
 
 COVERED: Mapping[Stratum, tuple[Stratum, ...]] = MappingProxyType(

@@ -190,70 +190,49 @@ def _finite(tolerances: FloatArray) -> FloatArray:
 LEAST = 1e-15
 
 
-class Cuts:
-    """Bounds A x ≤ 1 with A ≥ 0 of variables from 0 to 1, and the least Σ c_i / x_i for c > 0."""
+def _solve_cuts(
+    costs: FloatArray, cuts: list[FloatArray], guess: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return the x from 0 to 1 of least Σ c_i / x_i with all cuts a · x ≤ 1, and a lower bound.
 
-    def __init__(self, costs: FloatArray) -> None:
-        self.least = float(costs.sum())
-        """Lower bound of Σ c_i / x_i, from the multipliers of the bounds so far."""
-        self._costs = costs
-        self._rows: list[FloatArray] = []
-        self._guess = np.sqrt(costs) / np.sqrt(costs).sum()
+    The costs c (m,) are positive, and the cuts a (m,) are not negative. With u_i ≥ 1 / x_i, that
+    is |(2, x_i − u_i)| ≤ x_i + u_i, the sum is linear in u. All x are taken over a guess of them,
+    so that they are near 1 whatever the range of the costs.
+    """
+    from scipy import sparse
 
-    def effort(self, x: FloatArray) -> float:
-        """Return Σ c_i / x_i."""
-        return float((self._costs / x).sum())
+    # The solver has no types.
+    clarabel: Any = importlib.import_module("clarabel")
 
-    def add(self, row: FloatArray, right: float) -> None:
-        """Add the bound row · x ≤ right, with right > 0."""
-        self._rows.append(row / right)
-
-    def solve(self) -> FloatArray:
-        """Return the x of least Σ c_i / x_i, shape (m,), and improve the lower bound.
-
-        With u_i ≥ 1 / x_i, that is |(2, x_i − u_i)| ≤ x_i + u_i, the sum is linear in u. All x
-        are taken over the last ones, so that they are near 1 whatever the range of the costs.
-        """
-        from scipy import sparse
-
-        # The solver has no types.
-        clarabel: Any = importlib.import_module("clarabel")
-
-        m, k = len(self._costs), len(self._rows)
-        costs = self._costs / self._guess
-        size = float(costs.max())
-        costs = costs / size
-        one, none = sparse.eye_array(m), sparse.csc_array((m, m))
-        # Rows x + u, 2 and x − u of all cones, then in the order of the cones.
-        halves = sparse.block_array([[-one, -one], [none, none], [-one, one]], format="csr")
-        order = np.arange(3 * m).reshape(3, m).T.ravel()
-        rows = np.array(self._rows) * self._guess
-        bounds = sparse.block_array(
-            [[sparse.csr_array(rows), sparse.csr_array((k, m))], [one, none]]
-        )
-        matrix = sparse.vstack([bounds, halves[order]], format="csc")
-        rights = np.concatenate([np.ones(k), 1.0 / self._guess, np.tile([0.0, 2.0, 0.0], m)])
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        settings.tol_gap_rel = settings.tol_gap_abs = settings.tol_feas = 1e-11
-        cones = [clarabel.NonnegativeConeT(k + m), *(clarabel.SecondOrderConeT(3),) * m]
-        solution = clarabel.DefaultSolver(
-            sparse.csc_array((2 * m, 2 * m)),
-            np.concatenate([np.zeros(m), costs]),
-            matrix,
-            rights,
-            cones,
-            settings,
-        ).solve()
-        multipliers = np.maximum(np.array(solution.z)[: k + m], 0.0)
-        # The dual function bounds the sum from below for any multipliers.
-        slopes = rows.T @ multipliers[:k] + multipliers[k:]
-        bound = 2.0 * np.sqrt(costs * slopes).sum() - multipliers @ rights[: k + m]
-        self.least = max(self.least, size * float(bound))
-        x = np.clip(np.array(solution.x)[:m] * self._guess, LEAST, 1.0)
-        if np.isfinite(x).all():
-            self._guess = x
-        return x
+    m, k = len(costs), len(cuts)
+    costs = costs / guess
+    size = float(costs.max())
+    costs = costs / size
+    one, none = sparse.eye_array(m), sparse.csc_array((m, m))
+    # Rows x + u, 2 and x − u of all cones, then in the order of the cones.
+    halves = sparse.block_array([[-one, -one], [none, none], [-one, one]], format="csr")
+    order = np.arange(3 * m).reshape(3, m).T.ravel()
+    rows = np.array(cuts) * guess
+    bounds = sparse.block_array([[sparse.csr_array(rows), sparse.csr_array((k, m))], [one, none]])
+    matrix = sparse.vstack([bounds, halves[order]], format="csc")
+    rights = np.concatenate([np.ones(k), 1.0 / guess, np.tile([0.0, 2.0, 0.0], m)])
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_rel = settings.tol_gap_abs = settings.tol_feas = 1e-11
+    cones = [clarabel.NonnegativeConeT(k + m), *(clarabel.SecondOrderConeT(3),) * m]
+    solution = clarabel.DefaultSolver(
+        sparse.csc_array((2 * m, 2 * m)),
+        np.concatenate([np.zeros(m), costs]),
+        matrix,
+        rights,
+        cones,
+        settings,
+    ).solve()
+    multipliers = np.maximum(np.array(solution.z)[: k + m], 0.0)
+    # The dual function bounds the sum from below for any multipliers.
+    slopes = rows.T @ multipliers[:k] + multipliers[k:]
+    bound = 2.0 * np.sqrt(costs * slopes).sum() - multipliers @ rights[: k + m]
+    return np.clip(np.array(solution.x)[:m] * guess, LEAST, 1.0), size * float(bound)
 
 
 # Share of the largest influence up to which that of a source is rounding.
@@ -347,7 +326,8 @@ def _allocate(
         return tolerances, 0.0
     # A tolerance over the one at which its source alone uses up what is wanted is from 0 to 1.
     scales = 1.0 / largest[free]
-    cuts = Cuts(1.0 / (lengths[free] * scales))
+    costs, cuts = 1.0 / (lengths[free] * scales), list[FloatArray]()
+    guess, least = np.sqrt(costs) / np.sqrt(costs).sum(), float(costs.sum())
     bounds, best = held.copy(), math.inf
     at_rest = _sizes(shares, held)[0]
     x = np.full(len(free), 1.0 / len(free))
@@ -357,21 +337,23 @@ def _allocate(
         # The error is convex in the tolerances, so that this part of them is allowed.
         part = (1.0 - ROOM - at_rest) / np.maximum(sizes - at_rest, 1.0 - ROOM - at_rest)
         allowed = float(part.min()) * x
-        effort = cuts.effort(allowed)
+        effort = float((costs / allowed).sum())
         if effort < best:
             best, tolerances[free] = effort, allowed * scales
-        if effort <= (1.0 + GAP) * cuts.least:
+        if effort <= (1.0 + GAP) * least:
             break
         for half in range(2):
             place = int(sizes[:, half].argmax())
             size = sizes[place, half]
             if size > 0.0:
                 along = np.abs(vectors[place, half] @ halves[place, half]) / size
-                cuts.add(along[free] * scales, 1.0 - float(along @ held))
-        x = cuts.solve()
+                cuts.append(along[free] * scales / (1.0 - float(along @ held)))
+        x, bound = _solve_cuts(costs, cuts, guess)
+        least = max(least, bound)
         if not np.isfinite(x).all():
             break  # The solver has run out of precision; the best so far keeps what is wanted.
-    return tolerances, cuts.least
+        guess = x
+    return tolerances, least
 
 
 def _sizes(shares: FloatArray, bounds: FloatArray) -> tuple[FloatArray, FloatArray]:

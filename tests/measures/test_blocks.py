@@ -11,7 +11,7 @@ import pytest
 from explorer import Guide, Payload, Pose, Struts, Tool, evaluate
 from explorer.app.widgets.blocks import render
 from explorer.export.drawings.markup import elements
-from explorer.measures.blocks.block import Block, Facts, Share
+from explorer.measures.blocks.block import Block, Facts
 from explorer.measures.blocks.forces import largest_loads, reaction_tables, verdict
 from explorer.measures.blocks.precision import deflections, tool_errors
 from explorer.measures.blocks.singularity import (
@@ -70,10 +70,3 @@ def test_page_and_report_tell_the_same_words_for_one_value(
     page = re.sub("<[^>]*>", " ", re.sub("°", " ° ", render(blocks).replace("&#x27;", "'")))
     report = " ".join(text for each in elements(blocks) for text in each.itertext())
     assert words_of(page.replace("&nbsp;", " ")) <= words_of(report.replace("°", " ° "))
-
-
-@pytest.mark.parametrize("decimals", [0, 1])
-@pytest.mark.parametrize("share", [1.0 + 1e-12, 1.0001, 1.004, 1.2])
-def test_share_beyond_its_limit_never_reads_as_the_limit(share: float, decimals: int) -> None:
-    text = Share(share).text(decimals)
-    assert text.startswith("above ") or float(text.split()[0]) > 100.0

@@ -95,12 +95,6 @@ def test_indices_in_a_singular_pose_are_0(case: Case) -> None:
     assert found.manipulability < 1e-9 * found.singular_values[0] ** 6
 
 
-def test_manipulability_is_the_determinant_over_the_cubed_reach() -> None:
-    snapshot = evaluate(OPTIMAL, OPTIMAL.home_pose)
-    expected = abs(snapshot.determinant) / OPTIMAL.reach**3
-    assert snapshot.manipulability == pytest.approx(expected, rel=1e-9)
-
-
 def test_indices_over_the_workspace_are_those_of_its_nodes() -> None:
     case = MeasuredCase(OPTIMAL)
     every, positions = case.node_indices, case.at_nodes.positions

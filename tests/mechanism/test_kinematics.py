@@ -129,13 +129,6 @@ def test_modes_have_the_given_joints(case: Case) -> None:
     assert error.max() <= closing_error(case)
 
 
-def test_joints_of_thousands_of_poses_close(compiled: None) -> None:
-    rng, design = np.random.default_rng(7), PRESETS["paper-initial"]
-    rotation = rotation_from_quaternion(rng.normal(size=(5000, 4)))
-    position = rng.uniform(-20.0, 20.0, (5000, 3))
-    assert forward(design, inverse(design, position, rotation)).feasible.all()
-
-
 @given(all_cases())
 def test_mode_k_has_the_sign_triple_of_the_bits_of_k(case: Case) -> None:
     solved = forward(case.design, case.joints)

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from incidence import distance_of_lines, distance_to_plane
+from hypothesis import given
+from incidence import distance_of_lines
 from numpy.testing import assert_allclose
-from strategies import EPSILON, Case, all_cases, cases
+from strategies import EPSILON, Case, all_cases
 
 from explorer import PRESETS
 from explorer.mechanism.configuration import Configuration
@@ -56,20 +56,6 @@ def test_gaps_end_on_the_flags_and_have_the_lengths_of_the_margins(case: Case) -
     holding = np.abs(case.margins) <= 8.0 * EPSILON * case.size
     for index in np.flatnonzero(holding):
         assert gaps.lengths[index] <= 1e-13 * case.size or (index == 1 and sine_of(case) < 0.1)
-
-
-@given(cases())
-def test_lengths_of_gaps_are_the_distances_of_points_planes_and_lines(case: Case) -> None:
-    assume(sine_of(case) > 1e-3)
-    # Points of the two flags whose distances are of one size, whatever the design.
-    x, y, u, v = (case.size * each for each in (*np.eye(3)[:2], *case.rotation.T[:2]))
-    origin, b4 = np.zeros(3), case.position
-    distances = (
-        distance_to_plane(origin, (b4, b4 + u, b4 + v)),
-        distance_of_lines((origin, x), (b4, b4 + u)),
-        distance_to_plane(b4, (origin, x, y)),
-    )
-    assert_allclose(gaps_of(case).lengths, distances, rtol=1e-9, atol=1e-11 * case.size)
 
 
 @pytest.mark.parametrize("angle", [0.0, math.pi])

@@ -23,7 +23,7 @@ from strategies import (
     singular_cases,
 )
 
-from explorer import PRESETS, Design, InputError, Pose, margins, nearest_singularities, stratum
+from explorer import PRESETS, Design, InputError, Pose, margins, nearest_singularities
 from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
@@ -140,14 +140,6 @@ def test_nearest_singularity_at_a_distance_of_zero_is_the_pose_itself() -> None:
     assert [each.distance == 0.0 for each in nearest] == [True, True, True]
     assert all(each.pose is pose for each in nearest)
     assert nearest[0].name == "a1 on the platform plane"
-
-
-def test_nearest_pose_lies_in_the_stratum_of_its_incidence() -> None:
-    p, r = random_poses(10, MANY_ROWS)
-    nearest = nearest_singular_poses(Configuration(OPTIMAL, p, r))
-    for index, closure in enumerate(((3, 4, 2, 1), (4, 2, 3, 1), (4, 3, 1, 2))):
-        seen = stratum(nearest.position[:, index], nearest.rotation[:, index], OPTIMAL.reach)
-        assert (seen == closure).all()
 
 
 @given(ordinary_cases())

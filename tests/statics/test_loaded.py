@@ -24,7 +24,6 @@ from explorer.mechanism.design import Limits
 from explorer.mechanism.margins import margins, planes_of_singularity
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.forces import actuator_forces
 from explorer.statics.load_cases import largest_shares, limit_values, load_case
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.statics.reactions import limit_shares, limited_parts, part_limits, reactions
@@ -76,23 +75,6 @@ def test_no_sampled_direction_uses_a_larger_share_than_the_worst(limits: str) ->
         there = LoadedPose(design, pose, six(load), OWN)
         assert there.share == pytest.approx(worst.share, rel=1e-12)
         assert there.worst == worst.part
-
-
-def test_largest_force_takes_a_part_to_its_limit_in_its_worst_direction() -> None:
-    rng = np.random.default_rng(6)
-    for loaded in loaded_poses(limited(), 5):
-        unit_force = loaded.unit_force
-        force = 1.0 / unit_force.share
-        # Neither load nor payload act besides.
-        bare = limited(payload=Payload())
-        for direction in rng.normal(size=(50, 3)):
-            unit = direction / np.linalg.norm(direction)
-            other = LoadedPose(bare, loaded.pose, six([*(force * unit), 0.0, 0.0, 0.0]))
-            assert other.share <= 1.0 + 1e-9
-        load = np.array([*(force * unit_force.direction), 0.0, 0.0, 0.0])
-        there = LoadedPose(bare, loaded.pose, six(load))
-        assert there.share == pytest.approx(1.0, rel=1e-12)
-        assert there.worst == unit_force.part
 
 
 def test_loaded_pose_that_weighs_no_payload_has_no_forces() -> None:
@@ -254,19 +236,3 @@ def test_forces_and_precision_of_extreme_designs_and_poses_are_numbers(seed: int
     if precision.is_regular:
         assert not np.isnan(precision.ellipsoid.semi_axes).any()
         assert np.isfinite(precision.carriages).all()
-
-
-def test_pose_at_a1_is_singular_and_near_it_forces_grow_as_the_margins_shrink() -> None:
-    at = np.array([0.3, 0.5, 0.8])
-    rotation = Pose((0.0, 0.0, 0.0), (0.8, 0.1, 0.3, 0.5)).rotation
-    forces = {
-        size: actuator_forces(OPTIMAL, size * OPTIMAL.reach * at, rotation, (1, 2, 3, 4, 5, 6))
-        for size in (1e-12, 1e-20, 1e-25, 1e-27, 0.0)
-    }
-    # Legs 1 and 4 divide by one margin; legs 2 and 3 hold what these two cause, over another.
-    powers = np.array([1, 2, 2, 2, 2, 1])
-    for size in (1e-20, 1e-25):
-        expected = forces[1e-12] * (1e-12 / size) ** powers
-        assert_allclose(forces[size], expected, rtol=1e-8)
-    for size in (1e-27, 0.0):
-        assert np.isinf(forces[size]).all()

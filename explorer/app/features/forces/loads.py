@@ -17,7 +17,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.measures.blocks.source import LoadTopic, Source, load_source
 from explorer.mechanism.pose import Triple
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.number_text import format_number
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.statics.reactions import has_limits
@@ -71,8 +71,7 @@ def round_force(force: FloatArray, size: float) -> Triple:
         force: The force, shape (3,), in newtons.
         size: The size, in newtons.
     """
-    x, y, z = np.round(force, 3 - math.floor(math.log10(size))).tolist()
-    return x, y, z
+    return triple(np.round(force, 3 - math.floor(math.log10(size))))
 
 
 def fitting_scale(force: float, scale: float) -> float:

@@ -50,56 +50,13 @@ NOTHING = 1e-6
 SAME_FORCE = 1e-3
 
 
-class ForceArrows:
-    """Arrows between points.
-
-    Args:
-        scene: Where they are added.
-        name: Their node.
-        count: Number of arrows.
-        colour: Colour before the first frame.
-    """
-
-    def __init__(self, scene: viser.SceneApi, name: str, count: int, colour: Rgb) -> None:
-        self._shafts = shapes.Rods(scene, f"{name}/shafts", [colour] * count)
-        self._heads = shapes.Instances(scene, f"{name}/heads", shapes.cone(), [colour] * count)
-
-    def show(self, visible: bool) -> Iterator[Update]:
-        """Yield the updates that show or hide the arrows."""
-        yield from self._shafts.show(visible)
-        yield from self._heads.show(visible)
-
-    def draw(
-        self, tails: FloatArray, vectors: FloatArray, colours: list[Rgb], size: float
-    ) -> Iterator[Update]:
-        """Yield the updates that draw arrows from tails (n, 3) along vectors (n, 3).
-
-        Args:
-            tails: Where they begin, in scene units.
-            vectors: Their directions and lengths, in scene units.
-            colours: Their colours.
-            size: Scale of their thickness.
-        """
-        lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-        units = vectors / np.maximum(lengths, 1e-12)
-        heads = np.minimum(HEAD_LENGTH * size, MOST_HEAD * lengths)
-        necks = tails + units * (lengths - heads)
-        drawn = lengths[:, 0] > NOTHING
-        yield from self._shafts.between(tails, necks, np.where(drawn, SHAFT * size, NOTHING))
-        linear = [shapes.linear_colour(each) for each in colours]
-        yield from self._shafts.colour(linear)
-        radii = np.minimum(HEAD * size, heads * HEAD / HEAD_LENGTH)
-        scales = np.maximum(np.concatenate([radii, radii, heads], axis=1), NOTHING)
-        yield from self._heads.place(necks, shapes.turned_to(vectors), scales)
-        yield from self._heads.colour(linear)
-
-
 class ForcesScene(ScenePart):
     """The load and the weight of the payload, forces of legs and carriages, and bending."""
 
     def __init__(self, services: Services) -> None:
         scene, self._loads = services.scene, services.get(Loads)
-        self._arrows = ForceArrows(scene, "/forces/arrows", 8, LOAD)
+        self._shafts = shapes.Rods(scene, "/forces/arrows/shafts", [LOAD] * 8)
+        self._heads = shapes.Instances(scene, "/forces/arrows/heads", shapes.cone(), [LOAD] * 8)
         self._sleeves = shapes.Rods(
             scene, "/forces/sleeves", [shapes.GHOST] * 4, opacity=SLEEVE_OPACITY
         )
@@ -121,7 +78,8 @@ class ForcesScene(ScenePart):
         loaded = self._loads.of(placed.frame)
         shown = is_shown(placed)
         holds = shown and loaded.is_regular
-        yield from self._arrows.show(shown)
+        yield from self._shafts.show(shown)
+        yield from self._heads.show(shown)
         yield from self._sleeves.show(holds)
         for handle in (*self._bending, *self._ordinates):
             yield handle, "visible", holds
@@ -190,7 +148,18 @@ class ForcesScene(ScenePart):
             colours[2:] = [
                 share_colour(e) for e in (l1, _larger(d1, d2), _larger(d3, d4), l4, d1, d3)
             ]
-        yield from self._arrows.draw(tails, vectors, colours, placed.thickness)
+        size, lengths = placed.thickness, np.linalg.norm(vectors, axis=1, keepdims=True)
+        units = vectors / np.maximum(lengths, 1e-12)
+        heads = np.minimum(HEAD_LENGTH * size, MOST_HEAD * lengths)
+        necks = tails + units * (lengths - heads)
+        radius = np.where(lengths[:, 0] > NOTHING, SHAFT * size, NOTHING)
+        yield from self._shafts.between(tails, necks, radius)
+        radii = np.minimum(HEAD * size, heads * HEAD / HEAD_LENGTH)
+        scales = np.maximum(np.concatenate([radii, radii, heads], axis=1), NOTHING)
+        yield from self._heads.place(necks, shapes.turned_to(vectors), scales)
+        linear = [shapes.linear_colour(each) for each in colours]
+        yield from self._shafts.colour(linear)
+        yield from self._heads.colour(linear)
 
     def _draw_bending(
         self, placed: Placed, loaded: LoadedPose, index: int, leg: int, share: float | None
