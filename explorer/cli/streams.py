@@ -83,13 +83,8 @@ class Meter(AbstractContextManager["Meter"]):
 
     def __exit__(self, *_: object) -> None:
         """Erase the bar from a terminal."""
-        self.clear()
-
-    def clear(self) -> None:
-        """Erase the bar from a terminal."""
         if self._last_width and self.is_terminal:
             write_progress("\r" + " " * self._last_width + "\r")
-        self._last_width = 0
 
     def show(self, text: str, share: float) -> None:
         """Show a line, unless the last update is too recent.

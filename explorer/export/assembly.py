@@ -14,8 +14,6 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from explorer.export import mesh, opencascade as cad
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE
@@ -48,7 +46,7 @@ def assembly_bytes(prototype: Prototype, file_format: str) -> bytes:
         file_format: One of `FORMATS`.
 
     Raises:
-        InputError: The format is unknown, or the parts are too large for it.
+        InputError: The format is unknown.
         MissingExtraError: STEP without OpenCASCADE.
         ExplorerError: The library of the format refuses the parts.
     """
@@ -66,7 +64,6 @@ def part_groups() -> Sequence[tuple[str, Sequence[str]]]:
 
 def _3mf(prototype: Prototype) -> bytes:
     design, unit, home = prototype.design, prototype.design.unit_mm, prototype.design.home_pose
-    mesh.check_size(np.concatenate(prototype.at(home.position, home.rotation)) * unit)
     places, kinds = prototype.chains.places_at(home.position, home.rotation), list(COLOURS)
     by_name = {part.name: part for part in prototype.parts}
     with mesh.refusals_of_lib3mf("parts"):

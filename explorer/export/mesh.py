@@ -137,26 +137,8 @@ def glb_bytes(
     return scene.export(file_type="glb", tree_postprocessor=complete)
 
 
-LARGEST = 1e9
-"""The largest coordinate that lib3mf takes, in millimetres."""
-
 NAMESPACE = "urn:flagged-explorer"
 """The XML namespace of the design in a file's metadata."""
-
-
-def check_size(points: FloatArray) -> float:
-    """Return the largest magnitude of a coordinate of points (n, 3), in millimetres.
-
-    Raises:
-        InputError: Lib3mf does not accept the coordinate.
-    """
-    largest = float(np.abs(points).max())
-    if largest > LARGEST:
-        raise InputError(
-            f"lib3mf takes coordinates up to {LARGEST:g} mm; these reach {largest:.3g} mm: use "
-            "another format, or a smaller unit"
-        )
-    return largest
 
 
 @contextlib.contextmanager
@@ -168,7 +150,10 @@ def refusals_of_lib3mf(what: str) -> Generator[None]:
     try:
         yield
     except library.ELib3MFException as error:
-        raise ExplorerError(f"lib3mf refuses the {what}: {error}") from None
+        raise ExplorerError(
+            f"lib3mf refuses the {what} ({error}); use another format, or a smaller unit if it "
+            "reaches beyond 1000 km"
+        ) from None
 
 
 class Model:
@@ -392,8 +377,8 @@ def _glb(solid: Solid, design: Design, name: str) -> bytes:
 
 
 def _3mf(solid: Solid, design: Design, name: str) -> bytes:
-    largest = check_size(solid.vertices)
     # lib3mf writes fixed decimals, which it computes as integers of 64 bits.
+    largest = float(np.abs(solid.vertices).max())
     decimals = min(16, max(4, 11 - math.floor(math.log10(largest))))
     points = _single(solid, "3mf", decimals).vertices
     with refusals_of_lib3mf("mesh"):

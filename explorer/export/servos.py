@@ -82,19 +82,17 @@ class Strokes(NamedTuple):
 
 def strokes_of(design: Design, joints: FloatArray) -> Strokes:
     """Return the ranges of the actuated joints of a design, given their values at home (6,)."""
-    metres, limits, stated_ranges = 1e-3 * design.unit_mm, design.limits, joint_ranges(design)
-    at_home = dict(zip(JOINTS, joints.tolist(), strict=True))
-    gap = min(limits.gap, abs(at_home["d1"] - at_home["d3"]))
-    exceeded = gap < limits.gap
+    metres, least_gap = 1e-3 * design.unit_mm, design.limits.gap
+    at_home: dict[str, float] = dict(zip(JOINTS, joints.tolist(), strict=True))
+    gap = min(least_gap, abs(at_home["d1"] - at_home["d3"]))
+    exceeded = gap < least_gap
     ranges: dict[str, tuple[float, float]] = {}
-    for name, value in at_home.items():
-        stated = stated_ranges.get(name)
-        if stated is not None:
-            low, high = min(stated[0], value), max(stated[1], value)
-            exceeded |= (low, high) != stated
-            # MuJoCo refuses a range of zero width.
-            if high > low:
-                ranges[name] = low * metres, high * metres
+    for name, stated in joint_ranges(design).items():
+        low, high = min(stated[0], at_home[name]), max(stated[1], at_home[name])
+        exceeded |= (low, high) != stated
+        # MuJoCo refuses a range of zero width.
+        if high > low:
+            ranges[name] = low * metres, high * metres
     return Strokes(ranges, gap * metres, exceeded)
 
 

@@ -195,10 +195,10 @@ def _words_of_refusal(fault: msgspec.ValidationError, text: str, kind: Any) -> s
         name, known = unknown[1][:_LONGEST_QUOTE], _allowed_at(kind, path)
         close = difflib.get_close_matches(name.lower(), known, n=1)
         hint = f"did you mean `{close[0]}`?" if close else f"there are {', '.join(known)}"
-        words = f"unknown field `{name}`{_of(path)}; {hint}"
+        words = f"unknown field `{name}`{_path_text(path, ' of ')}; {hint}"
         path = (*path, unknown[1])
     elif missing is not None:
-        words = f"the field `{missing[1]}`{_of(path)} is missing"
+        words = f"the field `{missing[1]}`{_path_text(path, ' of ')} is missing"
     else:
         path = _matching(places, path, words)
         allowed = _allowed_at(kind, path) if words.startswith("Invalid enum value") else []
@@ -219,10 +219,6 @@ def _types_in_words(match: re.Match[str]) -> str:
     return " or ".join(_TYPES.get(each, each) for each in match[1].split(" | "))
 
 
-def _of(path: _Path) -> str:
-    return f" of {_path_text(path)}" if path else ""
-
-
 def _path_of(written: str) -> _Path:
     """Return the path in a message such as ".box[0]" or "limits.box"; [...] is any field."""
     steps = re.findall(r"([^.\[\]]+)|\[([0-9]+|\.\.\.)\]", written)
@@ -241,10 +237,10 @@ def _path_in_words(error: InputError, places: Mapping[_Path, _Place], outer: _Pa
     return outer
 
 
-def _path_text(path: _Path) -> str:
-    """Return a path as its user writes it, such as limits.box[0][2]."""
+def _path_text(path: _Path, before: str = "") -> str:
+    """Return a path as its user writes it, such as limits.box[0][2]; `before` goes before one."""
     steps = (f".{step}" if isinstance(step, str) else f"[{step}]" for step in path)
-    return "".join(steps).removeprefix(".")
+    return before * bool(path) + "".join(steps).removeprefix(".")
 
 
 def _places(text: str) -> Iterator[tuple[_Path, _Place]]:

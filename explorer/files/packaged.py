@@ -35,24 +35,20 @@ def _packaged_folder(folder: str) -> Traversable:
 LIBRARIES = ("flagged-explorer", "numpy", "scipy", "numba")
 
 
-def versions() -> dict[str, str]:
-    """Return the versions of Python and of `LIBRARIES`, by name."""
-    return dict(_read_versions())
-
-
 @functools.cache
-def _read_versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of `LIBRARIES`, by name; callers do not change it."""
     # The metadata are files, and reading them takes milliseconds.
-    versions = {"python": platform.python_version()}
+    known = {"python": platform.python_version()}
     for name in LIBRARIES:
         try:
-            versions[name] = metadata.version(name)
+            known[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             # A checkout that was never installed has no metadata.
             from explorer import __version__
 
-            versions[name] = __version__
-    return versions
+            known[name] = __version__
+    return known
 
 
 MANUAL_FILES = (

@@ -112,19 +112,16 @@ def path_margins(poses: Sequence[Pose], tool: ArrayLike | None = None) -> PathMa
 def _merge_corners(crossings: list[Crossing]) -> list[Crossing]:
     """Return the crossings, with one instead of two where both moves of a corner cross at it."""
     merged: list[Crossing] = []
+    ends: dict[tuple[int, int], int] = {}
     for crossing in crossings:
-        corner = (crossing.incidence, crossing.move - 1)
-        twins = [
-            index
-            for index, other in enumerate(merged)
-            if (other.incidence, other.move) == corner and other.share > 1.0 - NEAREST_ROOTS
-        ]
-        if twins and crossing.share <= NEAREST_ROOTS:
-            before = merged[twins[-1]]
-            changes_sign = before.side != crossing.side
-            merged[twins[-1]] = dataclasses.replace(before, changes_sign=changes_sign)
-        else:
-            merged.append(crossing)
+        twin = ends.get((crossing.incidence, crossing.move - 1))
+        if twin is not None and crossing.share <= NEAREST_ROOTS:
+            changes_sign = merged[twin].side != crossing.side
+            merged[twin] = dataclasses.replace(merged[twin], changes_sign=changes_sign)
+            continue
+        if crossing.share > 1.0 - NEAREST_ROOTS:
+            ends[crossing.incidence, crossing.move] = len(merged)
+        merged.append(crossing)
     return merged
 
 

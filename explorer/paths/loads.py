@@ -22,13 +22,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import GUIDE_ROWS, LENGTH_ROWS, STRUT_ROWS, Design
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import (
-    BoolArray,
-    FloatArray,
-    IntArray,
-    lengths_of,
-    rotate,
-)
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, lengths_of, rotate
 from explorer.paths.crossings import PathMargins, path_margins
 from explorer.statics.forces import load_array, twists_of_actuators
 from explorer.statics.reactions import LIMITED, Reactions, limit_shares, reactions
@@ -108,9 +102,9 @@ class DemandedLoad:
     def over(self, path: PathMargins, tool: ArrayLike | None = None) -> PathLoads:
         """Return the shares over a path of a tool, given with its crossings."""
         at, shares, bounds = self._sample(StraightMoves.along(path.poses, tool))
-        for crossing in path.crossings:
-            at = np.append(at, crossing.move + crossing.share)
-            shares = np.append(shares, np.full((1, len(LIMITED)), np.inf), axis=0)
+        at = np.append(at, [crossing.move + crossing.share for crossing in path.crossings])
+        infinite = np.full((len(path.crossings), len(LIMITED)), np.inf)
+        shares = np.append(shares, infinite, axis=0)
         order = np.argsort(at, kind="stable")
         bound = math.inf if path.crossings else float(bounds.max())
         return PathLoads(at[order], shares[order], bound)

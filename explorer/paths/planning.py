@@ -142,7 +142,9 @@ def plan_path(
     planner = _Planner(design, (start, goal), seed, tool, demanded_load)
     order = int(np.sign(ends[0].joints[D3] - ends[0].joints[D1]))
     rules = Rules.of(design, ends[0].signs, order)
-    margin, clearance = _preferred_bounds(*ends)
+    margin = SHARE_OF_MARGIN * min(float(np.abs(end.margins).min()) for end in ends)
+    least = min(float(end.clearances.clearance.min()) for end in ends)
+    clearance = min(PREFERRED_CLEARANCE * design.reach, SHARE_OF_CLEARANCE * least)
     demanded = _Demand(rules, 0.0, 0.0)
     preferred = _Demand(rules.tighten(margin, clearance), margin, clearance)
     path = (
@@ -242,22 +244,13 @@ class _Planner:
         )
 
 
-def _preferred_bounds(start: Snapshot, goal: Snapshot) -> tuple[float, float]:
-    """Return the margin and the clearance to prefer on a path; both ends have more."""
-    margin = min(float(np.abs(end.margins).min()) for end in (start, goal))
-    clearance = min(float(end.clearances.clearance.min()) for end in (start, goal))
-    preferred = PREFERRED_CLEARANCE * start.design.reach
-    return SHARE_OF_MARGIN * margin, min(preferred, SHARE_OF_CLEARANCE * clearance)
-
-
 def _check_ends(start: Snapshot, goal: Snapshot, load: DemandedLoad | None) -> None:
     named = {"start": start, "goal": goal}
     for name, end in named.items():
         vanishing = incidences(end.stratum)
         if vanishing:
             words = " and ".join(INCIDENCES[index - 1] for index in vanishing)
-            message = f"the {name} is singular ({words}); a path cannot start or end there"
-            raise InputError(message)
+            raise InputError(f"the {name} is singular ({words}); a path cannot start or end there")
     _check_same_mode(start, goal)
     for name, end in named.items():
         # `_check_same_order` compares the order of the carriages at both ends.
@@ -268,10 +261,16 @@ def _check_ends(start: Snapshot, goal: Snapshot, load: DemandedLoad | None) -> N
                 number = f"{value:.4g}".replace("-", "−")
                 broken.append(f"legs {first} and {second} collide (clearance {number})")
         if broken:
-            message = f"the {name} is outside the limits: {'; '.join(broken)}"
-            raise InputError(message)
+            raise InputError(f"the {name} is outside the limits: {'; '.join(broken)}")
         if load is not None:
-            _check_load(name, end.pose, load)
+            shares = load.shares(end.pose.position, end.pose.rotation)
+            part, share = int(shares.argmax()), float(shares.max())
+            if share > 1.0 + ROUNDING:
+                number = f"{100.0 * share:.{4 if share > 1.001 else 9}g}"
+                raise InputError(
+                    f"the {name} does not hold the load: {PART_NAMES[part]} at {number} % of its "
+                    "limit"
+                )
     _check_same_order(start, goal)
 
 
@@ -289,17 +288,6 @@ def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
         f"{goal.mode} ({mode_name(goal.mode)}): every path between them passes a pose where "
         f"{' and one where '.join(flat)}",
     )
-
-
-def _check_load(name: str, pose: Pose, load: DemandedLoad) -> None:
-    shares = load.shares(pose.position, pose.rotation)
-    part, share = int(shares.argmax()), float(shares.max())
-    if share > 1.0 + ROUNDING:
-        number = f"{100.0 * share:.{4 if share > 1.001 else 9}g}"
-        message = (
-            f"the {name} does not hold the load: {PART_NAMES[part]} at {number} % of its limit"
-        )
-        raise InputError(message)
 
 
 def _check_same_order(start: Snapshot, goal: Snapshot) -> None:

@@ -108,8 +108,7 @@ class Chains:
         mounts = np.stack([along] * 4)
         for index, leg in ((0, points.b1), (3, points.b4 - points.a3)):
             across = np.array([-leg[1], leg[0], 0.0]) * side
-            length = float(np.hypot(across[0], across[1]))
-            x = across / length if length > 0.0 else np.array([1.0, 0.0, 0.0])
+            x = across / np.linalg.norm(across) if across.any() else np.array([1.0, 0.0, 0.0])
             z = np.array([0.0, 0.0, float(side)])
             mounts[index] = np.column_stack([x, np.cross(z, x), z])
         return Chains(design, side, above, mounts)

@@ -89,13 +89,9 @@ class ImperfectMachine:
     @cached_property
     def shifts(self) -> FloatArray:
         """Displacements of the four legs' bases, shape (4, 3), in design units."""
-        starts = (
-            accuracy.A1_COLUMN,
-            accuracy.GUIDE_COLUMN,
-            accuracy.GUIDE_COLUMN,
-            accuracy.A3_COLUMN,
-        )
-        return np.stack([self.deviations[6 + start : 9 + start] for start in starts])
+        guide = accuracy.GUIDE_COLUMN
+        starts = np.array([accuracy.A1_COLUMN, guide, guide, accuracy.A3_COLUMN])
+        return self.deviations[6 + starts[:, None] + np.arange(3)]
 
     @cached_property
     def turns(self) -> FloatArray:
@@ -202,8 +198,7 @@ class ImperfectMachine:
         Raises:
             NoAnswerError: The loops do not close near home.
         """
-        meant, true = self.design.home_pose, self.home
-        tool = self.design.tool.position
+        meant, true, tool = self.design.home_pose, self.home, self.design.tool.position
         there, expected = (
             np.array(pose.position) + tool_offset(pose.rotation, tool) for pose in (true, meant)
         )
@@ -218,8 +213,7 @@ class ImperfectMachine:
         """
         if not self.deviations.any():
             return np.zeros(6)
-        home = self.design.home_pose
-        tool = self.design.tool.position
+        home, tool = self.design.home_pose, self.design.tool.position
         slopes = accuracy.error_by_source(Configuration.at(self.design, home, tool))
         if not np.isfinite(slopes).all():
             raise NoAnswerError(

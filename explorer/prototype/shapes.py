@@ -96,10 +96,9 @@ def forms_of(sizes: Sizes, k: Kernel) -> Iterator[tuple[str, str, Shape]]:
 
 def _base(k: Kernel, sizes: Sizes) -> Shape:
     """Return the base: its plate, the lugs of both universal joints, the rails on pillars."""
-    side, unit = sizes.chains.side, sizes.design.unit_mm
+    side, unit, guide = sizes.chains.side, sizes.design.unit_mm, sizes.guide
     low, high = -sizes.depth - sizes.base_plate, -sizes.depth
     a3 = (sizes.design.a3[0] * unit, sizes.design.a3[1] * unit * side)
-    guide = sizes.guide
     ends = [x for rail in sizes.rails for x in rail]
     feet = [
         Circle(sizes.legs[0].swing),
@@ -141,8 +140,7 @@ def _cross(k: Kernel, dims: LegSizes) -> Shape:
 
 def _carriage(k: Kernel, sizes: Sizes, dims: LegSizes) -> Shape:
     """Return a sleeve on the square shaft, with a flange at both ends."""
-    guide, half = sizes.guide, dims.radius
-    flange = _flange(dims)
+    guide, half, flange = sizes.guide, dims.radius, _flange(dims)
     pieces = [
         k.disc(Circle(guide.sleeve), -half, half),
         k.disc(Circle(guide.flange), -half, flange - half),
@@ -202,12 +200,11 @@ def _platform(k: Kernel, sizes: Sizes) -> Shape:
     """Return the platform plate, beyond the platform plane, with a hole for each ball's neck."""
     points = sizes.design.platform_points * sizes.design.unit_mm
     low, high = sizes.standoff, sizes.standoff + sizes.platform_plate
-    pads: list[Circle] = []
-    holes: list[Shape] = []
-    for dims, (x, y, _) in zip(sizes.legs, points.tolist(), strict=True):
-        pads.append(Circle(1.5 * dims.radius, x, y))
-        holes.append(k.hole(Circle(dims.neck + CLEARANCE, x, y), low - 1.0, high + 1.0))
-    return _facing(k.hull(pads, low, high) - k.union(holes), sizes)
+    legs = [(dims, x, y) for dims, (x, y, _) in zip(sizes.legs, points.tolist(), strict=True)]
+    plate = k.hull([Circle(1.5 * dims.radius, x, y) for dims, x, y in legs], low, high)
+    necks = (Circle(dims.neck + CLEARANCE, x, y) for dims, x, y in legs)
+    holes = k.union([k.hole(neck, low - 1.0, high + 1.0) for neck in necks])
+    return _facing(plate - holes, sizes)
 
 
 def _ball(k: Kernel, sizes: Sizes, leg: int) -> Shape:
@@ -262,8 +259,9 @@ class Part:
 
     def mass(self, density: float, unit_mm: float) -> Mass:
         """Return the mass properties in kilograms and metres, at a density in kg/m³."""
-        metres = 1e-3 * unit_mm
-        return self.unit_mass.in_units(metres, density * metres**3)
+        own, metres = self.unit_mass, 1e-3 * unit_mm
+        factor = density * metres**3
+        return Mass(own.mass * factor, own.centre * metres, own.inertia * (factor * metres**2))
 
 
 SEGMENTS = 48

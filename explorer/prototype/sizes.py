@@ -160,8 +160,8 @@ class Sizes:
             own.stroke(self.required_stroke(leg), self.home_length(leg))
             for leg, own in zip(LEGS, self.legs, strict=True)
         )
-        room_for_joints = max(self.legs[0].swing, self.legs[3].swing)
-        self.depth = max(room_for_joints, self.guide.eye) + 2.0 * CLEARANCE
+        room = max(self.legs[0].swing, self.legs[3].swing, self.guide.eye)
+        self.depth = room + 2.0 * CLEARANCE
         self.base_plate = max(1.5 * thickest, 3.0 * THINNEST)
         self.standoff = max(1.1 * own.cup for own in self.legs) + 2.0 * CLEARANCE
         self.platform_plate = max(1.2 * thickest, 3.0 * THINNEST)
@@ -188,9 +188,8 @@ class Sizes:
 
     def nearest_to_a1(self, leg: int) -> float:
         """Return the least distance of a leg's carriage from a1; a pillar stands between."""
-        radius = self.radii[leg - 1]
         sweep = self.legs[0].sweep(self.guide.eye)
-        return sweep + 2.0 * CLEARANCE + self.guide.pillar + radius
+        return sweep + 2.0 * CLEARANCE + self.guide.pillar + self.radii[leg - 1]
 
     @cached_property
     def carriage_ranges(self) -> Mapping[int, Stroke]:
@@ -203,11 +202,11 @@ class Sizes:
         for leg in ON_GUIDE:
             home, nearest = self.carriage_at_home(leg), self.nearest_to_a1(leg)
             low, high = self._required_guide_range(leg)
-            low, high = min(low, home), max(high, home)
             if home > 0.0:
-                ranges[leg] = Stroke(max(low, min(nearest, home)), high)
+                low = max(low, nearest)
             else:
-                ranges[leg] = Stroke(low, min(high, max(-nearest, home)))
+                high = min(high, -nearest)
+            ranges[leg] = Stroke(min(low, home), max(high, home))
         return ranges
 
     def _required_guide_range(self, leg: int) -> Stroke:

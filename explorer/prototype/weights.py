@@ -36,10 +36,6 @@ class Mass:
     centre: FloatArray
     inertia: FloatArray
 
-    def in_units(self, length: float, mass: float) -> Mass:
-        """Return the properties in other units, given the factors for lengths and masses."""
-        return Mass(self.mass * mass, self.centre * length, self.inertia * (mass * length**2))
-
 
 def bar(radius: float, start: FloatArray, end: FloatArray, density: float) -> Mass:
     """Return the mass properties of a round bar between two points (3,), zero if they coincide."""

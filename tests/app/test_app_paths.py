@@ -49,7 +49,6 @@ from explorer.app.features.paths.plots import (
     crossing_words,
     incidence_columns,
 )
-from explorer.app.features.paths.work import plan
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Action, Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
@@ -492,15 +491,19 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
         force=(0.0, 0.0, -25.0),
     )
     state = Go().apply(Set("paths.kind", "planned").apply(state))
-    worker = StubWorker()
+    orders: list[tuple[Any, ...]] = []
 
     def use_stub(*_: object, **__: object) -> StubWorker:
-        return worker
+        return StubWorker()
+
+    def submit(_: object, *order: Any) -> None:
+        orders.append(order)
 
     monkeypatch.setattr(feature, "Worker", use_stub)
+    monkeypatch.setattr(StubWorker, "submit", submit)
     PathRunner(services_for()).follow(Frame(state))
-    assert worker.orders[-1].request.tool == state.tool == PRESS.tool.position
-    poses = plan(worker.orders[-1].request).poses
+    _, task, arguments, *_ = orders[-1]
+    poses = task(*arguments).poses
     own = weights_of_parts(WeightsRequest(PRESS, 3000.0))
     weights = replace(own, on_platform=(*own.on_platform, PRESS.payload))
     along = path_loads(PRESS, poses, load_of(state), tool=state.tool, weights=weights)

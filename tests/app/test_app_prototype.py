@@ -22,7 +22,6 @@ from explorer.app.features.prototype.work import (
     PARTS_FEED,
     Parts,
     PartsFeed,
-    PartsRequest,
     parts_drawing,
     parts_to_draw,
     stock_of,
@@ -59,7 +58,7 @@ def feed(services: Services) -> PartsFeed:
 
 @pytest.fixture(scope="module")
 def parts() -> Parts:
-    parts = parts_drawing(PartsRequest(OPTIMAL))
+    parts = parts_drawing(OPTIMAL)
     assert isinstance(parts, Parts)
     return parts
 
@@ -319,7 +318,7 @@ def test_masses_and_counts_are_those_of_the_library(parts: Parts) -> None:
             same = [i for i in bill.items if i.name.partition(" ")[0] == line.kind]
             assert sum(item.mass == mass for item in same) >= line.count
     # Legs of other parts have lines of their own.
-    mixed = parts_drawing(PartsRequest(thick(with_prototype(), 0.2, 0.25, 0.2, 0.15).design))
+    mixed = parts_drawing(thick(with_prototype(), 0.2, 0.25, 0.2, 0.15).design)
     assert isinstance(mixed, Parts)
     names = [line.name for line in mixed.lines]
     assert {"carriage 2", "carriage 3", "cross 1", "cross 4", "ball 1, 3"} <= set(names)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import errno
 import inspect
-import json
 import os
 import re
 import subprocess
@@ -339,13 +338,6 @@ def test_bad_input_gives_no_object_and_status_2(cli: CommandLine, argv: tuple[st
 
 
 PROGRAM = [sys.executable, "-m", "explorer"]
-
-
-def test_process_answer_is_one_json_object_and_status_0() -> None:
-    argv = [*PROGRAM, "inverse", "--position", "10", "5", "9", "--json"]
-    done = subprocess.run(argv, capture_output=True, encoding="utf-8", check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert set(json.loads(done.stdout)) == {"joints", "folds", "within_limits", "violations"}
 
 
 def test_version_and_help_are_those_of_the_package(cli: CommandLine) -> None:

@@ -63,23 +63,6 @@ def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
     assert here[along.part] == here.max() == pytest.approx(along.share, rel=1e-10)
 
 
-def test_path_loads_samples_have_the_shares_of_their_poses() -> None:
-    design = random_machine(OPTIMAL, 5)
-    first, second = random_move(design.home_pose, 5, 1.0, 0.1)
-    poses = (first, second, design.home_pose)
-    load = np.array([3.0, -4.0, 5.0, 0.0, 1.0, 2.0])
-    along = path_loads(design, poses, load)
-    assert (along.at[0], along.at[-1]) == (0.0, 2.0)
-    assert (np.diff(along.at) >= 0.0).all()
-    for at, shares in zip(along.at, along.shares, strict=True):
-        move = 0 if at <= 1.0 else 1
-        ends = poses[move], poses[move + 1]
-        there = tool_move(*ends, at - move, np.zeros(3))
-        given = Configuration(design, *there, design.tool.position), load
-        expected = limit_shares(design, reactions(*given, design_weights(design)))[0]
-        np.testing.assert_allclose(shares, expected, rtol=1e-9)
-
-
 def test_path_loads_of_singular_path_is_infinite_at_its_first_crossing() -> None:
     design = random_machine(OPTIMAL, 1)
     home = design.home_pose

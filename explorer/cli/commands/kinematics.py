@@ -81,10 +81,8 @@ class Forward(JsonOptions, PointOptions):
         """Write all eight poses of the joints."""
         design = self.read_design()
         joints = np.array(self.joints)
-        squares, modes = (
-            kinematics.discriminants(design, joints),
-            kinematics.forward(design, joints),
-        )
+        squares = kinematics.discriminants(design, joints)
+        modes = kinematics.forward(design, joints)
         if not modes.feasible:
             if self.json:
                 output.write_json({"feasible": False, "discriminants": squares, "modes": []})

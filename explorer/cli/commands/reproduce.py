@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from explorer.cli import values
 from explorer.cli.options import JsonOptions
+from explorer.cli.output import attributes
 from explorer.cli.streams import write_error
 
 if TYPE_CHECKING:
@@ -45,15 +46,10 @@ def _claim_json(result: Result) -> dict[str, object]:
     """Return a claim and its measurement as plain values."""
     claim, measurement = result.claim, result.measurement
     return {
-        "name": claim.name,
+        **attributes(claim, "name reading paper command"),
+        **attributes(measurement, "verdict condition values"),
         "claim": claim.title,
-        "reading": claim.reading,
-        "paper": claim.paper,
         "measured": measurement.text,
-        "verdict": measurement.verdict,
-        "condition": measurement.condition,
-        "command": claim.command,
-        "values": measurement.values,
     }
 
 

@@ -96,8 +96,8 @@ class Sweep(JsonOptions):
         from explorer.sweep.run import run_study
 
         workers = self._workers()
-        with Meter() as meter:
-            try:
+        try:
+            with Meter() as meter:
                 progress = run_study(
                     study,
                     folder,
@@ -107,13 +107,12 @@ class Sweep(JsonOptions):
                         progress_line(progress), progress.done / progress.total
                     ),
                 )
-            except KeyboardInterrupt:
-                meter.clear()
-                write_error("stopped; finished designs are kept, and the same command continues")
-                raise
-            finally:
-                # Pending tasks are useless after any kind of end.
-                workers.shutdown(cancel_futures=True)
+        except KeyboardInterrupt:
+            write_error("stopped; finished designs are kept, and the same command continues")
+            raise
+        finally:
+            # Pending tasks are useless after any kind of end.
+            workers.shutdown(cancel_futures=True)
         self.write(
             lambda: {
                 **attributes(progress, "total done"),

@@ -59,7 +59,14 @@ def mechanism_section(data: ReportData) -> Iterator[Element]:
         f"orange where its margin is below the warning length of {100.0 * WARN_SHARE:g} % of the "
         "reach, or the nearest singular pose is nearer than a third of it; blue beyond.",
     )
-    yield element("div", _variables(data), _pose(data), class_="pair")
+    values = zip(_MEANINGS.items(), (*data.design.variables, data.design.reach), strict=True)
+    rows = [
+        _lengths(data, (element("b", name), f" {meaning}"), value)
+        for (name, meaning), value in values
+    ]
+    heads = ("design variable", "units", "mm")
+    variables = markup.table(heads, rows, "<>>", "Design variables X")
+    yield element("div", variables, _pose(data), class_="pair")
     yield _joints(data)
     yield _limits(data)
     broken = data.snapshot.violations
@@ -71,15 +78,6 @@ def mechanism_section(data: ReportData) -> Iterator[Element]:
 def _lengths(data: ReportData, name: Cell, value: float) -> Row:
     """Return a row with a length in design units and in millimetres."""
     return name, value, value * data.design.unit_mm
-
-
-def _variables(data: ReportData) -> Element:
-    values = (*data.design.variables, data.design.reach)
-    rows = [
-        _lengths(data, (element("b", name), f" {meaning}"), value)
-        for (name, meaning), value in zip(_MEANINGS.items(), values, strict=True)
-    ]
-    return markup.table(("design variable", "units", "mm"), rows, "<>>", "Design variables X")
 
 
 def _pose(data: ReportData) -> Element:

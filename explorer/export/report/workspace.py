@@ -255,7 +255,15 @@ def _over_the_workspace(
         words = f"The volume that holds it cannot be computed: {carried}."
         yield paragraph(words, class_="note")
     else:
-        yield _held_volumes(data, carried)
+        cubic, entire = (0.1 * data.design.unit_mm) ** 3, data.volume.volume
+        rows: list[Row] = [
+            (name, volume, volume * cubic, markup.percentage(volume / entire), remark)
+            for name, volume, remark in (
+                ("whole workspace", entire, ""),
+                ("holds the payload", carried.held_volume, "of a mesh, to half a per cent"),
+            )
+        ]
+        yield markup.table(("volume", "units³", "cm³", "share", ""), rows, "<>>><")
         if carried.best is not None and carried.factor is not None:
             yield _best(carried.best, carried.factor)
     if isinstance(data.solid, Solid) and not data.solid.is_empty:
@@ -266,18 +274,6 @@ def _over_the_workspace(
         "than at home, do not count as held, whatever their shares: nothing holds the payload on "
         "the way."
     )
-
-
-def _held_volumes(data: ReportData, carried: CarriedRegion) -> Element:
-    cubic, entire = (0.1 * data.design.unit_mm) ** 3, data.volume.volume
-    rows: list[Row] = [
-        (name, volume, volume * cubic, markup.percentage(volume / entire), remark)
-        for name, volume, remark in (
-            ("whole workspace", entire, ""),
-            ("holds the payload", carried.held_volume, "of a mesh, to half a per cent"),
-        )
-    ]
-    return markup.table(("volume", "units³", "cm³", "share", ""), rows, "<>>><")
 
 
 def _best(position: FloatArray, factor: float) -> Element:

@@ -1,4 +1,4 @@
-"""Actions on paths: to make one, straight or planned, and to play it."""
+"""Actions on paths, which make and play one, and the task of the planner's own process."""
 
 from __future__ import annotations
 
@@ -8,14 +8,19 @@ from typing import ClassVar
 
 import numpy as np
 
+from explorer.app.features.forces.tasks import WeightsRequest, weights_of_parts
 from explorer.app.state.actions import Action, move_to
 from explorer.app.state.paths import End, Journey, Paths
 from explorer.app.state.state import Joints, State, joints_of
+from explorer.app.state.view import Weighed
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import forward
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.machine import Six
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.number_text import format_number
+from explorer.paths.planning import PlannedPath, plan_path
+from explorer.statics.loaded import LoadedPose
 
 # Poses, and leg lengths over the reach, that differ by less are the same.
 SAME = 1e-9
@@ -96,7 +101,7 @@ def pose_of_end(state: State, end: End) -> Pose:
 def _legs(state: State) -> Joints:
     """Return the leg lengths whose modes are the ends of a path.
 
-    On a straight path between modes they are those of its ends, which all of it belongs to.
+    During a straight path between two modes of equal leg lengths, they are those lengths.
     """
     journey = state.journey
     if journey is not None and journey.kind == "straight" and journey.pose == state.pose:
@@ -224,3 +229,31 @@ def _go_along(state: State, journey: Journey) -> State:
 def _with(state: State, **changes: object) -> State:
     paths: Paths = replace(state.paths, **changes)  # pyright: ignore[reportArgumentType]
     return replace(state, paths=paths)
+
+
+def plan(
+    design: Design,
+    ends: tuple[Pose, Pose],
+    seconds: float,
+    tool: Triple | None,
+    load: Six | None,
+    weighed: Weighed,
+    density: float,
+) -> PlannedPath:
+    """Return a path between two poses, as `explorer.paths.planning.plan_path` finds it.
+
+    Args:
+        design: The manipulator.
+        ends: Start and goal.
+        seconds: Time for the search.
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
+        load: (F; M) at the tool point, base axes, in N and N × unit, that the path has to hold.
+        weighed: Bodies whose weights act besides the load.
+        density: Density of the parts, in kg/m³.
+    """
+    weights = own = None
+    if load is not None:
+        if weighed == "payload and legs":
+            own = weights_of_parts(WeightsRequest(design, density))
+        weights = LoadedPose(design, ends[0], load, own, weighed != "none").weights
+    return plan_path(design, *ends, seconds=seconds, tool=tool, load=load, weights=weights)

@@ -11,9 +11,8 @@ import viser
 
 from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab
 from explorer.app.features.forces.tasks import load_of
-from explorer.app.features.paths.actions import Advance, Play, TakePlan
+from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
 from explorer.app.features.paths.panel import PathsPanel
-from explorer.app.features.paths.work import PlanRequest, plan
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import Balls, add_lines
 from explorer.app.session.worker import Worker
@@ -60,10 +59,9 @@ class PathScene(ScenePart):
         yield self._line, "points", segments.astype(np.float32)
         if crossings:
             centres, radii = np.zeros((MOST_CROSSINGS, 3)), np.full(MOST_CROSSINGS, 1e-6)
-            count = len(crossings)
-            at = state.view.at
-            centres[:count] = [position_of(state.design, each.pose, at) for each in crossings]
-            radii[:count] = RADIUS
+            for index, crossing in enumerate(crossings):
+                centres[index] = position_of(state.design, crossing.pose, state.view.at)
+                radii[index] = RADIUS
             yield from self._balls.at(placed.scale * centres, radii)
 
 
@@ -121,18 +119,9 @@ class PathRunner(Runner):
 
     def _plan(self, state: State) -> None:
         number, design, paths = self._request, state.design, state.paths
-        if paths.planning is None:
-            return
         tool, view = state.tool, state.view
-        request = PlanRequest(
-            design,
-            *paths.planning,
-            paths.seconds,
-            tool,
-            load_of(state) if paths.holds_load else None,
-            view.forces.weighed,
-            view.prototype.density,
-        )
+        load = load_of(state) if paths.holds_load else None
+        weighed, density = view.forces.weighed, view.prototype.density
 
         def take_path(path: PlannedPath) -> None:
             moves = len(path.poses) - 1
@@ -143,7 +132,7 @@ class PathRunner(Runner):
         self._order = self.worker.submit(
             "plan",
             plan,
-            (request,),
+            (design, paths.planning, paths.seconds, tool, load, weighed, density),
             take_path,
             lambda problem: self._finish(number, None, problem),
         )

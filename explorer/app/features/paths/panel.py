@@ -14,7 +14,6 @@ from explorer.app.features.paths import actions, plots
 from explorer.app.inputs.control import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import Span
-from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import End, PathKind
@@ -155,26 +154,22 @@ class PathsPanel:
             ),
         )
         numbers = gui.add_html("")
-        self._controls.triple(
-            f"{title} x, y, z",
-            "Coordinates of b4 or of the tool point in the base frame, in design units.",
-            Bound(
-                lambda frame: typed_numbers(frame.state, end)[0],
-                lambda state, position: _set_typed(state, end, position, None),
-            ),
-            step=0.01,
-            visible=lambda state: _is_typed(state, end),
-        )
-        self._controls.triple(
-            f"{title} angles (°)",
-            "Yaw, pitch and roll of the platform, in degrees.",
-            Bound(
-                lambda frame: typed_numbers(frame.state, end)[1],
-                lambda state, angles: _set_typed(state, end, None, angles),
-            ),
-            step=0.1,
-            visible=lambda state: _is_typed(state, end),
-        )
+        place = "Coordinates of b4 or of the tool point in the base frame, in design units."
+        turn = "Yaw, pitch and roll of the platform, in degrees."
+        for index, words, hint, step in (
+            (0, "x, y, z", place, 0.01),
+            (1, "angles (°)", turn, 0.1),
+        ):
+            self._controls.triple(
+                f"{title} {words}",
+                hint,
+                Bound(
+                    lambda frame, index=index: typed_numbers(frame.state, end)[index],
+                    lambda state, triple, index=index: _set_typed(state, end, index, triple),
+                ),
+                step=step,
+                visible=lambda state: _is_typed(state, end),
+            )
         return numbers
 
     def _add_buttons(self, buttons: Buttons) -> None:
@@ -185,7 +180,7 @@ class PathsPanel:
             do(actions.Play(word == "on"), client)
 
         buttons.on("paths.play", play, values=("on", "off"))
-        buttons.on("paths.export", lambda _, client: self._export(client.client_id))
+        buttons.on("paths.export", self._export)
         buttons.on("paths.cancel", lambda _, client: do(actions.CancelPlan(), client))
         buttons.offer(
             "Paths › Cancel planning",
@@ -200,11 +195,11 @@ class PathsPanel:
             is_ready=lambda: self._session.state.journey is not None,
         )
 
-    def _export(self, who: Who) -> None:
+    def _export(self, _: str, client: viser.ClientHandle) -> None:
         journey = self._session.state.journey
         if journey is not None:
             data = trajectory_csv(journey.trajectory).encode()
-            self._downloads.send(who, f"{journey.design.name}-path.csv", data)
+            self._downloads.send(client.client_id, f"{journey.design.name}-path.csv", data)
 
 
 def end_numbers(state: State, end: EndName) -> str:
@@ -319,13 +314,12 @@ def typed_numbers(state: State, end: EndName) -> tuple[Triple, Triple]:
     return (x, y, z), (yaw, pitch, roll)
 
 
-def _set_typed(
-    state: State, end: EndName, position: Triple | None, angles: Triple | None
-) -> Action:
-    pose = actions.pose_of_end(state, _end(state, end))
-    there = position_of(state.design, pose, state.view.at) if position is None else position
-    if angles is not None:
-        pose = Pose.of_yaw_pitch_roll(pose.position, angles)
+def _set_typed(state: State, end: EndName, index: int, triple: Triple) -> Action:
+    """Set the position of an end, or with index 1 its angles."""
+    pose, there = actions.pose_of_end(state, _end(state, end)), triple
+    if index:
+        there = position_of(state.design, pose, state.view.at)
+        pose = Pose.of_yaw_pitch_roll(pose.position, triple)
     return Set(f"paths.{end}", state.pose_at(there, pose), end.capitalize(), "typed numbers")
 
 

@@ -327,16 +327,11 @@ class LoadPlot:
         if journey is None or loads is None:
             columns = blank_columns(2, (0.0, LEAST_TOP))
         else:
-            columns = load_columns(loads, journey.at)
+            # Room above the largest share and the limit, in percent.
+            top = float(np.clip(115.0 * loads.path.share, LEAST_TOP, MOST_TOP))
+            # Far above the chart a line is as good as at infinity.
+            percent: FloatArray = np.minimum(100.0 * loads.path.shares.max(axis=1), 4.0 * top)
+            share = np.append(percent, np.interp([journey.at] * 2, loads.time, percent))
+            beyond = np.where(share > 100.0, share, np.nan)
+            columns = time_columns(loads.time, (share, beyond), journey.at, (0.0, top))
         yield from self._chart.show(columns, is_visible=has_limits(frame.state.design))
-
-
-def load_columns(loads: JourneyLoads, now: float) -> tuple[NDArray[Any], ...]:
-    """Return the columns of the chart: time, share, share beyond the limit, and present time."""
-    # Room above the largest share and the limit, in percent.
-    top = float(np.clip(115.0 * loads.path.share, LEAST_TOP, MOST_TOP))
-    # Far above the chart a line is as good as at infinity.
-    percent: FloatArray = np.minimum(100.0 * loads.path.shares.max(axis=1), 4.0 * top)
-    share = np.append(percent, np.interp([now, now], loads.time, percent))
-    beyond = np.where(share > 100.0, share, np.nan)
-    return time_columns(loads.time, (share, beyond), now, (0.0, top))

@@ -54,7 +54,7 @@ class PrototypePanel:
         gui.add_html(note("Sized from the design; Export has them for printers and CAD."))
         self._trouble = gui.add_html("", visible=False)
         self._session = services.session
-        services.buttons.on(FIT, self._fit)
+        services.buttons.on(FIT, self._set_fitting_unit)
         self._folder = gui.add_folder("Parts", visible=False)
         with self._folder:
             controls.slider(
@@ -72,7 +72,7 @@ class PrototypePanel:
             )
             self._bill = gui.add_html("")
 
-    def _fit(self, _: str, client: viser.ClientHandle) -> None:
+    def _set_fitting_unit(self, _: str, client: viser.ClientHandle) -> None:
         fitting = _fitting_unit_mm(self._feed)
         if fitting is not None:
             unit = Set("design.unit_mm", fitting, "1 unit (mm)")
@@ -133,7 +133,8 @@ def parts_table(parts: Parts, density: float) -> str:
         row(
             escape(line.name),
             f"{line.count}",
-            f'<span class="ex-whole">{stock_words(line.stock)}</span>',
+            f'<span class="ex-whole">{"Ø " * (len(line.stock) == 2)}'
+            f"{' × '.join(map(_mm, line.stock))}</span>",
             _grams(line.mass(density)),
         )
         for line in parts.lines
@@ -163,11 +164,6 @@ def parts_table(parts: Parts, density: float) -> str:
     )
 
 
-def stock_words(stock: tuple[float, ...]) -> str:
-    """Return the diameter and length of a bar, or the sides of a block, in words."""
-    return ("Ø " if len(stock) == 2 else "") + " × ".join(map(_mm, stock))
-
-
 def _is_enough(actuator: Actuator) -> bool:
     """Whether a stroke covers the one that the limits allow, but for the last bits."""
     needed, stroke = actuator.required, actuator.stroke
@@ -184,9 +180,7 @@ def _grams(value: float) -> str:
 
 
 def _mass(grams: float) -> str:
-    if grams < 1000.0:
-        return f"{format_decimals(grams, 1)} g"
-    return f"{format_number(grams / 1000.0)} kg"
+    return f"{_grams(grams)} g" if grams < 1000.0 else f"{format_number(grams / 1000.0)} kg"
 
 
 def _send_assembly(services: Services, name: str, who: Who) -> None:

@@ -55,7 +55,7 @@ class PrototypeScene(ScenePart):
             self._nodes[name] = scene.add_mesh_simple(
                 f"/prototype/{path}", *NO_MESH, color=COLOURS[kind], visible=False
             )
-        self._drawn: tuple[Parts, float] | None = None
+        self._drawn: tuple[Parts | None, float] = None, 0.0
         self._meshes: dict[str, Drawn] = {}
 
     def updates(self, placed: Placed) -> Iterator[Update]:
@@ -88,7 +88,7 @@ class PrototypeScene(ScenePart):
         return np.concatenate(seen)
 
     def _shapes(self, parts: Parts, scale: float) -> Iterator[Update]:
-        if self._drawn is None or self._drawn[0] is not parts or self._drawn[1] != scale:
+        if self._drawn[0] is not parts or self._drawn[1] != scale:
             self._drawn = parts, scale
             names = (part.name for part in parts.prototype.parts)
             self._meshes = {
@@ -102,16 +102,16 @@ class PrototypeScene(ScenePart):
     def _places(self, placed: Placed, parts: Parts) -> Iterator[Update]:
         places = places_of(placed, parts)
         names = [part.name for part in parts.prototype.parts]
-        positions = (placed.scale * places.origin).tolist()
         turns = quaternion_from_rotation(places.rotation).tolist()
         platform = names.index("platform")
-        for index, name in enumerate(names):
+        for name, position, turn in zip(names, placed.scale * places.origin, turns, strict=True):
             if name in BALLS:
-                off = (places.origin[index] - places.origin[platform]) @ places.rotation[platform]
-                yield self._nodes[name], "position", tuple((placed.scale * off).tolist())
+                off = position - placed.scale * places.origin[platform]
+                there = off @ places.rotation[platform]
             else:
-                yield self._nodes[name], "position", tuple(positions[index])
-                yield self._nodes[name], "wxyz", tuple(turns[index])
+                there = position
+                yield self._nodes[name], "wxyz", tuple(turn)
+            yield self._nodes[name], "position", tuple(there.tolist())
 
 
 def places_of(placed: Placed, parts: Parts) -> Places:

@@ -64,10 +64,8 @@ def lines_of(prototype: Prototype) -> tuple[Line, ...]:
         stock = stock_of(part, prototype.design.unit_mm)
         key = part.kind, *(f"{value:.{DIGITS - 1}e}" for value in (item.volume, *stock))
         legs = lines[key].legs if key in lines else ()
-        leg = part.name.partition(" ")[2]
-        if leg:
-            legs = (*legs, int(leg))
-        lines[key] = Line(part.kind, legs, stock, item.volume)
+        numbers = map(int, part.name.split()[1:])
+        lines[key] = Line(part.kind, (*legs, *numbers), stock, item.volume)
     return tuple(sorted(lines.values(), key=lambda line: ORDER.index(line.kind)))
 
 
@@ -81,13 +79,6 @@ def stock_of(part: Part, unit_mm: float) -> tuple[float, ...]:
         return tuple(sides)
     off = np.delete(points - 0.5 * (lows + highs), axis, axis=1)
     return 2.0 * float(np.hypot(off[:, 0], off[:, 1]).max()), sides[axis]
-
-
-@dataclass(frozen=True)
-class PartsRequest:
-    """Request to make the parts of a design; its name does not count."""
-
-    design: Design
 
 
 @dataclass(frozen=True)
@@ -112,10 +103,10 @@ class Parts:
         return float(self.meshes[0][0][:, 2].min())
 
 
-def parts_drawing(request: PartsRequest) -> Parts | ExplorerError:
+def parts_drawing(design: Design) -> Parts | ExplorerError:
     """Return the parts of a design, ready to be drawn; or why it has none."""
     try:
-        prototype = make_prototype(request.design)
+        prototype = make_prototype(design)
     except ExplorerError as error:
         return error
     meshes = tuple(with_creases(part.vertices, part.faces) for part in prototype.parts)
@@ -123,13 +114,14 @@ def parts_drawing(request: PartsRequest) -> Parts | ExplorerError:
     return Parts(prototype, meshes, lines_of(prototype), actuators)
 
 
-def _request_for(frame: Frame) -> PartsRequest | None:
+def _request_for(frame: Frame) -> Design | None:
+    """Return the design without its name, on which the parts do not depend."""
     if frame.state.view.drawn_as != "prototype":
         return None
-    return PartsRequest(msgspec.structs.replace(frame.state.design, name=""))
+    return msgspec.structs.replace(frame.state.design, name="")
 
 
-PartsFeed: TypeAlias = Feed[PartsRequest, Parts | ExplorerError]
+PartsFeed: TypeAlias = Feed[Design, Parts | ExplorerError]
 PARTS_FEED = feed_of(parts_drawing, _request_for)
 
 

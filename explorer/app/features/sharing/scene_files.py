@@ -14,6 +14,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
+from itertools import accumulate
 
 import numpy as np
 import viser
@@ -118,7 +119,8 @@ def visible_messages(messages: Iterable[SceneMessage]) -> list[SceneMessage]:
         # A frame without axes is invisible, there only for its children.
         is_frame = message["type"] == "FrameMessage" and not message["props"]["show_axes"]
         if "props" in message and not is_frame:
-            lineage = _lineage(message["name"])
+            # The node and its ancestors.
+            lineage = list(accumulate(message["name"].split("/"), "{}/{}".format))
             if hidden.isdisjoint(lineage):
                 seen.update(lineage)
     return [
@@ -140,12 +142,6 @@ def caption_of(state: State, date: dt.date) -> str:
         f"{state.point} at ({x}, {y}, {z}) · {angles} · mode {Frame(state).snapshot.sign_words}<br>"
         f"1 unit = {format_number(state.design.unit_mm, 6)} mm · {date.isoformat()}"
     )
-
-
-def _lineage(name: str) -> list[str]:
-    """Return the names of a node of the scene and of its ancestors."""
-    parts = name.split("/")
-    return ["/".join(parts[: count + 1]) for count in range(len(parts))]
 
 
 LEAST, MOST = 16, 4096
