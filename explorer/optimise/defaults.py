@@ -78,7 +78,11 @@ def make_problem(
     variables = [given.get(name) or default_variable(start, name) for name in dict.fromkeys(names)]
     size = max(map(abs, start.variables))
     if volume is None and objective == "smallest-reach":
-        volume = _own_volume(start)
+        from explorer.workspace.slices.volume import workspace_volume
+
+        volume = workspace_volume(start).volume
+        if volume <= 0.0:
+            raise InputError("the start has an empty workspace: give the volume to reach")
     if reach is None and objective == "largest-volume":
         reach = longest_leg(start)
     if least is None:
@@ -131,15 +135,6 @@ def default_variable(start: Design, name: str) -> problem.Variable:
     low = max(value - YAW_WITHIN, min(value, below + LINES_APART))
     high = min(value + YAW_WITHIN, max(value, below + 180.0 - LINES_APART))
     return problem.Variable(name, low, high)
-
-
-def _own_volume(start: Design) -> float:
-    from explorer.workspace.slices.volume import workspace_volume
-
-    volume = workspace_volume(start).volume
-    if volume <= 0.0:
-        raise InputError("the start has an empty workspace: give the volume to reach")
-    return volume
 
 
 def paper_start() -> Design:

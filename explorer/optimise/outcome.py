@@ -18,8 +18,9 @@ import numpy as np
 from explorer.files.json_text import decode_strictly
 from explorer.files.packaged import versions
 from explorer.files.writing import read_at_most
-from explorer.measures.catalogue import CATALOGUE
-from explorer.mechanism.design import Design
+from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design, measures_in
+from explorer.measures.measure import Case
+from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import ObjectiveName, Problem
 
@@ -246,6 +247,22 @@ def step_of(iterate: Iterate) -> IterateRecord:
 def _fields(base: type[msgspec.Struct], value: msgspec.Struct) -> dict[str, Any]:
     """Return the values of those fields that a value has from a base."""
     return {name: getattr(value, name) for name in base.__struct_fields__}
+
+
+def compare_designs(
+    problem: Problem, before: Design, after: Design, values: Sequence[float]
+) -> tuple[Measurements, Measurements]:
+    """Return the measures of a design, and of the one with some values of a problem's variables.
+
+    Each is measured over the required box where it lies for that design.
+    """
+    demands, names = problem.demands, (*measures_in("optimise"), *VARIABLES)
+    margin = None if demands.clearance is None else demands.clearance_margin
+    box = demands.required_box
+    first = Case(before, demanded_margin=margin, box=box)
+    shifted = None if box is None else problem.required_box_at(values)
+    second = Case(after, demanded_margin=margin, box=shifted)
+    return measure_design(first, names), measure_design(second, names)
 
 
 GOALS: Mapping[ObjectiveName, str] = {

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import msgspec
 import numpy as np
@@ -264,12 +264,6 @@ def with_values(design: Design, values: Mapping[str, float]) -> Design:
         ranges = {name: (getattr(changed.limits, name)[0], values[REACH]) for name in LENGTHS}
         changed = changed.with_limits(**ranges)
     return changed
-
-
-def with_limits(design: Design, **limits: Any) -> Design:
-    """Return a design with other values of some fields of its limits."""
-    changed = msgspec.structs.replace(design.limits, **limits)
-    return msgspec.structs.replace(design, limits=changed)
 
 
 def with_box(design: Design, box: Box | None) -> Design:

@@ -30,7 +30,7 @@ class Measurement:
 
     Attributes:
         verdict: Judgement, which follows from the values.
-        words: Values by their names in the sentences of the claim.
+        words: Further values, or the same in words, by their names in the sentences of the claim.
         values: The values by name.
         table: Lines of a table with more of them.
         condition: Condition under which the claim is confirmed; "" for the other verdicts.

@@ -50,14 +50,11 @@ def judge_strata(neighbours: Order, count: int) -> claim.Measurement:
     outside, missing = len(neighbours - order), len(order - neighbours)
     counts = [sum(inversions(w) == k for w in STRATA) for k in range(7)]
     words = {
-        "found": len(found),
         "strata": len(STRATA),
         "counts": ", ".join(map(str, counts)),
         "poses": count,
         "pairs": len(neighbours),
-        "outside": outside,
         "order": len(order),
-        "missing": missing,
     }
     values = {"found": len(found), "by_dimension": counts, "outside": outside, "missing": missing}
     return claim.judge(len(found) == len(STRATA) and neighbours == order, words, values)
@@ -202,7 +199,9 @@ def measure_charts() -> claim.Measurement:
         if (rows == rows[0]).all() and inversions(tuple(rows[0])) == len(columns)
     }
     return judge_chart(
-        poses=_largest_difference(from_folds(folds), (p, r)),
+        poses=max(
+            float(np.abs(a - b).max()) for a, b in zip(from_folds(folds), (p, r), strict=True)
+        ),
         folds=_error_of_folds(of_strata, to_folds(*poses)),
         strata=len(ours),
         motions=_error_of_motions(claim.random_folds(random, np.full((MADE, 6), True))),
@@ -223,11 +222,9 @@ def judge_chart(
     exact = max(errors.values())
     words = {
         "poses": POSES,
-        "strata": strata,
         "all": len(STRATA),
         "exact": claim.below(exact, EXACT),
         "determinant": claim.below(determinant, BY_DIFFERENCES),
-        "at_home": at_home,
     }
     is_exact = exact < EXACT and determinant < BY_DIFFERENCES
     is_so = is_exact and strata == len(STRATA) and at_home > REGULAR
@@ -243,12 +240,6 @@ def _twists(folds: FloatArray) -> FloatArray:
     spins = [turns[..., 2, 1], turns[..., 0, 2], turns[..., 1, 0]]
     twists = np.concatenate([q - p, np.stack(spins, axis=-1)], axis=-1) / (2.0 * STEP)
     return np.swapaxes(twists, -1, -2)
-
-
-def _largest_difference(
-    one: tuple[FloatArray, FloatArray], other: tuple[FloatArray, FloatArray]
-) -> float:
-    return max(float(np.abs(a - b).max()) for a, b in zip(one, other, strict=True))
 
 
 def _error_of_folds(given: FloatArray, found: FloatArray) -> float:
@@ -269,6 +260,6 @@ def _error_of_motions(folds: FloatArray) -> float:
         pose = Pose.of((0.0, 0.0, 0.0), np.eye(3))
         for motion, column, sign in MOTIONS:
             pose = motion.move(pose, sign * float(row[column]))
-        found = np.array(pose.position), pose.rotation
-        worst = max(worst, _largest_difference(found, (position, rotation)))
+        worst = max(worst, float(np.abs(np.subtract(pose.position, position)).max()))
+        worst = max(worst, float(np.abs(pose.rotation - rotation).max()))
     return worst

@@ -147,7 +147,6 @@ def judge_optimum(
         "shortest": shortest,
         "longest": longest,
         "steps": (STEPS[0], STEPS[-1]),
-        "apart": apart,
         "touching": touching,
         "nodes": nodes,
         "highest": highest,

@@ -59,7 +59,6 @@ def judge_closed_form(joints: float, pose: float, modes: int) -> claim.Measureme
         "poses": POSES,
         "designs": len(PRESETS) + DESIGNS,
         "joints": claim.below(joints, EXACT),
-        "modes": modes,
         "pose": claim.below(pose, SAME),
     }
     is_so = joints < EXACT and pose < SAME and modes == 8
@@ -141,7 +140,6 @@ def judge_flat(
         "poses": FLAT_DESIGNS * FLAT_POSES,
         "designs": FLAT_DESIGNS,
         "off": OFF,
-        "off_planes": off_planes,
     }
     is_so = max(errors.values()) < FLAT and off_planes > 1e6 * FLAT
     return claim.judge(is_so, words, {**errors, "off_planes": off_planes})
@@ -168,12 +166,18 @@ def measure_mode_paths() -> claim.Measurement:
     """Find a singular pose on random paths between modes, and try to stay off them in a mode."""
     random = np.random.default_rng(8)
     worst = float(conditions_at_crossings(random_paths(random, PATHS)).max())
-    return judge_paths(worst, _kept_share(random))
+    # The least |δi| on straight lines in the folds, over the smaller of its ends.
+    one, other = (to_folds(*claim.random_poses(random, PATHS, OPTIMAL.reach)) for _ in range(2))
+    other[:, 3:] = np.copysign(other[:, 3:], one[:, 3:])
+    shares = np.linspace(0.0, 1.0, ON_PATH)[:, None, None]
+    sizes = np.abs(margins(*from_folds(one + shares * (other - one))))
+    kept = float((sizes / np.minimum(sizes[0], sizes[-1])).min())
+    return judge_paths(worst, kept)
 
 
 def judge_paths(worst: float, kept: float) -> claim.Measurement:
     """Judge by the worst inverse condition at crossings, and the least share of a margin kept."""
-    words = {"paths": PATHS, "worst": claim.below(worst, SINGULAR), "kept": kept}
+    words = {"worst": claim.below(worst, SINGULAR), "kept": kept}
     values = {"paths": PATHS, "largest_inverse_condition": worst, "kept_share_of_margins": kept}
     return claim.judge(worst < SINGULAR and kept > 1.0 - ROUNDING, words, values)
 
@@ -229,12 +233,3 @@ def conditions_at_crossings(paths: Paths) -> FloatArray:
         is_before = (signs(middle) == start)[rows, which]
         low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
     return Configuration(OPTIMAL, *paths.at(low)).inverse_condition
-
-
-def _kept_share(random: np.random.Generator) -> float:
-    """Return the least |δi| on straight lines in the folds over the smaller of its ends."""
-    one, other = (to_folds(*claim.random_poses(random, PATHS, OPTIMAL.reach)) for _ in range(2))
-    other[:, 3:] = np.copysign(other[:, 3:], one[:, 3:])
-    shares = np.linspace(0.0, 1.0, ON_PATH)[:, None, None]
-    sizes = np.abs(margins(*from_folds(one + shares * (other - one))))
-    return float((sizes / np.minimum(sizes[0], sizes[-1])).min())

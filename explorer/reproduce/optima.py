@@ -207,31 +207,6 @@ class Optimum:
 
 def measure_search() -> Measurement:
     """Match the paper's volume from its initial design, and search the smallest reach for it."""
-    return judge_search(_optima())
-
-
-def judge_search(optima: Sequence[Optimum]) -> Measurement:
-    """Judge optima in the order of `_optima`."""
-    paper, matches = optima[1], [each for each in optima[2:] if each.objective is not None]
-    exact = abs(1.0 - (paper.measured["volume"] or 0.0) / defaults.PAPER_VOLUME)
-    smallest = min(each.measured["reach"] or 0.0 for each in optima if each.starts > 1)
-    words = {
-        "paper": paper,
-        "exact": exact,
-        "match": below(max(each.objective or 0.0 for each in matches), MATCHED),
-        "found": " and in ".join(f"{each.iterations} iterations ({each.name})" for each in matches),
-        "iterations": PAPER_ITERATIONS,
-        "smallest": smallest,
-        "reach": paper.measured["reach"],
-    }
-    values = {"paper_objective_exact": exact, "optima": [_values(each) for each in optima]}
-    is_within = all(each.converged and (each.objective or 0.0) < MATCHED for each in matches)
-    condition = "by our reading and our search, on the exact volume" if is_within else ""
-    return judge(False, words, values, _table(optima), condition)
-
-
-def _optima() -> list[Optimum]:
-    """Return the paper's designs and ours."""
     margin = defaults.paper_problem().demands.clearance_margin
 
     def measure(design: Design) -> Measurements:
@@ -262,7 +237,27 @@ def _optima() -> list[Optimum]:
                 starts,
             )
         )
-    return optima
+    return judge_search(optima)
+
+
+def judge_search(optima: Sequence[Optimum]) -> Measurement:
+    """Judge optima in the order of `measure_search`."""
+    paper, matches = optima[1], [each for each in optima[2:] if each.objective is not None]
+    exact = abs(1.0 - (paper.measured["volume"] or 0.0) / defaults.PAPER_VOLUME)
+    smallest = min(each.measured["reach"] or 0.0 for each in optima if each.starts > 1)
+    words = {
+        "paper": paper,
+        "exact": exact,
+        "match": below(max(each.objective or 0.0 for each in matches), MATCHED),
+        "found": " and in ".join(f"{each.iterations} iterations ({each.name})" for each in matches),
+        "iterations": PAPER_ITERATIONS,
+        "smallest": smallest,
+        "reach": paper.measured["reach"],
+    }
+    values = {"paper_objective_exact": exact, "optima": [_values(each) for each in optima]}
+    is_within = all(each.converged and (each.objective or 0.0) < MATCHED for each in matches)
+    condition = "by our reading and our search, on the exact volume" if is_within else ""
+    return judge(False, words, values, _table(optima), condition)
 
 
 def _values(optimum: Optimum) -> Values:

@@ -19,7 +19,7 @@ from explorer.numerics.compiled import warm
 from explorer.sweep.parts import claim, pyarrow, sound_parts, write_part
 from explorer.sweep.rows import Rows, check_study, evaluate, load_kernels, rows_of_dead_workers
 from explorer.sweep.study import Study, encode_study
-from explorer.sweep.workers import NoWorkerError, Workers
+from explorer.sweep.workers import RunError, Workers
 
 # Tasks under way for each worker, so that no worker waits for this process.
 AHEAD = 4
@@ -28,12 +28,6 @@ AHEAD = 4
 CHUNK_DEATHS, DESIGN_DEATHS = 2, 3
 # Seconds between two calls of `stop`.
 STOP_SECONDS = 0.1
-
-
-class RunError(ExplorerError):
-    """A run that cannot go on; finished parts are kept."""
-
-    exit_status = 1
 
 
 @dataclass(frozen=True)
@@ -127,8 +121,6 @@ class _Run:
         self.watch = watch
         self.encoded = encode_study(study)
         self.counts: Counter[str] = Counter()
-        # One byte for each chunk, 1 if its part is written.
-        self.is_written = bytearray(study.chunks)
         self.retries: deque[_Piece] = deque()
         # Designs whose evaluation may have killed a worker; each is tried alone.
         self.suspects: deque[_Piece] = deque()
@@ -138,13 +130,14 @@ class _Run:
 
     def run(self, limit: int | None, stop: Callable[[], bool] | None) -> Progress:
         """Compute the missing rows."""
+        written: set[int] = set()
         # Damaged parts are computed again.
         for _, chunk, table in sound_parts(self.folder, [], self.study):
-            self.is_written[chunk] = 1
+            written.add(chunk)
             self.counts.update(table.column("status").to_pylist())
         self.kept, self.began = self.counts.total(), time.monotonic()
         self.watch(self._progress())
-        missing = self._missing(limit)
+        missing = self._missing(written, limit)
         try:
             while self._submit_tasks(missing):
                 if stop is not None and stop():
@@ -157,12 +150,12 @@ class _Run:
                 future.cancel()
         return self._progress()
 
-    def _missing(self, limit: int | None) -> Iterator[_Piece]:
+    def _missing(self, written: set[int], limit: int | None) -> Iterator[_Piece]:
         designs = 0
         for chunk in range(self.study.chunks):
             if limit is not None and designs >= limit:
                 return
-            if not self.is_written[chunk]:
+            if chunk not in written:
                 indices = self.study.rows_of(chunk)
                 designs += len(indices)
                 self.pending[chunk] = []
@@ -196,8 +189,6 @@ class _Run:
                 "the scheduler dropped the tasks; finished parts are kept, and the same "
                 "command continues"
             ) from None
-        except NoWorkerError as error:
-            raise RunError(str(error)) from None
         except ExplorerError:
             raise
         except Exception as error:
@@ -243,7 +234,6 @@ class _Run:
         del self.pending[chunk]
         pieces.sort(key=lambda piece: piece.indices.start)
         write_part(self.folder, self.study, chunk, pieces)
-        self.is_written[chunk] = 1
         for piece in pieces:
             self.counts.update(str(status) for status in piece.columns["status"])
         self.watch(self._progress())

@@ -22,7 +22,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any, ParamSpec, TypeVar
 
-from explorer.errors import InputError
+from explorer.errors import ExplorerError, InputError
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -47,8 +47,10 @@ class WorkerDiedError(BrokenExecutor):
     """The process of a task died before the task was done."""
 
 
-class NoWorkerError(Exception):
-    """A task was never begun, since no process stays alive until it is ready."""
+class RunError(ExplorerError):
+    """A run that cannot go on; finished parts are kept."""
+
+    exit_status = 1
 
 
 class Workers(Executor, ABC):
@@ -146,7 +148,7 @@ class LocalWorkers(Workers):
                     raise WorkerDiedError("the worker process was ended") from None
             else:
                 return child
-        raise NoWorkerError(
+        raise RunError(
             f"no worker process stays alive until it is ready{last}; see what they wrote. A "
             "script must be a file and start workers only below if __name__ == '__main__', since "
             "each of them imports it"

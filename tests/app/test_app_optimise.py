@@ -43,7 +43,13 @@ from explorer.app.features.optimise.feature import (
     visible_box,
 )
 from explorer.app.features.optimise.runner import Optimiser, result_of
-from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest, SearchRun
+from explorer.app.features.optimise.state import (
+    PLACE,
+    Comparison,
+    Optimisation,
+    OptimisationRequest,
+    SearchRun,
+)
 from explorer.app.features.optimise.words import (
     comparison_table,
     limit_rows,
@@ -52,7 +58,6 @@ from explorer.app.features.optimise.words import (
 )
 from explorer.app.features.optimise.work import (
     box_within,
-    compare,
     complete_request,
     find_refusals,
     liftable_limits,
@@ -80,7 +85,7 @@ from explorer.measures.box import corners_of
 from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
 from explorer.optimise.defaults import paper_problem, paper_start
-from explorer.optimise.outcome import Iterate, curves_of
+from explorer.optimise.outcome import Iterate, compare_designs, curves_of
 from explorer.optimise.problem import OBJECTIVES, SWING_LIMIT, YAW
 from explorer.optimise.search.sqp import Trail
 from explorer.workspace.limits.constraints import constraints, slacks
@@ -166,9 +171,8 @@ def found() -> State:
     outcome = optimise(run.problem, run.starts, Channel(iterates.append, lambda: False))
     result = result_of(run, outcome, (), is_cancelled=False)
     ended = EndRun(run.number, result, tuple(iterates)).apply(state)
-    margin = run.problem.demands.clearance_margin
-    comparison = compare(run.own.design, outcome.design, margin, (None, None))
-    return Compare(run.number, comparison).apply(ended)
+    both = compare_designs(run.problem, run.own.design, outcome.design, outcome.best.values)
+    return Compare(run.number, Comparison(*both)).apply(ended)
 
 
 # Searches in a process

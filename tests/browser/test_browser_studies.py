@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from tab import Tab
 
-from explorer.app.features.studies.feed import NO_PLAN, PlotJson
+from explorer.app.features.studies.feed import PlotJson
 from explorer.app.features.studies.panel import StudiesPanel
-from explorer.app.features.studies.state import Studies
+from explorer.app.features.studies.state import Studies, StudyPlan
 from explorer.app.session.session import UNDO
 from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.parts import write_part
@@ -82,7 +82,7 @@ def wait_for_plots(tab: Tab) -> None:
     feed = panel_of(tab).feed
 
     def plots() -> tuple[PlotJson, PlotJson] | None:
-        drawing, studies = feed.drawing, replace(Studies.of(tab.state), plan=NO_PLAN)
+        drawing, studies = feed.drawing, replace(Studies.of(tab.state), plan=StudyPlan())
         is_new = drawing is not None and drawing.request.studies == studies and feed.is_current
         return drawing.plots if drawing is not None and is_new else None
 

@@ -12,7 +12,6 @@ from report_page import read
 
 from explorer.app.features.compare.table import Column, table
 from explorer.app.features.compare.work import ComparedRequest, draw_compared
-from explorer.app.features.optimise.work import compare
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.state import StudyPlan, label_of, study_around, title_of
 from explorer.app.features.studies.words import chips
@@ -24,6 +23,7 @@ from explorer.measures.measure import Case
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, encode_design
 from explorer.optimise.defaults import make_problem, paper_start
+from explorer.optimise.outcome import compare_designs
 from explorer.optimise.problem import Problem
 from explorer.sweep.rows import evaluate
 from explorer.sweep.study import Study, decode_study, encode_study
@@ -52,8 +52,7 @@ def found() -> Design:
 def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture[str]) -> Places:
     """Return the values that each place shows of a design, by place and label."""
     paper = problem()
-    margin = paper.demands.clearance_margin
-    both = compare(paper.start, design, margin, (BOX, BOX))
+    before, after = compare_designs(paper, paper.start, design, paper.start_values)
     compared = draw_compared(ComparedRequest(without_name(design))).measurements
     assert compared is not None
     studied = measure_design(Case(design), SWIFT).values
@@ -62,9 +61,9 @@ def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture
     measured = CommandLine(capsys).answer("workspace", "--design", path)
     return {
         "Compare": {CATALOGUE[name].label: value for name, value in compared.values.items()},
-        "Optimise": {CATALOGUE[name].label: both.after.value(name) for name in both.after.values},
+        "Optimise": {CATALOGUE[name].label: after.value(name) for name in after.values},
         "explorer optimise": {
-            label: after for label, (_, after) in measure_rows_of_command(both.before, both.after)
+            label: new for label, (_, new) in measure_rows_of_command(before, after)
         },
         "Studies": {label_of(name): value for name, value in studied.items()},
         "explorer workspace": {
@@ -96,8 +95,8 @@ def test_measures_of_one_label_have_one_value(
 
 
 def test_demanded_clearance_of_an_optimised_design_counts_nearer_to_singular_planes() -> None:
-    margin = problem().demands.clearance_margin
-    after = compare(paper_start(), found(), margin, (None, None)).after
+    paper = problem()
+    _, after = compare_designs(paper, paper.start, found(), paper.start_values)
     demanded, own = after["demanded_clearance"], after["least_clearance"]
     assert demanded is not None
     assert own is not None
@@ -135,7 +134,7 @@ def test_compare_lists_a_new_measure() -> None:
 
 
 def test_optimiser_table_lists_a_new_measure() -> None:
-    after = compare(DESIGN, DESIGN, None, (None, None)).after
+    _, after = compare_designs(problem(), DESIGN, DESIGN, problem().start_values)
     assert after[NEW.name] == AREA
 
 

@@ -17,12 +17,12 @@ from explorer.cli.options import DesignOptions, JsonOptions, replace_given, writ
 from explorer.cli.output import attributes, figure, heading, table, write_json
 from explorer.cli.streams import Meter
 from explorer.errors import InputError, NoAnswerError
-from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design, measures_in
-from explorer.measures.measure import Case, longest_leg
+from explorer.measures.catalogue import CATALOGUE, Measurements
+from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
-from explorer.optimise.outcome import OBJECTIVE_SYMBOLS
+from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, compare_designs
 
 if TYPE_CHECKING:
     from explorer.optimise.outcome import Iterate, Outcome, Settings
@@ -322,13 +322,7 @@ def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> Iterator[str]:
     """Yield an outcome as lines of text, with the start and the best design side by side."""
     problem = outcome.problem
     yield heading(optimised_design(outcome))
-    margin = None if problem.demands.clearance is None else problem.demands.clearance_margin
-    box = problem.demands.required_box
-    shifted = None if box is None else problem.required_box_at(outcome.best.values)
-    before, after = (
-        measure_design(Case(design, demanded_margin=margin, box=where), measures_in("optimise"))
-        for design, where in ((problem.start, box), (outcome.design, shifted))
-    )
+    before, after = compare_designs(problem, problem.start, outcome.design, outcome.best.values)
     optimum = "optimum" if outcome.converged else "best so far"
     rows: list[tuple[str, ...]] = [("", "start", optimum, "change")]
     for name, pair in measure_rows(before, after):
@@ -353,10 +347,7 @@ def measure_rows(
 
     A value may be infinite.
     """
-    yield from zip(
-        VARIABLES, zip(before.design.variables, after.design.variables, strict=True), strict=True
-    )
-    for name in after.values:
+    for name in dict.fromkeys((*VARIABLES, *after.values)):
         new = after.value(name)
         if new is None:
             continue

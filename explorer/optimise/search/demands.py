@@ -137,7 +137,7 @@ class BoxDemand(Demand):
 
     A box whose corners lie within a convex limit lies within it; for a half-space the worst corner
     decides. A least length keeps the box outside a ball: there the point of the box nearest to the
-    centre decides, or the depth of a centre inside the box.
+    centre decides.
     """
 
     is_limit = True
@@ -156,12 +156,10 @@ class BoxDemand(Demand):
     def measure(self, state: State) -> Measured:
         """Return the slacks of the points that decide on each limit, over the size."""
         size, n = state.problem.size, len(state.u)
-        limits = {limit.name: limit for limit in state.limits}
         values: list[FloatArray] = []
         gradients: list[FloatArray] = []
         for name, count in self.counts.items():
-            limit = limits.get(name)
-            if isinstance(limit, BallOrCylinder | HalfSpace):
+            if limit := state.regions.get(name):
                 value, by_u, by_p = _slack_of_box(state, limit)
                 for axis, shift in enumerate(SHIFTS):
                     by_u = by_u + np.outer(by_p[:, axis], state.along({shift: 1.0}))
@@ -189,21 +187,7 @@ def _slack_of_box(
     centre = limit.centre.copy()
     if not limit.is_ball:
         centre[0] = 0.5 * (lows[0] + highs[0])
-    nearest = np.clip(centre, lows, highs)
-    slack, by_u, by_p = state.slack(limit, nearest[None, :])
-    if (nearest == centre).all():
-        # The centre is inside: its distance from the nearest face is to be made up.
-        axes = (0, 1, 2) if limit.is_ball else (1, 2)
-        depth, axis, side = min(
-            (side * float(end[axis] - centre[axis]), axis, side)
-            for axis in axes
-            for side, end in ((-1.0, lows), (1.0, highs))
-        )
-        normal = side * np.eye(3)[axis]
-        slack = np.array([-depth - limit.radius])
-        by_u = (np.array([*normal, -1.0]) @ state.motion(limit))[None, :]
-        by_p = -normal[None, :]
-    return slack, by_u, by_p
+    return state.slack(limit, np.clip(centre, lows, highs)[None, :])
 
 
 class TiltDemand(Demand):

@@ -138,7 +138,7 @@ class ClearanceDemand(Demand):
         """Return the limits that offer a way out, and how far each position is outside them."""
         # A limit that no position satisfies, such as the gap, has its own demand: as a way out
         # it would make the bound leap, from far below zero to met, where that is missed by little.
-        limits = [it for it in state.limits if isinstance(it, BallOrCylinder | HalfSpace)]
+        limits = [*state.regions.values()]
         slacks = [-limit.slack(self.positions) for limit in limits]
         return limits, np.minimum(slacks, FAR * state.problem.size)
 

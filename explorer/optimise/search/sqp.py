@@ -302,9 +302,8 @@ def _conditions(model: Model, at: Evaluation, around: list[Evaluation]) -> Optim
     goal[-1] = 1.0
     factors, residual = nnls(columns, goal)
     pulls = factors[len(around) :] * np.linalg.norm(demands, axis=0)
-    if not len(pulls) or not pulls.max() > 0.0:
-        return Optimality(float(residual), "")
-    return Optimality(float(residual), active[int(pulls.argmax())][0])
+    has_pull = pulls.max(initial=0.0) > 0.0
+    return Optimality(float(residual), active[int(pulls.argmax())][0] if has_pull else "")
 
 
 # Demands that are missed by more than this, dimensionless, are not missed by little.

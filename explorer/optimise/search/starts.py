@@ -18,7 +18,7 @@ from explorer.optimise.search.demands import DegenerateDemand, GapDemand
 from explorer.optimise.search.model import MISSED, Model
 from explorer.optimise.search.sqp import Point, slsqp
 from explorer.optimise.search.state import UNBOUNDED, State, scaled_bounds
-from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace
+from explorer.workspace.limits.constraints import HalfSpace
 
 # Designs tried for each start, before the bounds are taken to allow no more.
 TRIES = 64
@@ -99,19 +99,17 @@ def open_workspace(
         sides.append(DegenerateDemand(problem.demands.least, here))
     if here.design.limits.gap > 0.0:
         sides.append(GapDemand(here))
-    names = [limit.name for limit in here.limits if isinstance(limit, BallOrCylinder | HalfSpace)]
+    names = [*here.regions]
     labels = [*names, *(name for side in sides for name in side.names)]
     first = np.concatenate([start, _least_broken(here) / size])
     costs = np.concatenate([np.ones(n), np.full(3, COST_OF_PLACE)])
 
     def evaluate(x: FloatArray) -> Point:
         state = State(problem, x[:n])
-        limits = {limit.name: limit for limit in state.limits}
         # A limit that is not there is one that no position keeps.
         values, rows = np.full(len(labels), -MISSED), np.zeros((len(labels), len(x)))
         for index, name in enumerate(names):
-            limit = limits.get(name)
-            if isinstance(limit, BallOrCylinder | HalfSpace):
+            if limit := state.regions.get(name):
                 slack, by_u, by_p = state.slack(limit, x[None, n:] * size)
                 norm = float(np.linalg.norm(limit.normal)) if isinstance(limit, HalfSpace) else 1.0
                 values[index] = (float(slack[0]) / norm - radius) / size
@@ -144,7 +142,5 @@ def _least_broken(state: State) -> FloatArray:
     shares = np.linspace(0.0, 1.0, SEARCHED + 2)[1:-1]
     axes = [low + (high - low) * shares for low, high in zip(lows, highs, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    slack = [
-        limit.slack(grid) for limit in state.limits if isinstance(limit, BallOrCylinder | HalfSpace)
-    ]
+    slack = [limit.slack(grid) for limit in state.regions.values()]
     return grid[int(np.min(slack, axis=0).argmax())]

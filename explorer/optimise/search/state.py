@@ -86,6 +86,15 @@ class State:
         return constraints(self.design, self.rotation)
 
     @cached_property
+    def regions(self) -> dict[str, BallOrCylinder | HalfSpace]:
+        """The limits of the workspace by name, without those that no position keeps."""
+        return {
+            limit.name: limit
+            for limit in self.limits
+            if isinstance(limit, BallOrCylinder | HalfSpace)
+        }
+
+    @cached_property
     def workspace(self) -> Volume:
         """Volume of the workspace and its gradient."""
         return workspace_volume(self.design, self.rotation, explain=False)

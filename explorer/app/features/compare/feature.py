@@ -15,7 +15,6 @@ from explorer.app.features.compare.table import Column, bars, columns_of, notes,
 from explorer.app.features.compare.work import FEEDS, draw_compared
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
-from explorer.app.session.session import Change
 from explorer.app.state.actions import Action, Open
 from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
@@ -175,7 +174,7 @@ class ComparePanel:
             "compare.pin",
             is_ready=lambda: None in self._session.state.compared.pinned,
         )
-        places: tuple[tuple[str, Callable[[int], Change], str, str], ...] = (
+        places: tuple[tuple[str, Callable[[State, int], Action], str, str], ...] = (
             (
                 "open",
                 _open,
@@ -184,7 +183,7 @@ class ComparePanel:
             ),
             (
                 "unpin",
-                lambda slot: lambda _: Unpin(slot),
+                lambda _, slot: Unpin(slot),
                 "Unpin",
                 "Remove it from the comparison; undo brings it back.",
             ),
@@ -202,9 +201,9 @@ class ComparePanel:
                 )
 
     def _change_place(
-        self, change: Callable[[int], Change], place: str, client: viser.ClientHandle
+        self, change: Callable[[State, int], Action], place: str, client: viser.ClientHandle
     ) -> None:
-        self._session.do(change(SLOTS.index(place)), who=client.client_id)
+        self._session.do(lambda state: change(state, SLOTS.index(place)), who=client.client_id)
 
     def _page(
         self, state: State, columns: tuple[Column, ...], choices: Mapping[str, Design]
@@ -258,14 +257,11 @@ class ComparePanel:
             self._session.post(self, lambda _: Pin(design), who=event.client_id)
 
 
-def _open(slot: int) -> Change:
-    def change(state: State) -> Open:
-        design = state.compared.pinned[slot]
-        if design is None:
-            raise InputError(f"nothing is pinned as {SLOTS[slot]}; pin a design first")
-        return Open(design)
-
-    return change
+def _open(state: State, slot: int) -> Open:
+    design = state.compared.pinned[slot]
+    if design is None:
+        raise InputError(f"nothing is pinned as {SLOTS[slot]}; pin a design first")
+    return Open(design)
 
 
 def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:

@@ -12,15 +12,20 @@ import time
 
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import Advance, Compare, EndRun
-from explorer.app.features.optimise.state import Optimisation, SearchResult, SearchRun
-from explorer.app.features.optimise.work import compare, optimise
+from explorer.app.features.optimise.state import (
+    Comparison,
+    Optimisation,
+    SearchResult,
+    SearchRun,
+)
+from explorer.app.features.optimise.work import optimise
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.session.worker import Worker
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.numerics.number_text import format_number
-from explorer.optimise.outcome import Iterate, Outcome, Settings, record_of
+from explorer.optimise.outcome import Iterate, Outcome, Settings, compare_designs, record_of
 from explorer.optimise.search.sqp import Trail
 
 # Least seconds between two iterates on the page, and most to wait for the drawing of one.
@@ -110,7 +115,7 @@ class Optimiser(Runner):
         with self._lock:
             self._ending = ending
         if self._is_cancelled:
-            self._post()
+            self._session.post(self, self._advance)
 
     def _play(self, number: int) -> None:
         """Advance the page from iterate to iterate until the run has ended."""
@@ -122,10 +127,7 @@ class Optimiser(Runner):
             if is_idle or self._session.is_waiting(self):
                 continue
             if self._drawings.is_settled or time.monotonic() - self._advanced > LONGEST:
-                self._post()
-
-    def _post(self) -> None:
-        self._session.post(self, self._advance)
+                self._session.post(self, self._advance)
 
     def _advance(self, state: State) -> Action | None:
         """Return the action that shows the next iterates, or the end once all are shown."""
@@ -147,20 +149,15 @@ class Optimiser(Runner):
             return EndRun(run.number, result, iterates)
 
     def _compare(self, run: SearchRun) -> None:
-        best, problem = run.best, run.problem
-        if best is None:
-            return
-        demands = problem.demands
-        margin = None if demands.clearance is None else demands.clearance_margin
-        box = demands.required_box
-        boxes = (box, None if box is None else problem.required_box_at(best.values))
-        self.worker.submit(
-            "compare",
-            compare,
-            (run.own.design, best.design, margin, boxes),
-            lambda comparison: self._session.do(Compare(run.number, comparison)),
-            lambda _: None,
-        )
+        best = run.best
+        if best is not None:
+            self.worker.submit(
+                "compare",
+                compare_designs,
+                (run.problem, run.own.design, best.design, best.values),
+                lambda both: self._session.do(Compare(run.number, Comparison(*both))),
+                lambda _: None,
+            )
 
 
 def result_of(

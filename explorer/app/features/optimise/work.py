@@ -9,17 +9,11 @@ from functools import lru_cache
 import msgspec
 import numpy as np
 
-from explorer.app.features.optimise.state import (
-    PLACE,
-    Comparison,
-    Optimisation,
-    OptimisationRequest,
-)
+from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest
 from explorer.app.session.worker import Channel
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
-from explorer.measures.catalogue import measure_design, measures_in
-from explorer.measures.measure import Case, longest_leg
+from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.optimise import conflicts, defaults, problem as problems, solver
 from explorer.optimise.outcome import Outcome
@@ -155,22 +149,3 @@ def optimise(problem: problems.Problem, starts: int, channel: Channel) -> Outcom
     return solver.optimise_design(
         problem, starts=starts, watch=channel.send, stop=channel.is_cancelled
     )
-
-
-def compare(
-    before: Design,
-    after: Design,
-    demanded_margin: float | None,
-    boxes: tuple[problems.Box | None, problems.Box | None],
-) -> Comparison:
-    """Return the measures of two designs.
-
-    The margin is that from which on a clearance is demanded, None without a demand; the boxes are
-    those of each design for its least margin.
-    """
-    names = (*measures_in("optimise"), *VARIABLES)
-    first, second = (
-        measure_design(Case(design, demanded_margin=demanded_margin, box=box), names)
-        for design, box in zip((before, after), boxes, strict=True)
-    )
-    return Comparison(first, second)

@@ -30,8 +30,6 @@ from explorer.sweep.study import Study
 MOST_ON_PAGE = 100_000
 """Number of designs of the largest study that the page shows."""
 
-NO_PLAN = StudyPlan()
-
 
 class PlotJson:
     """A figure in the form that viser takes, encoded at once."""
@@ -163,7 +161,7 @@ class StudyFeed:
         if studies.name is None:
             self._request = self._drawing = self.problem = None
             return
-        request = Request(replace(studies, plan=NO_PLAN), self._computed, dark)
+        request = Request(replace(studies, plan=StudyPlan()), self._computed, dark)
         if request != self._request:
             self._request = request
             self._jobs.post("draw", time.monotonic(), request)
@@ -205,10 +203,10 @@ class StudyFeed:
         inside = np.ones(results.count, dtype=np.bool_) if seen is None else seen.inside
         if seen is not None:
             revision = next(self._revision)
-            lines, points = (
-                draw(seen, revision, dark=request.dark) for draw in (parallel, scatter)
+            plots = (
+                PlotJson(parallel(seen, revision, dark=request.dark)),
+                PlotJson(scatter(seen, revision, dark=request.dark)),
             )
-            plots = PlotJson(lines), PlotJson(points)
         ordered = sort_front(results, front)
         return StudyDrawing(request, results, ordered, inside, seen, plots, reasons(results))
 
@@ -241,11 +239,8 @@ def reasons(results: Results) -> tuple[tuple[str, str, int], ...]:
     """Return counts of the rows that are not done, by status and reason, most frequent first."""
     columns = results.columns
     not_done = columns["status"] != "done"
-    pairs = zip(
-        columns["status"][not_done].tolist(), columns["reason"][not_done].tolist(), strict=True
-    )
-    counted = Counter((str(status), str(reason or "")) for status, reason in pairs)
-    return tuple((*pair, count) for pair, count in counted.most_common())
+    pairs = zip(columns["status"][not_done], columns["reason"][not_done], strict=True)
+    return tuple((*pair, count) for pair, count in Counter(pairs).most_common())
 
 
 def sort_front(results: Results, front: BoolArray) -> IntArray:

@@ -25,7 +25,6 @@ from explorer.app.features.studies.state import (
     within,
 )
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.numerics.number_text import format_number
 from explorer.sweep.results import Results
 
 Figure: TypeAlias = dict[str, Any]
@@ -243,10 +242,11 @@ def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
         "t": 64 if is_tilted else 40,
         "b": 12,
     }
-    layout = _layout(plotted, "parallel", margin, dark=dark)
+    figure = _figure(plotted, "parallel", [trace], margin, dark=dark)
     # Lines carry no data that could name their designs.
-    layout["meta"]["designs"] = plotted.results.columns["index"][plotted.lines].tolist()
-    return _figure([trace], layout)
+    designs = plotted.results.columns["index"][plotted.lines].tolist()
+    figure["layout"]["meta"]["designs"] = designs
+    return figure
 
 
 def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
@@ -283,8 +283,8 @@ def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
     if (line := _front_line(plotted)) is not None:
         traces.append(line)
     traces += [_points(plotted, inside & front, disc), _points(plotted, is_picked, ring)]
-    layout = _layout(plotted, "scatter", {"l": 62, "r": 10, "t": 12, "b": 42}, dark=dark)
-    layout |= {
+    figure = _figure(plotted, "scatter", traces, {"l": 62, "r": 10, "t": 12, "b": 42}, dark=dark)
+    figure["layout"] |= {
         "xaxis": _axis(plotted.across),
         "yaxis": _axis(plotted.up),
         "showlegend": False,
@@ -294,7 +294,7 @@ def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
         "selectionrevision": revision,
         "shapes": _boxes(plotted),
     }
-    return _figure(traces, layout)
+    return figure
 
 
 def pack(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
@@ -304,19 +304,18 @@ def pack(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
 
 
 def _points(plotted: PlotRows, which: BoolArray, marker: Mapping[str, Any]) -> Figure:
-    indices = plotted.results.columns["index"][plotted.rows[which]]
-    x, y = (plotted.column(name)[plotted.rows][which] for name in (plotted.across, plotted.up))
+    rows = plotted.rows[which]
+    x, y = (
+        f"{label_of(name)} %{{{axis}:,.5~r}} {unit_of(name)}".replace(" °", "°")
+        for axis, name in (("x", plotted.across), ("y", plotted.up))
+    )
     return {
         "type": "scatter" if len(plotted.rows) <= MOST_AS_SVG else "scattergl",
         "mode": "markers",
-        "x": pack(x),
-        "y": pack(y),
-        "customdata": pack(indices, "i4"),
-        "text": [
-            f"{_hover_line(plotted.across, across)}<br>{_hover_line(plotted.up, up)}"
-            for across, up in zip(x.tolist(), y.tolist(), strict=True)
-        ],
-        "hovertemplate": "<b>design %{customdata}</b><br>%{text}<extra></extra>",
+        "x": pack(plotted.column(plotted.across)[rows]),
+        "y": pack(plotted.column(plotted.up)[rows]),
+        "customdata": pack(plotted.results.columns["index"][rows], "i4"),
+        "hovertemplate": f"<b>design %{{customdata}}</b><br>{x}<br>{y}<extra></extra>",
         "marker": dict(marker),
         # The server draws the points outside the brushes.
         "unselected": {"marker": {"opacity": marker.get("opacity", 1.0)}},
@@ -381,10 +380,10 @@ def _axis(name: str) -> dict[str, Any]:
     }
 
 
-def _layout(
-    plotted: PlotRows, plot: str, margin: Mapping[str, int], *, dark: bool
-) -> dict[str, Any]:
-    return {
+def _figure(
+    plotted: PlotRows, plot: str, data: list[Figure], margin: Mapping[str, int], *, dark: bool
+) -> Figure:
+    layout = {
         "paper_bgcolor": PAPER[dark],
         "plot_bgcolor": "rgba(0,0,0,0)",
         "font": {"color": TEXT if not dark else "#aeb6c0", "family": "inherit", "size": 11},
@@ -397,17 +396,8 @@ def _layout(
             "axes": [plotted.across, plotted.up],
         },
     }
-
-
-def _figure(data: list[Figure], layout: Figure) -> Figure:
     config = {"displayModeBar": False, "doubleClick": "reset", "responsive": False}
     return {"data": data, "layout": layout, "config": config}
-
-
-def _hover_line(name: str, value: float) -> str:
-    unit = unit_of(name)
-    gap = "" if unit == "°" else " "
-    return f"{label_of(name)} {format_number(value, 5)}{gap}{unit}".rstrip()
 
 
 def _ends(values: FloatArray) -> Range:

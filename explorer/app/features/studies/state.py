@@ -80,10 +80,6 @@ class StudyPlan:
         ("clearance", "max"),
     )
 
-    def sense_of(self, measure: str) -> Sense | None:
-        """Return the sense of a measure that is an objective; None if it is none."""
-        return dict(self.objectives).get(measure)
-
     def with_variable_toggled(self, name: str) -> StudyPlan:
         """Return the plan in which a variable varies if it did not, and else stays fixed."""
         return replace(self, variables=_toggle(NAMES, self.variables, name))
@@ -95,14 +91,10 @@ class StudyPlan:
         """
         senses = dict(self.objectives)
         measures = self.measures
-        if name not in measures:
-            measures = _toggle(tuple(measures_in("studies")), measures, name)
-        elif name not in senses:
-            senses[name] = "max"
-        elif senses[name] == "max":
-            senses[name] = "min"
+        if name in measures and senses.get(name) != "min":
+            senses[name] = "min" if name in senses else "max"
         else:
-            del senses[name]
+            senses.pop(name, None)
             measures = _toggle(tuple(measures_in("studies")), measures, name)
         ordered = tuple((other, senses[other]) for other in CATALOGUE if other in senses)
         return replace(self, measures=measures, objectives=ordered)

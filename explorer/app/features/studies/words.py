@@ -297,8 +297,9 @@ def chips(plan: StudyPlan, design: Design) -> str:
         )
         for name in variables
     )
+    senses = dict(plan.objectives)
     measured = "".join(
-        _chip("measure", name, _hint(name), plan.sense_of(name), is_on=name in plan.measures)
+        _chip("measure", name, _hint(name), senses.get(name), is_on=name in plan.measures)
         for name in measures
     )
     groups = (
