@@ -102,7 +102,9 @@ class Layout:
             panels.lay_out()
             titles = {"drawer": panels.titles("work"), "dialogs": panels.titles("dialog")}
             run_script(server, read_script("places", titles))
-        server.on_client_connect(self._connected)
+        server.on_client_connect(
+            lambda client: ask_browser(client, lambda facts: self._answered(client, facts))
+        )
 
     def reset(self, client: viser.ClientHandle) -> None:
         """Put the panels of a browser into the places that they have at first."""
@@ -113,9 +115,6 @@ class Layout:
     def _make_room(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
         if self._panels is not None and is_narrow(facts):
             dock_above_in(client, self._panels.build, self._panels.analyse)
-
-    def _connected(self, client: viser.ClientHandle) -> None:
-        ask_browser(client, lambda facts: self._answered(client, facts))
 
     def _answered(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
         self._make_room(client, facts)

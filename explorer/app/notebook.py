@@ -10,7 +10,6 @@ import atexit
 import threading
 import weakref
 from html import escape
-from types import TracebackType
 from typing import Self
 
 from explorer.app.server import Running, start
@@ -101,12 +100,7 @@ class Shown:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.stop()
 
     def __repr__(self) -> str:

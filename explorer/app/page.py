@@ -38,7 +38,6 @@ from explorer.app.look import read_script, read_stylesheet
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
 from explorer.app.session import clock
-from explorer.app.session.history import History
 from explorer.app.session.session import Session, Who
 from explorer.app.session.worker import Worker, log_error
 from explorer.app.state.frame import Frame
@@ -94,7 +93,6 @@ class Page:
     Args:
         server: Server that the page is drawn on.
         state: The first state.
-        history: History that led to the state; None to start one with it.
         panels, user_data, preferences, studies: As for `explorer.app.server.start`.
     """
 
@@ -105,7 +103,6 @@ class Page:
         *,
         panels: bool = True,
         user_data: UserData | None = None,
-        history: History | None = None,
         preferences: PreferenceFile | None = None,
         studies: StudyFolders | None = None,
     ) -> None:
@@ -122,6 +119,7 @@ class Page:
         self._frame = Frame(state)
         self._assigner = Assigner(server)
         self._presses = presses = Presses()
+        history = None if user_data is None else user_data.history
         self.session = Session(
             state, self._draw, self._complain, self._report, history, press_at=presses.at
         )

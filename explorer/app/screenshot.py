@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from explorer.app.browser.headless import PictureError, headless_browser
+from explorer.app.look import call_script, read_script
 from explorer.files.writing import write_whole
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
@@ -30,11 +31,6 @@ PATIENCE_SECONDS = 60.0
 SCENE_CANVAS = "canvas[data-engine]"
 # Waits until a page has come to rest after a mark, see `look/clock.js`.
 SETTLED = "mark => window.explorer?.settled?.(mark)"
-# Whether nothing fades or glides any more; what turns without an end, such as a sign that something
-# is loading, is left out.
-IS_STILL = """() => document.getAnimations().every(
-    ({ playState, effect }) => playState !== "running" || effect.getTiming().iterations === Infinity
-)"""
 # Has a page report its camera, and with it the size of the canvas.
 REPORT_CAMERA = "() => window.__viserMutable.sendCamera?.()"
 _marks = itertools.count(1)
@@ -46,47 +42,11 @@ SCENE_ALONE = (
     f"body *:not(:has({SCENE_CANVAS})):not({SCENE_CANVAS}) {{ visibility: hidden !important; }}"
 )
 
-# A page prepares many frames before the one that is wanted. It draws none before, and none after:
-# each takes a software renderer as long as all else together.
-HOLD = """(() => {
-    window.isReleased = false;
-    const context = WebGL2RenderingContext.prototype;
-    for (const name of ["clear", "drawArrays", "drawElements", "drawArraysInstanced",
-                        "drawElementsInstanced", "drawRangeElements"]) {
-        const draw = context[name];
-        context[name] = function (...all) {
-            if (window.isReleased) draw.apply(this, all);
-        };
-    }
-})()"""
-# Wait for a number of frames to be drawn, and until the browser has taken the last of them.
-AWAIT_FRAMES = """(count) => new Promise((resolve) => {
-    const { render } = window.__viserTestpoints.rendererInfo;
-    const last = render.frame + count;
-    const next = () => {
-        if (render.frame < last) {
-            window.__viserMutable.requestRender();
-            requestAnimationFrame(next);
-        } else requestAnimationFrame(resolve);
-    };
-    next();
-})"""
-# Draw one frame on a page on hold.
-DRAW_FRAME = """() => new Promise((resolve) => {
-    const { scene, requestRender } = window.__viserMutable;
-    const [before, after] = [scene.onBeforeRender, scene.onAfterRender];
-    scene.onBeforeRender = (...all) => {
-        window.isReleased = true;
-        before(...all);
-    };
-    scene.onAfterRender = (...all) => {
-        after(...all);
-        Object.assign(scene, { onBeforeRender: before, onAfterRender: after });
-        window.isReleased = false;
-        requestAnimationFrame(resolve);
-    };
-    requestRender();
-})"""
+# The script with the functions that pictures need, and the same with a call that holds the page:
+# it then draws only frames that it is told to draw.
+PICTURES = read_script("pictures")
+HOLD = f"{PICTURES}{call_script('hold')}"
+AWAIT_FRAMES = "(count) => window.explorer.awaitFrames(count)"
 
 
 def take(
@@ -159,7 +119,7 @@ def draw_page(
         settle(page, client)
         running.page.point_cameras(view)
         settle(page, client)
-        page.evaluate(DRAW_FRAME)
+        page.evaluate("window.explorer.drawFrame()")
         # Panels fade in; the scene alone is at rest.
         return stable_picture(page) if panels else page.screenshot()
     finally:
@@ -183,8 +143,7 @@ def open_page(
     known = set(running.viser.get_clients())
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
     page.set_default_timeout(1000.0 * PATIENCE_SECONDS)
-    if hold:
-        page.add_init_script(HOLD)
+    page.add_init_script(HOLD if hold else PICTURES)
     page.goto(fixed_resolution_url(running))
     # viser warns of software rendering; no picture shows the warning.
     page.add_style_tag(content=".mantine-Notifications-root { display: none !important; }")
@@ -223,7 +182,7 @@ def settle(page: Page, client: ClientHandle) -> None:
                 raise PictureError("the size of the scene did not become known in time")
             page.wait_for_timeout(10)
     # A frame that has begun may show what was before, where any is drawn.
-    page.evaluate(f"(count) => window.isReleased === false || ({AWAIT_FRAMES})(count)", 2)
+    page.evaluate("window.isReleased === false || window.explorer.awaitFrames(2)")
 
 
 def _is_size_known(page: Page, client: ClientHandle) -> bool:
@@ -243,7 +202,7 @@ def stable_picture(page: Page) -> bytes:
     Raises:
         PictureError: It keeps changing.
     """
-    _await_rest(page, IS_STILL)
+    _await_rest(page, "window.explorer.isStill()")
     page.evaluate(AWAIT_FRAMES, 2)
     return page.screenshot()
 

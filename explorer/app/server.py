@@ -119,7 +119,6 @@ def start(
         state,
         panels=panels,
         user_data=user_data,
-        history=history,
         preferences=preferences,
         studies=studies,
     )

@@ -5,18 +5,13 @@ from __future__ import annotations
 import socket
 import zlib
 from collections.abc import Iterator
-from contextlib import closing
 from http import HTTPStatus
 from http.client import HTTPConnection, HTTPResponse
 
 import pytest
-from client import PROTOCOL, Client
 from hypothesis import given, strategies as st
 from websockets.datastructures import Headers
-from websockets.exceptions import InvalidStatus
 from websockets.http11 import Request
-from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Origin
 
 from explorer.app.security import Access, Refusal, is_loopback
 from explorer.app.server import Running, start
@@ -295,34 +290,6 @@ def get(running: Running, target: str, **headers: str) -> tuple[HTTPResponse, st
     if response.headers.get("Content-Encoding") == "gzip":
         body = zlib.decompress(body, 16 + zlib.MAX_WBITS)
     return response, body.decode()
-
-
-def through_proxy(running: Running, origin: str, token: str = TOKEN) -> ClientConnection:
-    """Open a websocket as a proxy passes it on."""
-    return connect(
-        f"ws://{PROXY}/?token={token}",
-        sock=socket.create_connection(("127.0.0.1", running.viser.get_port())),
-        origin=Origin(origin),
-        subprotocols=[PROTOCOL],
-        compression=None,
-        max_size=None,
-        proxy=None,
-    )
-
-
-def test_websocket_through_a_proxy_needs_its_origin_and_the_token(behind: Running) -> None:
-    for scheme in ("http", "https"):
-        with closing(through_proxy(behind, f"{scheme}://{PROXY}")) as connection:
-            assert Client(connection).find("x")
-    for origin, token, status in (
-        (f"https://evil.{PROXY}", TOKEN, 403),
-        (f"https://{PROXY}:444", TOKEN, 403),
-        ("https://evil.example", TOKEN, 403),
-        (f"https://{PROXY}", TOKEN[:-1], 401),
-    ):
-        with pytest.raises(InvalidStatus) as refusal:
-            through_proxy(behind, origin, token)
-        assert refusal.value.response.status_code == status
 
 
 def test_page_through_a_proxy_lets_itself_connect_there(behind: Running) -> None:

@@ -123,20 +123,21 @@ def record_controls(patch: pytest.MonkeyPatch, controls: list[BoundControl]) -> 
     """Record each control that is made with a path from here on."""
     sources: dict[int, tuple[At, Mapping[str, object] | None]] = {}
     control_type: Any = Control
-    bind, initialise = At.bound, control_type.__init__
+    bind, initialise = At.bound, control_type.__post_init__
 
     def bind_and_record(at: At, name: str, options: Any = None) -> Bound[Any]:
         bound = bind(at, name, options)
         sources[id(bound.write)] = at, options
         return bound
 
-    def record(control: Any, session: Any, handle: Any, bound: Any, **more: Any) -> None:
-        initialise(control, session, handle, bound, **more)
-        if id(bound.write) in sources:
-            controls.append(BoundControl(handle, *sources[id(bound.write)]))
+    def record(control: Control[Any]) -> None:
+        initialise(control)
+        source = sources.get(id(control.bound.write))
+        if source is not None:
+            controls.append(BoundControl(control.handle, *source))
 
     patch.setattr(At, "bound", bind_and_record)
-    patch.setattr(Control, "__init__", record)
+    patch.setattr(Control, "__post_init__", record)
 
 
 def test_control_with_a_path_sets_the_value_there_and_no_other(

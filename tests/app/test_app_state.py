@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from sample_states import Sample, samples, states_of
 from strategies import designs
 
 from explorer.app.session.session import Session
@@ -25,14 +25,13 @@ from explorer.app.state.actions import (
     SetAngle,
     SetJoint,
     SetMode,
-    SetPose,
     SetPosition,
     SetVariable,
     UseNearest,
 )
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, joints_of, mode_at, open_state
-from explorer.errors import DesignError, ExplorerError, InputError
+from explorer.errors import DesignError, InputError
 from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import forward
@@ -206,34 +205,9 @@ def test_warning_length_that_is_not_positive_is_refused(state: State, length: fl
         Set("view", replace(state.view, warn_below=length)).apply(state)
 
 
-# Lengths are from well inside to far outside what the mechanism can do.
-MAKERS: tuple[Callable[[int, float, float], Action], ...] = (
-    lambda i, share, length: SetJoint(i, abs(length) if JOINTS[i] in LENGTHS else length),
-    lambda i, share, length: SetPosition(i % 3, length),
-    lambda i, share, length: SetAngle(i % 3, 360.0 * share - 180.0),
-    lambda i, share, length: SetMode(i),
-    lambda i, share, length: SetVariable(VARIABLES[i], length),
-    lambda i, share, length: Set("hold", "pose" if share < 0.5 else "legs"),
-    lambda i, share, length: Reset(),
-    lambda i, share, length: UseNearest(),
-    lambda i, share, length: SetPose(Pose((length, 3.0, 4.0), (share, 0.3, -0.2, 1.0))),
-)
-
-
-@given(
-    st.lists(
-        st.tuples(st.sampled_from(MAKERS), st.integers(0, 5), st.floats(0, 1)),
-        min_size=1,
-        max_size=40,
-    )
-)
-def test_state_after_any_actions_does_not_contradict_itself(
-    steps: list[tuple[Callable[[int, float, float], Action], int, float]],
-) -> None:
-    state = open_state(OPTIMAL)
-    for make, index, share in steps:
-        with contextlib.suppress(ExplorerError):
-            state = make(index, share, 45.0 * share - 10.0).apply(state)
+@given(samples())
+def test_state_after_any_actions_does_not_contradict_itself(actions: list[Sample]) -> None:
+    for state in states_of(actions):
         snapshot = Frame(state).snapshot
         assert np.isfinite(snapshot.margins).all()
         if state.unclosed is None:

@@ -6,11 +6,9 @@ places of macOS and Windows, and the one that Playwright has downloaded.
 
 from __future__ import annotations
 
-import importlib.util
 import itertools
 import os
 import shutil
-import subprocess
 import sys
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -60,13 +58,14 @@ def headless_browser(
         raise MissingExtraError(
             'pictures need the extra "screenshot": pip install "flagged-explorer[screenshot]"'
         ) from None
-    chromium = find_chromium()
-    if chromium is None:
-        raise MissingExtraError(
-            "pictures need a Chromium: install chromium or google-chrome with the system's "
-            "package manager, or run: playwright install chromium"
-        )
+    found = find_chromium()
     with sync_playwright() as playwright:
+        chromium = found or playwright.chromium.executable_path
+        if not os.access(chromium, os.X_OK):
+            raise MissingExtraError(
+                "pictures need a Chromium: install chromium or google-chrome with the system's "
+                "package manager, or run: playwright install chromium"
+            )
         try:
             browser = playwright.chromium.launch(
                 executable_path=chromium,
@@ -100,16 +99,9 @@ _WINDOWS_PROGRAMS = (
     "Microsoft/Edge/Application/msedge.exe",
 )
 
-# Playwright's calls refuse to run inside an event loop, so another process asks.
-_ASK_PLAYWRIGHT = """
-from playwright.sync_api import sync_playwright
-with sync_playwright() as playwright:
-    print(playwright.chromium.executable_path)
-"""
-
 
 def find_chromium() -> str | None:
-    """Return the path of a Chromium that can be started, or None.
+    """Return the path of a Chromium of this machine that can be started, or None.
 
     Raises:
         InputError: EXPLORER_CHROMIUM is set, but names no program.
@@ -124,7 +116,7 @@ def find_chromium() -> str | None:
             )
         return program
     on_path = (path for path in map(shutil.which, NAMES) if path and not _is_snap_stub(path))
-    return next(itertools.chain(on_path, _usual_places()), None) or _find_playwrights()
+    return next(itertools.chain(on_path, _usual_places()), None)
 
 
 def _is_snap_stub(program: str) -> bool:
@@ -147,13 +139,3 @@ def _usual_places() -> Iterator[str]:
     for place in places:
         if os.access(place, os.X_OK):
             yield str(place)
-
-
-def _find_playwrights() -> str | None:
-    if importlib.util.find_spec("playwright") is None:
-        return None
-    answer = subprocess.run(  # noqa: S603 - our own interpreter and our own words
-        [sys.executable, "-c", _ASK_PLAYWRIGHT], check=False, capture_output=True, text=True
-    )
-    path = answer.stdout.strip()
-    return path if answer.returncode == 0 and path and os.access(path, os.X_OK) else None

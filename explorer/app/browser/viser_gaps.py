@@ -7,19 +7,8 @@ from typing import Any, cast
 
 import numpy as np
 import viser
+import viser._messages as protocol
 from numpy.typing import ArrayLike
-from viser._messages import (
-    GuiSliderMark,
-    GuiUpdateMessage,
-    RunJavascriptMessage,
-    SceneNodeUpdateMessage,
-    SetCameraFovMessage,
-    SetCameraLookAtMessage,
-    SetCameraPositionMessage,
-    SetCameraUpDirectionMessage,
-    SetOrientationMessage,
-    SetPositionMessage,
-)
 
 from explorer.numerics.arrays import FloatArray
 
@@ -35,7 +24,7 @@ MARKS = "_marks"
 
 def slider_marks(values: Iterable[float]) -> tuple[object, ...]:
     """Return marks without words at positions of a slider."""
-    return tuple(GuiSliderMark(value, "") for value in values)
+    return tuple(protocol.GuiSliderMark(value, "") for value in values)
 
 
 def place(node: viser.SceneNodeHandle, name: str, value: ArrayLike) -> None:
@@ -66,7 +55,7 @@ def assign_properties(node: viser.SceneNodeHandle, values: Mapping[str, object])
             # A copy, since the message is sent later.
             updates[name] = np.array(value, dtype=dtype)
         setattr(properties, name, updates[name])
-    internals._impl.api._queue_scene_message(SceneNodeUpdateMessage(node.name, updates))
+    internals._impl.api._queue_scene_message(protocol.SceneNodeUpdateMessage(node.name, updates))
 
 
 def put_camera(
@@ -78,11 +67,11 @@ def put_camera(
     loading returns to its first camera after all messages.
     """
     messages = (
-        SetCameraUpDirectionMessage((0.0, 0.0, 1.0)),
-        SetCameraPositionMessage(cast("Any", tuple(eye.tolist()))),
-        SetCameraLookAtMessage(cast("Any", tuple(target.tolist()))),
+        protocol.SetCameraUpDirectionMessage((0.0, 0.0, 1.0)),
+        protocol.SetCameraPositionMessage(cast("Any", tuple(eye.tolist()))),
+        protocol.SetCameraLookAtMessage(cast("Any", tuple(target.tolist()))),
         # A browser answers this one, whatever its camera did.
-        SetCameraFovMessage(field_of_view),
+        protocol.SetCameraFovMessage(field_of_view),
     )
     with client.atomic():
         for message in messages:
@@ -105,10 +94,10 @@ def resend(handle: Any, name: str) -> None:
     """Send browsers a property of a control, or a node's place. Gap: viser sends none twice."""
     state = handle._impl
     if name in PLACE:
-        kind = SetPositionMessage if name == "position" else SetOrientationMessage
+        kind = protocol.SetPositionMessage if name == "position" else protocol.SetOrientationMessage
         state.api._queue_scene_message(kind(handle.name, tuple(getattr(handle, name).tolist())))
     else:
-        message = GuiUpdateMessage(state.uuid, {name: getattr(state, name)})
+        message = protocol.GuiUpdateMessage(state.uuid, {name: getattr(state, name)})
         state.gui_api._websock_interface.queue_message(message)
 
 
@@ -136,11 +125,11 @@ def mark_broadcasts(client: viser.ClientHandle, number: int) -> None:
     """
 
     # Gap: viser has no such mark. The type of a message is the name of its class.
-    class Mark(RunJavascriptMessage):
+    class Mark(protocol.RunJavascriptMessage):
         def redundancy_key(self) -> str:
             return "mark"
 
-    Mark.__name__ = RunJavascriptMessage.__name__
+    Mark.__name__ = protocol.RunJavascriptMessage.__name__
     internals: Any = client
     source = f"(window.explorer ??= {{}}).mark = {number};"
     _send_to_all(internals._viser_server, Mark(source=source))
@@ -152,7 +141,7 @@ def _script(source: str) -> object:
     Gap: an error that viser's page meets at a message takes all messages that wait with it.
     """
     guarded = f"try {{\n{source}\n}} catch (error) {{ console.error(error); }}"
-    return RunJavascriptMessage(source=guarded)
+    return protocol.RunJavascriptMessage(source=guarded)
 
 
 def _send_to_all(server: Any, message: object) -> None:

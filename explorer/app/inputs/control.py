@@ -9,8 +9,8 @@ pointer.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Generic, TypeAlias, TypeVar, cast
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import viser
 
@@ -103,10 +103,11 @@ Condition = Callable[[State], bool]
 """A function that tells whether a condition holds in a state."""
 
 
+@dataclass(eq=False)
 class Control(Generic[Value]):
     """An input of the page, bound to the state.
 
-    Args:
+    Attributes:
         session: Session to which changes are posted.
         handle: The input.
         bound: Binding of its value.
@@ -115,128 +116,107 @@ class Control(Generic[Value]):
         step: Function that returns the step of its buttons; None for a fixed one, or none.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        handle: viser.GuiInputHandle[Value],
-        bound: Bound[Value],
-        *,
-        disabled: Condition | None = None,
-        visible: Condition | None = None,
-        step: Callable[[State], float] | None = None,
-    ) -> None:
-        self.handle = handle
-        self._session = session
-        self._bound = bound
-        self._disabled = disabled
-        self._visible = visible
-        self._step = step
-        self._last_value: Value | None = None
-        # Whether the last value came from the control itself.
-        self._is_set_here = False
-        handle.on_update(self._post_change)
+    session: Session
+    handle: viser.GuiInputHandle[Value]
+    bound: Bound[Value]
+    _: KW_ONLY
+    disabled: Condition | None = None
+    visible: Condition | None = None
+    step: Callable[[State], float] | None = None
+    _last_value: Value | None = field(default=None, init=False)
+    # Whether the last value came from the control itself.
+    _is_set_here: bool = field(default=False, init=False)
+
+    def __post_init__(self) -> None:
+        self.handle.on_update(self._post_change)
 
     # A coroutine runs on the thread that reads messages, so that changes and presses keep their
     # order.
     async def _post_change(self, event: viser.GuiEvent[Any]) -> None:
         # Assignments by the explorer itself have no client.
-        if event.client_id is None:
-            return
-        self._session.post(
-            self, self._change, stamp=self.handle.update_timestamp, who=event.client_id
-        )
+        if event.client_id is not None:
+            stamp = self.handle.update_timestamp
+            self.session.post(self, self._change, stamp=stamp, who=event.client_id)
 
     def _change(self, state: State) -> Action:
         self._last_value = self.handle.value
         self._is_set_here = True
-        return self._bound.write(state, self._last_value)
+        return self.bound.write(state, self._last_value)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the control show the frame, its step first."""
-        if self._step is not None:
-            step = self._step(frame.state)
+        if self.step is not None:
+            step = self.step(frame.state)
             yield self.handle, "step", step
             yield self.handle, "precision", decimals(step)
-        yield from self._show(frame.state, self._bound.read(frame))
+        yield from self._show(frame.state, self.bound.read(frame))
 
     def _show(self, state: State, value: Value) -> Iterator[Update]:
-        if self._disabled is not None:
-            yield self.handle, "disabled", self._disabled(state)
-        if self._visible is not None:
-            yield self.handle, "visible", self._visible(state)
+        if self.disabled is not None:
+            yield self.handle, "disabled", self.disabled(state)
+        if self.visible is not None:
+            yield self.handle, "visible", self.visible(state)
         # While a newer change waits, its value counts.
-        if value != self._last_value and not self._session.is_waiting(self):
+        if value != self._last_value and not self.session.is_waiting(self):
             self._last_value = value
             self._is_set_here = False
             yield self.handle, "value", value
 
     def _is_own(self, value: Value) -> bool:
         """Whether a value is the one that was last set with the control itself."""
-        return self._is_set_here and (value == self._last_value or self._session.is_waiting(self))
+        return self._is_set_here and (value == self._last_value or self.session.is_waiting(self))
 
 
+@dataclass(eq=False)
 class Slider(Control[float]):
-    """A slider with a number field, whose range and tinted parts follow the state."""
+    """A slider with a number field, whose range and tinted parts follow the state.
 
-    def __init__(
-        self,
-        session: Session,
-        handle: viser.GuiSliderHandle[float],
-        bound: Bound[float],
-        span: Span | Callable[[State], Span],
-        disabled: Condition | None,
-        tinted: Callable[[Frame], Intervals] | None,
-        colours: tuple[viser.GuiHtmlHandle, Callable[[Frame, Span], str]] | None = None,
-        *,
-        visible: Condition | None = None,
-        closes_up: bool = False,
-    ) -> None:
-        super().__init__(session, handle, bound, disabled=disabled, visible=visible)
-        self._track = Track(handle, span, closes_up=closes_up)
-        self._tinted = tinted
-        self._colours = colours
+    Attributes:
+        track: Its range.
+        tinted: Function that returns the tinted parts of its track; None to tint none.
+        colours: The strip behind its track and the function that returns the stops of the strip's
+            gradient; None for a grey track.
+    """
+
+    _: KW_ONLY
+    track: Track
+    tinted: Callable[[Frame], Intervals] | None
+    colours: tuple[viser.GuiHtmlHandle, Callable[[Frame, Span], str]] | None
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the slider show the frame, its range first."""
-        if self._visible is not None and not self._visible(frame.state):
+        if self.visible is not None and not self.visible(frame.state):
             yield self.handle, "visible", False
-            if self._colours is not None:
-                yield self._colours[0], "visible", False
+            if self.colours is not None:
+                yield self.colours[0], "visible", False
             return
-        value = self._bound.read(frame)
-        tinted = () if self._tinted is None else self._tinted(frame)
+        value = self.bound.read(frame)
+        tinted = () if self.tinted is None else self.tinted(frame)
         is_own = self._is_own(value)
-        span = self._track.span(frame.state, (value,), tinted, is_own=is_own)
+        span = self.track.span(frame.state, (value,), tinted, is_own=is_own)
         # A field would show rounding as −0.00, or as 5.00 where 5 was meant.
         size = max(abs(span.low), abs(span.high))
         value = snap_to_decimals(value, decimals(span.step), size)
-        yield from self._track.updates(span)
-        if self._tinted is not None:
+        yield from self.track.updates(span)
+        if self.tinted is not None:
             yield self.handle, MARKS, slider_marks(tint_marks(tinted, span))
-        if self._colours is not None:
-            strip, stops = self._colours
+        if self.colours is not None:
+            strip, stops = self.colours
             yield strip, "visible", True
             yield strip, "content", colour_strip(stops(frame, span))
         yield from self._show(frame.state, value)
 
 
+@dataclass(eq=False)
 class Thumbs(Control[Pair]):
-    """The two thumbs of a range, whose track follows the state."""
+    """The two thumbs of a range, whose `track` follows the state."""
 
-    def __init__(
-        self,
-        session: Session,
-        handle: viser.GuiMultiSliderHandle[float],
-        bound: Bound[Pair],
-        span: Callable[[State], Span],
-        disabled: Condition | None,
-    ) -> None:
-        super().__init__(session, cast("Any", handle), bound, disabled=disabled)
-        self._track = Track(handle, span)
+    _: KW_ONLY
+    track: Track
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the thumbs show the frame, their range first."""
-        ends = self._bound.read(frame)
-        span = self._track.span(frame.state, ends, is_own=self._is_own(ends))
-        yield from self._track.updates(span)
+        ends = self.bound.read(frame)
+        span = self.track.span(frame.state, ends, is_own=self._is_own(ends))
+        yield from self.track.updates(span)
         yield from self._show(frame.state, ends)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, Unpack
 
 import viser
 
@@ -17,7 +17,7 @@ from explorer.app.inputs.control import (
     Value,
     bound_to,
 )
-from explorer.app.inputs.ranges import Intervals, Span
+from explorer.app.inputs.ranges import Intervals, Span, Track
 from explorer.app.session.session import Session
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
@@ -30,6 +30,13 @@ from explorer.mechanism.pose import Triple
 MAIN: Literal["blue"] = "blue"
 # Decimals of a field in which values far below its step count.
 MOST_DECIMALS = 9
+
+
+class Conditions(TypedDict, total=False):
+    """In which states a control is disabled, never if missing, and visible, always if missing."""
+
+    disabled: Condition | None
+    visible: Condition | None
 
 
 class Controls:
@@ -56,11 +63,10 @@ class Controls:
         at: Source[float],
         span: Span | Callable[[State], Span],
         *,
-        disabled: Condition | None = None,
-        visible: Condition | None = None,
         tinted: Callable[[Frame], Intervals] | None = None,
         coloured: Callable[[Frame, Span], str] | None = None,
         closes_up: bool = False,
+        **conditions: Unpack[Conditions],
     ) -> Slider:
         """Add a slider with a number field.
 
@@ -69,35 +75,23 @@ class Controls:
             hint: Sentence on what it sets.
             at: Source of its value.
             span: Range of its track, which may follow the state; values beyond can be typed.
-            disabled: Condition in which it is disabled; None for never.
-            visible: Condition in which it is visible; None for always.
             tinted: Function that returns the feasible parts of the track; None to tint none.
             coloured: Function that returns the colours of the track for its range, as stops of a
                 CSS gradient; None for grey.
             closes_up: Whether the track shows only the surroundings of its tinted parts.
+            conditions: In which states it is disabled and visible.
         """
         # The stylesheet puts the colours on the track.
         colours = None if coloured is None else (self._gui.add_html(""), coloured)
-        handle = self._gui.add_slider(
-            label,
-            min=0.0,
-            max=1.0,
-            step=0.01,
-            initial_value=0.0,
-            hint=hint,
-            marks=(),
-        )
-        bound = bound_to(at, label)
+        handle = self._gui.add_slider(label, 0.0, 1.0, 0.01, 0.0, hint=hint, marks=())
         slider = Slider(
             self._session,
             handle,
-            bound,
-            span,
-            disabled,
-            tinted,
-            colours,
-            visible=visible,
-            closes_up=closes_up,
+            bound_to(at, label),
+            track=Track(handle, span, closes_up=closes_up),
+            tinted=tinted,
+            colours=colours,
+            **conditions,
         )
         self._controls.append(slider)
         return slider
@@ -108,8 +102,7 @@ class Controls:
         hint: str,
         at: Bound[Pair],
         span: Callable[[State], Span],
-        *,
-        disabled: Condition | None = None,
+        **conditions: Unpack[Conditions],
     ) -> None:
         """Add a range in one row: a slider with two thumbs, and a number field for each end.
 
@@ -118,13 +111,20 @@ class Controls:
             hint: Sentence on what it sets.
             at: Binding of its ends, the lower one first; the fields may be given them in any order.
             span: Function that returns the range of its track; values beyond can be typed.
-            disabled: Condition in which it is disabled; None for never.
+            conditions: In which states it is disabled and visible.
         """
         thumbs = self._gui.add_multi_slider(label, 0.0, 1.0, 0.01, (0.0, 1.0), marks=(), hint=hint)
         # The stylesheet puts the fields into the row of the thumbs, and a script names them.
         fields = self._gui.add_vector2(f"{label} ends", (0.0, 1.0), step=0.01, hint=hint)
-        self._controls.append(Thumbs(self._session, thumbs, at, span, disabled))
-        self._bind(fields, at, disabled=disabled, step=lambda state: span(state).step)
+        untyped: Any = thumbs
+        self._controls.append(
+            Thumbs(self._session, untyped, at, track=Track(thumbs, span), **conditions)
+        )
+
+        def step(state: State) -> float:
+            return span(state).step
+
+        self._bind(fields, at, step, **conditions)
 
     def number(
         self,
@@ -134,8 +134,8 @@ class Controls:
         *,
         least: float,
         step: float | Callable[[State], float],
-        visible: Condition | None = None,
         small: bool = False,
+        **conditions: Unpack[Conditions],
     ) -> None:
         """Add a number field; its step may follow the state.
 
@@ -145,18 +145,15 @@ class Controls:
             at: Source of its value.
             least: Least value.
             step: Step of its buttons, whose decimals are shown.
-            visible: Condition in which it is visible; None for always.
             small: Whether values far below a step that is given count, and have their decimals.
+            conditions: In which states it is disabled and visible.
         """
-        bound = bound_to(at, label)
-        if callable(step):
-            handle = self._gui.add_number(label, least, min=least, hint=hint)
-            self._bind(handle, bound, visible=visible, step=step)
-        else:
-            handle = self._gui.add_number(label, least, min=least, step=step, hint=hint)
-            if small:
-                handle.precision = MOST_DECIMALS
-            self._bind(handle, bound, visible=visible)
+        follows = step if callable(step) else None
+        fixed = None if callable(step) else step
+        handle = self._gui.add_number(label, least, min=least, step=fixed, hint=hint)
+        if small:
+            handle.precision = MOST_DECIMALS
+        self._bind(handle, bound_to(at, label), follows, **conditions)
 
     def triple(
         self,
@@ -165,27 +162,21 @@ class Controls:
         at: Source[Triple],
         *,
         step: float,
-        visible: Condition | None = None,
         small: bool = False,
+        **conditions: Unpack[Conditions],
     ) -> None:
         """Add three number fields side by side; `small` as in `number`."""
         handle = self._gui.add_vector3(label, (0.0, 0.0, 0.0), step=step, hint=hint)
         if small:
             handle.precision = MOST_DECIMALS
-        self._bind(handle, bound_to(at, label), visible=visible)
+        self._bind(handle, bound_to(at, label), **conditions)
 
     def checkbox(
-        self,
-        label: str,
-        hint: str,
-        at: Source[bool],
-        *,
-        disabled: Condition | None = None,
-        visible: Condition | None = None,
+        self, label: str, hint: str, at: Source[bool], **conditions: Unpack[Conditions]
     ) -> None:
         """Add a checkbox."""
         handle = self._gui.add_checkbox(label, initial_value=False, hint=hint)
-        self._bind(handle, bound_to(at, label), disabled=disabled, visible=visible)
+        self._bind(handle, bound_to(at, label), **conditions)
 
     def dropdown(
         self,
@@ -193,8 +184,7 @@ class Controls:
         hint: str,
         options: Mapping[str, object] | tuple[str, ...],
         at: Source[str],
-        *,
-        disabled: Condition | None = None,
+        **conditions: Unpack[Conditions],
     ) -> None:
         """Add a list to choose from.
 
@@ -203,18 +193,18 @@ class Controls:
             hint: Sentence on what it chooses.
             options: Words of the options, with their values if `at` is a path.
             at: Source of its value.
-            disabled: Condition in which it is disabled; None for never.
+            conditions: In which states it is disabled and visible.
         """
         handle = self._gui.add_dropdown(label, tuple(options), hint=hint)
         values = options if isinstance(options, Mapping) else {text: text for text in options}
-        self._bind(handle, bound_to(at, label, values), disabled=disabled)
+        self._bind(handle, bound_to(at, label, values), **conditions)
 
     def text(
-        self, label: str, hint: str, at: Source[str], *, disabled: Condition | None = None
+        self, label: str, hint: str, at: Source[str], **conditions: Unpack[Conditions]
     ) -> None:
         """Add a line of text."""
         handle = self._gui.add_text(label, "", hint=hint)
-        self._bind(handle, bound_to(at, label), disabled=disabled)
+        self._bind(handle, bound_to(at, label), **conditions)
 
     def button(
         self,
@@ -246,15 +236,11 @@ class Controls:
         self,
         handle: viser.GuiInputHandle[Value],
         bound: Bound[Value],
-        *,
-        disabled: Condition | None = None,
-        visible: Condition | None = None,
         step: Callable[[State], float] | None = None,
+        **conditions: Unpack[Conditions],
     ) -> None:
         """Bind an input that has no range to the state."""
-        self._controls.append(
-            Control(self._session, handle, bound, disabled=disabled, visible=visible, step=step)
-        )
+        self._controls.append(Control(self._session, handle, bound, step=step, **conditions))
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make every control show the frame."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import viser
@@ -38,27 +38,21 @@ Intervals: TypeAlias = tuple[Interval, ...]
 """Disjoint ascending intervals, in the unit of a slider's value; an end may be infinite."""
 
 
+@dataclass(eq=False)
 class Track:
     """The range of a slider, which follows the state and holds every value of its thumbs.
 
-    Args:
+    Attributes:
         handle: The slider.
-        span: Range, or the function that returns it.
+        of_state: Range, or the function that returns it.
         closes_up: Whether it shows only the surroundings of the tinted parts.
     """
 
-    def __init__(
-        self,
-        handle: viser.GuiSliderHandle[float] | viser.GuiMultiSliderHandle[float],
-        span: Span | Callable[[State], Span],
-        *,
-        closes_up: bool = False,
-    ) -> None:
-        self._handle = handle
-        self._span = span
-        self._closes_up = closes_up
-        self._shown: Span | None = None
-        self._whole: Span | None = None
+    handle: viser.GuiSliderHandle[float] | viser.GuiMultiSliderHandle[float]
+    of_state: Span | Callable[[State], Span]
+    closes_up: bool = False
+    _shown: Span | None = field(default=None, init=False)
+    _whole: Span | None = field(default=None, init=False)
 
     def span(
         self, state: State, values: tuple[float, ...], tinted: Intervals = (), *, is_own: bool
@@ -70,10 +64,11 @@ class Track:
             values: Values of the thumbs.
             tinted: The tinted parts.
             is_own: Whether the slider itself was changed last: then its range may only grow, so
-                that it holds still under the pointer, unless `span` itself has changed.
+                that it holds still under the pointer, unless `of_state` has changed.
         """
-        span = whole = self._span if isinstance(self._span, Span) else self._span(state)
-        if self._closes_up:
+        whole = self.of_state if isinstance(self.of_state, Span) else self.of_state(state)
+        span = whole
+        if self.closes_up:
             span = close_up(span, tinted, self._shown)
         low, high = min(span.low, *values), max(span.high, *values)
         if is_own and self._shown is not None and whole == self._whole:
@@ -86,10 +81,10 @@ class Track:
         if span == self._shown:
             return
         self._shown = span
-        yield self._handle, "min", span.low
-        yield self._handle, "max", span.high
-        yield self._handle, "step", span.step
-        yield self._handle, "precision", decimals(span.step)
+        yield self.handle, "min", span.low
+        yield self.handle, "max", span.high
+        yield self.handle, "step", span.step
+        yield self.handle, "precision", decimals(span.step)
 
 
 def tint_marks(intervals: Intervals, span: Span) -> tuple[float, ...]:

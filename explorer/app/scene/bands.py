@@ -120,35 +120,31 @@ class Colouring:
             pairs = itertools.combinations(planes, 2)
             folds += [a + sign * b for a, b in pairs for sign in (-1.0, 1.0)]
         for normal in folds:
-            parts = _Bands(vertices, triangles, vertices @ normal, None)
+            parts = _Bands(vertices, triangles, vertices @ normal)
             parts.split(0.0)
             vertices, triangles = parts.vertices, parts.triangles
         return vertices, triangles
 
 
+@dataclass
 class _Bands:
     """Triangles that are split at levels of a value.
 
-    Args:
+    Attributes:
         vertices: Positions, shape (n, 3).
         triangles: Indices of vertices, shape (m, 3).
         values: Values at the vertices, shape (n,).
         value: Function from points (n, 3) to values (n,); None if it is linear on each triangle.
     """
 
-    def __init__(
-        self,
-        vertices: FloatArray,
-        triangles: IntArray,
-        values: FloatArray,
-        value: Callable[[FloatArray], FloatArray] | None,
-    ) -> None:
-        self.vertices, self.triangles = vertices, triangles
-        self._values, self._value = values, value
+    vertices: FloatArray
+    triangles: IntArray
+    values: FloatArray
+    value: Callable[[FloatArray], FloatArray] | None = None
 
     def split(self, level: float) -> None:
         """Split all triangles along the line where the value equals a level."""
-        off = self._values - level
+        off = self.values - level
         high = off >= 0.0
         if high.all() or not high.any():
             return
@@ -156,18 +152,18 @@ class _Bands:
         a, b = division.ends.T
         start, span = self.vertices[a], self.vertices[b] - self.vertices[a]
         share = -off[a] / (off[b] - off[a])
-        value = self._value
+        value = self.value
         if value is not None:
             share = find_roots(
                 lambda at: value(start + at[:, None] * span) - level, off[a], off[b], BAND_ERROR
             )
         self.vertices = np.concatenate([self.vertices, start + share[:, None] * span])
-        self._values = np.concatenate([self._values, np.full(len(a), level)])
+        self.values = np.concatenate([self.values, np.full(len(a), level)])
         self.triangles = division.faces
 
     def shells(self, bands: PositionBands) -> tuple[Shell, ...]:
         """Return the triangles in the colours of bands."""
-        middle = self._values[self.triangles].mean(axis=1)
+        middle = self.values[self.triangles].mean(axis=1)
         band: IntArray = (middle[:, None] >= bands.edges[1:]).sum(axis=1)
         return tuple(
             _shell(colour, self.vertices, self.triangles[band == index])

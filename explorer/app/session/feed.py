@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from explorer.app.session.clock import Pause, now
@@ -42,12 +42,13 @@ Request = TypeVar("Request")
 Drawing = TypeVar("Drawing")
 
 
+@dataclass(eq=False)
 class Feed(Generic[Request, Drawing]):
     """Requests drawings of one kind and holds the newest.
 
     The session, the worker and the browsers change it, each on a thread of its own.
 
-    Args:
+    Attributes:
         worker: The worker that computes them.
         task: A function of the worker, from requests to drawings.
         request_of: Returns the request of a frame; None if nothing is to be drawn.
@@ -55,30 +56,20 @@ class Feed(Generic[Request, Drawing]):
         key: Key of the requests, of which the newest counts; the task if None.
         has_stages: Whether the task sends each `Stage`, and parts of the drawing as soon as they
             are known, and can be cancelled.
-
-    Attributes:
         request: The newest request; None if nothing is to be drawn.
         problem: Why there is no newer drawing, if the last request failed.
     """
 
-    def __init__(
-        self,
-        worker: Worker,
-        task: Callable[[Request], Drawing] | Callable[[Request, Channel], Drawing],
-        request_of: Callable[[Frame], Request | None],
-        redraw: Callable[[], None],
-        key: object = None,
-        *,
-        has_stages: bool = False,
-    ) -> None:
+    worker: Worker
+    task: Callable[[Request], Drawing] | Callable[[Request, Channel], Drawing]
+    request_of: Callable[[Frame], Request | None]
+    redraw: Callable[[], None]
+    key: object = None
+    has_stages: bool = field(default=False, kw_only=True)
+
+    def __post_init__(self) -> None:
         self.request: Request | None = None
         self.problem: str | None = None
-        self._worker = worker
-        self._task = task
-        self._has_stages = has_stages
-        self._key = task if key is None else key
-        self._request_of = request_of
-        self._redraw = redraw
         self._lock = threading.RLock()
         # The newest drawing, and the request that it answers.
         self._drawing: Drawing | None = None
@@ -87,7 +78,7 @@ class Feed(Generic[Request, Drawing]):
         self._part: object = None
         self._stage: Stage | None = None
         # Shows the first stage of a drawing that takes long.
-        self._stage_pause = Pause(LONG_SECONDS, redraw)
+        self._stage_pause = Pause(LONG_SECONDS, self.redraw)
         # Number of the newest request, its time, and its number in the worker.
         self._count, self._submitted, self._order = 0, 0.0, -1
 
@@ -124,23 +115,23 @@ class Feed(Generic[Request, Drawing]):
 
     def follow(self, frame: Frame) -> None:
         """Request the drawing of a frame, unless it is the newest request already."""
-        request = self._request_of(frame)
+        request = self.request_of(frame)
         with self._lock:
             if request == self.request:
                 return
-            if request is None and self._has_stages:
-                self._worker.cancel(self._order)
+            if request is None and self.has_stages:
+                self.worker.cancel(self._order)
             self.problem, self.request = None, request
             self._submit()
 
     def cancel(self) -> None:
         """Cancel the drawing being computed, if it can be; `retry` requests it again."""
         with self._lock:
-            if not self._has_stages or self.is_settled:
+            if not self.has_stages or self.is_settled:
                 return
-            self._worker.cancel(self._order, CANCEL_SECONDS)
+            self.worker.cancel(self._order, CANCEL_SECONDS)
             self.problem = CANCELLED
-        self._redraw()
+        self.redraw()
 
     def retry(self) -> None:
         """Request a drawing again that was cancelled."""
@@ -149,7 +140,7 @@ class Feed(Generic[Request, Drawing]):
                 return
             self.problem = None
             self._submit()
-        self._redraw()
+        self.redraw()
 
     def _submit(self) -> None:
         request = self.request
@@ -164,19 +155,19 @@ class Feed(Generic[Request, Drawing]):
                 self._receive_stage(count, value)
             else:
                 self._part = value
-                self._redraw()
+                self.redraw()
 
         before = self._order
-        self._order = self._worker.submit(
-            self._key,
-            self._task,
+        self._order = self.worker.submit(
+            self.task if self.key is None else self.key,
+            self.task,
             (request,),
             lambda drawing: self._show_drawing(request, drawing),
             lambda problem: self._show_problem(count, problem),
-            receive if self._has_stages else None,
+            receive if self.has_stages else None,
         )
-        if self._has_stages:
-            self._worker.cancel(before, after=LONG_SECONDS)
+        if self.has_stages:
+            self.worker.cancel(before, after=LONG_SECONDS)
 
     def _receive_stage(self, count: int, stage: Stage) -> None:
         with self._lock:
@@ -184,7 +175,7 @@ class Feed(Generic[Request, Drawing]):
                 return
             is_first, self._stage = self._stage is None, stage
         if self.stage is not None:
-            self._redraw()
+            self.redraw()
         elif is_first:
             self._stage_pause.begin()
 
@@ -195,7 +186,7 @@ class Feed(Generic[Request, Drawing]):
             if self.is_current:
                 self.problem = None
                 self._stage_pause.cancel()
-        self._redraw()
+        self.redraw()
 
     def _show_problem(self, count: int, problem: str) -> None:
         with self._lock:
@@ -203,7 +194,7 @@ class Feed(Generic[Request, Drawing]):
                 return
             self._drawing, self._part, self.problem = None, None, problem
             self._stage_pause.cancel()
-        self._redraw()
+        self.redraw()
 
 
 def feed_of(

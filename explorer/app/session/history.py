@@ -139,11 +139,10 @@ class History:
             if earlier and earlier[-1].state == after:
                 # The gesture ended where it began, so that its step is dropped.
                 return History(earlier, self.at - 1)
-            before = earlier[-1].state if earlier else present.state
-            words, press = event.action.describe(before, after), event.press or present.press
+            words, press = event.action.describe(after), event.press or present.press
             step = Step(present.number, words, after, present.source, event.time, press)
             return History((*earlier, step), self.at, is_open=True)
-        words = event.action.describe(present.state, after)
+        words = event.action.describe(after)
         step = Step(present.number + 1, words, after, event.source, event.time, event.press)
         steps = (*earlier, present, step)[-MOST_STEPS:]
         return History(steps, len(steps) - 1, is_open=True)

@@ -48,10 +48,6 @@ class LatestWins(Generic[Item]):
                 self._waiting[key] = (stamp, item)
                 self._condition.notify_all()
 
-    def is_waiting(self, key: object) -> bool:
-        """Whether an item with this key waits."""
-        return key in self.waiting
-
     @property
     def waiting(self) -> set[object]:
         """The keys of the items that wait."""

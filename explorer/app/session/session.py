@@ -164,7 +164,7 @@ class Session:
 
     def is_waiting(self, key: object) -> bool:
         """Whether a change with this key waits."""
-        return self._jobs.is_waiting(key)
+        return key in self._jobs.waiting
 
     @property
     def has_changes(self) -> bool:

@@ -230,7 +230,7 @@ class Worker:
     def _serve_all(self, requests: Sequence[_Request]) -> None:
         for request in requests:
             # Requests that became outdated while others were served are left out.
-            if not self._queue.is_waiting(request.key):
+            if request.key not in self._queue.waiting:
                 self._serve(request)
             # Orders with lower numbers are done or were replaced.
             last = request.order.number

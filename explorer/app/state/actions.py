@@ -13,18 +13,10 @@ from typing import ClassVar, cast
 import msgspec
 import numpy as np
 
+from explorer.app.state import state as states
 from explorer.app.state.clear_length import clear_length
 from explorer.app.state.parts import parts_kept_on_open, with_value
-from explorer.app.state.state import (
-    Joints,
-    State,
-    Substituted,
-    Unclosed,
-    angles_of,
-    joints_of,
-    mode_at,
-    open_state,
-)
+from explorer.app.state.state import State, angles_of, joints_of, open_state
 from explorer.app.state.view import DrawnAs
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, VARIABLES, Design
@@ -68,8 +60,8 @@ class Action(ABC):
         name = re.sub("(?<=.)([A-Z])", r" \1", type(self).__name__).lower()
         return name.removeprefix("set ").capitalize()
 
-    def describe(self, before: State, after: State) -> str:  # noqa: ARG002 - overrides may use it
-        """Return a description of the step that led from one state to another."""
+    def describe(self, after: State) -> str:
+        """Return a description of the step that led to a state."""
         return self.words().replace(DESIGN, after.design.name)
 
 
@@ -143,9 +135,8 @@ class SetJoint(Action):
             )
         return _assemble(replace(state, joints=joints), solution, state.mode)
 
-    def describe(self, before: State, after: State) -> str:
+    def describe(self, after: State) -> str:
         """Return which joint has which value."""
-        del before
         return f"{JOINTS[self.joint]} = {format_number(self.value, 6, size=after.design.reach)}"
 
 
@@ -165,7 +156,7 @@ class UseNearest(Action):
             return move_to(state, state.pose)
         value, words = nearest
         after = SetJoint(unclosed.joint, value).apply(state)
-        return replace(after, taken=Substituted(after.joints, words))
+        return replace(after, taken=states.Substituted(after.joints, words))
 
 
 @dataclass(frozen=True)
@@ -182,9 +173,8 @@ class SetPosition(Action):
         position = with_value(state.pose.position, str(self.axis), value)
         return move_to(state, Pose(position, state.pose.quaternion), state.yaw_pitch_roll)
 
-    def describe(self, before: State, after: State) -> str:
+    def describe(self, after: State) -> str:
         """Return which coordinate has which value."""
-        del before
         name = "xyz"[self.axis]
         if after.view.at != "b4":
             name += f" of {after.point}"
@@ -220,9 +210,8 @@ class SetPose(Action):
         """Return the next state."""
         return move_to(state, self.pose)
 
-    def describe(self, before: State, after: State) -> str:
+    def describe(self, after: State) -> str:
         """Return where the platform is."""
-        del before
         p, size = after.position, after.design.reach
         return f"Move {after.point} to {', '.join(format_number(x, 4, size=size) for x in p)}"
 
@@ -380,7 +369,7 @@ def move_to(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> S
         pose=pose,
         yaw_pitch_roll=angles_of(pose) if yaw_pitch_roll is None else yaw_pitch_roll,
         joints=joints_of(state.design, pose),
-        mode=mode_at(pose, state.mode),
+        mode=states.mode_at(pose, state.mode),
         unclosed=None,
     )
 
@@ -401,12 +390,12 @@ def check_free(state: State) -> None:
         raise InputError("the design is being optimised: wait until that is done, or cancel it")
 
 
-def _unclosed_error(design: Design, joints: Joints, cause: SetJoint) -> Unclosed:
+def _unclosed_error(design: Design, joints: states.Joints, cause: SetJoint) -> states.Unclosed:
     values = np.array(joints)
     squares = discriminants(design, values)
     failing = tuple(int(i) for i in np.flatnonzero(squares < 0.0))
     intervals = feasible_intervals(design, values)[cause.joint]
-    return Unclosed(
+    return states.Unclosed(
         joint=cause.joint,
         asked=cause.value,
         nearest=nearest_feasible(design, values, cause.joint, intervals),

@@ -46,7 +46,11 @@ def clear_length(state: State) -> tuple[float, str] | None:
     def length(share: float) -> float:
         return end + share * (far - end)
 
-    best, is_clear = _first_clear(lambda share: _level(_verdict(state, joint, length(share))))
+    def level(share: float) -> float:
+        found = _verdict(state, joint, length(share))
+        return 0.0 if found is None else min(found.levels)
+
+    best, is_clear = _first_clear(level)
     value = length(best)
     there = _verdict(state, joint, value)
     if there is None or there.kind == "singular":
@@ -78,11 +82,6 @@ def _first_clear(level: Callable[[float], float]) -> tuple[float, bool]:
             best, best_level = share, here
         before = share
     return best, False
-
-
-def _level(found: Verdict | None) -> float:
-    """Return the lowest level of a verdict; 0 where the joints do not close."""
-    return 0.0 if found is None else min(found.levels)
 
 
 def _verdict(state: State, joint: int, value: float) -> Verdict | None:

@@ -53,9 +53,8 @@ class SetFold(Action):
             mode = mode | bit if value > 0.0 else mode & ~bit
         return replace(move_to(state, pose), mode=mode, set_folds=GivenFolds(folds, pose))
 
-    def describe(self, before: State, after: State) -> str:
+    def describe(self, after: State) -> str:
         """Return which coordinate has which value."""
-        del before
         if self.index > 0:
             return f"{FOLDS[self.index]} = {format_number(self.value, 6, size=FULL_TURN)}°"
         return f"{FOLDS[0]} = {format_number(self.value, 6, size=after.design.reach)}"

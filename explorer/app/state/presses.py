@@ -6,6 +6,7 @@ whatever the pauses between them. Where no press is reported, as with keys, paus
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from dataclasses import dataclass
@@ -31,10 +32,7 @@ class Press:
 class _Period:
     number: int
     began: float
-    ended: float | None = None
-
-    def contains(self, time: float) -> bool:
-        return self.began <= time and (self.ended is None or time <= self.ended)
+    ended: float = math.inf
 
 
 class Presses:
@@ -60,7 +58,7 @@ class Presses:
                 if last is not None and last.number == -number:
                     last.ended = time
             elif last is not None and last.number == number:
-                last.ended = None
+                last.ended = math.inf
             else:
                 periods.append(_Period(number, time))
 
@@ -71,7 +69,7 @@ class Presses:
         with self._lock:
             for period in reversed(self._periods.get(client, ())):
                 if period.began <= time:
-                    return Press(client, period.number) if period.contains(time) else None
+                    return Press(client, period.number) if time <= period.ended else None
         return None
 
     def forget(self, client: int) -> None:

@@ -19,21 +19,12 @@ from explorer.app.state.parts import STAYS, TRANSIENT, FeaturePart
 from explorer.app.state.paths import Journey, Mode, Paths
 from explorer.app.state.presses import Press
 from explorer.app.state.view import View
+from explorer.mechanism import pose as poses, tilt_torsion as tilts
 from explorer.mechanism.configuration import Point, offset_of, point_of, pose_with, position_of
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_of
-from explorer.mechanism.pose import (
-    Pose,
-    Triple,
-    rotation_from_yaw_pitch_roll,
-    yaw_pitch_roll_from_rotation,
-)
-from explorer.mechanism.tilt_torsion import (
-    TiltTorsion,
-    rotation_from_tilt_torsion,
-    tilt_torsion_of,
-)
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_SHARE
@@ -191,7 +182,7 @@ class State:
     )
     compared: Compared = field(default_factory=Compared, metadata=STAYS)
     studies: StudiesPart = field(default_factory=StudiesPart.new, metadata=STAYS)
-    set_tilt_torsion: TiltTorsion | None = None
+    set_tilt_torsion: tilts.TiltTorsion | None = None
     set_tool_angles: Triple | None = None
     set_folds: GivenFolds | None = None
 
@@ -203,17 +194,15 @@ class State:
         return replace(optimisation.own, optimisation=optimisation.without_run())
 
     @property
-    def tilt_torsion(self) -> TiltTorsion:
+    def tilt_torsion(self) -> tilts.TiltTorsion:
         """Azimuth, tilt and torsion of the pose in degrees, as the user set them if known.
 
         At tilt 0 and 180° the rotation does not determine all three.
         """
         given, rotation = self.set_tilt_torsion, self.pose.rotation
-        if given is not None and np.allclose(
-            rotation_from_tilt_torsion(given), rotation, rtol=0.0, atol=SAME_ROTATION
-        ):
+        if given is not None and _are_same(tilts.rotation_from_tilt_torsion(given), rotation):
             return given
-        return tilt_torsion_of(rotation)
+        return tilts.tilt_torsion_of(rotation)
 
     @property
     def tool_angles(self) -> Triple:
@@ -222,8 +211,8 @@ class State:
         At a pitch of ±90° the orientation does not determine all three.
         """
         given, tool = self.set_tool_angles, Pose((0.0, 0.0, 0.0), self.design.tool.quaternion)
-        if given is not None and np.allclose(
-            rotation_from_yaw_pitch_roll(given), tool.rotation, rtol=0.0, atol=SAME_ROTATION
+        if given is not None and _are_same(
+            poses.rotation_from_yaw_pitch_roll(given), tool.rotation
         ):
             return given
         return angles_of(tool)
@@ -279,6 +268,11 @@ class State:
         return WARN_SHARE * self.design.reach if given is None else given
 
 
+def _are_same(one: FloatArray, other: FloatArray) -> bool:
+    """Whether two rotation matrices are the same but for rounding."""
+    return bool(np.allclose(one, other, rtol=0.0, atol=SAME_ROTATION))
+
+
 def open_state(design: Design, pose: Pose | None = None, view: View | None = None) -> State:
     """Return the state in which a design opens: in its home pose unless another is given."""
     at = design.home_pose if pose is None else pose
@@ -301,7 +295,7 @@ def joints_of(design: Design, pose: Pose) -> Joints:
 
 def angles_of(pose: Pose) -> Triple:
     """Return yaw, pitch and roll of a pose in degrees as plain numbers."""
-    yaw, pitch, roll = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
+    yaw, pitch, roll = poses.yaw_pitch_roll_from_rotation(pose.rotation).tolist()
     return (yaw, pitch, roll)
 
 

@@ -106,27 +106,17 @@ def _table(block: kinds.Table) -> tuple[list[str], list[str]]:
                     heads.append(head)
             case kinds.Column():
                 if not column.wide:
-                    cells.append(
-                        [
-                            f"{before}{text}{unit}"
-                            for text, (before, unit) in zip(
-                                column.texts, column.around, strict=True
-                            )
-                        ]
-                    )
+                    pairs = zip(column.texts, column.around, strict=True)
+                    cells.append([f"{before}{text}{unit}" for text, (before, unit) in pairs])
                     heads.append(column.head)
                     has_heads = has_heads or not column.unit
             case kinds.Shares(head, values):
-                pairs = [_share(value) for value in values]
-                cells += [bar for bar, _ in pairs], [text for _, text in pairs]
+                shares = [_share(value) for value in values]
+                cells += [bar for bar, _ in shares], [text for _, text in shares]
                 heads += "", head
             case kinds.Bars(lengths, bar_kinds):
-                cells.append(
-                    [
-                        meter(100.0 * length, KIND_COLOURS[kind])
-                        for length, kind in zip(lengths, bar_kinds, strict=True)
-                    ]
-                )
+                colours = [KIND_COLOURS[kind] for kind in bar_kinds]
+                cells.append([*map(meter, (100.0 * length for length in lengths), colours)])
                 heads.append("")
     looks = [f"ex-{look}" if look else "" for look in block.looks] or [""] * len(cells[0])
     rows = [row(*each, look=look) for *each, look in zip(*cells, looks, strict=True)]

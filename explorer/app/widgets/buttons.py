@@ -43,11 +43,14 @@ class Buttons:
 
     Args:
         server: The server whose browsers show the page.
+
+    Attributes:
+        commands: The commands that press a button, for the palette.
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._registered: dict[str, tuple[PressHandler, Container[str] | None]] = {}
-        self._commands: list[Command] = []
+        self.commands: list[Command] = []
         # Handles presses one after the other, in their order.
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="buttons")
         self.inbox = server.gui.add_text("Presses on markup", "", visible=False)
@@ -59,11 +62,6 @@ class Buttons:
                 self.receive(event.target.value, event.client)
 
         run_script(server, read_script("buttons", element_id(self.inbox)))
-
-    @property
-    def commands(self) -> tuple[Command, ...]:
-        """The commands that press a button, for the palette."""
-        return tuple(self._commands)
 
     def on(self, name: str, does: PressHandler, *, values: Container[str] | None = None) -> None:
         """Register the function that handles presses on the buttons with a name.
@@ -104,7 +102,7 @@ class Buttons:
         def run(client: viser.ClientHandle) -> None:
             self.press(name, value, client)
 
-        self._commands.append(Command(label, hint, run, is_ready, keys=keys))
+        self.commands.append(Command(label, hint, run, is_ready, keys=keys))
 
     def receive(self, text: str, client: viser.ClientHandle) -> None:
         """Queue a press that a page sent; drop a text that describes none."""

@@ -24,6 +24,9 @@ class Theme:
         gui: Controls of the page.
         dark: Whether the page is dark; None to follow the first browser.
         changed: Called after a change.
+
+    Attributes:
+        is_dark: Whether the page is dark.
     """
 
     def __init__(
@@ -32,19 +35,14 @@ class Theme:
         self._gui = gui
         self._changed = changed
         self._is_chosen = dark is not None
-        self._dark = dark is True
+        self.is_dark = dark is True
         self._configure()
-
-    @property
-    def is_dark(self) -> bool:
-        """Whether the page is dark."""
-        return self._dark
 
     def choose(self, *, dark: bool) -> None:
         """Make all pages dark, or light."""
         self._is_chosen = True
-        if dark != self._dark:
-            self._dark = dark
+        if dark != self.is_dark:
+            self.is_dark = dark
             self._configure()
             self._changed()
 
@@ -58,6 +56,6 @@ class Theme:
             show_logo=False,
             show_share_button=False,
             control_width="large",
-            brand_color=BRAND_ON_DARK if self._dark else BRAND,
-            dark_mode=self._dark,
+            brand_color=BRAND_ON_DARK if self.is_dark else BRAND,
+            dark_mode=self.is_dark,
         )

@@ -13,23 +13,14 @@ from explorer.app.browser.viser_gaps import run_script_in
 from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.help.tour import TourGuide
 from explorer.app.state.frame import Frame
+from explorer.app.widgets import palette
 from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.markup import box, caption, dim
-from explorer.app.widgets.palette import (
-    PAGE,
-    PALETTE_KEY,
-    STEP,
-    Command,
-    Key,
-    group_of,
-    shift,
-    with_keys,
-)
 from explorer.files.packaged import list_pages, read_page
 
 PRESS = "page"
-KEYS = {"Theme": (shift("L"),), "Keys": (Key("K"),)}
+KEYS = {"Theme": (palette.shift("L"),), "Keys": (palette.Key("K"),)}
 HINTS = {
     "Tour": "Do five steps, from the first move to an optimised design.",
     "Manual": "Read the manual beside the scene.",
@@ -65,10 +56,12 @@ class HelpButtons:
         buttons.on(PRESS, lambda name, client: presses[name](client), values=presses)
         for name in presses:
             keys = KEYS.get(name, ())
-            buttons.offer(f"{PAGE}{STEP}{name}", HINTS[name], PRESS, name, keys=keys)
+            buttons.offer(
+                f"{palette.PAGE}{palette.STEP}{name}", HINTS[name], PRESS, name, keys=keys
+            )
         commands = open_button(
             "commands",
-            f"Commands {keycap(str(PALETTE_KEY))}",
+            f"Commands {keycap(str(palette.PALETTE_KEY))}",
             hint="Search for anything that can be done, and do it.",
             class_name="ex-tool ex-commands",
         )
@@ -124,7 +117,7 @@ class KeysDialog:
 
 def hint_of(name: str) -> str:
     """Return the hint of a button, with its keys."""
-    return with_keys(HINTS[name], KEYS.get(name, ()))
+    return palette.with_keys(HINTS[name], KEYS.get(name, ()))
 
 
 def keycap(key: str) -> str:
@@ -132,14 +125,14 @@ def keycap(key: str) -> str:
     return f'<kbd class="ex-keycap">{escape(key)}</kbd>'
 
 
-def keys_table(commands: Iterable[Command]) -> str:
+def keys_table(commands: Iterable[palette.Command]) -> str:
     """Return all keys as HTML, in the groups of their commands and in two columns."""
-    groups = {PAGE: [_row("Search all commands", keycap(str(PALETTE_KEY)))]}
+    groups = {palette.PAGE: [_row("Search all commands", keycap(str(palette.PALETTE_KEY)))]}
     for command in commands:
         if command.keys:
             caps = " ".join(keycap(str(key)) for key in command.keys)
-            words = command.label.partition(STEP)[2].replace(STEP, ", ")
-            groups.setdefault(group_of(command), []).append(_row(words, caps))
+            words = command.label.partition(palette.STEP)[2].replace(palette.STEP, ", ")
+            groups.setdefault(palette.group_of(command), []).append(_row(words, caps))
     groups["Camera"] = [_row(words, keycap(keys)) for keys, words in CAMERA]
     blocks = (f"<div>{caption(name)}{''.join(rows)}</div>" for name, rows in groups.items())
     return f'<div class="ex-keys">{"".join(blocks)}</div>'

@@ -24,7 +24,7 @@ from explorer.legs.clearance import legs_of
 from explorer.measures.snapshot import Snapshot
 from explorer.numerics.arrays import FloatArray
 from explorer.reproduce.six_legs import TWIN
-from explorer.singularity.colours import OUTLINE, proximity_colour
+from explorer.singularity.colours import OUTLINE, Rgb, proximity_colour
 
 # Sizes in scene units.
 PLATE_THICKNESS, BASE_RADIUS = 0.22, 0.75
@@ -121,7 +121,7 @@ class Telescopes(shapes.Rods):
     """Actuators, each with a cylinder at the base end and a rod at the platform end."""
 
     def __init__(self, scene: viser.SceneApi, name: str, count: int) -> None:
-        super().__init__(scene, name, self._part_colours([False] * count))
+        super().__init__(scene, name, _colours_of_parts([False] * count))
 
     def along(self, placed: Placed, bases: FloatArray, tips: FloatArray) -> Updates:
         """Yield the updates that draw the actuators from bases (n, 3) to tips (n, 3)."""
@@ -138,15 +138,12 @@ class Telescopes(shapes.Rods):
             size * np.repeat([TUBE_RADIUS, ROD_RADIUS, COLLAR_RADIUS, SOCKET_RADIUS], count),
         )
 
-    def colour_alarms(self, alarms: list[bool]) -> Updates:
-        """Yield the updates that give some actuators the colour of an alarm."""
-        yield from self.colour(self._part_colours(alarms))
 
-    @staticmethod
-    def _part_colours(alarms: list[bool]) -> list[tuple[int, int, int]]:
-        tubes = [OUTLINE if alarm else shapes.TUBE for alarm in alarms]
-        rods = [OUTLINE if alarm else shapes.ROD for alarm in alarms]
-        return [*tubes, *rods, *[shapes.JOINT] * (2 * len(alarms))]
+def _colours_of_parts(alarms: list[bool]) -> list[Rgb]:
+    """Return the colours of the parts of actuators, some of which have that of an alarm."""
+    tubes = [OUTLINE if alarm else shapes.TUBE for alarm in alarms]
+    rods = [OUTLINE if alarm else shapes.ROD for alarm in alarms]
+    return [*tubes, *rods, *[shapes.JOINT] * (2 * len(alarms))]
 
 
 class Legs(ScenePart):
@@ -171,7 +168,8 @@ class Legs(ScenePart):
             return
         size, (bases, tips) = placed.thickness, placed.struts
         yield from self._actuators.along(placed, bases, tips)
-        yield from self._actuators.colour_alarms(colliding_legs(placed.frame.snapshot))
+        alarms = colliding_legs(placed.frame.snapshot)
+        yield from self._actuators.colour(_colours_of_parts(alarms))
         yield from self._balls.at(
             np.concatenate([tips, bases[[0, 3]]]),
             size * np.array([BALL_RADIUS] * 4 + [1.2 * TUBE_RADIUS] * 2),

@@ -12,7 +12,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.incidences import approaches
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import add_label
-from explorer.app.session.clock import Timer, now
+from explorer.app.session.clock import Pause, now
 from explorer.app.state.actions import SetPose
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Updates
@@ -66,9 +66,9 @@ class DragHandle(ScenePart):
         )
         self._session = services.session
         self._moved_at = -math.inf
-        self._timer: Timer | None = None
+        self._pause = Pause(PAUSE, services.session.redraw)
         self.handle.on_update(self._move_platform)
-        services.at_end(self._forget_timer)
+        services.at_end(self._pause.cancel)
 
     def pose(self, state: State) -> Pose:
         """Return the pose of the platform where the gizmo is.
@@ -107,17 +107,8 @@ class DragHandle(ScenePart):
         # viser's client forgets the movement that it has yet to send when the gizmo's look changes.
         if wanted == present or now() - self._moved_at > PAUSE:
             return wanted
-        if self._timer is None:
-            self._timer = Timer(PAUSE, self._look_again)
+        self._pause.begin()
         return present
-
-    def _look_again(self) -> None:
-        self._timer = None
-        self._session.redraw()
-
-    def _forget_timer(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
 
     async def _move_platform(self, event: viser.TransformControlsEvent) -> None:
         if event.client_id is not None:

@@ -29,21 +29,16 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.workspace.limits.table import LIMITS, Entry, Limit, Switch
 
 JOINT_HINTS = {
-    "l1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
-    "d1": "Leg 2: position of its carriage on the guide, from a1.",
-    "d2": "Leg 2: length of the actuator from the guide, perpendicular to it, to b2.",
-    "d3": "Leg 3: position of its carriage on the guide, from a1.",
-    "d4": "Leg 3: length of the actuator from the guide, perpendicular to it, to b3.",
-    "l4": "Leg 4: length of the actuator from a3 to b4 (U joint, actuator, ball joint).",
+    "l1  leg 1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
+    "d1  leg 2 slide": "Leg 2: position of its carriage on the guide, from a1.",
+    "d2  leg 2": "Leg 2: length of the actuator from the guide, perpendicular to it, to b2.",
+    "d3  leg 3 slide": "Leg 3: position of its carriage on the guide, from a1.",
+    "d4  leg 3": "Leg 3: length of the actuator from the guide, perpendicular to it, to b3.",
+    "l4  leg 4": "Leg 4: length of the actuator from a3 to b4 (U joint, actuator, ball joint).",
 }
-JOINT_LABELS = {
-    "l1": "l1  leg 1",
-    "d1": "d1  leg 2 slide",
-    "d2": "d2  leg 2",
-    "d3": "d3  leg 3 slide",
-    "d4": "d4  leg 3",
-    "l4": "l4  leg 4",
-}
+"""Hints by the labels of the joints, in their order."""
+
+JOINT_LABELS = dict(zip(JOINTS, JOINT_HINTS, strict=True))
 ANGLES = (
     ("yaw", "about the base's z, the first of three", 180.0),
     ("pitch", "about the y that yaw turned, the second of three", 90.0),
@@ -90,10 +85,10 @@ class MovePanel:
         gui = services.gui
         self._controls = controls = Controls(gui, services.session)
         with gui.add_folder("Legs (design units)"):
-            for joint, name in enumerate(JOINTS):
+            for joint, (label, hint) in enumerate(JOINT_HINTS.items()):
                 controls.slider(
-                    JOINT_LABELS[name],
-                    JOINT_HINTS[name],
+                    label,
+                    hint,
                     item(lambda frame: frame.state.joints, joint, actions.SetJoint),
                     partial(ranges.joint_span, joint=joint),
                     tinted=lambda frame, joint=joint: frame.snapshot.intervals[joint],
@@ -108,8 +103,12 @@ class MovePanel:
                 icon=viser.Icon.MAGNET,
                 main=True,
             )
+
+        def is_point(state: State, at: str) -> bool:
+            return at == "b4" or any(state.design.tool.position)
+
         self._coordinates = _choice(services, "Set as", "view.coordinates", COORDINATES)
-        self._points = _choice(services, "Position of", "view.at", POINTS, _is_point)
+        self._points = _choice(services, "Position of", "view.at", POINTS, is_point)
         self._pose = gui.add_folder("")
         with self._pose:
             self._choices = gui.add_html("")
@@ -159,10 +158,6 @@ def _is_by_position(state: State) -> bool:
     return state.view.coordinates == "position"
 
 
-def _is_point(state: State, at: str) -> bool:
-    return at == "b4" or any(state.design.tool.position)
-
-
 def _choice(
     services: Services,
     title: str,
@@ -206,7 +201,10 @@ class DesignPanel:
                 "Preset",
                 "Open one of the designs of the paper's Table 1, in its home pose.",
                 (*PRESETS, NO_OPTION),
-                Bound(_preset_name, _open_preset),
+                Bound(
+                    _preset_name,
+                    lambda state, name: actions.Open(PRESETS.get(name, state.design)),
+                ),
             )
             controls.dropdown(
                 "On a change",
@@ -279,10 +277,6 @@ class DesignPanel:
             lambda state: limit_span(state.base, entry),
             disabled=lambda state: limit.switch is not None and limit.value(state.design) is None,
         )
-
-
-def _open_preset(state: State, name: str) -> actions.Open:
-    return actions.Open(PRESETS.get(name, state.design))
 
 
 def _preset_name(frame: Frame) -> str:

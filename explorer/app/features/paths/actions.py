@@ -62,9 +62,8 @@ class Go(Action):
         mode = state.paths.start
         return replace(after, mode=mode) if isinstance(mode, int) else after
 
-    def describe(self, before: State, after: State) -> str:
+    def describe(self, after: State) -> str:
         """Return which path was played or requested."""
-        del before
         journey = after.journey
         return "Plan a path" if journey is None else journey.title
 
