@@ -178,12 +178,9 @@ def ends_of_moves(
     q = arrays.position_array("end position", end_position)
     r, s = checked_rotation(start_rotation), checked_rotation(end_rotation)
     batch = arrays.batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
-    starts = arrays.rows_for_kernel(p, batch, 1), arrays.rows_for_kernel(r, batch, 2)
-    return batch, (
-        *starts,
-        arrays.rows_for_kernel(q, batch, 1),
-        arrays.rows_for_kernel(s, batch, 2),
-    )
+    p, q = (arrays.rows_for_kernel(each, batch, 1) for each in (p, q))
+    r, s = (arrays.rows_for_kernel(each, batch, 2) for each in (r, s))
+    return batch, (p, r, q, s)
 
 
 def move_clearances(
@@ -267,11 +264,9 @@ def move_clearance(
     ends = ends_of_moves(start.position, start.rotation, end.position, end.rotation)
     bound, least, share, tolerances = _least_distances(design, *ends, tolerance, math.nan, tool)
     radii = radii_of_pairs(design)
-    positions, rotations = poses_between(start, end, np.linspace(0.0, 1.0, steps + 1), tool)
-    overlaps = step_overlaps(
-        Configuration(design, positions[:-1], rotations[:-1]),
-        Configuration(design, positions[1:], rotations[1:]),
-    )
+    shares = np.linspace(0.0, 1.0, steps + 1)
+    before, after = (poses_between(start, end, at, tool) for at in (shares[:-1], shares[1:]))
+    overlaps = step_overlaps(Configuration(design, *before), Configuration(design, *after))
     closest = leg_clearances(Configuration(design, *poses_between(start, end, share, tool)))
     pairs = np.arange(len(PAIRS))
     return MoveClearance(
@@ -319,9 +314,8 @@ def _least_distances(
         if not requested >= least_one:
             raise InputError(f"the tolerance must be at least {least_one:.2g}; got {requested:g}")
         tolerances = np.full(len(size), requested)
-    bound, least, share = (
-        np.full((len(size), len(PAIRS)), value) for value in (np.inf, np.inf, 0.0)
-    )
+    bound = np.full((len(size), len(PAIRS)), np.inf)
+    least, share = bound.copy(), np.zeros(bound.shape)
     targets = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design) + target)
     rows = moves.start, moves.step, np.asarray(angle), parts, np.array([*design.a3, 0.0])
     least_rows(POSES_OF_MOVE * len(size), *rows, tolerances, targets, bound, least, share)

@@ -168,9 +168,9 @@ class _LocalLoad:
     limits: tuple[Constraint, ...]
     part_names: tuple[str, ...]
 
-    def holds(self, positions: FloatArray) -> BoolArray:
-        """Return at which positions (n, 3) the parts hold the load, shape (n,)."""
-        return load_cases.largest_shares(self.case, self.rotation, positions)[0] <= 1.0
+    def shares(self, positions: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Return the largest shares of a limit at positions (n, 3), and the parts, (n,) each."""
+        return load_cases.largest_shares(self.case, self.rotation, positions)
 
     def allows(self, positions: FloatArray) -> BoolArray:
         """Return which positions (n, 3) keep the limits of the workspace, shape (n,)."""
@@ -186,8 +186,7 @@ class _LocalLoad:
         """Return the best position found within the limits."""
         grid = make_grid(*whole.ends, COARSE, 0)
         tried = np.vstack([whole.vertices, positions_within(whole, grid, self.allows)])
-        shares = partial(load_cases.largest_shares, self.case, self.rotation)
-        found = best_positions(tried, grid.step, shares, self.allows)
+        found = best_positions(tried, grid.step, self.shares, self.allows)
         return min(found, key=lambda best: best.share)
 
 
@@ -201,7 +200,7 @@ def _carried_part(whole: Solid, load: _LocalLoad, nodes: int) -> Solid:
     """
     grid = make_grid(*whole.ends, COARSE, 0)
     positions = grid.positions.reshape(-1, 3)
-    kept = positions[load.holds(positions) & load.allows(positions)]
+    kept = positions[(load.shares(positions)[0] <= 1.0) & load.allows(positions)]
     if not len(kept):
         best = load.best_within(whole)
         if best.share > 1.0:
@@ -215,12 +214,12 @@ def _carried_part(whole: Solid, load: _LocalLoad, nodes: int) -> Solid:
         if near.is_empty:
             return _without_limits(near, set(side_of_limit))
         part, step = _carve(near, load, count)
-        bounding = {side_of_limit.get(limit) for limit in np.unique(part.limit_of_face).tolist()}
-        open_sides = [side for side in bounding if side is not None]
+        bounding = np.unique(part.limit_of_face).tolist()
+        open_sides = [side for limit, side in side_of_limit.items() if limit in bounding]
         if open_sides:
-            size = box[1] - box[0]
-            for end, axis in open_sides:
-                box[end, axis] += (-GROWTH, GROWTH)[end] * size[axis]
+            growth = GROWTH * np.array([box[0] - box[1], box[1] - box[0]])
+            for side in open_sides:
+                box[side] += growth[side]
             continue
         before, volume = volume, part.volume
         if 0.0 < abs(volume - before) <= SETTLED * volume or count >= most:
@@ -334,12 +333,11 @@ def best_positions(
             if best.share <= enough:
                 break
             near = best.position + size * step * cube
-            near = near[allows(near)]
+            near = np.vstack([best.position, near[allows(near)]])
             around, of = shares(near)
-            if len(near) and around.min() < best.share:
-                index = int(around.argmin())
-                best = Best(near[index], float(around[index]), int(of[index]))
-            else:
-                size *= 0.5
+            index = int(around.argmin())
+            # The best position itself comes first.
+            size *= 1.0 if index else 0.5
+            best = Best(near[index], float(around[index]), int(of[index]))
         found.append(best)
     return found

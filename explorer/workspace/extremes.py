@@ -353,14 +353,10 @@ def _angles(values: FloatArray) -> FloatArray:
     orders = np.arange(-DEGREE, DEGREE + 1)
     waves = values @ np.exp(-1j * np.outer(ANGLES, orders)) / len(ANGLES)
     waves *= np.exp(1j * far[:, None] * orders)
-    of_waves = [
-        np.polynomial.polynomial.polymul(
-            np.polynomial.polynomial.polypow([1.0, 1j], DEGREE + order),
-            np.polynomial.polynomial.polypow([1.0, -1j], DEGREE - order),
-        )
-        for order in orders
-    ]
-    rows = (waves @ np.array(of_waves)).real
+    # The powers 4 + k of 1 + iz and 4 - k of 1 - iz, whose roots are i and -i.
+    roots = [[1j] * (DEGREE + k) + [-1j] * (DEGREE - k) for k in range(-DEGREE, DEGREE + 1)]
+    of_waves = np.array([np.poly(each)[::-1] for each in roots]) * (-1.0) ** orders[:, None]
+    rows = (waves @ of_waves).real
     companion = np.zeros((len(rows), 2 * DEGREE, 2 * DEGREE))
     companion[:, range(1, 2 * DEGREE), range(2 * DEGREE - 1)] = 1.0
     # A polynomial that is zero has no angles of its own.

@@ -120,9 +120,8 @@ def least_clearances(
         distance = np.zeros((0, len(PAIRS)))
         for part in np.array_split(middles, 1 + len(middles) // BATCH):
             before_each()
-            distance = np.vstack(
-                [distance, leg_clearances(Configuration(design, part, r)).distance]
-            )
+            of_part = leg_clearances(Configuration(design, part, r)).distance
+            distance = np.vstack([distance, of_part])
         inside = np.flatnonzero(slack >= 0.0)
         if len(inside):
             least = inside[distance[inside].argmin(axis=0)]
@@ -189,11 +188,10 @@ class _Domain:
             return np.array([*of_limits, *self._spare_margins(p * reach)]) / reach
 
         optimum = descend(distance, slacks, position / reach)
-        if optimum is not None and (slacks(optimum) >= -CROSSING).all():
-            value = distance(optimum)[0] * reach
-            if value < least:
-                return value, optimum * reach
-        return least, position
+        if optimum is None or not (slacks(optimum) >= -CROSSING).all():
+            return least, position
+        value = distance(optimum)[0] * reach
+        return (value, optimum * reach) if value < least else (least, position)
 
     def _spare_margins(self, p: FloatArray) -> FloatArray:
         """Return |δ| less the margin at positions (..., 3), shape (..., 3); (..., 0) if it is 0."""

@@ -42,43 +42,36 @@ def nearest_carrying_pose(loaded: LoadedPose) -> Pose | None:
     Args:
         loaded: A pose under a load and weights.
     """
-    signs = _signs_of(loaded)
-    whole = workspace_solid(loaded.design, loaded.pose.rotation, signs=signs)
+    design, pose = loaded.design, loaded.pose
+    own = np.sign(margins(pose.position, pose.rotation)).astype(np.int64).tolist()
+    # A margin of zero takes the sign of home.
+    x, y, z = (sign or home for sign, home in zip(own, design.home_signs, strict=True))
+    signs = x, y, z
+    whole = workspace_solid(design, pose.rotation, signs=signs)
     if whole.is_empty:
         return None
-    limits = constraints(loaded.design, loaded.pose.rotation, signs)
-    search = _Search(loaded, Rules.of(loaded.design, signs), limits)
+    search = _Search(loaded, Rules.of(design, signs), constraints(design, pose.rotation, signs))
     ends = whole.ends
     grid = make_grid(*ends, NODES, 0)
     tried = np.vstack([search.here, positions_within(whole, grid, search.allows)])
     found = search.nearest(tried, grid.step)
+    if found is None:
+        return None
     for _ in range(ROUNDS):
-        if found is None or not search.distance(found[None]).all():
+        distance = float(search.distance(found))
+        if distance == 0.0:
             break
-        distance = float(search.distance(found[None])[0])
         lows = np.maximum(ends[0], search.here - distance)
         highs = np.minimum(ends[1], search.here + distance)
         grid = make_grid(lows, highs, NODES, 0)
         tried = grid.positions.reshape(-1, 3)
         tried = tried[search.distance(tried) < (1.0 - NEARER) * distance]
         nearer = search.nearest(tried[search.allows(tried)], grid.step)
-        if nearer is None or search.distance(nearer[None])[0] >= (1.0 - NEARER) * distance:
+        if nearer is None or search.distance(nearer) >= (1.0 - NEARER) * distance:
             break
         found = nearer
-    if found is None:
-        return None
     x, y, z = found.tolist()
-    return Pose((x, y, z), loaded.pose.quaternion)
-
-
-def _signs_of(loaded: LoadedPose) -> tuple[int, int, int]:
-    """Return the signs of the margins of a pose; those of home for margins of zero."""
-    pose = loaded.pose
-    own = np.sign(margins(pose.position, pose.rotation)).astype(np.int64).tolist()
-    first, second, third = (
-        sign or home for sign, home in zip(own, loaded.design.home_signs, strict=True)
-    )
-    return first, second, third
+    return Pose((x, y, z), pose.quaternion)
 
 
 @dataclass(frozen=True)
@@ -101,8 +94,8 @@ class _Search:
         return np.array(self.loaded.pose.position)
 
     def distance(self, positions: FloatArray) -> FloatArray:
-        """Return the distances of positions (n, 3) from the pose, shape (n,)."""
-        return np.asarray(np.linalg.norm(positions - self.here, axis=1))
+        """Return the distances of positions (..., 3) from the pose, shape (...)."""
+        return np.asarray(np.linalg.norm(positions - self.here, axis=-1))
 
     def allows(self, positions: FloatArray) -> BoolArray:
         """Return which positions (n, 3) keep all limits and clearances, shape (n,)."""
@@ -146,9 +139,5 @@ class _Search:
     def _shares(self, positions: FloatArray) -> FloatArray:
         """Return the shares of the limits at positions (..., 3), shape (..., 12)."""
         loaded = self.loaded
-        reacted = reactions(
-            Configuration(loaded.design, positions, loaded.pose.rotation, loaded.tool),
-            loaded.load,
-            loaded.weights,
-        )
-        return limit_shares(loaded.design, reacted)
+        at = Configuration(loaded.design, positions, loaded.pose.rotation, loaded.tool)
+        return limit_shares(loaded.design, reactions(at, loaded.load, loaded.weights))

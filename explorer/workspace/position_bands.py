@@ -153,12 +153,12 @@ def measure_positions(
             return np.linalg.norm(moved, axis=-1) * design.unit_mm, whole
         case _:
             # The share of a limit of one newton or one newton metre, in N × unit, is the value.
-            limits = None if measure == "share" else np.full((2, 10), np.inf)
-            if limits is not None and measure == "force":
-                limits[:, :6] = 1.0
-            elif limits is not None:
-                limits[:, 6:8] = 1e3 / design.unit_mm
-            loaded = load_case(design, rotation, w, limits)
+            units = np.full((2, 10), np.inf)
+            if measure == "force":
+                units[:, :6] = 1.0
+            else:
+                units[:, 6:8] = 1e3 / design.unit_mm
+            loaded = load_case(design, rotation, w, None if measure == "share" else units)
             return largest_shares(loaded, rotation, positions)
 
 
@@ -185,8 +185,8 @@ def _round_levels(
     """Return round numbers that suit what is measured within the limits, ascending."""
     limits = constraints(design, rotation)
     lows, highs = box_of(limits) or (np.zeros(3), np.full(3, design.reach))
-    axes = np.linspace(lows, highs, NODES + 2)[1:-1].T
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    shares = (np.indices((NODES,) * 3).reshape(3, -1).T + 1.0) / (NODES + 1)
+    nodes = lows + (highs - lows) * shares
     within = nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]
     found = measured(within if len(within) else nodes)
     found = found[np.isfinite(found) & (found > 0.0)]

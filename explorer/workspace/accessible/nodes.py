@@ -56,19 +56,13 @@ class Grid:
     @cached_property
     def positions(self) -> FloatArray:
         """The nodes, shape (nx, ny, nz, 3)."""
-        axes = [
-            low + step * np.arange(count)
-            for low, step, count in zip(self.lows, self.step, self.counts, strict=True)
-        ]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        return self.lows + self.step * np.stack([*np.indices(self.counts)], axis=-1)
 
     def cell_around(self, position: FloatArray, wider: int = 0) -> tuple[slice, slice, slice]:
         """Return the nodes of the cell that holds a position, and of `wider` cells around it."""
         first = np.floor((position - self.lows) / self.step).astype(np.int64)
-        x, y, z = (
-            slice(max(0, int(i) - wider), max(0, min(int(i) + 2 + wider, count)))
-            for i, count in zip(first, self.counts, strict=True)
-        )
+        ends = np.clip([first - wider, first + 2 + wider], 0, self.counts)
+        x, y, z = map(slice, *ends.tolist())
         return x, y, z
 
 
@@ -144,13 +138,13 @@ class Survey:
         shape, allowed = allowed.shape, allowed.ravel()
         clear = self.clear[:, list(pairs)].all(axis=-1)
         usable = clear & allowed[self.first] & allowed[self.second]
-        ends = (self.first[usable], self.second[usable])
-        ones = np.ones(len(ends[0]), dtype=np.int8)
-        graph = coo_array((ones, ends), shape=(allowed.size, allowed.size))
-        count, labels = connected_components(graph, directed=False)
-        has_seed = np.zeros(count, dtype=np.bool_)
-        has_seed[labels[seeds.ravel() & allowed]] = True
-        return np.asarray((has_seed[labels] & allowed).reshape(shape))
+        ends = self.first[usable], self.second[usable]
+        graph = coo_array(
+            (usable[usable].astype(np.int8), ends), shape=(allowed.size, allowed.size)
+        )
+        _, labels = connected_components(graph, directed=False)
+        with_seed = labels[seeds.ravel() & allowed]
+        return np.asarray((np.isin(labels, with_seed) & allowed).reshape(shape))
 
 
 def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:

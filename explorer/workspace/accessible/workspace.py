@@ -11,7 +11,6 @@ sides, so that a signed distance is needed to tell the sides apart.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -197,6 +196,11 @@ class _Carver:
         """Sums of the radii of the pairs, shape (6,)."""
         return radii_of_pairs(self.design)
 
+    @property
+    def touching(self) -> float:
+        """Clearance that counts as touching, see `TOUCHING`, in design units."""
+        return TOUCHING * self.design.reach
+
     @cached_property
     def survey(self) -> Survey:
         """The survey of the grid, needed only if a pair may collide."""
@@ -216,148 +220,112 @@ class _Carver:
         )
         return bool((cut & (surveyed.clearance[..., pair] > SLACK * self.design.reach)).any())
 
-    def carve(self, pairs: Sequence[int]) -> tuple[Solid, float]:
+    def carve(self, pairs: list[int]) -> tuple[Solid, float]:
         """Cut out collisions of some pairs; return the part with the start, and its volume."""
         surfaces = [self._surface(pairs)] if pairs else []
         solid = carved_solid(self.whole, surfaces, self.start)
         # Both meshes lack the same volume at the limits, so it cancels in their difference.
         return solid, max(0.0, self.volume - max(0.0, self.whole.volume - solid.volume))
 
-    def _thin_walls(
-        self, extended: BoolArray, clearance: FloatArray, pairs: Sequence[int]
-    ) -> IntArray:
-        """Return a node of each step whose ends are free although legs collide between them.
-
-        This happens with legs thinner than a step. The node is the end nearer to the collision;
-        once it is cut out, the surface passes on either side of it.
-        """
-        surveyed = self.survey
-        thick = [pair for pair in pairs if self.radii[pair] > 0.0]
-        collides = ~surveyed.clear[:, thick].all(axis=1)
-        first, second = surveyed.first[collides], surveyed.second[collides]
-        free = extended.ravel()
-        between = free[first] & free[second]
-        first, second = first[between], second[between]
-        least = clearance.ravel()
-        return np.where(least[first] < least[second], first, second)
-
-    def _surface(self, pairs: Sequence[int]) -> Surface:
+    def _surface(self, pairs: list[int]) -> Surface:
         from scipy.ndimage import binary_dilation
 
-        surveyed, (design, rotation) = self.survey, (self.design, self.rotation)
+        surveyed, design = self.survey, self.design
         extended = surveyed.extend(surveyed.accessible_from(self.start, pairs), pairs)
-        clearance = np.minimum(surveyed.clearance[..., list(pairs)].min(axis=-1), design.reach)
+        clearance = np.minimum(surveyed.clearance[..., pairs].min(axis=-1), design.reach)
         # Beyond a wall without thickness the distance from it counts as negative.
         values = clearance * np.where(extended, 1.0, -np.sign(clearance))
-        touching = TOUCHING * design.reach
-        if not self.radii[list(pairs)].all():
-            values = values + touching
-        values.ravel()[self._thin_walls(extended, clearance, pairs)] = -touching
+        if not self.radii[pairs].all():
+            values = values + self.touching
+        # Legs thinner than a step may collide between two free nodes. The node nearer to the
+        # collision is cut out, so that the surface passes on either side of it.
+        free, least = extended.ravel(), clearance.ravel()
+        thick = [pair for pair in pairs if self.radii[pair] > 0.0]
+        first, second = surveyed.first, surveyed.second
+        between = ~surveyed.clear[:, thick].all(axis=1) & free[first] & free[second]
+        first, second = first[between], second[between]
+        values.ravel()[np.where(least[first] < least[second], first, second)] = -self.touching
         # Far from all nodes within the limits there is nothing to cut.
         near: Any = binary_dilation(surveyed.within, CUBE)
         values[~near] = np.abs(values[~near])
+        return Surface(
+            values,
+            surveyed.grid.lows,
+            surveyed.grid.step,
+            partial(self._project, pairs),
+            PAIR_NAMES,
+            lambda points: self._nearest_pairs(pairs, points)[1],
+        )
 
-        def name_of(points: FloatArray) -> IntArray:
-            return _nearest_pairs(design, rotation, pairs, points)[1]
+    def _project(self, pairs: list[int], points: FloatArray, beside: FloatArray) -> FloatArray:
+        """Project points (n, 3) onto the surface at which the nearest pair of legs collides.
 
-        lows, step = surveyed.grid.lows, surveyed.grid.step
-        project = partial(_project_onto_collisions, design, rotation, pairs, touching, step)
-        return Surface(values, lows, step, project, PAIR_NAMES, name_of)
+        For pairs without radii that surface is `touching` beyond a crossing of axes. Beside each
+        point is a free position on the near side of the surface, shape (n, 3). A point that
+        diverges is returned as it is.
+        """
+        if not len(points):
+            return points
+        step = self.survey.grid.step
+        # On the way from `beside` to a point the legs may pass through one another. A stride as
+        # long as the clearance is free, since clearance changes no faster than position.
+        segment = points - beside
+        length = np.linalg.norm(segment, axis=1)
+        covered, collision = np.zeros(len(points)), beside
+        clearance, pair = self._nearest_pairs(pairs, beside)
+        for _ in range(STRIDES):
+            covered = np.minimum(length, covered + np.maximum(clearance, 0.0))
+            collision = beside + (covered / np.maximum(length, 1e-300))[:, None] * segment
+            clearance, pair = self._nearest_pairs(pairs, collision)
+        collides = covered < length - NEAR * float(step.min())
+        side = np.sign(self._signed_distances(pair, beside)[3])
+        is_signed = self._signed_distances(pair, points)[2]
+        radii = self.radii[pair]
+        target = np.where(radii > 0.0, 0.0, -self.touching)
+        projected = np.where((collides & ~is_signed)[:, None], collision, points)
+        for _ in range(STEPS):
+            value, gradient, has_side, _ = self._signed_distances(pair, projected)
+            direction = np.where(has_side, side, 1.0)
+            excess, gradient = target - value * direction + radii, gradient * direction[:, None]
+            square = dot(gradient, gradient)
+            ratio = np.where(square > LEAST_SLOPE**2, excess / np.maximum(square, 1e-300), 0.0)
+            move = ratio[:, None] * gradient
+            cells = np.abs(move / step).max(axis=1)
+            projected += move * np.minimum(1.0, SHARE / np.maximum(cells, 1e-300))[:, None]
+        astray = np.abs((projected - points) / step).max(axis=1) > 1.0
+        projected[astray] = np.where(collides[:, None], collision, points)[astray]
+        return projected
 
+    def _nearest_pairs(self, pairs: list[int], points: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Return the least clearance of some pairs at positions (n, 3), and its pair, (n,) each."""
+        poses = Configuration(self.design, points, self.rotation)
+        clearance = leg_clearances(poses).clearance[:, pairs]
+        return clearance.min(axis=1), np.array(pairs, dtype=np.int64)[clearance.argmin(axis=1)]
 
-def _project_onto_collisions(
-    design: Design,
-    rotation: FloatArray,
-    pairs: Sequence[int],
-    touching: float,
-    step: FloatArray,
-    points: FloatArray,
-    beside: FloatArray,
-) -> FloatArray:
-    """Project points (n, 3) onto the surface at which the nearest pair of legs begins to collide.
+    def _signed_distances(
+        self, pair: IntArray, at: FloatArray
+    ) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
+        """Return distances (n,) of the axes of a pair of legs at each position, signed if possible.
 
-    For pairs without radii that surface is `touching` beyond a crossing of axes. Beside each point
-    is a free position on the near side of the surface, shape (n, 3). A point that diverges is
-    returned as it is. The grid has a step on each axis, shape (3,).
-    """
-    if not len(points):
-        return points
-    # On the way from `beside` to a point the legs may pass through one another.
-    collision, pair, collides = _first_collisions(design, rotation, pairs, step, beside, points)
-    side = np.sign(_signed_distances(design, rotation, pair, beside)[3])
-    is_signed = _signed_distances(design, rotation, pair, points)[2]
-    radii = radii_of_pairs(design)[pair]
-    target = np.where(radii > 0.0, 0.0, -touching)
-    projected = np.where((collides & ~is_signed)[:, None], collision, points)
-    for _ in range(STEPS):
-        value, gradient, has_side, _ = _signed_distances(design, rotation, pair, projected)
-        direction = np.where(has_side, side, 1.0)
-        value, gradient = value * direction - radii, gradient * direction[:, None]
-        square = dot(gradient, gradient)
-        ratio = np.where(square > LEAST_SLOPE**2, (target - value) / np.maximum(square, 1e-300), 0)
-        move = ratio[:, None] * gradient
-        cells = np.abs(move / step).max(axis=1)
-        projected += move * np.minimum(1.0, SHARE / np.maximum(cells, 1e-300))[:, None]
-    astray = np.abs((projected - points) / step).max(axis=1) > 1.0
-    projected[astray] = np.where(collides[:, None], collision, points)[astray]
-    return projected
-
-
-def _first_collisions(
-    design: Design,
-    rotation: FloatArray,
-    pairs: Sequence[int],
-    step: FloatArray,
-    start: FloatArray,
-    end: FloatArray,
-) -> tuple[FloatArray, IntArray, BoolArray]:
-    """Return the first collisions on segments from free starts to ends, shape (n, 3) each.
-
-    A stride as long as the clearance is free, since clearance changes no faster than position.
-    Returned are positions, the ends where there is no collision; the pairs of legs nearest there,
-    shape (n,); and whether a collision precedes the end, shape (n,).
-    """
-    segment = end - start
-    length = np.linalg.norm(segment, axis=1)
-    covered, at = np.zeros(len(start)), start
-    clearance, pair = _nearest_pairs(design, rotation, pairs, at)
-    for _ in range(STRIDES):
-        covered = np.minimum(length, covered + np.maximum(clearance, 0.0))
-        at = start + (covered / np.maximum(length, 1e-300))[:, None] * segment
-        clearance, pair = _nearest_pairs(design, rotation, pairs, at)
-    return at, pair, covered < length - NEAR * float(step.min())
-
-
-def _nearest_pairs(
-    design: Design, rotation: FloatArray, pairs: Sequence[int], points: FloatArray
-) -> tuple[FloatArray, IntArray]:
-    """Return the least clearance of some pairs at positions (n, 3), and its pair, (n,) each."""
-    clearance = leg_clearances(Configuration(design, points, rotation)).clearance[:, list(pairs)]
-    return clearance.min(axis=1), np.array(pairs, dtype=np.int64)[clearance.argmin(axis=1)]
-
-
-def _signed_distances(
-    design: Design, rotation: FloatArray, pair: IntArray, at: FloatArray
-) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
-    """Return distances (n,) of the axes of a pair of legs at each position, signed if possible.
-
-    Where the closest points lie between the ends of the legs, the distance is that of the two
-    lines, and its sign tells on which side of each other they are. Returned are also the gradients
-    in position, (n, 3), which distances are signed, and the signed ones of the lines in any case.
-    """
-    poses = Configuration(design, at, rotation)
-    clearances, axes = leg_clearances(poses), leg_axes(poses)
-    rows, ends = np.arange(len(at)), np.array(PAIRS)[pair] - 1
-    one, two = axes[rows, ends[:, 0]], axes[rows, ends[:, 1]]
-    u, v = one[:, 1] - one[:, 0], two[:, 1] - two[:, 0]
-    normal = np.cross(u, v)
-    length = np.linalg.norm(normal, axis=-1)
-    scale = np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1)
-    normal = normal / np.where(length > 0.0, length, 1.0)[:, None]
-    signed, distance = dot(one[:, 0] - two[:, 0], normal), clearances.distance[rows, pair]
-    has_side = (length > 1e-6 * scale) & (np.abs(np.abs(signed) - distance) <= 1e-9 * design.reach)
-    off = clearances.points[rows, pair, 0] - clearances.points[rows, pair, 1]
-    outward = off / np.where(distance > 0.0, distance, 1.0)[:, None]
-    rates = point_rates(axes, clearances.points)[rows, pair]
-    gradient = np.where(has_side[:, None], normal, outward) * rates
-    return np.where(has_side, signed, distance), gradient, has_side, signed
+        Where the closest points lie between the ends of the legs, the distance is that of the two
+        lines, and its sign tells on which side of each other they are. Returned are also the
+        gradients in position, (n, 3), which distances are signed, and the signed ones of the lines
+        in any case.
+        """
+        poses = Configuration(self.design, at, self.rotation)
+        clearances, axes = leg_clearances(poses), leg_axes(poses)
+        rows, ends = np.arange(len(at)), np.array(PAIRS)[pair] - 1
+        one, two = axes[rows, ends[:, 0]], axes[rows, ends[:, 1]]
+        u, v = one[:, 1] - one[:, 0], two[:, 1] - two[:, 0]
+        normal = np.cross(u, v)
+        length = np.linalg.norm(normal, axis=-1)
+        scale = np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1)
+        normal = normal / np.where(length > 0.0, length, 1.0)[:, None]
+        signed, distance = dot(one[:, 0] - two[:, 0], normal), clearances.distance[rows, pair]
+        is_of_lines = np.abs(np.abs(signed) - distance) <= 1e-9 * self.design.reach
+        has_side = (length > 1e-6 * scale) & is_of_lines
+        off = clearances.points[rows, pair, 0] - clearances.points[rows, pair, 1]
+        outward = off / np.where(distance > 0.0, distance, 1.0)[:, None]
+        rates = point_rates(axes, clearances.points)[rows, pair]
+        gradient = np.where(has_side[:, None], normal, outward) * rates
+        return np.where(has_side, signed, distance), gradient, has_side, signed

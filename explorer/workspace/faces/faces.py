@@ -45,28 +45,20 @@ def divide(faces: IntArray, high: BoolArray) -> Division:
     """Divide the faces (m, 3) with vertices on either side of a level, high for n vertices."""
     count = len(high)
     sides = high[faces]
-    number = sides[:, 0].astype(np.int64) + sides[:, 1] + sides[:, 2]
-    mixed = np.flatnonzero((number == 1) | (number == 2))
-    whole = np.flatnonzero((number == 0) | (number == 3))
-    if not len(mixed):
-        return Division(np.zeros((0, 2), dtype=np.int64), faces, number == 3, np.arange(len(faces)))
+    number: IntArray = sides.sum(axis=1)
+    mixed, whole = np.flatnonzero(number % 3), np.flatnonzero(number % 3 == 0)
     # The corner that is alone on its side comes first.
     lone_is_high = number[mixed] == 1
     lone = np.argmax(sides[mixed] == lone_is_high[:, None], axis=1)
     corners = np.take_along_axis(faces[mixed], (lone[:, None] + np.arange(3)) % 3, axis=1)
     a, b, c = corners.T
-    crossed = np.concatenate([np.stack([a, b], axis=1), np.stack([a, c], axis=1)])
-    flip = np.concatenate([lone_is_high, lone_is_high])
-    crossed[flip] = crossed[flip][:, ::-1]
-    keys, inverse = np.unique(crossed[:, 0] * count + crossed[:, 1], return_inverse=True)
-    ends = np.stack([keys // count, keys % count], axis=1)
-    on_ab, on_ac = count + inverse[: len(mixed)], count + inverse[len(mixed) :]
-    divided = [faces[whole]] + [
-        np.stack(triple, axis=1) for triple in ((a, on_ab, on_ac), (on_ab, b, c), (on_ab, c, on_ac))
-    ]
+    low, high = np.where(lone_is_high, [b, c], a), np.where(lone_is_high, a, [b, c])
+    keys, inverse = np.unique(low * count + high, return_inverse=True)
+    on_ab, on_ac = count + inverse.reshape(2, -1)
+    parts = ((a, on_ab, on_ac), (on_ab, b, c), (on_ab, c, on_ac))
     return Division(
-        ends,
-        np.concatenate(divided),
+        np.stack(np.divmod(keys, count), axis=1),
+        np.concatenate([faces[whole], *(np.stack(part, axis=1) for part in parts)]),
         np.concatenate([number[whole] == 3, lone_is_high, ~lone_is_high, ~lone_is_high]),
         np.concatenate([whole, mixed, mixed, mixed]),
     )
@@ -151,12 +143,8 @@ class _Cut:
     triangles: IntArray
 
 
-NOTHING = _Cut(
-    np.zeros((0, 3)),
-    np.zeros(0, dtype=np.int64),
-    np.zeros(0, dtype=np.int64),
-    np.zeros((0, 3), dtype=np.int64),
-)
+_NO_INDICES: IntArray = np.zeros(0, dtype=np.int64)
+NOTHING = _Cut(np.zeros((0, 3)), _NO_INDICES, _NO_INDICES, _NO_INDICES.reshape(0, 3))
 """No triangles."""
 
 
@@ -170,18 +158,17 @@ def workspace_faces(limits: Sequence[Constraint]) -> Faces:
     if ends is None:
         return _finish(NOTHING, surfaces, names, 1.0)
     box = Box(*ends).surroundings(ROUNDING)
-    cut = _cut_by_all(smooth, surfaces, box)
-    for _ in range(MOST_ROUNDS - 1):
-        found = cut.vertices
-        if not len(found):
+    cut = NOTHING
+    for _ in range(MOST_ROUNDS):
+        cut = _cut_by_all(smooth, surfaces, box)
+        if not len(cut.vertices):
             break
-        lows, highs = found.min(axis=0), found.max(axis=0)
+        lows, highs = cut.vertices.min(axis=0), cut.vertices.max(axis=0)
         if float(np.linalg.norm(highs - lows)) > LOOSE * box.size:
             break
         # The triangles are too large for so small a workspace.
         more = MISSED * box.size
         box = Box(np.maximum(lows - more, box.lows), np.minimum(highs + more, box.highs))
-        cut = _cut_by_all(smooth, surfaces, box)
     return _finish(cut, surfaces, names, box.size)
 
 
@@ -200,12 +187,11 @@ def _cut_by_all(limits: Sequence[Smooth], surfaces: Surfaces, box: Box) -> _Cut:
     # Bits for the sides of the box, and for limits that are violated. Of two faces that coincide,
     # that of the first limit stays.
     beyond = np.zeros(count, dtype=np.int64)
-    for axis in range(3):
-        beyond |= (points[:, axis] < box.lows[axis]).astype(np.int64) << 2 * axis
-        beyond |= (points[:, axis] > box.highs[axis]).astype(np.int64) << 2 * axis + 1
-    for index, value in enumerate(values):
-        violated = value < np.where(owners > index, rounding, -rounding)
-        beyond |= violated.astype(np.int64) << index + 6
+    violations = (
+        value < np.where(owners > index, rounding, -rounding) for index, value in enumerate(values)
+    )
+    for bit, is_beyond in enumerate((*(points < box.lows).T, *(points > box.highs).T, *violations)):
+        beyond |= is_beyond.astype(np.int64) << bit
     a, b, c = faces.T
     near = faces[beyond[a] & beyond[b] & beyond[c] == 0]
     cut = _Cut(points, owners, np.zeros(count, dtype=np.int64), near)
@@ -221,11 +207,9 @@ def _snap(cut: _Cut, surfaces: Surfaces, values: FloatArray, rounding: float) ->
     Values (k, n) are the distance of each vertex from each surface, infinite from its own.
     """
     room = np.full(len(cut.vertices), np.inf)
-    for one, other in ((0, 1), (1, 2), (2, 0)):
-        ends = cut.triangles[:, one], cut.triangles[:, other]
-        lengths = np.linalg.norm(cut.vertices[ends[0]] - cut.vertices[ends[1]], axis=1)
-        for end in ends:
-            np.minimum.at(room, end, SNAP * lengths)
+    for ends in (cut.triangles[:, :2], cut.triangles[:, 1:], cut.triangles[:, ::2]):
+        lengths = np.linalg.norm(np.diff(cut.vertices[ends], axis=1)[:, 0], axis=1)
+        np.minimum.at(room, ends, SNAP * lengths[:, None])
     sizes = np.abs(values)
     sizes[sizes <= rounding] = np.inf
     nearest = sizes.argmin(axis=0)
@@ -334,15 +318,11 @@ def _compact(cut: _Cut) -> _Cut:
     return _Cut(cut.vertices[used], cut.owner[used], cut.cuts[used], number[cut.triangles])
 
 
-def _normals(vertices: FloatArray, triangles: IntArray) -> FloatArray:
-    """Return normals (m, 3) as long as twice the areas of triangles."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    return np.cross(b - a, c - a)
-
-
 def _finish(cut: _Cut, surfaces: Surfaces, names: tuple[str, ...], size: float) -> Faces:
     """Turn triangles outwards, and find the edges."""
-    across = _normals(cut.vertices, cut.triangles)
+    a, b, c = (cut.vertices[cut.triangles[:, k]] for k in range(3))
+    # Normals as long as twice the areas.
+    across = np.cross(b - a, c - a)
     is_line = dot(across, across) <= (LEAST_AREA * size**2) ** 2
     cut = _compact(replace(cut, triangles=cut.triangles[~is_line]))
     corners, across = cut.vertices[cut.triangles], across[~is_line]

@@ -111,11 +111,8 @@ def pattern(limit: BallOrCylinder | HalfSpace | Cone, box: Box) -> Facets:
     count = max(3, math.ceil(2.0 * angle * limit.radius / edge))
     turns = math.atan2(towards[1], towards[0]) + np.linspace(-angle, angle, count + 1)
     rows = _rows(box.lows[0], box.highs[0], edge)
-    points = np.empty((len(turns), len(rows), 3))
-    points[..., 0] = rows
-    points[..., 1] = (centre[0] + limit.radius * np.cos(turns))[:, None]
-    points[..., 2] = (centre[1] + limit.radius * np.sin(turns))[:, None]
-    return points.reshape(-1, 3), _grid_faces(len(turns), len(rows))
+    y, z = (centre + limit.radius * np.column_stack([np.cos(turns), np.sin(turns)])).T[..., None]
+    return _join(rows, y, z), _grid_faces(len(turns), len(rows))
 
 
 def _part_near(centre: FloatArray, radius: float, box: Box) -> tuple[FloatArray, float]:
@@ -151,15 +148,16 @@ def _rows(low: float, high: float, edge: float) -> FloatArray:
     return np.linspace(low - more, high + more, count)
 
 
+def _join(*coordinates: FloatArray | float) -> FloatArray:
+    """Return points (n, 3) with coordinates that are broadcast."""
+    return np.stack(np.broadcast_arrays(*coordinates), axis=-1).reshape(-1, 3)
+
+
 def _grid_faces(rows: int, columns: int) -> IntArray:
     """Return the faces of a grid of points, in the order of `reshape`."""
-    first: IntArray = (
-        np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1, dtype=np.int64)
-    ).ravel()
-    right, up = first + 1, first + columns
-    return np.concatenate(
-        [np.stack([first, right, up + 1], axis=1), np.stack([first, up + 1, up], axis=1)]
-    )
+    first: IntArray = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    cell = first[:, None] + np.array([0, 1, columns + 1, columns])
+    return np.concatenate([cell[:, :3], cell[:, [0, 2, 3]]])
 
 
 def _plane(normal: FloatArray, limit: HalfSpace, box: Box) -> Facets:
@@ -171,9 +169,7 @@ def _plane(normal: FloatArray, limit: HalfSpace, box: Box) -> Facets:
     flat = box.corners @ frame[:2].T
     edge = LONGEST * box.size
     u, v = (_rows(flat[:, k].min(), flat[:, k].max(), edge) for k in (0, 1))
-    points = np.empty((len(u), len(v), 3))
-    points[..., 0], points[..., 1], points[..., 2] = u[:, None], v, offset
-    return points.reshape(-1, 3) @ frame, _grid_faces(len(u), len(v))
+    return _join(u[:, None], v, offset) @ frame, _grid_faces(len(u), len(v))
 
 
 def _cone(limit: Cone, box: Box) -> Facets:
@@ -209,12 +205,7 @@ def _wedge(limit: Cone, box: Box) -> Facets:
     middle = math.atan2(limit.axis[2], limit.axis[1])
     edge = LONGEST * box.size
     x, rows = _rows(box.lows[0], box.highs[0], edge), _rows(near, far, edge)
-    points = np.empty((2, len(x), len(rows), 3))
-    for side, at in zip(points, (middle - turn, middle + turn), strict=True):
-        side[..., 0] = x[:, None]
-        side[..., 1], side[..., 2] = (
-            apex[0] + np.maximum(rows, 0.0) * math.cos(at),
-            apex[1] + np.maximum(rows, 0.0) * math.sin(at),
-        )
+    at, along = np.array([middle - turn, middle + turn])[:, None, None], np.maximum(rows, 0.0)
+    points = _join(x[:, None], apex[0] + along * np.cos(at), apex[1] + along * np.sin(at))
     faces = _grid_faces(len(x), len(rows))
-    return points.reshape(-1, 3), np.concatenate([faces, faces + len(x) * len(rows)])
+    return points, np.concatenate([faces, faces + len(x) * len(rows)])

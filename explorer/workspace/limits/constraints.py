@@ -281,13 +281,11 @@ def _balls(
     demand: Demand, centre: FloatArray, centre_rates: dict[str, FloatArray], *, is_ball: bool
 ) -> Iterator[Constraint]:
     """Yield the balls, or the cylinders, of a demand on the distance from a centre."""
-    for bound, name, inside in zip(
-        (demand.low, demand.high), demand.end_names(), (False, True), strict=True
-    ):
-        if math.isfinite(bound.value) and (inside or bound.value > 0.0):
+    for bound, name, side in demand.finite_ends():
+        if side > 0.0 or bound.value > 0.0:
             rates = {key: np.array([*rate, 0.0]) for key, rate in centre_rates.items()}
             _add_rates(rates, bound, 1.0)
-            yield BallOrCylinder(name, centre, bound.value, is_ball, inside, rates)
+            yield BallOrCylinder(name, centre, bound.value, is_ball, side > 0.0, rates)
 
 
 def _line(
@@ -314,20 +312,16 @@ def _half_spaces(
     demand: Demand, k: FloatArray, c: float, line_rates: dict[str, FloatArray]
 ) -> Iterator[Constraint]:
     """Yield the half-spaces of a demand on k·p + c."""
-    names = demand.end_names()
     if float(np.linalg.norm(k)) <= PARALLEL:
         # Lines are parallel, and their margin is zero at every position.
         yield Never(demand.name)
         return
-    for bound, name, side in zip((demand.low, demand.high), names, (-1.0, 1.0), strict=True):
-        if math.isfinite(bound.value):
-            # The offset shrinks where c grows.
-            rates = {
-                key: side * rate * np.array([1.0, 1.0, 1.0, -1.0])
-                for key, rate in line_rates.items()
-            }
-            _add_rates(rates, bound, side)
-            yield HalfSpace(name, side * k, side * (bound.value - c), rates)
+    for bound, name, side in demand.finite_ends():
+        # The offset shrinks where c grows.
+        signs = np.array([side, side, side, -side])
+        rates = {key: signs * rate for key, rate in line_rates.items()}
+        _add_rates(rates, bound, side)
+        yield HalfSpace(name, side * k, side * (bound.value - c), rates)
 
 
 def _cone(design: Design, r: FloatArray, demand: Demand, angle: LegAngle) -> Constraint:

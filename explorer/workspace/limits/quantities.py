@@ -310,6 +310,11 @@ class Demand:
         first, second = (f"{self.name} {end}".rstrip() for end in ends)
         return first, second
 
+    def finite_ends(self) -> list[tuple[Bound, str, float]]:
+        """Return the finite ends, each with its name and −1 for the low or 1 for the high one."""
+        ends = zip((self.low, self.high), self.end_names(), (-1.0, 1.0), strict=True)
+        return [end for end in ends if math.isfinite(end[0].value)]
+
     def text_of(self, value: float, **form: Any) -> str:
         """Return a value of the quantity in words; `form` as for `format_number`."""
         return f"{format_number(value, **form)}{'°' if self.angle else ''}"

@@ -81,12 +81,9 @@ class Region:
                 highs[start:] = np.minimum(highs[start:], limit.centre[start:] + limit.radius)
         for row in self.planes:
             for axis, other in ((Y, Z), (Z, Y)):
-                if row[X] == 0.0 and row[other] == 0.0:
-                    end = float(row[OFFSET] / row[axis])
-                    if row[axis] > 0.0:
-                        highs[axis] = min(float(highs[axis]), end)
-                    else:
-                        lows[axis] = max(float(lows[axis]), end)
+                if row[X] == row[other] == 0.0:
+                    tighten, ends = (np.minimum, highs) if row[axis] > 0.0 else (np.maximum, lows)
+                    ends[axis] = tighten(ends[axis], row[OFFSET] / row[axis])
         return lows, highs
 
     @property
@@ -128,18 +125,13 @@ def region_of(limits: Sequence[Constraint]) -> Region:
             low, low_limit = end, limit
     if any(isinstance(limit, Never) for limit in limits):
         high = -math.inf
+    cones = [
+        [*c.apex, *c.axis, math.cos(c.half_angle), c.flat] for c in limits if isinstance(c, Cone)
+    ]
     return Region(
-        circles=np.array(
-            [[*c.centre, c.radius, float(c.is_ball), 1.0 if c.inside else -1.0] for c in circles]
-        ),
+        circles=np.array([[*c.centre, c.radius, c.is_ball, 2.0 * c.inside - 1.0] for c in circles]),
         planes=np.array([[*c.normal, c.offset] for c in planes]).reshape(-1, PLANE_COLUMNS),
-        cones=np.array(
-            [
-                [*c.apex, *c.axis, math.cos(c.half_angle), float(c.flat)]
-                for c in limits
-                if isinstance(c, Cone)
-            ]
-        ).reshape(-1, CONE_COLUMNS),
+        cones=np.array(cones, dtype=np.float64).reshape(-1, CONE_COLUMNS),
         low=low,
         high=high,
         circle_limits=tuple(circles),
@@ -157,20 +149,17 @@ def _drop_duplicates(
     distinct: list[BallOrCylinder] = []
     is_flat = False
     for limit in balls:
-        same_surface = [other for other in distinct if _is_same(limit, other, tolerance)]
-        is_flat = is_flat or any(twin.inside != limit.inside for twin in same_surface)
-        if all(twin.inside != limit.inside for twin in same_surface):
+        sides = {
+            other.inside
+            for other in distinct
+            if other.is_ball == limit.is_ball
+            and abs(other.radius - limit.radius) <= tolerance
+            and np.abs(other.centre - limit.centre)[0 if limit.is_ball else 1 :].max() <= tolerance
+        }
+        is_flat = is_flat or (not limit.inside) in sides
+        if limit.inside not in sides:
             distinct.append(limit)
     return distinct, is_flat
-
-
-def _is_same(a: BallOrCylinder, b: BallOrCylinder, tolerance: float) -> bool:
-    off = np.abs(a.centre - b.centre)[0 if a.is_ball else 1 :]
-    return (
-        a.is_ball == b.is_ball
-        and float(off.max()) <= tolerance
-        and abs(a.radius - b.radius) <= tolerance
-    )
 
 
 def _add_plane(planes: list[HalfSpace], new: HalfSpace, tolerance: float) -> list[HalfSpace]:

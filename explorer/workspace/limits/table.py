@@ -122,11 +122,8 @@ def _length(name: str) -> Limit:
         longest = max(design.length_range(length)[1] for length in LENGTHS)
         return 0.0, max(longest, design.reach)
 
-    subjects = {
-        "": f"The length {name}",
-        " minimum": f"The least length {name}",
-        " maximum": f"The greatest length {name}",
-    }
+    words = {"": "length", " minimum": "least length", " maximum": "greatest length"}
+    subjects = {part: f"The {which} {name}" for part, which in words.items()}
     entry = Entry(name, f"Minimum and maximum of {name}.", track, least=0.0)
     return Limit(name, subjects, demands, (entry,), AT_REACH)
 
@@ -190,10 +187,13 @@ def _box(case: LimitCase) -> Iterator[Demand]:
             yield Demand(name, quantities.X + axis, *ends, symbol=f"b4 {letter}")
 
 
-def _box_track(design: Design, axis: int) -> Pair:
-    free = possible_ranges(design.with_limits(box=None)).position[axis]
-    own = design.limits.box or ((free[0],) * 3, (free[1],) * 3)
-    return min(free[0], own[0][axis]), max(free[1], own[1][axis])
+def _box_entry(axis: int, name: str) -> Entry:
+    def track(design: Design) -> Pair:
+        free = possible_ranges(design.with_limits(box=None)).position[axis]
+        own = design.limits.box or ((free[0],) * 3, (free[1],) * 3)
+        return min(free[0], own[0][axis]), max(free[1], own[1][axis])
+
+    return Entry(f"b4 {name}", f"The faces of the box across {name}.", track, axis)
 
 
 def _margins(case: LimitCase) -> Iterator[Demand]:
@@ -211,10 +211,8 @@ def _swing(joint: str, kind: str) -> Limit:
     def demands(case: LimitCase) -> Iterator[Demand]:
         if case.value is not None:
             angle = angle_from_home(case.design, leg, in_platform=joint.startswith("b"))
-            name = f"swing {joint}"
-            yield Demand(
-                name, quantities.ANGLE, high=Bound(case.value), has_ends=False, angle=angle
-            )
+            name, most = f"swing {joint}", Bound(case.value)
+            yield Demand(name, quantities.ANGLE, high=most, has_ends=False, angle=angle)
 
     hint = (
         f"Maximum angle of leg {leg + 1} in this joint from its direction in the home pose; 180 "
@@ -279,15 +277,7 @@ LIMITS: list[Limit] = [
             **{f" {axis}": f"The box for b4 along {axis}" for axis in "xyz"},
         },
         _box,
-        tuple(
-            Entry(
-                f"b4 {name}",
-                f"The faces of the box across {name}.",
-                lambda design, axis=axis: _box_track(design, axis),
-                axis,
-            )
-            for axis, name in enumerate("xyz")
-        ),
+        tuple(_box_entry(axis, name) for axis, name in enumerate("xyz")),
         Switch("Box for b4", "Keep b4 within a box."),
     ),
     Limit(

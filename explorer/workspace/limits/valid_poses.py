@@ -58,15 +58,11 @@ class Rules(NamedTuple):
         The margin is ignored if the rules demand none.
         """
         row, demands = self.row.copy(), self.demands.copy()
-        row[quantities.RADII :] = np.where(
-            row[quantities.RADII :] < 0.0,
-            row[quantities.RADII :],
-            row[quantities.RADII :] + clearance,
-        )
+        radii = row[quantities.RADII :]
+        radii[radii >= 0.0] += clearance
         low, high = demands[:, quantities.LOW], demands[:, quantities.HIGH]
-        of_margins = (demands[:, quantities.QUANTITY] >= quantities.DELTA1) & (
-            demands[:, quantities.QUANTITY] <= quantities.DELTA3
-        )
+        kind = demands[:, quantities.QUANTITY]
+        of_margins = (kind >= quantities.DELTA1) & (kind <= quantities.DELTA3)
         low[of_margins & np.isfinite(low) & (low < margin)] = margin
         high[of_margins & np.isfinite(high) & (high > -margin)] = -margin
         return Rules(row, demands)

@@ -252,9 +252,7 @@ def torsion_range(
     """
     p, sigma = one_position(position), _torsion_of(design, torsion)
     r = rotation_from_tilt_torsion([one_angle("azimuth", azimuth), one_angle("tilt", tilt), sigma])
-    # For a decreasing torsion the platform's x-axis turns towards its negative y-axis.
-    turns = np.stack([_turn_about_z(r, -1.0), _turn_about_z(r, 1.0)])
-    angles, limits = _end_of_turns(design, p, turns, tool)
+    angles, limits = _end_of_turns(design, p, _turns_about_z(r), tool)
     down, up = in_degrees(angles).tolist()
     names = names_of(design, limits)
     if names[0] is None and names[1] is None:
@@ -262,8 +260,7 @@ def torsion_range(
     if names[0] is None or names[1] is None:
         # Half a turn one way ends where the other way ends, beyond that half turn.
         half = r * np.array([-1.0, -1.0, 1.0])
-        rest = np.stack([_turn_about_z(half, -1.0), _turn_about_z(half, 1.0)])
-        angles, limits = _end_of_turns(design, p, rest, tool)
+        angles, limits = _end_of_turns(design, p, _turns_about_z(half), tool)
         # Where the half turn ends on a limit, rounding may make the start of the rest invalid.
         more, rest_names = np.maximum(np.degrees(angles), 0.0).tolist(), names_of(design, limits)
         if names[0] is None:
@@ -305,21 +302,19 @@ def _end_of_turns(
     design: Design, position: FloatArray, turns: FloatArray, tool: ArrayLike | None
 ) -> tuple[FloatArray, list[int]]:
     """Return the angles (n,) in radians at which turns (n, 3, 3, 3) end, and their limits."""
-    angles, limits = np.empty(len(turns)), np.empty(len(turns), dtype=np.int64)
-    rules = Rules.of(design).without_clearances()
-    turn_rows(
-        len(turns), *rules, arrays.for_kernel(position), one_tool(tool), turns, angles, limits
-    )
+    count = len(turns)
+    angles, limits = np.empty(count), np.empty(count, dtype=np.int64)
+    rules, p = Rules.of(design).without_clearances(), arrays.for_kernel(position)
+    turn_rows(count, *rules, p, one_tool(tool), turns, angles, limits)
     return angles, limits.tolist()
 
 
-def _turn_about_z(rotation: FloatArray, sign: float) -> FloatArray:
-    """Return the turn from a rotation about the platform's z-axis, shape (3, 3, 3)."""
-    x, y, z = rotation.T
-    still = np.column_stack([0.0 * x, 0.0 * y, z])
-    cosine = np.column_stack([x, y, 0.0 * z])
-    sine = sign * np.column_stack([y, -x, 0.0 * z])
-    return np.stack([still + cosine, 2.0 * sine, still - cosine], axis=-1)
+def _turns_about_z(rotation: FloatArray) -> FloatArray:
+    """Return the turns down and up from a rotation about the platform's z-axis, (2, 3, 3, 3)."""
+    # For a decreasing torsion the platform's x-axis turns towards its negative y-axis.
+    sine = 2.0 * np.column_stack([rotation[:, 1], -rotation[:, 0], np.zeros(3)])
+    end = rotation * np.array([-1.0, -1.0, 1.0])
+    return np.stack([np.stack([rotation, side * sine, end], axis=-1) for side in (-1.0, 1.0)])
 
 
 # Error of an angle that is computed in two ways, in degrees.
@@ -341,17 +336,15 @@ def is_connected(
     Position, tool and errors are those of `greatest_tilt`; orientations are rotations (3, 3).
     """
     p = one_position(position)
-    ends = [
-        tilt_torsion_of(checked_rotation(each)) for each in (rotation, other) if each is not None
-    ]
+    given = [each for each in (rotation, other) if each is not None]
+    ends = [tilt_torsion_of(checked_rotation(each)) for each in given]
     for azimuth, tilt, torsion in ends:
         reached = tilt_map(design, p, torsion, [azimuth], tool).tilts[0]
         if not reached >= tilt - ANGLE_TOLERANCE:
             return False
     if other is None:
         return True
+    # Without any torsion the range is NaN, which no turn is within.
     span = torsion_range(design, p, ends[0].torsion, tool=tool)
-    if math.isnan(span.low):
-        return False
     turn = (ends[1].torsion - span.low + ANGLE_TOLERANCE) % 360.0 - ANGLE_TOLERANCE
     return turn <= span.high - span.low + ANGLE_TOLERANCE

@@ -262,17 +262,14 @@ def _join(edges: list[Edge], corner: float) -> tuple[tuple[Edge, ...], ...] | No
     """Return edges joined to closed loops; None if an end has no start nearby."""
     unjoined, loops = list(edges), list[tuple[Edge, ...]]()
     while unjoined:
-        loop = [unjoined.pop()]
-        while True:
-            end = loop[-1].end
-            gap = math.dist(end, loop[0].start)
-            gaps = [math.dist(end, other.start) for other in unjoined]
-            nearest = min([gap, *gaps])
-            if nearest > corner:
+        loop, index = [unjoined.pop()], -1
+        while index != 0:
+            gaps = [math.dist(loop[-1].end, edge.start) for edge in (loop[0], *unjoined)]
+            index = gaps.index(min(gaps))
+            if gaps[index] > corner:
                 return None
-            if nearest == gap:
-                break
-            loop.append(unjoined.pop(gaps.index(nearest)))
+            if index:
+                loop.append(unjoined.pop(index - 1))
         loops.append(tuple(loop))
     return tuple(loops)
 

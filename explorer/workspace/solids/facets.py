@@ -134,15 +134,14 @@ def cylinder(
     The centre and the unit direction are in y and z, shape (2,); the angle in radians is π for
     the whole cylinder; for the step see `step_of`.
     """
-    whole = angle >= math.pi
     count = max(3, math.ceil(2.0 * angle / step))
     turns = math.atan2(towards[1], towards[0]) + np.linspace(-angle, angle, count + 1)
-    if whole:
+    if angle >= math.pi:
         turns = turns[:-1]
-    outline = centre + radius * _outward_scale(2.0 * angle / count) * np.column_stack(
-        [np.cos(turns), np.sin(turns)]
+    outline = (
+        radius * _outward_scale(2.0 * angle / count) * np.array([np.cos(turns), np.sin(turns)])
     )
-    return prism(outline, box)
+    return prism(centre + outline.T, box)
 
 
 def prism(outline: FloatArray, box: Box) -> Facets:
@@ -189,10 +188,9 @@ def wedge(apex: FloatArray, axis: FloatArray, half_angle: float, box: Box) -> Fa
     in radians is below a right angle.
     """
     width, height, wall = _far_rim(apex, half_angle, box)
-    along, across = height * axis, width * np.array([-axis[1], axis[0]])
-    far = wall * axis
-    outline = [0.0 * axis, along - across, along - across + far, along + across + far]
-    return prism(apex + np.array([*outline, along + across]), box)
+    far, across = (height + wall) * axis, width * np.array([-axis[1], axis[0]])
+    low, high = height * axis - across, height * axis + across
+    return prism(apex + np.array([0.0 * axis, low, far - across, far + across, high]), box)
 
 
 def cone(apex: FloatArray, axis: FloatArray, half_angle: float, step: float, box: Box) -> Facets:
@@ -281,32 +279,24 @@ def _stitch_rings(counts: IntArray, first: IntArray) -> IntArray:
     """
     pairs = np.arange(len(counts) - 1)
     edges = np.where(counts > 1, counts, 0)
-    sides: list[tuple[IntArray, FloatArray, IntArray]] = []
-    for side in (0, 1):
-        edge_counts = edges[pairs + side]
-        pair = np.repeat(pairs, edge_counts)
-        sides.append(
-            (
-                pair,
-                (_positions_in_groups(edge_counts) + 0.5) / np.repeat(edge_counts, edge_counts),
-                np.full(len(pair), side),
-            )
-        )
-    pair, middle, side = (np.concatenate(both) for both in zip(*sides, strict=True))
+    # The edges of the inner ring of each pair come first, then those of the outer one.
+    edge_counts = np.concatenate([edges[:-1], edges[1:]])
+    pair = np.repeat(np.concatenate([pairs, pairs]), edge_counts)
+    side = np.repeat([0, 1], [edges[:-1].sum(), edges[1:].sum()])
+    middle = (_positions_in_groups(edge_counts) + 0.5) / np.repeat(edge_counts, edge_counts)
     order = np.lexsort((side, middle, pair))
     pair, side = pair[order], side[order]
     starts = np.searchsorted(pair, pairs)
-    passed: list[IntArray] = []
-    for ring in (0, 1):
-        edges_before = np.cumsum(side == ring) - (side == ring)
-        passed.append(edges_before - edges_before[starts][pair])
-    inner, outer = counts[pair], counts[pair + 1]
-    inner_point, outer_point = first[pair] + passed[0] % inner, first[pair + 1] + passed[1] % outer
-    third_point = np.where(
-        side == 0, first[pair] + (passed[0] + 1) % inner, first[pair + 1] + (passed[1] + 1) % outer
-    )
+    rings = np.array([side == 0, side == 1])
+    before = np.cumsum(rings, axis=1) - rings
+    passed: IntArray = before - before[:, starts[pair]]
+    ring = np.stack([pair, pair + 1])
+    points: IntArray = first[ring] + passed % counts[ring]
+    following: IntArray = first[ring] + (passed + 1) % counts[ring]
     # Rings go from the pole outwards, each counter-clockwise about z.
-    return np.column_stack([inner_point, outer_point, third_point])
+    faces = np.empty((len(side), 3), dtype=np.int64)
+    faces[:, :2], faces[:, 2] = points.T, following[side, np.arange(len(side))]
+    return faces
 
 
 def _positions_in_groups(counts: IntArray) -> IntArray:

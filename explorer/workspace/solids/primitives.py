@@ -137,11 +137,8 @@ def primitives_of(limits: Sequence[Constraint], frame: Frame) -> list[Primitive]
     # The box ends on surfaces of limits, to rounding. The block extends beyond them, so that
     # rounding does not decide whether all of the block satisfies a limit.
     block = box.surroundings()
-    planes = [
-        end
-        for end in (region.low_limit, region.high_limit, *region.plane_limits)
-        if end is not None
-    ]
+    ends = (region.low_limit, region.high_limit)
+    planes = (*filter(None, ends), *region.plane_limits)
     primitives = [Primitive("", False, 12, block.mesh)]
     for primitive in (
         *(_half_space(plane, box, block, frame) for plane in planes),
@@ -188,21 +185,17 @@ def _balls_and_cylinders(
                 bounding.append((limit, radius))
         if not bounding:
             continue
-        parts = [
-            facets.facing_part(centre, radius, frame.box, frame.chord) for _, radius in bounding
-        ]
-        angle = max(part[1] for part in parts)
-        step = facets.step_of(max(radius for _, radius in bounding), frame.chord)
+        radii = [radius for _, radius in bounding]
+        parts = [facets.facing_part(centre, radius, frame.box, frame.chord) for radius in radii]
+        towards, angle = parts[0][0], max(part[1] for part in parts)
+        step = facets.step_of(max(radii), frame.chord)
         for limit, radius in bounding:
-            towards = parts[0][0]
             if limit.is_ball:
                 faces = facets.ball_faces(angle, step)
                 tessellate = partial(facets.ball, centre, radius, towards, angle, step)
             else:
-                faces = math.ceil(8.0 * angle / step)
-                tessellate = partial(
-                    facets.cylinder, centre, radius, towards, angle, step, frame.box
-                )
+                faces, args = math.ceil(8.0 * angle / step), (centre, radius, towards, angle, step)
+                tessellate = partial(facets.cylinder, *args, frame.box)
             yield Primitive(limit.name, not limit.inside, faces, tessellate)
 
 
@@ -222,18 +215,14 @@ def _cone(limit: Cone, frame: Frame) -> Primitive | bool:
         return True
     farthest = frame.box.distances(apex)[1]
     if abs(math.cos(angle)) * farthest <= FLAT * frame.chord:
-        offset = -float(axis @ apex)
-        return Primitive(
-            limit.name, False, 12, partial(facets.half_space, -axis, offset, frame.box)
-        )
+        plane = partial(facets.half_space, -axis, -float(axis @ apex), frame.box)
+        return Primitive(limit.name, False, 12, plane)
     is_cut = angle > 0.5 * math.pi
     if is_cut:
         axis, angle = -axis, math.pi - angle
-    if limit.flat:
-        tessellate = partial(facets.wedge, apex[1:], axis[1:], angle, frame.box)
-        return Primitive(limit.name, is_cut, 16, tessellate)
     step = facets.step_of(farthest, frame.chord)
-    faces = math.ceil(12.0 * math.pi / step)
-    return Primitive(
-        limit.name, is_cut, faces, partial(facets.cone, apex, axis, angle, step, frame.box)
-    )
+    faces, tessellate = 16, partial(facets.wedge, apex[1:], axis[1:], angle, frame.box)
+    if not limit.flat:
+        faces = math.ceil(12.0 * math.pi / step)
+        tessellate = partial(facets.cone, apex, axis, angle, step, frame.box)
+    return Primitive(limit.name, is_cut, faces, tessellate)

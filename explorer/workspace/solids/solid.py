@@ -74,8 +74,7 @@ class Solid:
         if self.is_empty:
             return 0.0
         lows, highs = self.ends
-        middle = 0.5 * (lows + highs)
-        a, b, c = ((self.vertices - middle)[self.faces[:, k]] for k in range(3))
+        a, b, c = ((self.vertices - 0.5 * (lows + highs))[self.faces[:, k]] for k in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
     @cached_property
@@ -87,20 +86,16 @@ class Solid:
     @cached_property
     def is_watertight(self) -> bool:
         """Whether each edge is used exactly twice, in opposite directions."""
-        if self.is_empty:
-            return False
         edges = self.faces.astype(np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
         count = len(self.vertices)
         there, back = np.sort(edges @ [count, 1]), np.sort(edges @ [1, count])
-        return bool((np.diff(there) > 0).all() and (there == back).all())
+        return bool(len(there) and (np.diff(there) > 0).all() and (there == back).all())
 
     def winding(self, point: FloatArray) -> float:
         """Return the winding number of the faces about a point (3,): 1 inside, 0 outside.
 
         It is the sum of the solid angles of the faces (A. Van Oosterom and J. Strackee, 1983).
         """
-        if self.is_empty:
-            return 0.0
         a, b, c = ((self.vertices - point)[self.faces[:, k]] for k in range(3))
         x, y, z = (np.linalg.norm(v, axis=1) for v in (a, b, c))
         over = np.einsum("ij,ij->i", a, np.cross(b, c))
@@ -210,15 +205,13 @@ def carved_solid(
     names = tuple(dict.fromkeys((*whole.limits, *(n for s in carved for n in s.names))))
     pieces = [body] if seed is None else body.decompose() or [body]
     parts = [replace(solid_of(part, origins, frame, names), agrees=whole.agrees) for part in pieces]
+    at = np.zeros(3) if seed is None else seed
 
     def nearness(part: Solid) -> tuple[float, float]:
-        if seed is None:
-            return 0.0, 0.0
         # Rounding may put the seed on the surface or outside; the nearest vertex then decides.
-        distance = float(np.linalg.norm(part.vertices - seed, axis=1).min())
-        return round(part.winding(seed), 1), -distance
+        return round(part.winding(at), 1), -float(np.linalg.norm(part.vertices - at, axis=1).min())
 
-    solid = parts[0] if seed is None else max(parts, key=nearness)
+    solid = max(parts, key=nearness) if len(parts) > 1 else parts[0]
     limit_of_face = solid.limit_of_face.copy()
     for index, surface in enumerate(carved, len(whole.limits)):
         faces = np.flatnonzero(solid.limit_of_face == index)
@@ -238,8 +231,7 @@ def _below_zero(surface: Surface, frame: Frame, face_id: int, near: Manifold) ->
     if near.is_empty():
         return Manifold()
     untyped: Any = near
-    box = np.array(untyped.bounding_box(), dtype=np.float64)
-    ends = frame.to_design(box.reshape(2, 3))
+    ends = frame.to_design(np.reshape(untyped.bounding_box(), (2, 3)))
     nodes = (ends - surface.lows) / surface.step
     first = np.maximum(np.floor(nodes[0]).astype(np.int64) - AROUND, 0)
     end = np.ceil(nodes[1]).astype(np.int64) + AROUND + 1

@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.workspace.limits.constraints import (
     Constraint,
     HalfSpace,
@@ -71,11 +70,10 @@ def workspace_solid(
     """
     r = orientation_of(design, rotation)
     limits = constraints(design, r, signs)
-    exact = (
-        exact_volume(limits, COLUMNS)
-        if volume is None
-        else ExactVolume(volume.volume, 2.0 * volume.error)
-    )
+    if volume is None:
+        exact = exact_volume(limits, COLUMNS)
+    else:
+        exact = ExactVolume(volume.volume, 2.0 * volume.error)
     solid = _make_agreeing_solid(limits, frame_of([limits], design.reach, tolerance), exact)
     return replace(solid, empty_because=find_emptying_limits(limits)) if solid.is_empty else solid
 
@@ -102,10 +100,13 @@ def inclusive_solid(
     bodies, _ = _make_bodies(families, frame, names)
     vertices, faces, _ = mesh_of(union(bodies))
     points = frame.to_design(vertices)
-    limits = [limit for family in families for limit in family]
-    solid = Solid(
-        points, faces, _nearest_limits(limits, points, faces, names), names, frame.tolerance
-    )
+    # The simplified union has lost the limits of its faces: each gets that of the nearest surface.
+    nearest, least = np.zeros(len(faces), dtype=np.int64), np.full(len(faces), np.inf)
+    for limit in (limit for family in families for limit in family):
+        off = limit.distance(points)[faces].max(axis=1)
+        nearest[off < least] = names.index(limit.name)
+        least = np.minimum(off, least)
+    solid = Solid(points, faces, nearest, names, frame.tolerance)
     if not solid.is_empty:
         return solid
     because = dict.fromkeys(name for family in families for name in find_emptying_limits(family))
@@ -181,9 +182,7 @@ def _make_bodies(
     from manifold3d import Manifold, OpType
 
     primitives_of_families = [primitives_of(limits, frame) for limits in families]
-    faces = sum(
-        primitive.faces for primitives in primitives_of_families for primitive in primitives
-    )
+    faces = sum(primitive.faces for family in primitives_of_families for primitive in family)
     if faces > MOST_FACES:
         # The number of faces of a ball is inverse to the tolerance; other solids have fewer.
         least = frame.tolerance * faces / MOST_FACES
@@ -195,8 +194,7 @@ def _make_bodies(
     origins: dict[int, int] = {}
     bodies: list[Manifold] = []
     for primitives in primitives_of_families:
-        common: list[Manifold] = []
-        cut: list[Manifold] = []
+        common, cut = list[Manifold](), list[Manifold]()
         for primitive in primitives:
             face_id = Manifold.reserve_ids(1)
             if primitive.name:
@@ -207,22 +205,6 @@ def _make_bodies(
         whole = Manifold.batch_boolean(common or [Manifold()], OpType.Intersect)
         bodies.append(Manifold.batch_boolean([whole, *cut], OpType.Subtract))
     return bodies, origins
-
-
-def _nearest_limits(
-    limits: Sequence[Constraint],
-    vertices: FloatArray,
-    faces: NDArray[np.int32],
-    names: tuple[str, ...],
-) -> IntArray:
-    """Return the indices of the names of the limits on whose surfaces faces lie, shape (m,)."""
-    nearest = np.zeros(len(faces), dtype=np.int64)
-    least = np.full(len(faces), np.inf)
-    for limit in limits:
-        off = limit.distance(vertices)[faces].max(axis=1)
-        nearest[off < least] = names.index(limit.name)
-        least = np.minimum(off, least)
-    return nearest
 
 
 @dataclass(frozen=True)

@@ -137,15 +137,10 @@ def marked_radii(curve: RadiusCurve, radius: float | None) -> tuple[float | None
     return radius, curve.radius_at(SHARE), curve.harmless
 
 
-def volume_at(curve: RadiusCurve, radius: float) -> float:
-    """Return the accessible volume at a radius; 0 beyond the last radius of the curve."""
-    return float(np.interp(radius, *_without_drop(curve), right=0.0))
-
-
-def _without_drop(curve: RadiusCurve) -> tuple[FloatArray, FloatArray]:
-    """Return distinct radii and their volumes, without the drop to 0 at the last radius."""
-    first = np.append(True, np.diff(curve.radii) > 0.0)
-    return curve.radii[first], curve.volumes[first]
+def volume_at(curve: RadiusCurve, radius: float | FloatArray) -> FloatArray:
+    """Return the accessible volumes at radii (...); 0 beyond the last radius of the curve."""
+    # The last radius comes twice; its second volume is the drop to 0.
+    return np.asarray(np.interp(radius, curve.radii[:-1], curve.volumes[:-1], right=0.0))
 
 
 def chart_columns(curve: RadiusCurve, radius: float | None) -> tuple[FloatArray, ...]:
@@ -157,18 +152,15 @@ def chart_columns(curve: RadiusCurve, radius: float | None) -> tuple[FloatArray,
     marked = [mark for mark in marks if mark is not None]
     last = float(curve.radii[-1])
     end = max(BEYOND_LAST * last, BEYOND_PRESENT * max(marked))
-    radii, volumes = _without_drop(curve)
-    inner = np.unique([*radii, *(mark for mark in marked if mark <= last)])
-    outer = np.unique([last, *(mark for mark in marked if mark > last), end])
-    x = np.concatenate([inner, outer])
-    y = np.concatenate([np.interp(inner, radii, volumes), np.zeros(len(outer))])
-    columns = [x, y]
-    for mark in marks:
-        column = np.full(len(x), np.nan)
+    x = np.unique([*curve.radii, *marked, end])
+    drop = int(np.searchsorted(x, last)) + 1
+    x, y = np.insert(x, drop, last), np.insert(volume_at(curve, x), drop, 0.0)
+    columns = np.full((len(marks), len(x)), np.nan)
+    for column, mark in zip(columns, marks, strict=True):
         if mark is not None:
-            column[np.searchsorted(x, mark)] = volume_at(curve, mark)
-        columns.append(column)
-    return tuple(columns)
+            at = np.searchsorted(x, mark)
+            column[at] = y[at]
+    return x, y, *columns
 
 
 def radius_words(frame: Frame, feed: Feed[Selection, RadiusCurve | Trouble]) -> str:
@@ -202,16 +194,16 @@ def first_collision(curve: RadiusCurve, reach: float) -> str:
     closest = float(least.clearance.min())
     if not np.isfinite(closest):
         return "No two legs can meet."
-    first = np.flatnonzero(least.clearance <= closest)
-    meetings = [
-        f"legs {i} and {j} at {_position(least.position[pair])}"
-        for pair, (i, j) in ((int(pair), PAIRS[pair]) for pair in first)
-    ]
+    first = np.flatnonzero(least.clearance <= closest).tolist()
+    meetings = "; ".join(
+        f"legs {PAIRS[pair][0]} and {PAIRS[pair][1]} at {_position(least.position[pair])}"
+        for pair in first
+    )
     if closest > 0.0:
-        return f"First collision within the limits: {'; '.join(meetings)}."
+        return f"First collision within the limits: {meetings}."
     on_base = np.abs(least.position[first, 2]).max() <= 1e-6 * reach
     where = ", where z = 0" if on_base else ""
-    return f"Even without radii legs touch within the limits{where}: {'; '.join(meetings)}."
+    return f"Even without radii legs touch within the limits{where}: {meetings}."
 
 
 def _row(name: str, colour: Rgb, radius: float | None, curve: RadiusCurve, unit_mm: float) -> str:
@@ -219,7 +211,7 @@ def _row(name: str, colour: Rgb, radius: float | None, curve: RadiusCurve, unit_
     if radius is not None:
         value, note = format_number(radius, 3), f"{format_number(radius * unit_mm, 3)} mm"
         if name == MARKS[0][0]:
-            share = volume_at(curve, radius) / float(curve.volumes[0])
+            share = float(volume_at(curve, radius) / curve.volumes[0])
             note = f"{format_number(100.0 * share, 3)} %"
     return row(f"{swatch(colour, 'ex-dot')}{name}", value, dim(note))
 

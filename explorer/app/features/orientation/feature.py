@@ -32,7 +32,6 @@ from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.singularity.colours import Rgb
-from explorer.workspace.orientations.share import OrientationShare
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,
     greatest_tilt,
@@ -56,6 +55,7 @@ BOUNDS = {
     "inclusive": ("at least", "positions that have only others of the range are left out."),
     "total": ("at most", "positions that lack only others of the range are in it."),
 }
+NO_NODES: BoolArray = np.zeros(0, dtype=np.bool_)
 # Tilt below which the azimuth has no effect, in degrees.
 LEVEL = 1e-6
 
@@ -81,7 +81,7 @@ class OrientationPanel:
                 HINTS[axis],
                 item(lambda frame: frame.state.tilt_torsion, axis, work.SetTiltTorsion),
                 SPANS[axis],
-                disabled=_is_level if axis == 0 else None,
+                disabled=None if axis else lambda state: state.tilt_torsion.tilt < LEVEL,
             )
         self._strip = gui.add_html("")
         with gui.add_folder("Over the workspace"):
@@ -155,13 +155,8 @@ class OrientationPanel:
         """Turn the platform to a torsion that a page sent, in degrees."""
         torsion: float | None = decode_text(text, _TORSION)
         if torsion is not None:
-            self._session.do(
-                work.SetTiltTorsion(work.ANGLES.index("torsion"), torsion), who=client.client_id
-            )
-
-
-def _is_level(state: State) -> bool:
-    return state.tilt_torsion.tilt < LEVEL
+            action = work.SetTiltTorsion(work.ANGLES.index("torsion"), torsion)
+            self._session.do(action, who=client.client_id)
 
 
 def _has_range(state: State) -> bool:
@@ -186,7 +181,10 @@ def summary(
         )
     share = best = "…"
     if feed.drawing is not None:
-        share = share_words(feed.drawing.share)
+        found = feed.drawing.share
+        share = f"{100.0 * found.share:.2f} % ± {100.0 * found.standard_error:.2f} %"
+        if found.share in (0.0, 1.0):
+            share = f"{'all' if found.share else 'none'} of {found.orientations:,}"
         best = best_words(feed.drawing.by_torsion.best, tilt_here(feed, here, least))
     if feed.problem is not None:
         share = best = "unknown"
@@ -226,13 +224,6 @@ def tilt_here(feed: work.PositionFeed, here: TiltTorsion, least: GreatestTilt) -
     if feed.drawing is None or feed.is_current:
         return least.tilt
     return maps.tilt_at(feed.drawing.by_torsion, here.torsion)
-
-
-def share_words(share: OrientationShare) -> str:
-    """Return a share of all orientations in words."""
-    if share.share in (0.0, 1.0):
-        return f"{'all' if share.share else 'none'} of {share.orientations:,}"
-    return f"{100.0 * share.share:.2f} % ± {100.0 * share.standard_error:.2f} %"
 
 
 def best_words(best: GreatestTilt, tilt: float) -> str:
@@ -295,10 +286,9 @@ class OrientationScene(ScenePart):
         view, scale = placed.frame.state.view.orientation, placed.scale
         tilts = self._tilts.drawing if view.tilts else None
         cut = placed.frame.state.view.workspace
-        visible = None if tilts is None else nodes_beside_cut(tilts, cut)
-        has_points = visible is not None and bool(visible.any())
-        yield self._points, "visible", has_points
-        if tilts is not None and has_points:
+        visible = NO_NODES if tilts is None else nodes_beside_cut(tilts, cut)
+        yield self._points, "visible", bool(visible.any())
+        if tilts is not None and visible.any():
             yield self._points, "points", (scale * tilts.positions[visible]).astype(np.float32)
             yield self._points, "colors", maps.colours_of(tilts.tilts[visible], maps.most_of(tilts))
             yield self._points, "point_size", POINT_SHARE * scale * tilts.step
@@ -315,10 +305,8 @@ class OrientationScene(ScenePart):
         tilts, ranged = self._tilts.drawing, self._ranges.drawing
         drawn = [tilts.positions] if tilts is not None else []
         drawn += [ranged.solid.vertices] if ranged is not None else []
-        ends = [np.array([p.min(axis=0), p.max(axis=0)]) for p in drawn if len(p)]
-        if not ends:
-            return NO_POINTS
-        return placed.scale * np.concatenate([corners_of(box) for box in ends])
+        boxes = [corners_of(np.array([p.min(axis=0), p.max(axis=0)])) for p in drawn if len(p)]
+        return placed.scale * np.concatenate([NO_POINTS, *boxes])
 
 
 def nodes_beside_cut(drawing: work.TiltsDrawing, view: WorkspaceView) -> BoolArray:

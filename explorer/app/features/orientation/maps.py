@@ -90,9 +90,8 @@ def colour_of(limit: str | None) -> Rgb:
 
 def edge_of(tilts: TiltMap, here: TiltTorsion, home: TiltTorsion) -> float:
     """Return the tilt at the edge of the map, in degrees."""
-    finite = [tilt for tilt in tilts.tilts.tolist() if math.isfinite(tilt)]
-    largest = max([LEAST_EDGE, here.tilt, home.tilt, *finite])
-    return min(180.0, _round_up(largest))
+    largest = float(np.nan_to_num(tilts.tilts).max())
+    return min(180.0, _round_up(max(LEAST_EDGE, here.tilt, home.tilt, largest)))
 
 
 def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: TiltTorsion) -> str:
@@ -170,29 +169,21 @@ def _least(least: GreatestTilt, edge: float) -> Iterator[str]:
 
 def _region(tilts: TiltMap, edge: float) -> Iterator[str]:
     """Yield the tilts that are possible, and their border in the colours of the limits."""
-    values = [t if math.isfinite(t) else 0.0 for t in tilts.tilts.tolist()]
-    points = [_place(a, t, edge) for a, t in zip(tilts.azimuths.tolist(), values, strict=True)]
-    outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+    azimuths, values = np.radians(tilts.azimuths), np.nan_to_num(tilts.tilts) * RADIUS / edge
+    x, y = CENTRE[0] + values * np.cos(azimuths), CENTRE[1] - values * np.sin(azimuths)
+    points = np.column_stack([x, y])
+    outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in points.tolist())
     yield f'<polygon class="possible" points="{outline}"/>'
-    middles = [
-        (0.5 * (x + u), 0.5 * (y + v))
-        for (x, y), (u, v) in zip(points, [*points[1:], points[0]], strict=True)
-    ]
+    middles = 0.5 * (points + np.roll(points, -1, axis=0))
+    parts = np.stack([np.roll(middles, 1, axis=0), points, middles], axis=1)
     for limit, group in itertools.groupby(range(len(points)), lambda k: tilts.limits[k]):
-        part = [at for k in group for at in (middles[k - 1], points[k], middles[k])]
-        path = "L".join(f"{x:.1f} {y:.1f}" for x, y in part)
+        path = "L".join(f"{x:.1f} {y:.1f}" for x, y in parts[[*group]].reshape(-1, 2).tolist())
         yield f'<path class="border" stroke="{css(colour_of(limit))}" d="M{path}"/>'
 
 
 def tilt_at(by_torsion: TiltByTorsion, torsion: float) -> float:
     """Return the tilt at a torsion between those of the row; NaN where no tilt is possible."""
-    count = len(by_torsion.tilts)
-    # Without full turns first, since a torsion may be as large as any number.
-    turned = math.remainder(torsion, 360.0) - float(by_torsion.torsions[0])
-    place = turned * count / 360.0 % count
-    left, share = int(place), place % 1.0
-    tilts = by_torsion.tilts.tolist()
-    return (1.0 - share) * tilts[left % count] + share * tilts[(left + 1) % count]
+    return float(np.interp(torsion, by_torsion.torsions, by_torsion.tilts, period=360.0))
 
 
 def torsion_strip(by_torsion: TiltByTorsion, torsion: float, tilt: float) -> str:

@@ -25,6 +25,7 @@ from explorer.mechanism.tilt_torsion import (
 )
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
+from explorer.workspace.accessible.nodes import make_cell_grid
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.orientations.share import (
     OrientationShare,
@@ -149,10 +150,8 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
     if ends is None:
         return TiltsDrawing(np.zeros((0, 3)), np.zeros(0), 0.0)
     lows, highs = np.array(ends) + tool_offset(rotation, request.tool)
-    # Nodes in the middle of cells: on the surface of the workspace no tilt is left.
-    shares = (np.arange(NODES) + 0.5) / NODES
-    axes = [low + shares * (high - low) for low, high in zip(lows, highs, strict=True)]
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    # On the surface of the workspace no tilt is left.
+    nodes = make_cell_grid(lows, highs, NODES).positions.reshape(-1, 3)
     parts: list[FloatArray] = []
     for index, part in enumerate(np.array_split(nodes, PARTS)):
         watch("greatest tilts", index / PARTS)
@@ -197,10 +196,9 @@ def orientations_over(request: RangeRequest) -> FloatArray:
 
 def range_solid(request: RangeRequest) -> RangeDrawing:
     """Return the workspace over a range of orientations."""
-    design = request.design
     make = inclusive_solid if request.over == "inclusive" else total_solid
-    tolerance = LIVE_TOLERANCE * design.reach
-    solid = make(design, orientations_over(request), tolerance, request.tool)
+    tolerance = LIVE_TOLERANCE * request.design.reach
+    solid = make(request.design, orientations_over(request), tolerance, request.tool)
     return RangeDrawing(request, solid)
 
 

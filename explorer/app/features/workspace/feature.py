@@ -296,29 +296,28 @@ def _sender(what: feeds.Exported) -> Callable[[Services], Callable[[str, Who], N
     )
 
 
-class VolumeFigure:
-    """The volume of the workspace within the limits, dim while a newer one is computed."""
+def volume_figure(services: Services) -> Callable[[Frame], str]:
+    """Return the figure of the volume within the limits, dim while a newer one is computed."""
+    feed = services.get(feeds.VOLUME_FEED)
 
-    def __init__(self, services: Services) -> None:
-        self._feed = services.get(feeds.VOLUME_FEED)
-
-    def __call__(self, frame: Frame) -> str:
-        """Return the figure for a frame, as HTML."""
-        drawing, name = self._feed.drawing, "Volume"
+    def figure_of(frame: Frame) -> str:
+        drawing, name = feed.drawing, "Volume"
         which = feeds.orientation_word(frame)
         hint = f"Exact volume of the workspace within the limits, in the {which} orientation."
         if drawing is not None:
             name += feeds.turned_suffix(drawing.request.design, drawing.request.rotation)
             if drawing.measured.volume <= 0.0:
                 hint += f" It is emptied by: {', '.join(drawing.measured.empty_because)}."
-        look = look_of(self._feed)
-        return figure("Workspace", name, texts.volume_text(drawing), hint=hint, look=look)
+        text, look = texts.volume_text(drawing), look_of(feed)
+        return figure("Workspace", name, text, hint=hint, look=look)
+
+    return figure_of
 
 
 WORKSPACE = Feature(
     "workspace",
     tabs=(Tab("analyse", "Workspace", WorkspacePanel, viser.Icon.SPHERE),),
-    bar=(InBar("middle", VolumeFigure),),
+    bar=(InBar("middle", volume_figure),),
     exports=(
         Export(
             "Workspace",

@@ -21,6 +21,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, Rgb, band_colours, proximity_colour
 from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.workspace.faces.surfaces import Surfaces
 from explorer.workspace.limits import constraints as limits
 from explorer.workspace.position_bands import SHARE_COLOURS, STEP_COLOURS
 
@@ -143,7 +144,8 @@ def _most_broken(frame: Frame) -> tuple[str, float, FloatArray] | None:
     slack, limit = min(broken, key=lambda pair: pair[0])
     if slack >= -state.design.tolerance:
         return None
-    return limit.name, slack, np.array([p, _nearest(limit, p)]) + state.offset(rotation)
+    (distance,), (inward,) = Surfaces([limit]).distances(p[None], np.zeros(1, dtype=np.int64))
+    return limit.name, slack, np.array([p, p - distance * inward]) + state.offset(rotation)
 
 
 class _SingularPlane:
@@ -213,15 +215,3 @@ def _scale_hull(drawing: work.WorkspaceDrawing, scale: float) -> Drawn | None:
 def _scale_shell(shell: Shell, scale: float) -> Drawn:
     vertices = np.asarray(shell.vertices * scale, dtype=np.float32)
     return vertices, np.asarray(shell.faces, dtype=np.uint32)
-
-
-def _nearest(limit: limits.BallOrCylinder | limits.HalfSpace, p: FloatArray) -> FloatArray:
-    """Return the position nearest to p on the surface of a limit."""
-    if isinstance(limit, limits.HalfSpace):
-        excess = float(limit.normal @ p) - limit.offset
-        return p - limit.normal * excess / float(limit.normal @ limit.normal)
-    axes = np.array([1.0 if limit.is_ball else 0.0, 1.0, 1.0])
-    off = (p - limit.centre) * axes
-    distance = float(np.linalg.norm(off))
-    outward = off / distance if distance > 0.0 else np.array([0.0, 0.0, 1.0])
-    return p + outward * (limit.radius - distance)

@@ -149,18 +149,10 @@ def slice_map(
         loops = [loop for solid in (whole, part) for loop in cut_loops(solid, (first, second))]
     drawn = slices.map(axis, level, "workspace-slice", loops)
     (u0, v0), (u1, v1) = (ends[[first, second]].tolist() for ends in (slices.lows, slices.highs))
-    return SliceMap(
-        axis,
-        level,
-        (u0, v0),
-        (u1, v1),
-        slices.own_scale,
-        as_html(drawn),
-        left_out,
-        # A copy without its bands, whose functions cannot leave the worker.
-        replace(colouring),
-        np.zeros(3),
-    )
+    # A copy of the colouring has no bands, whose functions cannot leave the worker.
+    colouring, scale, markup = replace(colouring), slices.own_scale, as_html(drawn)
+    ends = (u0, v0), (u1, v1)
+    return SliceMap(axis, level, *ends, scale, markup, left_out, colouring, np.zeros(3))
 
 
 def cut_loops(solid: Solid, axes: tuple[int, int]) -> list[FloatArray]:

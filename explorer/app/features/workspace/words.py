@@ -129,16 +129,11 @@ def workspace_details(
     drawing = feed.drawing
     if drawing is None:
         return markup.note("Show the solid or the hull to see its numbers.")
-    part = drawing.part
-    parts = [_numbers(drawing, frame.state)]
+    part, parts = drawing.part, list[str]()
     if drawing.mesh_agrees is False:
-        parts.insert(
-            0,
-            markup.alert(
-                "The solid is not quite the workspace",
-                "The workspace is too thin for its triangles: their volume is not the exact one.",
-            ),
-        )
+        why = "The workspace is too thin for its triangles: their volume is not the exact one."
+        parts.append(markup.alert("The solid is not quite the workspace", why))
+    parts.append(_numbers(drawing, frame.state))
     if part is not None and part.pairs and drawing.volume > 0.0:
         clearances = workspace_clearances(part.pairs, drawing.request.design)
         parts += [content_of(block, {}) for block in clearances]
@@ -202,14 +197,10 @@ def legend(measure: Measure, warn_below: float, drawing: work.WorkspaceDrawing |
         name = "1 / cond J" if measure == "condition" else "Smallest |δ| (units)"
         colours = band_colours()
         # All bands are drawn equally wide, so the values at their edges are not evenly spaced.
-        edges = [
-            (100.0 * index / len(colours), format_number(BAND_EDGES[index] * warn_below, 2))
-            for index in (0, 2, 4, 6, 9)
-        ]
+        marked = {k: format_number(BAND_EDGES[k] * warn_below, 2) for k in (0, 2, 4, 6, 9)}
+        edges = [(100.0 * k / len(colours), text) for k, text in marked.items()]
     width = 100.0 / len(colours)
-    stops = ",".join(
-        f"{css(band)} 0 {width * (index + 1):g}%" for index, band in enumerate(colours)
-    )
+    stops = ",".join(f"{css(band)} 0 {width * k:g}%" for k, band in enumerate(colours, 1))
     marks = ""
     if drawing is not None and drawing.slice_map is not None:
         if any(drawing.request.design.limits.leg_radii):

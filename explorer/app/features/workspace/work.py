@@ -99,10 +99,9 @@ class Trouble:
 
 def trouble_of(error: ExplorerError) -> Trouble:
     """Return an error of the library as a trouble."""
-    nearest = error.nearest if isinstance(error, StartError) else None
-    if nearest is None:
+    if not isinstance(error, StartError) or error.nearest is None:
         return Trouble(str(error))
-    x, y, z = nearest.tolist()
+    x, y, z = error.nearest.tolist()
     return Trouble(str(error), (x, y, z))
 
 
@@ -288,8 +287,7 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
             part, solid = answer
     whole_extent = extent = None if whole.is_empty else extent_of(design, rotation)
     if part is not None:
-        corners = solid.vertices
-        extent = None if solid.is_empty else (corners.min(axis=0), corners.max(axis=0))
+        extent = None if solid.is_empty else solid.ends
     shown, mapped, cut, level = solid, None, None, 0.0
     if request.cut is not None and extent is not None:
         axis = maps.AXES.index(request.cut)
