@@ -33,6 +33,7 @@ from explorer.app.features.optimise.actions import (
     Revert,
     SetRequest,
     StartRun,
+    TakePaperBox,
 )
 from explorer.app.features.optimise.buttons import ACCEPT, CANCEL, HULL, LIFT, PAPER, REVERT, START
 from explorer.app.features.optimise.feature import (
@@ -60,6 +61,7 @@ from explorer.app.features.optimise.work import (
     box_within,
     complete_request,
     find_refusals,
+    is_paper_box_on_offer,
     liftable_limits,
     optimise,
     problem_of,
@@ -387,6 +389,7 @@ def test_run_from_an_undecided_result_still_reverts_to_the_own_design() -> None:
         Open(OPTIMAL),
         Reset(),
         LiftLimit("box"),
+        TakePaperBox(),
     ],
 )
 def test_design_cannot_be_changed_while_a_run_goes_on(action: Action) -> None:
@@ -498,6 +501,15 @@ def test_limit_that_rules_a_search_out_is_lifted_by_one_press(
     after = LiftLimit(limit).apply(before)
     assert limit not in {refusal.limit for refusal in find_refusals(after)}
     assert after.design.home_pose == design.home_pose
+
+
+def test_paper_box_allows_the_search_and_keeps_the_home() -> None:
+    before = ask(SMALL, open_state(INITIAL))
+    after = TakePaperBox().apply(before)
+    assert is_paper_box_on_offer(before)
+    assert find_refusals(before) != ()
+    assert find_refusals(after) == ()
+    assert after.design.home_pose == INITIAL.home_pose
 
 
 def test_tilt_is_demanded_over_the_required_box() -> None:

@@ -30,7 +30,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
 from explorer.optimise import conflicts, defaults
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.problem import MAXIMA, SWING_LIMIT, YAW
+from explorer.optimise.problem import MAXIMA, SWING_LIMIT, YAW, with_box
 
 SUFFIX = "-optimised"
 LIMIT_NAMES = {SWING_LIMIT: "bounds of the swing", "margin": "least margin"}
@@ -126,6 +126,18 @@ class LiftLimit(Action):
         if design is None:
             raise InputError(f"the design has no limit named {self.limit!r} to lift")
         return replace(state, design=design)
+
+
+@dataclass(frozen=True)
+class TakePaperBox(Action):
+    """Bound the design by the box of the paper's optimum; its home pose stays where it is."""
+
+    template: ClassVar[str] = "Take the paper's box"
+
+    def apply(self, state: State) -> State:
+        """Return the next state; refuse while the design is being optimised."""
+        check_free(state)
+        return replace(state, design=with_box(state.design, conflicts.PAPER_BOX))
 
 
 @dataclass(frozen=True)

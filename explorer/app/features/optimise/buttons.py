@@ -15,7 +15,11 @@ from explorer.app.features.designs.feature import send_design
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise import actions
 from explorer.app.features.optimise.state import Optimisation
-from explorer.app.features.optimise.work import find_refusals, liftable_limits
+from explorer.app.features.optimise.work import (
+    find_refusals,
+    is_paper_box_on_offer,
+    liftable_limits,
+)
 from explorer.app.features.workspace.feeds import send_workspace
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action
@@ -26,7 +30,7 @@ from explorer.optimise.outcome import encode_record
 
 START, CANCEL = "optimise.start", "optimise.cancel"
 ACCEPT, REVERT = "optimise.accept", "optimise.revert"
-PAPER, LIFT = "optimise.paper", "optimise.lift"
+PAPER, PAPER_BOX, LIFT = "optimise.paper", "optimise.box", "optimise.lift"
 HULL, DESIGN, RECORD = "optimise.hull", "optimise.design", "optimise.record"
 
 
@@ -87,6 +91,12 @@ BUTTONS: Mapping[str, Button] = {
         "8000 with a clearance of 0.2; one undo brings your design back.",
         lambda state: not state.optimisation.is_on,
         lambda _, __: actions.TakePaperProblem(),
+    ),
+    PAPER_BOX: Button(
+        "Take the paper's box",
+        "Bound b4 by the box of the paper's optimum; one undo brings yours back.",
+        is_paper_box_on_offer,
+        lambda _, __: actions.TakePaperBox(),
     ),
     LIFT: Button(
         "Lift the limit",

@@ -114,6 +114,8 @@ def result_words(state: State) -> str:
         )
         for limit in limits
     )
+    if work.is_paper_box_on_offer(state):
+        remedies += buttons.button(buttons.PAPER_BOX, state)
     undecided = Optimisation.of(state).undecided
     is_success = undecided is not None and undecided.has_converged
     verdict = "" if run is None or run.verdict is None else verdict_words(state, run, run.verdict)
