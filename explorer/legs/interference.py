@@ -232,11 +232,6 @@ def step_overlaps(start: Configuration, end: Configuration) -> BoolArray:
     The result is False for a pair that shares a joint, see `explorer.legs.clearance.joined_pairs`.
     """
     swept = swept_tetrahedra(start, end)
-    overlaps = np.zeros((*swept.shape[:-3], len(PAIRS)), dtype=np.bool_)
-    for index, joined in enumerate(joined_pairs(start.design)):
-        if not joined:
-            first, second = PAIRS[index]
-            overlaps[..., index] = tetrahedra_overlap(
-                swept[..., first - 1, :, :], swept[..., second - 1, :, :]
-            )
-    return overlaps
+    first, second = np.array(PAIRS).T - 1
+    overlap = tetrahedra_overlap(swept[..., first, :, :], swept[..., second, :, :])
+    return overlap & ~joined_pairs(start.design)

@@ -25,8 +25,7 @@ from explorer.mechanism.kinematics import (
 from explorer.mechanism.margins import describe_modes, mode_name, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, lengths_of, triple
-from explorer.singularity.freedoms import Freedoms, freedoms
-from explorer.singularity.gaps import FlagGaps, flag_gaps, least_turns
+from explorer.singularity.freedoms import FlagGaps, Freedoms, flag_gaps, freedoms, least_turns
 from explorer.singularity.nearest import (
     NearestPoses,
     NearestSingularity,

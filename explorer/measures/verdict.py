@@ -11,7 +11,7 @@ warning value of its own, and the pose is near a singularity if any is below:
   metric of Nawratil, with any shift and turn (`explorer.singularity.nearest`). Its warning length
   is a third of that of margins (`DISTANCE_SHARE`): the platform may turn as well as shift, so that
   its points move by less than the margin;
-- the least turn that leads to it (`explorer.singularity.gaps`), below 10° (`WARN_TURN`). It is
+- the least turn that leads to it (`explorer.singularity.freedoms`), below 10° (`WARN_TURN`). It is
   a transmission angle: its sine is the share of a leg's force that acts, so that at 10° the legs
   push six times as hard as where lines and planes are at right angles. Textbooks keep such angles
   above 30° to 45° in continuous service; this value only warns of a singularity. A small platform

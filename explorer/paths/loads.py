@@ -155,8 +155,8 @@ class DemandedLoad:
         design, masses = self.design, self.weights
         position, rotation = moves.poses(number, share)
         poses = Configuration(design, position, rotation)
-        held = self._reactions(poses)
-        forces = np.abs(held.actuators) + held.spread[:, :6]
+        middle = self._reactions(poses)
+        forces = np.abs(middle.actuators) + middle.spread[:, :6]
         lengths, turn = poses.joints, moves.turn[number]
         bodies, gravity = masses.on_platform, STANDARD_GRAVITY * math.hypot(*design.gravity)
         joints = design.platform_points[[0, 1, 1, 2, 2, 3]]
@@ -196,9 +196,9 @@ class DemandedLoad:
                 across = across + tilting[:, 1:3] + forces[:, STRUT_ROWS] * tilt[:, 1:3]
             widening = np.concatenate([change, bending, across, bending], axis=1)
         is_bounded = (most < 1.0) & np.isfinite(widening).all(axis=1, keepdims=True)
-        wider = held._replace(spread=held.spread + np.where(is_bounded, widening, 0.0))
+        wider = middle._replace(spread=middle.spread + np.where(is_bounded, widening, 0.0))
         bound = np.where(is_bounded, limit_shares(design, wider), np.inf).max(axis=1)
-        return limit_shares(design, held), bound
+        return limit_shares(design, middle), bound
 
     def _reactions(self, poses: Configuration) -> Reactions:
         return reactions(poses.with_tool(self.design.tool.position), self.load, self.weights)

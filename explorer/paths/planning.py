@@ -14,9 +14,8 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Literal, NamedTuple
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,12 +26,10 @@ from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.configuration import one_tool
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.folds import FOLD_LINES, from_folds, to_folds, write_poses
-from explorer.mechanism.margins import INCIDENCES, margins, mode_name
+from explorer.mechanism.margins import INCIDENCES, mode_name
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray
+from explorer.paths import search
 from explorer.paths.loads import ROUNDING, DemandedLoad
-from explorer.paths.proofs import Proofs, divide_line, positions_and_rotations
-from explorer.paths.search import lengths_of_moves, search_tree, smooth
 from explorer.singularity.strata import incidences
 from explorer.statics.reactions import PART_NAMES
 from explorer.statics.weights import Weights
@@ -137,111 +134,54 @@ def plan_path(
     ends = evaluate(design, start), evaluate(design, goal)
     _check_ends(*ends, demanded_load)
     # Compiling takes seconds, once on a machine; they do not count as search.
-    for kernel in (divide_line, valid_move_rows, valid_rows, write_poses):
+    for kernel in (search.divide_line, valid_move_rows, valid_rows, write_poses):
         kernel.compile()
-    planner = _Planner(design, (start, goal), seed, tool, demanded_load)
     order = int(np.sign(ends[0].joints[D3] - ends[0].joints[D1]))
     rules = Rules.of(design, ends[0].signs, order)
-    margin = SHARE_OF_MARGIN * min(float(np.abs(end.margins).min()) for end in ends)
+    margin = min(float(np.abs(end.margins).min()) for end in ends)
+    # The signs of margins have to be certain, also of ends with small ones.
+    tolerance = min(DEFAULT_TOLERANCE * design.reach, margin)
     least = min(float(end.clearances.clearance.min()) for end in ends)
     clearance = min(PREFERRED_CLEARANCE * design.reach, SHARE_OF_CLEARANCE * least)
-    demanded = _Demand(rules, 0.0, 0.0)
-    preferred = _Demand(rules.tighten(margin, clearance), margin, clearance)
-    path = (
-        planner.plan_line(preferred)
-        or planner.plan_line(demanded)
-        or planner.search(preferred, SHARE_FOR_PREFERRED * seconds)
-        or planner.search(demanded, max(seconds - planner.seconds, 0.0))
-    )
-    if path is None:
-        raise NoPathError(
-            "out of time",
-            f"no path {'' if load is None else 'that holds the load '}was found within "
-            f"{seconds:g} s ({planner.checked} lines tried); there may be one: allow more time, "
-            "or go by a pose in between",
-        )
-    return path
-
-
-class _Demand(NamedTuple):
-    """Rules, and the margin and the clearance that they demand beyond those of the design."""
-
-    rules: Rules
-    margin: float
-    clearance: float
-
-
-@dataclass
-class _Planner:
-    """Searches for paths between two poses, under one demand after another."""
-
-    design: Design
-    ends: tuple[Pose, Pose]
-    seed: int
-    tool: Triple | None
-    load: DemandedLoad | None
-    checked: int = 0
-    started: float = field(default_factory=time.perf_counter)
-
-    @property
-    def seconds(self) -> float:
-        """Time since the start of the first search, in seconds."""
-        return time.perf_counter() - self.started
-
-    @cached_property
-    def folds(self) -> FloatArray:
-        """Fold coordinates of both ends, shape (2, 6)."""
-        return to_folds(*positions_and_rotations(self.ends))
-
-    @cached_property
-    def tolerance(self) -> float:
-        """Length by which limits may be exceeded between poses, in design units."""
-        # The signs of margins have to be certain, also of ends with small ones.
-        least = float(np.abs(margins(*positions_and_rotations(self.ends))).min())
-        return min(DEFAULT_TOLERANCE * self.design.reach, least)
-
-    def plan_line(self, demand: _Demand) -> PlannedPath | None:
-        """Return the straight line in the folds if it is proven valid."""
-        self.checked += 1
-        corners = self._proofs(demand).prove_line(*self.folds)
+    room = SHARE_OF_MARGIN * margin, clearance
+    preferred, demanded = (rules.tighten(*room), *room), (rules, 0.0, 0.0)
+    first, last = to_folds(*search.positions_and_rotations((start, goal)))
+    began, checked = time.perf_counter(), 0
+    for (own_rules, margin, clearance), share in (
+        (preferred, 0.0),
+        (demanded, 0.0),
+        (preferred, SHARE_FOR_PREFERRED),
+        (demanded, 1.0),
+    ):
+        proofs = search.Proofs(design, own_rules, tool, demanded_load, tolerance)
+        if share:
+            left = began + share * seconds - time.perf_counter()
+            corners, lines = search.search_tree(proofs, first, last, max(left, 0.0))
+        else:
+            corners, lines = proofs.prove_line(first, last), 1
+        checked += lines
         if corners is None:
-            return None
-        poses = self._poses(corners)
-        return self._path(demand, poses, poses)
-
-    def search(self, demand: _Demand, seconds: float) -> PlannedPath | None:
-        """Return a smoothed path of OMPL's search, or None if the time was too short."""
-        proofs = self._proofs(demand)
-        first, last = self.folds
-        corners, checked = search_tree(proofs, first, last, seconds)
-        self.checked += checked
-        if corners is None:
-            return None
-        unsmoothed = self._poses(corners)
-        return self._path(demand, unsmoothed, smooth(proofs, unsmoothed, self.seed))
-
-    def _proofs(self, demand: _Demand) -> Proofs:
-        return Proofs(self.design, demand.rules, self.tool, self.load, self.tolerance)
-
-    def _poses(self, corners: FloatArray) -> tuple[Pose, ...]:
-        """Return the poses of corners, with the given ends, from which they differ by rounding."""
+            continue
+        # The corners at the ends differ from these by rounding.
         between = zip(*from_folds(corners[1:-1]), strict=True)
-        start, goal = self.ends
-        return (start, *(Pose.of(p, r) for p, r in between), goal)
-
-    def _path(
-        self, demand: _Demand, unsmoothed: tuple[Pose, ...], poses: tuple[Pose, ...]
-    ) -> PlannedPath:
+        unsmoothed = (start, *(Pose.of(p, r) for p, r in between), goal)
+        poses = search.smooth(proofs, unsmoothed, seed) if share else unsmoothed
         return PlannedPath(
             poses=poses,
             unsmoothed=unsmoothed,
-            length=float(lengths_of_moves(self.design, poses).sum()),
-            margin=max(self.design.limits.margin or 0.0, demand.margin),
-            clearance=demand.clearance,
-            seconds=self.seconds,
-            checked=self.checked,
-            tool=self.tool,
+            length=float(search.lengths_of_moves(design, poses).sum()),
+            margin=max(design.limits.margin or 0.0, margin),
+            clearance=clearance,
+            seconds=time.perf_counter() - began,
+            checked=checked,
+            tool=tool,
         )
+    raise NoPathError(
+        "out of time",
+        f"no path {'' if load is None else 'that holds the load '}was found within "
+        f"{seconds:g} s ({checked} lines tried); there may be one: allow more time, or go by a "
+        "pose in between",
+    )
 
 
 def _check_ends(start: Snapshot, goal: Snapshot, load: DemandedLoad | None) -> None:

@@ -1,10 +1,15 @@
-"""Paths by search: a tree of lines in the fold coordinates of a mode, made shorter and rounder.
+"""Proofs that moves and lines in the folds are valid, and paths by search.
 
-A mode is a box of fold coordinates without a singularity inside, so the search has to avoid the
-other limits alone. OMPL's RRT-Connect (Kuffner and LaValle 2000) grows a tree of straight lines
-from both ends. Then random points of the path are joined by straight moves where that is shorter,
-and its corners are cut off. A proof covers every line and every new move as a whole (see
-`explorer.paths.proofs`), so no step is too coarse; the rest of an old move is valid as part of it.
+A straight line in fold coordinates between two poses of one mode meets no singularity, and along
+it no |δi| is below the smaller of its two ends (see `explorer.mechanism.folds`). It is cut into
+straight moves, which come the closer to it the shorter they are, until each is proven valid. There
+is an end of that where another limit is exceeded, and for lines that run along a wall of the mode
+so closely, at some 10⁻⁵ of the reach or less, that they would need more moves than are tried.
+
+A search has to avoid the other limits alone. OMPL's RRT-Connect (Kuffner and LaValle 2000) grows a
+tree of such lines from both ends. Then random points of the path are joined by straight moves where
+that is shorter. A proof covers every line and every new move as a whole, so no step is too coarse;
+the rest of an old move is valid as part of it. Loads are sampled.
 """
 
 from __future__ import annotations
@@ -14,28 +19,144 @@ import importlib
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from explorer.errors import MissingExtraError
-from explorer.legs.moves import poses_between
+from explorer.legs.moves import StraightMoves, poses_between
 from explorer.mechanism.design import Design
-from explorer.mechanism.folds import write_poses
-from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import FloatArray
-from explorer.paths.proofs import Proofs, positions_and_rotations
+from explorer.mechanism.folds import from_folds, write_pose, write_poses
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.compiled import kernel
+from explorer.paths.loads import DemandedLoad
 from explorer.singularity.nearest import displacement
+from explorer.workspace.limits import valid_moves
 from explorer.workspace.limits.quantities import valid_rows
+from explorer.workspace.limits.valid_moves import count_steps, make_check
+from explorer.workspace.limits.valid_poses import Rules
 
+# The shortest move is this share of a line; a line has at most so many moves.
+SHORTEST, MOST_MOVES = 2.0**-12, 256
+# Steps along all moves that are tried on a line; a step takes half a microsecond.
+MOST_STEPS = 50_000
+# Number of poses whose check takes as long as that of a line, by which a kernel is loaded at once.
+ROWS_OF_LINE = 400
 # The longest line of a tree, as a share of the extent of the space.
 LONGEST_LINE = 0.25
 # Shortcuts tried in a round, rounds without gain that end the search, and the most rounds.
 TRIES, MOST_IDLE_ROUNDS, MOST_ROUNDS = 24, 4, 60
 # The least gain, as a share of the path's length.
 GAIN = 1e-3
-# Cuts of a corner, as shares of the two moves beside it, widest first; rounds of cutting.
-CUTS, CUT_ROUNDS = (0.25, 0.08), 3
+
+
+@dataclass(frozen=True)
+class Proofs:
+    """Proofs under one set of rules.
+
+    Attributes:
+        design: The manipulator.
+        rules: Rules that every pose keeps.
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
+        load: Load that the moves hold; None for none.
+        tolerance: Length by which limits may be exceeded between poses that keep them, in design
+            units; a 10,000th of the reach if None.
+    """
+
+    design: Design
+    rules: Rules
+    tool: Triple | None = None
+    load: DemandedLoad | None = None
+    tolerance: float | None = None
+
+    def are_valid(self, moves: Sequence[tuple[Pose, Pose]]) -> list[bool]:
+        """Return whether each straight move, given by its ends, is proven valid; one or more."""
+        (p, r), (q, s) = (positions_and_rotations(ends) for ends in zip(*moves, strict=True))
+        rules, tool, tolerance = self.rules, self.tool, self.tolerance
+        valid = valid_moves.moves_are_valid(
+            self.design, p, r, q, s, rules=rules, tolerance=tolerance, tool=tool
+        )
+        if self.load is not None and valid.any():
+            ends = p[valid], r[valid], q[valid], s[valid]
+            valid[valid] = self.load.holds_along(StraightMoves.between(*ends, tool))
+        return valid.tolist()
+
+    def prove_line(self, first: FloatArray, last: FloatArray) -> FloatArray | None:
+        """Return the corners of a straight line in the folds, (n, 6), or None if it is not proven.
+
+        The moves between the corners are straight, and as long as is proven. The first and the last
+        corner are in the same mode.
+        """
+        tool = np.zeros(3) if self.tool is None else np.array(self.tool)
+        shares, count = np.zeros(MOST_MOVES + 1), np.zeros(1, dtype=np.int64)
+        row, demands, tolerance = self.rules.row, self.rules.demands, self.tolerance
+        if tolerance is None:
+            tolerance = valid_moves.DEFAULT_TOLERANCE * self.design.reach
+        divide_line(ROWS_OF_LINE, row, demands, first, last, tool, tolerance, shares[1:], count)
+        if not count[0]:
+            return None
+        share = shares[: count[0] + 1, None]
+        corners = (1.0 - share) * first + share * last
+        if self.load is not None:
+            p, r = from_folds(corners)
+            moves = StraightMoves.between(p[:-1], r[:-1], p[1:], r[1:], tool)
+            if not self.load.holds_along(moves).all():
+                return None
+        return corners
+
+
+def positions_and_rotations(poses: Sequence[Pose]) -> tuple[FloatArray, FloatArray]:
+    """Return the positions (n, 3) and the rotations (n, 3, 3) of poses."""
+    return np.array([pose.position for pose in poses]), np.array([pose.rotation for pose in poses])
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], i8[::1])")
+def divide_line(
+    row: FloatArray,
+    demands: FloatArray,
+    first: FloatArray,
+    last: FloatArray,
+    tool: FloatArray,
+    tolerance: float,
+    shares: FloatArray,
+    count: IntArray,
+) -> None:
+    """Halve a straight line in the folds until each piece is a valid straight move.
+
+    The shares of the line at which its pieces end, shape (MOST_MOVES,), and their number, shape
+    (1,), 0 if the line is not proven valid, are written. The other arguments are those of
+    `MoveCheck` and `Proofs.prove_line`.
+    """
+    check = make_check(row, demands, tool)
+    p, r, q, s = np.zeros(3), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
+    corner = np.zeros(6)
+    count[0] = 0
+    low, size, pieces, left = 0.0, 1.0, 0, MOST_STEPS
+    write_pose(first, p, r)
+    while low < 1.0:
+        high = low + size
+        for i in range(6):
+            corner[i] = (1.0 - high) * first[i] + high * last[i]
+        write_pose(corner, q, s)
+        steps = count_steps(check, p, r, q, s, tolerance, left)
+        left -= abs(steps)
+        if steps > 0:
+            if pieces == shares.shape[0]:
+                return
+            shares[pieces] = high
+            pieces += 1
+            low = high
+            write_pose(corner, p, r)
+            # The next piece is as long as halving allows; powers of two are exact.
+            while size < 1.0 and low % (2.0 * size) == 0.0:
+                size *= 2.0
+        else:
+            size *= 0.5
+            if size < SHORTEST or left <= 0:
+                return
+    count[0] = pieces
 
 
 @functools.cache
@@ -148,83 +269,43 @@ def lengths_of_moves(design: Design, poses: Sequence[Pose]) -> FloatArray:
 
 
 def smooth(proofs: Proofs, poses: Sequence[Pose], seed: int = 0) -> tuple[Pose, ...]:
-    """Return a path with the same ends, shorter and with its corners cut off.
+    """Return a shorter path with the same ends.
 
     Args:
         proofs: Proofs that moves are valid.
         poses: Corners of the path.
         seed: Seed of the random shortcuts.
     """
-    return tuple(_cut_corners(proofs, _shorten(proofs, list(poses), seed)))
-
-
-def _shorten(proofs: Proofs, poses: list[Pose], seed: int) -> list[Pose]:
     rng = np.random.default_rng(seed)
-    idle_rounds = 0
+    corners, idle_rounds = list(poses), 0
+
+    def pose_at(place: float) -> Pose:
+        move = int(place)
+        if move == place:
+            return corners[move]
+        ends = corners[move], corners[move + 1]
+        return Pose.of(*poses_between(*ends, place - move, proofs.tool))
+
     for _ in range(MOST_ROUNDS):
-        if len(poses) < 3 or idle_rounds >= MOST_IDLE_ROUNDS:
+        if len(corners) < 3 or idle_rounds >= MOST_IDLE_ROUNDS:
             break
-        ends = np.concatenate([[0.0], np.cumsum(lengths_of_moves(proofs.design, poses))])
+        ends = np.concatenate([[0.0], np.cumsum(lengths_of_moves(proofs.design, corners))])
         pairs = np.sort(rng.uniform(0.0, ends[-1], (TRIES, 2)), axis=1)
         # Some shortcuts go from corner to corner.
         pairs[0] = ends[0], ends[-1]
         pairs[1:4] = np.sort(ends[rng.integers(0, len(ends), (3, 2))], axis=1)
-        shortcuts = [_shortcut(proofs, poses, ends, *pair) for pair in pairs.tolist()]
-        least = GAIN * float(ends[-1])
-        worthwhile = sorted((cut for cut in shortcuts if cut[0] > least), key=lambda cut: -cut[0])
-        valid = proofs.are_valid([cut[1] for cut in worthwhile]) if worthwhile else []
-        shortened = next(itertools.compress((path for _, _, path in worthwhile), valid), None)
+        shortcuts: list[tuple[float, tuple[Pose, Pose], list[Pose]]] = []
+        places = np.interp(pairs, ends, np.arange(len(ends)))
+        for (first, last), length in zip(places.tolist(), np.diff(pairs)[:, 0], strict=True):
+            move = pose_at(first), pose_at(last)
+            gain = float(length - lengths_of_moves(proofs.design, move)[0])
+            path = [*corners[: int(first) + 1], *move, *corners[math.ceil(last) :]]
+            if gain > GAIN * float(ends[-1]):
+                distinct = [path[0], *(b for a, b in itertools.pairwise(path) if a != b)]
+                shortcuts.append((gain, move, distinct))
+        shortcuts.sort(key=lambda cut: -cut[0])
+        valid = proofs.are_valid([cut[1] for cut in shortcuts]) if shortcuts else []
+        shortened = next(itertools.compress((path for _, _, path in shortcuts), valid), None)
         idle_rounds = 0 if shortened else idle_rounds + 1
-        poses = shortened or poses
-    return poses
-
-
-def _shortcut(
-    proofs: Proofs, poses: list[Pose], ends: FloatArray, first: float, last: float
-) -> tuple[float, tuple[Pose, Pose], list[Pose]]:
-    """Return what a straight move between two points of a path saves, the move, and the new path.
-
-    The points are given by their distances along the path, as are its corners, shape (n,).
-    """
-    (i, start), (j, end) = (_pose_after(proofs, poses, ends, each) for each in (first, last))
-    if i == j:
-        return 0.0, (start, end), poses
-    gain = last - first - float(lengths_of_moves(proofs.design, [start, end])[0])
-    path = [*poses[: i + 1], start, end, *poses[j + 1 :]]
-    return gain, (start, end), [path[0], *(b for a, b in itertools.pairwise(path) if a != b)]
-
-
-def _pose_after(
-    proofs: Proofs, poses: list[Pose], ends: FloatArray, distance: float
-) -> tuple[int, Pose]:
-    """Return the number of the move, and the pose, at a distance along the path."""
-    index = int(np.searchsorted(ends, distance, side="right")) - 1
-    if index >= len(poses) - 1:
-        return len(poses) - 2, poses[-1]
-    share = (distance - float(ends[index])) / float(ends[index + 1] - ends[index])
-    return index, _pose_between(proofs, poses[index], poses[index + 1], share)
-
-
-def _pose_between(proofs: Proofs, start: Pose, end: Pose, share: float) -> Pose:
-    return Pose.of(*poses_between(start, end, share, proofs.tool)) if share else start
-
-
-def _cut_corners(proofs: Proofs, poses: list[Pose]) -> list[Pose]:
-    for _ in range(CUT_ROUNDS):
-        if len(poses) < 3:
-            break
-        corners = list(zip(poses, poses[1:], poses[2:], strict=False))
-        cuts = [
-            [
-                (_pose_between(proofs, b, a, share), _pose_between(proofs, b, c, share))
-                for share in CUTS
-            ]
-            for a, b, c in corners
-        ]
-        valid = iter(proofs.are_valid([cut for choices in cuts for cut in choices]))
-        path: list[Pose] = [poses[0]]
-        for (_, corner, _), choices in zip(corners, cuts, strict=True):
-            possible = [cut for cut in choices if next(valid)]
-            path += possible[0] if possible else (corner,)
-        poses = [*path, poses[-1]]
-    return poses
+        corners = shortened or corners
+    return tuple(corners)

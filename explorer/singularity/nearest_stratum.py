@@ -6,9 +6,7 @@ the squared distance a smooth function of the angles: Newton's method refines it
 grid. It is L + s S², where L and S are linear in the cosine and the sine of each angle, so that one
 array of coefficients gives the value and all derivatives, for all strata at once.
 
-The three strata of codimension one have an exact solution in `explorer.singularity.nearest`; where
-the rotation alone is free, it is that of the orthogonal Procrustes problem (Schönemann 1966; for
-rotations, Kabsch 1976).
+The three strata of codimension one have an exact solution in `explorer.singularity.nearest`.
 """
 
 from __future__ import annotations
@@ -76,14 +74,13 @@ _FREE = ("zxz", ("",))
 _GUIDE_ALONG, _LINE_ALONG = ("xz", ("",)), ("zx", ("",))
 _PARALLEL_PLANES, _PARALLEL_LINES = ("z", ("", "x")), ("x", ("", "z"))
 _PARALLEL_FLAGS = ("", ("", "x", "y", "z"))
-_TURNED_ABOUT_A1 = _Closure(*_FREE, "a1")
 
 _CLOSURES: Mapping[Stratum, _Closure] = MappingProxyType(
     {
         (3, 4, 1, 2): _Closure(*_FREE, "node"),
         (2, 4, 3, 1): _Closure(*_FREE, "u"),
         (4, 1, 3, 2): _Closure(*_FREE, "guide"),
-        (1, 4, 3, 2): _TURNED_ABOUT_A1,
+        (1, 4, 3, 2): _Closure(*_FREE, "a1"),
         (3, 2, 4, 1): _Closure(*_GUIDE_ALONG, "platform"),
         (2, 3, 4, 1): _Closure(*_GUIDE_ALONG, "u"),
         (3, 1, 4, 2): _Closure(*_GUIDE_ALONG, "guide"),
@@ -158,11 +155,6 @@ class _Target:
     goal: FloatArray
     rotated_scatter: FloatArray
 
-    @property
-    def about_a1(self) -> FloatArray:
-        """The scatter of the points about a1 rather than about their centroid, rotated, (3, 3)."""
-        return self.rotated_scatter + np.outer(self.goal, self.centroid)
-
     def position(self, place: str, angles: FloatArray, rotation: FloatArray) -> FloatArray:
         """Return the best position (3,) at angles (3,) and their rotation (3, 3)."""
         free = self.goal - rotation @ self.centroid
@@ -190,7 +182,8 @@ class _Target:
             sign, matrix, constant = 1.0, self.rotated_scatter, 2.0
         else:
             # Along a line the distance from a1 to the projection does not count.
-            sign, matrix = 0.0 if place == "a1" else -1.0, self.about_a1
+            sign = 0.0 if place == "a1" else -1.0
+            matrix = self.rotated_scatter + np.outer(goal, centroid)
             constant = 2.0 + float(goal @ goal + centroid @ centroid)
         if place == "node":
             square[0, 2, 2], square[1, 2, 2] = goal[0], goal[1]
@@ -213,26 +206,16 @@ def _contract(basis: FloatArray, matrix: FloatArray) -> FloatArray:
 
 @functools.cache
 def _rotation_coefficients(axes: str, flip: str) -> FloatArray:
-    """Return the coefficients (3, 3, 3) of each entry (3, 3) of a product of turns."""
-    turns = [_turn_coefficients(axis) for axis in axes]
+    """Return the coefficients of cosine, sine and 1 of each entry of turns, (3, 3, 3, 3, 3)."""
+    turns: list[FloatArray] = []
+    for unit in (np.eye(3)["xyz".index(axis)] for axis in axes):
+        along = np.outer(unit, unit)
+        turns.append(np.array([np.eye(3) - along, np.cross(unit, np.eye(3)).T, along]))
     still = np.zeros((3, 3, 3))
     still[2] = np.eye(3)
     first, second, third = turns + [still] * (ANGLES - len(turns))
-    return np.einsum("aij,bjk,ckl,lm->abcim", first, second, third, _half_turn(flip))
-
-
-@functools.cache
-def _turn_coefficients(axis: str) -> FloatArray:
-    """Return the coefficients of cosine, sine and 1 in a turn about a base axis, (3, 3, 3)."""
-    unit = np.eye(3)["xyz".index(axis)]
-    along = np.outer(unit, unit)
-    return np.array([np.eye(3) - along, np.cross(unit, np.eye(3)).T, along])
-
-
-@functools.cache
-def _half_turn(axis: str) -> FloatArray:
-    """Return a half turn about an axis; no turn for ""."""
-    return 2.0 * np.diag(np.eye(3)["xyz".index(axis)]) - np.eye(3) if axis else np.eye(3)
+    half = 2.0 * np.diag(np.eye(3)["xyz".index(flip)]) - np.eye(3) if flip else np.eye(3)
+    return np.einsum("aij,bjk,ckl,lm->abcim", first, second, third, half)
 
 
 def _nearest_poses(design: Design, pose: Pose, strata: Sequence[Stratum]) -> list[Pose]:
@@ -242,30 +225,28 @@ def _nearest_poses(design: Design, pose: Pose, strata: Sequence[Stratum]) -> lis
     centroid = platform.centroid / unit
     goal = np.array(pose.position) / unit + rotation @ centroid
     target = _Target(centroid, goal, rotation @ platform.scatter / unit**2)
-    best: dict[Stratum, Pose] = {}
     problems: list[tuple[Stratum, str]] = []
     terms: list[tuple[FloatArray, float]] = []
     starts: list[FloatArray] = []
     for w in strata:
         closure = _CLOSURES[w]
-        if closure == _TURNED_ABOUT_A1:
-            best[w] = Pose.of(np.zeros(3), _nearest_rotation(target.about_a1))
-            continue
         for flip in closure.flips:
             problems.append((w, flip))
             terms.append(target.coefficients(closure, flip))
             starts.append(grid_minima(*terms[-1], len(closure.axes)))
-    if problems:
-        which = np.repeat(np.arange(len(problems)), [len(each) for each in starts])
-        coefficients = np.array([each for each, _ in terms])[which]
-        angles = np.concatenate(starts)
-        value = minimise(coefficients, np.array([each for _, each in terms])[which], angles)
-        for index in np.argsort(value, kind="stable").tolist():
-            w, flip = problems[which[index]]
-            if w not in best:
-                closure, at = _CLOSURES[w], angles[index]
-                turn = _rotation(closure.axes, flip, at)
-                best[w] = Pose.of(unit * target.position(closure.place, at, turn), turn)
+    if not problems:
+        return []
+    which = np.repeat(np.arange(len(problems)), [len(each) for each in starts])
+    coefficients = np.array([each for each, _ in terms])[which]
+    angles = np.concatenate(starts)
+    value = minimise(coefficients, np.array([each for _, each in terms])[which], angles)
+    best: dict[Stratum, Pose] = {}
+    for index in np.argsort(value, kind="stable").tolist():
+        w, flip = problems[which[index]]
+        if w not in best:
+            closure, at = _CLOSURES[w], angles[index]
+            turn = _rotation(closure.axes, flip, at)
+            best[w] = Pose.of(unit * target.position(closure.place, at, turn), turn)
     return [best[w] for w in strata]
 
 
@@ -273,13 +254,6 @@ def _rotation(axes: str, flip: str, angles: FloatArray) -> FloatArray:
     """Return the product of turns by angles (3,) and a half turn."""
     a, b, c = powers_of(angles)[:, 0]
     return np.einsum("abcij,a,b,c->ij", _rotation_coefficients(axes, flip), a, b, c)
-
-
-def _nearest_rotation(matrix: FloatArray) -> FloatArray:
-    """Return the rotation R (3, 3) with the largest trace of Rᵀ A for a matrix A (3, 3)."""
-    left, _, right = np.linalg.svd(matrix)
-    side = np.sign(np.linalg.det(left @ right))
-    return left @ np.diag([1.0, 1.0, side]) @ right
 
 
 # Number of grid angles in a turn, largest number of Newton steps, and the last step in radians.

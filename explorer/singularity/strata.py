@@ -24,7 +24,14 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import INCIDENCES, INCIDENT
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import FloatArray, IntArray, batch_shape, dot, position_array
+from explorer.numerics.arrays import (
+    FloatArray,
+    IntArray,
+    batch_shape,
+    dot,
+    lengths_of,
+    position_array,
+)
 
 GENERIC = (4, 3, 2, 1)
 
@@ -94,7 +101,7 @@ def _ranks_of_pose(
     near = INCIDENT * (distance if length is None else length)
 
     point_on_point = distance <= near
-    a1_on_line = _cross_norm(u, p) <= near
+    a1_on_line = lengths_of(np.cross(u, p)) <= near
     a1_on_plane = np.abs(dot(n, p)) <= near
     b4_on_line = across <= near
     b4_on_plane = np.abs(p[..., 2]) <= near
@@ -118,13 +125,6 @@ def _ranks_of_pose(
         (2, 1): count(1, line_along_base_plane & b4_on_plane),
         (2, 2): count(2, planes_parallel & b4_on_plane),
     }
-
-
-def _cross_norm(u: FloatArray, p: FloatArray) -> FloatArray:
-    """Return |u × p| over the last axis, in a third of the time of `np.cross`."""
-    a, b, c = u[..., 0], u[..., 1], u[..., 2]
-    x, y, z = p[..., 0], p[..., 1], p[..., 2]
-    return np.hypot(np.hypot(b * z - c * y, c * x - a * z), a * y - b * x)
 
 
 Stratum = tuple[int, ...]

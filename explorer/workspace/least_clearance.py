@@ -11,7 +11,6 @@ time: its extent, margins and clearances. A least value at the nodes is an upper
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -48,7 +47,7 @@ BATCH = 10_000
 # Distance, over the reach, at which axes count as crossing; also the tolerance of a limit.
 CROSSING = 1e-9
 
-CORNERS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
+CORNERS = np.indices((2, 2, 2)).reshape(3, -1).T - 0.5
 
 
 class LeastClearances(NamedTuple):

@@ -100,7 +100,7 @@ def position_bands(
             in N and N × unit; None for none. Only measures of a load need it.
     """
 
-    def measured(points: FloatArray) -> FloatArray:
+    def measure_at(points: FloatArray) -> FloatArray:
         return measure_positions(design, rotation, measure, points, load)[0]
 
     if measure in ("margin", "condition"):
@@ -108,16 +108,16 @@ def position_bands(
         unit = warn_below if is_margin else colours.warning_condition(design.reach, warn_below)
         edges, levels = colours.BAND_EDGES, tuple(unit * edge for edge in colours.BAND_EDGES)
         own = colours.band_colours()
-        return PositionBands(measure, edges, own, levels, lambda points: measured(points) / unit)
+        return PositionBands(measure, edges, own, levels, lambda points: measure_at(points) / unit)
     if measure == "share":
         levels, own = SHARES, SHARE_COLOURS
     else:
-        levels, own = _round_levels(design, rotation, measured), STEP_COLOURS
+        levels, own = _round_levels(design, rotation, measure_at), STEP_COLOURS
     highest = levels[-1]
     edges = (0.0, *(highest / level for level in reversed(levels)))
 
     def values(points: FloatArray) -> FloatArray:
-        return highest / np.maximum(measured(points), highest / (FARTHEST * edges[-1]))
+        return highest / np.maximum(measure_at(points), highest / (FARTHEST * edges[-1]))
 
     return PositionBands(measure, edges, own[::-1], (math.inf, *reversed(levels)), values)
 
@@ -145,12 +145,12 @@ def measure_positions(
         case "condition":
             return at.with_tool(np.zeros(3)).inverse_condition, whole
         case "error":
-            moved = worst_errors(at, actuator_errors(design)).displacement
-            return moved * design.unit_mm, whole
+            displacement = worst_errors(at, actuator_errors(design)).displacement
+            return displacement * design.unit_mm, whole
         case "deflection":
             wrench = payload_wrench(design, rotation) + w
-            moved = deflection(compliance_of(at, *stiffness_of(design)), wrench)[..., :3]
-            return np.linalg.norm(moved, axis=-1) * design.unit_mm, whole
+            displacement = deflection(compliance_of(at, *stiffness_of(design)), wrench)[..., :3]
+            return np.linalg.norm(displacement, axis=-1) * design.unit_mm, whole
         case _:
             # The share of a limit of one newton or one newton metre, in N × unit, is the value.
             units = np.full((2, 10), np.inf)
@@ -180,15 +180,15 @@ def is_unstated(design: Design, measure: PositionMeasure) -> bool:
 
 
 def _round_levels(
-    design: Design, rotation: FloatArray, measured: Callable[[FloatArray], FloatArray]
+    design: Design, rotation: FloatArray, measure_at: Callable[[FloatArray], FloatArray]
 ) -> tuple[float, ...]:
-    """Return round numbers that suit what is measured within the limits, ascending."""
+    """Return round numbers that suit the measure within the limits, ascending."""
     limits = constraints(design, rotation)
     lows, highs = box_of(limits) or (np.zeros(3), np.full(3, design.reach))
     shares = (np.indices((NODES,) * 3).reshape(3, -1).T + 1.0) / (NODES + 1)
     nodes = lows + (highs - lows) * shares
     within = nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]
-    found = measured(within if len(within) else nodes)
+    found = measure_at(within if len(within) else nodes)
     found = found[np.isfinite(found) & (found > 0.0)]
     least = float(np.quantile(found, LEAST_SHARE)) if len(found) else 1.0
     exponent = math.floor(math.log10(least))

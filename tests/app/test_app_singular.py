@@ -52,7 +52,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
-from explorer.singularity.gaps import least_turns
+from explorer.singularity.freedoms import least_turns
 from explorer.singularity.nearest import displacement, nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_stratum
 from explorer.singularity.strata import GENERIC, OF_INCIDENCES, STRATA, incidences

@@ -15,7 +15,7 @@ from explorer import Pose, inverse, margins, to_folds
 from explorer.mechanism.margins import mode_of, signs_of
 from explorer.numerics.compiled import warm
 from explorer.paths.planning import NoPathError, plan_path
-from explorer.paths.proofs import Proofs
+from explorer.paths.search import Proofs
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.quantities import DELTA1, DELTA2, DELTA3, QUANTITY
 from explorer.workspace.limits.valid_moves import moves_are_valid

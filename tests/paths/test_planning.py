@@ -1,4 +1,4 @@
-"""Planned paths keep all limits, margins and clearances; a failure states its reason."""
+"""Planned paths and lines in the folds keep all limits; a failure states its reason."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import math
 import sys
 from functools import cache
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 import pytest
 from clear_moves import moves_are_clear
 from limited_designs import limited
 from long_cases import long_after
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 from tool_moves import tool_move
 
@@ -26,15 +27,26 @@ from explorer import (
     Pose,
     evaluate,
     forward,
+    from_folds,
     inverse,
+    margins,
+    rotation_from_quaternion,
     to_folds,
 )
 from explorer.legs.moves import move_clearances, poses_between
+from explorer.mechanism.margins import mode_of, signs_of
+from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
 from explorer.paths.planning import NoPathError, PlannedPath, plan_path
-from explorer.paths.proofs import Proofs, positions_and_rotations
-from explorer.paths.search import lengths_of_moves, load_ompl, smooth
+from explorer.paths.search import (
+    Proofs,
+    lengths_of_moves,
+    load_ompl,
+    positions_and_rotations,
+    smooth,
+)
 from explorer.singularity.nearest import displacement
+from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 DESIGN = limited(PRESETS["paper-optimal"], leg_radii=(0.2,) * 4)
@@ -228,13 +240,71 @@ def test_plan_path_mode_other_than_the_home_has_a_path() -> None:
     assert plan_path(free, start, goal).poses == (start, goal)
 
 
-@pytest.mark.parametrize("tool", [(math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0), (1.0, 2.0)])
-def test_plan_path_tool_that_is_no_point_is_refused(tool: tuple[float, float, float]) -> None:
-    with pytest.raises(InputError, match="tool must"):
-        plan_path(DESIGN, HOME, HOME, tool=tool)
+def test_plan_path_with_an_unusable_tool_or_time_is_refused() -> None:
+    tools: list[Any] = [(math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0), (1.0, 2.0)]
+    for tool in tools:
+        with pytest.raises(InputError, match="tool must"):
+            plan_path(DESIGN, HOME, HOME, tool=tool)
+    for seconds in (0.0, math.nan, math.inf):
+        with pytest.raises(InputError, match="time above zero"):
+            plan_path(DESIGN, HOME, HOME, seconds=seconds)
 
 
-@pytest.mark.parametrize("seconds", [0.0, math.nan, math.inf])
-def test_plan_path_time_not_positive_is_refused(seconds: float) -> None:
-    with pytest.raises(InputError, match="time above zero"):
-        plan_path(DESIGN, HOME, HOME, seconds=seconds)
+FREE = limited(
+    PRESETS["paper-optimal"],
+    **dict.fromkeys(("l1", "d2", "d4", "l4"), (0.0, 1e3)),
+    box=None,
+    carriage_order="any",
+)
+MODE = 5
+
+
+def poses_of_mode(count: int) -> tuple[FloatArray, FloatArray]:
+    """Return random poses of one mode, at distances up to some times the reach."""
+    rng = np.random.default_rng(0)
+    position = 10.0 * rng.normal(size=(12 * count, 3))
+    rotation = rotation_from_quaternion(rng.normal(size=(12 * count, 4)))
+    chosen = np.flatnonzero(mode_of(margins(position, rotation)) == MODE)[:count]
+    return position[chosen], rotation[chosen]
+
+
+def proofs(margin: float, tolerance: float) -> Proofs:
+    """Return proofs that demand a margin and the signs of the mode, and nothing else."""
+    rules = Rules.of(FREE, signs_of(MODE)).without_clearances().tighten(margin, 0.0)
+    return Proofs(FREE, rules, tolerance=tolerance)
+
+
+@pytest.mark.parametrize("count", [1000, pytest.param(10_000, marks=pytest.mark.long)])
+def test_line_between_any_two_poses_of_a_mode_is_proven_where_a_quarter_of_moves_fail(
+    count: int,
+) -> None:
+    position, rotation = poses_of_mode(2 * count)
+    folds = to_folds(position, rotation)
+    rules = proofs(0.0, 0.0).rules
+    ends = position[:count], rotation[:count], position[count:], rotation[count:]
+    straight = moves_are_valid(FREE, *ends, rules=rules)
+    assert 0.7 < straight.mean() < 0.8
+    for first, last, is_straight in zip(folds[:count], folds[count:], straight, strict=True):
+        least = min(float(np.abs(margins(*from_folds(end))).min()) for end in (first, last))
+        corners = proofs(0.5 * least, min(1e-4 * FREE.reach, 0.1 * least)).prove_line(first, last)
+        assert corners is not None
+        assert len(corners) > 2 or is_straight
+        poses = [Pose.of(*from_folds(corner)) for corner in corners]
+        along = path_margins(poses)
+        assert along.crossings == ()
+        assert min(along.least) >= 0.4 * least
+
+
+@pytest.mark.parametrize("flat", [1e-2, 1e-4])
+@pytest.mark.parametrize("wall", range(1, 6))
+def test_line_along_a_wall_of_a_mode_is_proven(wall: int, flat: float) -> None:
+    rng = np.random.default_rng(wall)
+    first, last = rng.uniform([5.0, *[0.3] * 5], [20.0, *[2.8] * 5], (2, 6))
+    signs = np.array([1.0, 1.0, 1.0, *signs_of(MODE)])
+    first[wall] = last[wall] = flat
+    first, last = signs * first, signs * last
+    least = min(float(np.abs(margins(*from_folds(end))).min()) for end in (first, last))
+    corners = proofs(0.0, 0.1 * least).prove_line(first, last)
+    assert corners is not None
+    assert_array_equal(corners[0], first)
+    assert_array_equal(corners[-1], last)

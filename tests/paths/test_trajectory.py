@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import itertools
 import math
 
 import numpy as np
@@ -85,8 +84,6 @@ def test_trajectory_csv_reads_back_to_the_last_bit() -> None:
     assert head[-4:] == ["qz", *(f"tool_{axis} [10 mm]" for axis in "xyz")]
     assert of_tool.tool_position is not None
     assert [[float(word) for word in row[-3:]] for row in rows] == of_tool.tool_position.tolist()
-    for earlier, later in itertools.pairwise(values[:, 0].tolist()):
-        assert earlier < later
 
 
 def test_trajectory_bad_input_is_refused() -> None:

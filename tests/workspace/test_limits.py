@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -221,18 +222,6 @@ def test_leg_without_a_direction_at_home_violates_its_cone() -> None:
     assert not moves_are_valid(design, pose.position, pose.rotation, pose.position, pose.rotation)
 
 
-def random_moves(seed: int, count: int, share: float) -> tuple[FloatArray, ...]:
-    """Return moves between valid poses, or a share of each."""
-    rng = np.random.default_rng(seed)
-    places = rng.uniform([0, -12, 0], [20, 22, 18], (60 * count, 3))
-    rotations = Rotation.random(60 * count, random_state=rng).as_matrix()
-    valid = poses_are_valid(THICK, places, rotations)
-    p, r = places[valid][: count + 1], rotations[valid][: count + 1]
-    turn = Rotation.from_matrix(r[1:] @ np.swapaxes(r[:-1], -1, -2)).as_rotvec()
-    end_rotations = Rotation.from_rotvec(share * turn).as_matrix() @ r[:-1]
-    return p[:-1], r[:-1], p[:-1] + share * (p[1:] - p[:-1]), end_rotations
-
-
 @pytest.mark.parametrize("share", [1.0, 0.2])
 @pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (3.0, -2.0, -1.0), (0.0, 0.0, 30.0)])
 def test_move_valid_has_valid_poses_all_along(
@@ -240,11 +229,15 @@ def test_move_valid_has_valid_poses_all_along(
 ) -> None:
     """Moves are those of a tool, at b4 or elsewhere, between valid poses or a share of each."""
     point = np.array(tool)
-    starts = random_moves(7, 60, 1.0)
+    rng = np.random.default_rng(7)
+    places = rng.uniform([0, -12, 0], [20, 22, 18], (3600, 3))
+    rotations = Rotation.random(3600, random_state=rng).as_matrix()
+    valid = poses_are_valid(THICK, places, rotations)
+    starts = [Pose.of(p, r) for p, r in zip(places[valid], rotations[valid], strict=True)][:61]
     moves: list[tuple[FloatArray, ...]] = []
-    for p, r, q, s in zip(*starts, strict=True):
-        position, rotation = tool_move(Pose.of(p, r), Pose.of(q, s), share, point)
-        moves.append((p, r, position[0], rotation[0]))
+    for start, end in itertools.pairwise(starts):
+        position, rotation = tool_move(start, end, share, point)
+        moves.append((np.array(start.position), start.rotation, position[0], rotation[0]))
     arrays = [np.array(column) for column in zip(*moves, strict=True)]
     found = moves_are_valid(THICK, *arrays, tool=tool)
     agree = 0

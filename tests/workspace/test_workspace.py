@@ -187,16 +187,11 @@ PARTS = 150
 ROUNDING = 1e-13
 
 
-def unbounded(design: Design, rotation: FloatArray | None) -> tuple[Design, FloatArray]:
-    """Return the design without cones, which have no exact slices, and its rotation."""
-    return limited(
-        design, swing=Swing()
-    ), design.home_pose.rotation if rotation is None else rotation
-
-
 def troubled_without_cones(seed: int) -> tuple[Design, FloatArray]:
-    """Return a troubled case without its cones."""
-    return unbounded(*troubled_case(seed))
+    """Return a troubled case without its cones, which have no exact slices."""
+    design, rotation = troubled_case(seed)
+    rotation = design.home_pose.rotation if rotation is None else rotation
+    return limited(design, swing=Swing()), rotation
 
 
 CASES: dict[str, Callable[[int], tuple[Design, FloatArray]]] = {
@@ -222,14 +217,10 @@ def volume_in_parts(design: Design, rotation: FloatArray) -> tuple[float, float]
     return total, error
 
 
-def decoded(case: dict[str, Any]) -> tuple[Design, FloatArray]:
-    """Return the design and rotation of a case in the data."""
-    return decode_design(json.dumps(case["design"]).encode(), "case"), np.array(case["rotation"])
-
-
 @pytest.mark.parametrize("case", DEFECTS)
 def test_volume_with_breaks_between_nodes_is_the_reference_one(case: dict[str, Any]) -> None:
-    design, rotation = decoded(case)
+    design = decode_design(json.dumps(case["design"]).encode(), "case")
+    rotation = np.array(case["rotation"])
     found = workspace_volume(design, rotation)
     assert found.volume == pytest.approx(case["volume"], rel=1e-7)
     volume, _ = volume_in_parts(design, rotation)

@@ -351,9 +351,5 @@ class Demand:
     @property
     def is_range(self) -> bool:
         """Whether both ends exclude something; no length or angle is below zero."""
-        least = 0.0 if self.quantity in MAGNITUDES else -math.inf
+        least = 0.0 if self.quantity in (GAP, *range(L1, ANGLE + 1)) else -math.inf
         return self.low.value > least and self.high.value < math.inf
-
-
-MAGNITUDES = (GAP, *range(L1, ANGLE + 1))
-"""Quantities that are never negative."""

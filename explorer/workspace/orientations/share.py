@@ -11,10 +11,10 @@ orientations.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,8 +27,7 @@ from explorer.mechanism.pose import checked_rotation, rotation_from_yaw_pitch_ro
 from explorer.numerics import arrays
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.checks import whole
-from explorer.numerics.compiled import kernel
-from explorer.workspace.limits.quantities import is_valid, valid_rows
+from explorer.workspace.limits.quantities import valid_rows
 from explorer.workspace.limits.valid_poses import Rules
 
 MOST_ORIENTATIONS = 1_000_000
@@ -63,7 +62,8 @@ def yaw_pitch_roll_range(
         first, last = (start, end) if count > 1 else (0.5 * (start + end), 0.0)
         axes.append(np.asarray(np.linspace(first, last, count), dtype=np.float64))
     whole("the number of orientations", math.prod(counts), 1, MOST_ORIENTATIONS)
-    return rotation_from_yaw_pitch_roll(np.array(list(itertools.product(*axes))))
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    return rotation_from_yaw_pitch_roll(grid.reshape(-1, 3))
 
 
 def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> FloatArray:
@@ -153,20 +153,30 @@ def orientation_share(
     """
     p, t = one_position(position), one_tool(tool)
     n = whole("the number of orientations", n, 2, MOST_ORIENTATIONS)
-    seed = whole("the seed", seed, 0, 2**63)
-    sets = min(SETS, n)
-    sizes = np.full(sets, n // sets, dtype=np.int64)
-    sizes[: n % sets] += 1
-    turns = Rotation.random(sets, random_state=np.random.default_rng(seed))
-    quaternions = arrays.for_kernel(turns.as_quat(scalar_first=True).reshape(sets, 4))
-    counts = np.zeros(sets, dtype=np.int64)
-    rules = Rules.of(design).without_clearances()
-    share_rows(n, *rules, arrays.for_kernel(p), t, quaternions, sizes, counts)
-    share = float(counts.sum()) / n
-    weights = sizes / n
+    rotations, sizes = _even_sets(n, whole("the seed", seed, 0, 2**63))
+    within = _are_within(design, p, rotations, t)
+    shares = np.add.reduceat(within.astype(np.int64), np.cumsum(sizes) - sizes) / sizes
+    share = float(within.mean())
     # The sets differ in size by one orientation at the most.
-    spread = float(np.sum(weights * (counts / sizes - share) ** 2))
-    return OrientationShare(share, math.sqrt(spread / (sets - 1)), n)
+    spread = float(np.average((shares - share) ** 2, weights=sizes))
+    return OrientationShare(share, math.sqrt(spread / (len(sizes) - 1)), n)
+
+
+@lru_cache(1)
+def _even_sets(n: int, seed: int) -> tuple[FloatArray, IntArray]:
+    """Return the rotations of sets that each stand for all, (n, 3, 3), and the sets' sizes."""
+    sizes = [len(part) for part in np.array_split(np.empty(n), min(SETS, n))]
+    turns = Rotation.random(len(sizes), random_state=np.random.default_rng(seed))
+    sets: list[FloatArray] = []
+    for turn, size in zip(turns, sizes, strict=True):
+        s = np.arange(size) + 0.5
+        inner, outer = np.sqrt(s / size), np.sqrt(1.0 - s / size)
+        first, second = 2.0 * math.pi * s / PHI, 2.0 * math.pi * s / PSI
+        w, x = outer * np.cos(second), inner * np.sin(first)
+        y, z = inner * np.cos(first), outer * np.sin(second)
+        spiral = Rotation.from_quat(np.column_stack([w, x, y, z]), scalar_first=True)
+        sets.append((turn * spiral).as_matrix())
+    return np.concatenate(sets), np.array(sizes, dtype=np.int64)
 
 
 def orientation_capability(
@@ -206,49 +216,13 @@ def orientations_within(
     p, r, t = one_position(position), checked_rotation(rotations), one_tool(tool)
     if r.ndim != 3 or not len(r):
         raise InputError(f"rotations must have the shape (n, 3, 3); got {r.shape}")
-    within = np.empty(len(r), dtype=np.bool_)
-    rules = Rules.of(design).without_clearances()
-    valid_rows(len(r), *rules, p - tool_offset(r, t), arrays.for_kernel(r), within)
+    return _are_within(design, p, r, t)
+
+
+def _are_within(
+    design: Design, position: FloatArray, rotations: FloatArray, tool: FloatArray
+) -> BoolArray:
+    within = np.empty(len(rotations), dtype=np.bool_)
+    at = position - tool_offset(rotations, tool), arrays.for_kernel(rotations)
+    valid_rows(len(within), *Rules.of(design).without_clearances(), *at, within)
     return within
-
-
-@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], i8[::1], i8[::1])")
-def share_rows(
-    row: FloatArray,
-    demands: FloatArray,
-    position: FloatArray,
-    tool: FloatArray,
-    turns: FloatArray,
-    sizes: IntArray,
-    counts: IntArray,
-) -> None:
-    """Write how many orientations of each set satisfy all rules.
-
-    Each of m sets of a size is turned by a unit quaternion (w, x, y, z), shape (m, 4). The position
-    is that of the tool.
-    """
-    base, ends, r = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros((3, 3))
-    p = np.zeros(3)
-    for index in range(turns.shape[0]):
-        a, b, c, d = turns[index, 0], turns[index, 1], turns[index, 2], turns[index, 3]
-        size = sizes[index]
-        count = 0
-        for number in range(size):
-            s = number + 0.5
-            inner, outer = math.sqrt(s / size), math.sqrt(1.0 - s / size)
-            first, second = 2.0 * math.pi * s / PHI, 2.0 * math.pi * s / PSI
-            e, f = outer * math.cos(second), inner * math.sin(first)
-            g, h = inner * math.cos(first), outer * math.sin(second)
-            w, x = a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g
-            y, z = a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e
-            r[0, 0], r[0, 1] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z)
-            r[0, 2], r[1, 0] = 2.0 * (x * z + w * y), 2.0 * (x * y + w * z)
-            r[1, 1], r[1, 2] = 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-            r[2, 0], r[2, 1] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
-            r[2, 2] = 1.0 - 2.0 * (x * x + y * y)
-            for i in range(3):
-                arm = r[i, 0] * tool[0] + r[i, 1] * tool[1] + r[i, 2] * tool[2]
-                p[i] = position[i] - arm
-            if is_valid(row, demands, p, r, base, ends):
-                count += 1
-        counts[index] = count

@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.workspace.faces.faces import find_roots
 from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace, constraints
@@ -122,7 +121,7 @@ def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) 
         raise InputError(f"a slice is cut across x, y or z; got {axis!r}")
     cut = AXES.index(axis)
     axes = cut, *(other for other in range(3) if other != cut)
-    limits = constraints(design, checked_rotation(rotation))
+    limits = constraints(design, rotation)
     if any(isinstance(limit, Cone) for limit in limits):
         return None
     empty = Outline(axis, level, ())

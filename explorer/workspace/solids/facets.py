@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -29,12 +30,8 @@ RATIO = 2.0**0.125
 
 _CORNERS: BoolArray = np.array([[k >> 2 & 1, k >> 1 & 1, k & 1] for k in range(8)], dtype=np.bool_)
 
-_BLOCK: IntArray = np.array(
-    [
-        *([0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]),
-        *([2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]),
-    ]
-)
+# A square, counter-clockwise.
+_SQUARE: FloatArray = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 class Box:
@@ -66,8 +63,50 @@ class Box:
         return Box(self.lows - more, self.highs + more)
 
     def mesh(self) -> Facets:
-        """Return the corners and faces of the box."""
-        return self.corners, _BLOCK
+        """Return the vertices and faces of the box."""
+        half = 0.5 * (self.highs - self.lows)[1:]
+        return prism(self.middle[1:] + half * _SQUARE, self.lows[0], self.highs[0])
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The frame in which workspaces are tessellated, and the tolerance.
+
+    Attributes:
+        middle: Middle of the workspaces in design units, shape (3,).
+        scale: Largest extent of the workspaces in design units; the unit of this frame.
+        tolerance: Largest distance of a face from the true surface, in design units.
+        box: Box that holds the workspaces, in this frame.
+    """
+
+    middle: FloatArray
+    scale: float
+    tolerance: float
+    box: Box
+
+    @property
+    def chord(self) -> float:
+        """The tolerance in this frame."""
+        return self.tolerance / self.scale
+
+    @property
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """(lows, highs) of the box in design units, each (3,)."""
+        return self.to_design(self.box.lows), self.to_design(self.box.highs)
+
+    def to_frame(self, points: FloatArray) -> FloatArray:
+        """Return points (..., 3) in design units as points of this frame."""
+        return (points - self.middle) / self.scale
+
+    def to_design(self, points: FloatArray) -> FloatArray:
+        """Return points (..., 3) of this frame in design units."""
+        return points * self.scale + self.middle
+
+
+def frame_around(lows: FloatArray, highs: FloatArray, tolerance: float) -> Frame:
+    """Return the frame around a box; all arguments are in design units."""
+    middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
+    return Frame(middle, scale, tolerance, Box((lows - middle) / scale, (highs - middle) / scale))
 
 
 def step_of(radius: float, tolerance: float) -> float:
@@ -141,16 +180,20 @@ def cylinder(
     outline = (
         radius * _outward_scale(2.0 * angle / count) * np.array([np.cos(turns), np.sin(turns)])
     )
-    return prism(centre + outline.T, box)
+    return prism(centre + outline.T, *_along(box))
 
 
-def prism(outline: FloatArray, box: Box) -> Facets:
+def prism(outline: FloatArray, low: float, high: float) -> Facets:
     """Return the prism along x over a convex outline (n, 2) in y and z, counter-clockwise."""
     count = len(outline)
-    beyond = BEYOND * box.size
-    x = np.repeat([box.lows[0] - beyond, box.highs[0] + beyond], count)
-    points = np.column_stack([x, np.concatenate([outline, outline])])
+    points = np.column_stack([np.repeat([low, high], count), np.vstack([outline, outline])])
     return points, np.concatenate([_tube(count), _fan(count)[:, [0, 2, 1]], _fan(count) + count])
+
+
+def _along(box: Box) -> tuple[float, float]:
+    """Return the ends along x of what goes through a box."""
+    beyond = BEYOND * box.size
+    return float(box.lows[0]) - beyond, float(box.highs[0]) + beyond
 
 
 def _tube(count: int) -> IntArray:
@@ -177,8 +220,9 @@ def half_space(normal: FloatArray, offset: float, box: Box) -> Facets:
     unit = normal / length
     off = box.middle - (float(unit @ box.middle) - offset / length) * unit
     reach = 2.0 * box.size + float(np.linalg.norm(off - box.middle))
-    signs = Box(np.array([-1.0, -1.0, -2.0]), np.array([1.0, 1.0, 0.0])).corners
-    return off + reach * (signs @ frame_about(unit)), _BLOCK
+    points, faces = prism(_SQUARE, -2.0, 0.0)
+    # The axis of the prism is the normal, the last axis of the frame.
+    return off + reach * (points[:, [1, 2, 0]] @ frame_about(unit)), faces
 
 
 def wedge(apex: FloatArray, axis: FloatArray, half_angle: float, box: Box) -> Facets:
@@ -190,7 +234,7 @@ def wedge(apex: FloatArray, axis: FloatArray, half_angle: float, box: Box) -> Fa
     width, height, wall = _far_rim(apex, half_angle, box)
     far, across = (height + wall) * axis, width * np.array([-axis[1], axis[0]])
     low, high = height * axis - across, height * axis + across
-    return prism(apex + np.array([0.0 * axis, low, far - across, far + across, high]), box)
+    return prism(apex + np.array([0.0 * axis, low, far - across, far + across, high]), *_along(box))
 
 
 def cone(apex: FloatArray, axis: FloatArray, half_angle: float, step: float, box: Box) -> Facets:

@@ -18,8 +18,7 @@ from explorer.errors import ExplorerError
 from explorer.numerics.arrays import FloatArray, IntArray, dot
 from explorer.numerics.isosurface import surface_below_zero
 from explorer.workspace.limits.constraints import HalfSpace
-from explorer.workspace.solids.facets import Facets
-from explorer.workspace.solids.primitives import Frame, frame_around
+from explorer.workspace.solids.facets import Facets, Frame, frame_around
 
 if TYPE_CHECKING:
     from manifold3d import Manifold

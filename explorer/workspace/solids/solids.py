@@ -9,8 +9,9 @@ that bound is useless, so the difference must not exceed a share of the exact vo
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,20 +20,31 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.workspace.limits.constraints import (
+    BallOrCylinder,
+    Cone,
     Constraint,
     HalfSpace,
     constraints,
     constraints_over,
     orientation_of,
 )
-from explorer.workspace.limits.region import region_of
+from explorer.workspace.limits.region import box_of, contract_box, region_of
 from explorer.workspace.slices.volume import Volume, find_emptying_limits, volume_of
-from explorer.workspace.solids.primitives import MOST_FACES, Frame, frame_of, primitives_of
+from explorer.workspace.solids import facets
+from explorer.workspace.solids.facets import Box, Frame, frame_around
 from explorer.workspace.solids.solid import Solid, manifold_of, mesh_of, solid_of, union
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
+# The default tolerance of chords, as a share of the size of the workspace.
+DEFAULT_TOLERANCE = 1.0 / 500.0
+# The largest tolerance as such a share, since coarser facets would miss the workspace.
+COARSEST = 1.0 / 4.0
+# The most faces of all primitives together.
+MOST_FACES = 2_000_000
+# A cone within this share of the tolerance of a plane is tessellated as the plane.
+FLAT = 1e-3
 # Divisor of the tolerance in each round of refining a mesh that does not agree, the most rounds,
 # and the most faces of all primitives together.
 FINER, MOST_ROUNDS, MOST_REFINED = 4.0, 10, 60_000
@@ -71,10 +83,10 @@ def workspace_solid(
     r = orientation_of(design, rotation)
     limits = constraints(design, r, signs)
     if volume is None:
-        exact = exact_volume(limits, COLUMNS)
+        exact = _exact_volume(limits, COLUMNS)
     else:
-        exact = ExactVolume(volume.volume, 2.0 * volume.error)
-    solid = _make_agreeing_solid(limits, frame_of([limits], design.reach, tolerance), exact)
+        exact = volume.volume, 2.0 * volume.error
+    solid = _make_agreeing_solid(limits, _frame_of([limits], design.reach, tolerance), exact)
     return replace(solid, empty_because=find_emptying_limits(limits)) if solid.is_empty else solid
 
 
@@ -95,7 +107,7 @@ def inclusive_solid(
         ExplorerError: A boolean fails.
     """
     families = constraints_over(design, rotations, tool)
-    frame = frame_of(families, design.reach, tolerance)
+    frame = _frame_of(families, design.reach, tolerance)
     names = _names(families)
     bodies, _ = _make_bodies(families, frame, names)
     vertices, faces, _ = mesh_of(union(bodies))
@@ -127,7 +139,7 @@ def total_solid(
 
     def make_without(name: str) -> Solid:
         others = [limit for limit in limits if limit.name != name]
-        return _make_solid(others, frame_of([others], design.reach, tolerance))
+        return _make_solid(others, _frame_of([others], design.reach, tolerance))
 
     solid = make_without("")
     if not solid.is_empty:
@@ -148,31 +160,36 @@ def _make_solid(limits: Sequence[Constraint], frame: Frame) -> Solid:
     return solid_of(bodies[0], origins, frame, names)
 
 
-def _make_agreeing_solid(limits: Sequence[Constraint], frame: Frame, exact: ExactVolume) -> Solid:
+def _make_agreeing_solid(
+    limits: Sequence[Constraint], frame: Frame, exact: tuple[float, float]
+) -> Solid:
     """Return a workspace as a mesh that agrees with the exact volume, if that is possible."""
     best = _make_solid(limits, frame)
-    if exact.is_met_by(best):
+    if _excess(best, *exact) <= 0.0:
         return replace(best, agrees=True)
     # The tolerance has to suit the smallest box around the workspace.
-    finer = frame.contract(limits)
-    if finer is not None:
+    ends = contract_box(limits, *frame.ends)
+    if ends is not None:
+        scale = float((ends[1] - ends[0]).max())
+        finer = frame_around(*ends, min(frame.tolerance, DEFAULT_TOLERANCE * scale))
         # Within the box columns are closer and rounding is smaller.
-        sides, (lows, highs) = np.concatenate([-np.eye(3), np.eye(3)]), finer.ends
-        ends = [*(-lows).tolist(), *highs.tolist()]
-        walls = (HalfSpace("", side, end) for side, end in zip(sides, ends, strict=True))
-        exact = exact_volume([*limits, *walls], WITHIN_BOX)
+        sides = zip([*-np.eye(3), *np.eye(3)], [*-ends[0], *ends[1]], strict=True)
+        walls = (HalfSpace("", side, float(end)) for side, end in sides)
+        exact = _exact_volume([*limits, *walls], WITHIN_BOX)
         for _ in range(MOST_ROUNDS):
-            faces = sum(primitive.faces for primitive in primitives_of(limits, finer))
-            if exact.is_met_by(best) or faces > MOST_REFINED:
+            faces = sum(primitive.faces for primitive in _primitives_of(limits, finer))
+            if _excess(best, *exact) <= 0.0 or faces > MOST_REFINED:
                 break
             solid = _make_solid(limits, finer)
-            if best.is_empty or exact.excess(solid) < exact.excess(best):
+            if best.is_empty or _excess(solid, *exact) < _excess(best, *exact):
                 best = solid
             finer = replace(finer, tolerance=finer.tolerance / FINER)
-    if finer is None or exact.is_artefact(best):
-        empty = replace(best, vertices=best.vertices[:0], faces=best.faces[:0], agrees=True)
-        return replace(empty, limit_of_face=best.limit_of_face[:0], tolerance=frame.tolerance)
-    return replace(best, agrees=exact.excess(best) <= 0.0)
+    agrees = _excess(best, *exact) <= 0.0
+    is_artefact = exact[0] <= 0.0 and abs(best.volume) <= best.tolerance * best.area
+    if ends is not None and (agrees or not is_artefact):
+        return replace(best, agrees=agrees)
+    empty = replace(best, vertices=best.vertices[:0], faces=best.faces[:0], agrees=True)
+    return replace(empty, limit_of_face=best.limit_of_face[:0], tolerance=frame.tolerance)
 
 
 def _make_bodies(
@@ -181,7 +198,7 @@ def _make_bodies(
     """Return each family's workspace as a body, and the indices of names by the ids of faces."""
     from manifold3d import Manifold, OpType
 
-    primitives_of_families = [primitives_of(limits, frame) for limits in families]
+    primitives_of_families = [_primitives_of(limits, frame) for limits in families]
     faces = sum(primitive.faces for family in primitives_of_families for primitive in family)
     if faces > MOST_FACES:
         # The number of faces of a ball is inverse to the tolerance; other solids have fewer.
@@ -208,34 +225,162 @@ def _make_bodies(
 
 
 @dataclass(frozen=True)
-class ExactVolume:
-    """The exact volume that a mesh is compared with and a bound of its error, in cubed units."""
+class Primitive:
+    """A primitive solid, before its tessellation, in the frame of a workspace.
 
-    volume: float
-    error: float
+    Attributes:
+        name: Name of the limit, "" for the block around the workspace.
+        is_cut: Whether positions outside satisfy the limit, rather than those inside.
+        faces: Approximate number of faces.
+        tessellate: Function that returns the vertices and faces.
+    """
 
-    def excess(self, solid: Solid) -> float:
-        """Return the volume by which the difference of a mesh exceeds the allowed one.
-
-        The mesh agrees if the excess is not positive. It is infinite if some face comes from no
-        limit, since its facet protrudes.
-        """
-        if (solid.limit_of_face < 0).any():
-            return math.inf
-        allowed = min(solid.tolerance * solid.area, LARGEST_SHARE * self.volume)
-        return abs(solid.volume - self.volume) - allowed - self.error
-
-    def is_met_by(self, solid: Solid) -> bool:
-        """Return whether a mesh agrees, and is not empty although the exact volume is not zero."""
-        return self.excess(solid) <= 0.0 and not (solid.is_empty and self.volume > 0.0)
-
-    def is_artefact(self, solid: Solid) -> bool:
-        """Return whether the exact volume is zero and that of the mesh is due to its tolerance."""
-        disagrees = self.volume <= 0.0 and self.excess(solid) > 0.0
-        return disagrees and abs(solid.volume) <= solid.tolerance * solid.area
+    name: str
+    is_cut: bool
+    faces: int
+    tessellate: Callable[[], facets.Facets]
 
 
-def exact_volume(limits: Sequence[Constraint], columns: int) -> ExactVolume:
-    """Return the exact volume of a workspace; within cones that of some columns per axis."""
+def _frame_of(
+    families: Sequence[Sequence[Constraint]], reach: float, tolerance: float | None
+) -> Frame:
+    """Return the frame for workspaces, given by the limits of each.
+
+    The tolerance in design units is at most a quarter of the largest extent; if None, it is a 500th
+    of the reach or of the largest extent, whichever is smaller.
+
+    Raises:
+        InputError: The tolerance is not positive.
+    """
+    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise InputError(f"the tolerance must be positive; got {tolerance:g}")
+    boxes = [box for box in map(box_of, families) if box is not None]
+    # If all workspaces are empty, any frame will do.
+    lows = np.min([low for low, _ in boxes], axis=0) if boxes else np.zeros(3)
+    highs = np.max([high for _, high in boxes], axis=0) if boxes else np.full(3, reach)
+    scale = float((highs - lows).max())
+    chord = min(tolerance or DEFAULT_TOLERANCE * min(reach, scale), COARSEST * scale)
+    return frame_around(lows, highs, chord)
+
+
+def _primitives_of(limits: Sequence[Constraint], frame: Frame) -> list[Primitive]:
+    """Return the primitives of a workspace: their intersection, less those that are cut.
+
+    The list is empty if the boxes around the primitives already show that the workspace is.
+    """
+    region = region_of(limits)
+    if region.box is None:
+        return []
+    # The box of a contracted frame is smaller than that of the region.
+    lows, highs = map(frame.to_frame, region.box)
+    box = Box(np.maximum(lows, frame.box.lows), np.minimum(highs, frame.box.highs))
+    # The box ends on surfaces of limits, to rounding. The block extends beyond them, so that
+    # rounding does not decide whether all of the block satisfies a limit.
+    block = box.surroundings()
+    ends = (region.low_limit, region.high_limit)
+    planes = (*filter(None, ends), *region.plane_limits)
+    primitives = [Primitive("", False, 12, block.mesh)]
+    for primitive in (
+        *(_half_space(plane, box, block, frame) for plane in planes),
+        *_balls_and_cylinders(region.circle_limits, box, block, frame),
+        *(_cone(limit, frame) for limit in limits if isinstance(limit, Cone)),
+    ):
+        if primitive is False:
+            return []
+        if primitive is not True:
+            primitives.append(primitive)
+    return primitives
+
+
+def _half_space(plane: HalfSpace, box: Box, block: Box, frame: Frame) -> Primitive | bool:
+    """Return the primitive; True if the whole block satisfies it, False if the box violates it."""
+    length = float(np.linalg.norm(plane.normal))
+    normal = plane.normal / length
+    offset = (plane.offset / length - float(normal @ frame.middle)) / frame.scale
+    if float((block.corners @ normal).max()) < offset:
+        return True
+    if float((box.corners @ normal).min()) >= offset:
+        return False
+    return Primitive(plane.name, False, 12, partial(facets.half_space, normal, offset, frame.box))
+
+
+def _balls_and_cylinders(
+    limits: Sequence[BallOrCylinder], box: Box, block: Box, frame: Frame
+) -> Iterator[Primitive | bool]:
+    """Yield each primitive; True if the whole block satisfies it, False if the box violates it."""
+    concentric: dict[tuple[bool, bytes], list[BallOrCylinder]] = {}
+    for limit in limits:
+        concentric.setdefault((limit.is_ball, limit.centre.tobytes()), []).append(limit)
+    for group in concentric.values():
+        # Concentric surfaces share a pattern of facets, so that thin shells have no holes.
+        start = 0 if group[0].is_ball else 1
+        centre = frame.to_frame(group[0].centre)[start:]
+        (near, far), beyond = box.distances(centre), block.distances(centre)[1]
+        bounding: list[tuple[BallOrCylinder, float]] = []
+        for limit in group:
+            radius = limit.radius / frame.scale
+            if radius <= near or radius > (beyond if limit.inside else far):
+                yield (radius <= near) != limit.inside
+            else:
+                bounding.append((limit, radius))
+        if not bounding:
+            continue
+        radii = [radius for _, radius in bounding]
+        parts = [facets.facing_part(centre, radius, frame.box, frame.chord) for radius in radii]
+        towards, angle = parts[0][0], max(part[1] for part in parts)
+        step = facets.step_of(max(radii), frame.chord)
+        for limit, radius in bounding:
+            if limit.is_ball:
+                faces = facets.ball_faces(angle, step)
+                tessellate = partial(facets.ball, centre, radius, towards, angle, step)
+            else:
+                faces, args = math.ceil(8.0 * angle / step), (centre, radius, towards, angle, step)
+                tessellate = partial(facets.cylinder, *args, frame.box)
+            yield Primitive(limit.name, not limit.inside, faces, tessellate)
+
+
+def _cone(limit: Cone, frame: Frame) -> Primitive | bool:
+    """Return the primitive; True if all positions satisfy the limit, False if none does."""
+    apex, axis, angle = frame.to_frame(limit.apex), limit.axis, limit.half_angle
+    if limit.flat:
+        # The leg is perpendicular to x, so only a section of its cone counts: a wedge.
+        across = math.hypot(axis[1], axis[2])
+        cosine = math.cos(angle)
+        if abs(cosine) >= across:
+            return cosine <= 0.0
+        axis, angle = np.array([0.0, axis[1], axis[2]]) / across, math.acos(cosine / across)
+        # The edge of the wedge is a line along x, represented by its nearest point.
+        apex = np.array([frame.box.middle[0], apex[1], apex[2]])
+    if angle >= math.pi:
+        return True
+    farthest = frame.box.distances(apex)[1]
+    if abs(math.cos(angle)) * farthest <= FLAT * frame.chord:
+        plane = partial(facets.half_space, -axis, -float(axis @ apex), frame.box)
+        return Primitive(limit.name, False, 12, plane)
+    is_cut = angle > 0.5 * math.pi
+    if is_cut:
+        axis, angle = -axis, math.pi - angle
+    step = facets.step_of(farthest, frame.chord)
+    faces, tessellate = 16, partial(facets.wedge, apex[1:], axis[1:], angle, frame.box)
+    if not limit.flat:
+        faces = math.ceil(12.0 * math.pi / step)
+        tessellate = partial(facets.cone, apex, axis, angle, step, frame.box)
+    return Primitive(limit.name, is_cut, faces, tessellate)
+
+
+def _excess(solid: Solid, volume: float, error: float) -> float:
+    """Return the volume by which a mesh differs from an exact one by more than is allowed.
+
+    The mesh agrees if it is not positive. It is infinite if some face comes from no limit, since
+    its facet protrudes, and for a mesh that is empty although the exact volume is not zero.
+    """
+    if (solid.limit_of_face < 0).any() or (solid.is_empty and volume > 0.0):
+        return math.inf
+    allowed = min(solid.tolerance * solid.area, LARGEST_SHARE * volume)
+    return abs(solid.volume - volume) - allowed - error
+
+
+def _exact_volume(limits: Sequence[Constraint], columns: int) -> tuple[float, float]:
+    """Return the exact volume of a workspace, within cones by columns, and a bound of its error."""
     volume, error, _ = volume_of(region_of(limits), columns)
-    return ExactVolume(volume, 2.0 * error)
+    return volume, 2.0 * error
