@@ -17,6 +17,7 @@ from explorer.cli import values
 from explorer.cli.output import write_json
 from explorer.cli.streams import write
 from explorer.errors import DesignError, ExplorerError, InputError, StorageError
+from explorer.files.writing import write_whole
 from explorer.mechanism.configuration import Point, offset_of, tool_offset, tool_position
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design, typical_machine
@@ -25,6 +26,7 @@ from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion
 from explorer.numerics.arrays import FloatArray
+from explorer.statics.reactions import has_limits
 
 if TYPE_CHECKING:
     from explorer.workspace.carried_region import CarriedRegion
@@ -78,8 +80,6 @@ def write_files(files: Mapping[Path, bytes]) -> tuple[list[Path], list[StorageEr
     The command prints its answer before it raises the errors, so that a full disk does not lose
     the work of hours.
     """
-    from explorer.files.writing import write_whole
-
     written: list[Path] = []
     errors: list[StorageError] = []
     for path, data in files.items():
@@ -278,8 +278,6 @@ class PoseOptions(OrientationOptions, PointOptions):
 
 def check_has_limits(design: Design) -> None:
     """Check that a part of a design has a limit."""
-    from explorer.statics.reactions import has_limits
-
     if not has_limits(design):
         raise InputError(
             "the design limits neither its actuators nor its struts nor its guide, so that it "

@@ -9,12 +9,13 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.cli.streams import write
+from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
@@ -23,10 +24,6 @@ from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_ascii, format_fixed
-
-if TYPE_CHECKING:
-    from explorer.measures.snapshot import Snapshot
-    from explorer.workspace.solids.solid import Solid
 
 
 def write_json(answer: Mapping[str, object]) -> None:
@@ -191,12 +188,3 @@ def radii_line(design: Design) -> str:
 
 DISAGREES = "its volume does not agree with the exact one"
 """The remark on a mesh that `explorer.workspace.solids.solids` rejects."""
-
-
-def mesh_json(solid: Solid) -> dict[str, object]:
-    """Return the measures of a mesh as plain values."""
-    return {
-        "volume": solid.volume,
-        "triangles": len(solid.faces),
-        "watertight": solid.is_watertight,
-    }

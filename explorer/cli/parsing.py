@@ -14,7 +14,7 @@ import io
 import re
 from collections.abc import Iterable, Sequence
 from itertools import takewhile
-from typing import Any, ClassVar, Protocol, get_type_hints
+from typing import Any, get_type_hints
 
 import tyro
 from tyro.constructors import PrimitiveConstructorSpec
@@ -26,23 +26,14 @@ _HELP = ("-h", "--help")
 # Modules of the commands that have none of their own name.
 _MODULES = {
     **dict.fromkeys(("inverse", "forward", "singularity"), "kinematics"),
-    **dict.fromkeys(("forces", "accuracy"), "statics"),
+    **dict.fromkeys(("forces", "accuracy", "budget"), "statics"),
     **dict.fromkeys(("interference", "path"), "moves"),
+    "orientation": "workspace",
     **dict.fromkeys(("serve", "report", "screenshot"), "page"),
 }
 
 
-class Command(Protocol):
-    """The interface of a command's dataclass."""
-
-    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
-
-    def run(self) -> None:
-        """Run the command and write its answer to standard output."""
-        ...
-
-
-def load_command(name: str, known: Iterable[str]) -> type[Command]:
+def load_command(name: str, known: Iterable[str]) -> type[Any]:
     """Import a command's module and return its dataclass."""
     if name not in known:
         hint = suggestion(name, known) or f"there are {', '.join(known)}"
@@ -51,7 +42,7 @@ def load_command(name: str, known: Iterable[str]) -> type[Command]:
     return getattr(module, name.capitalize())
 
 
-def parse(name: str, command: type[Command], argv: Sequence[str]) -> Command | None:
+def parse(name: str, command: type[Any], argv: Sequence[str]) -> Any:
     """Return the command with its options set; None if the arguments ask for help."""
     program = f"explorer {name}"
     page, errors = io.StringIO(), io.StringIO()
@@ -93,7 +84,7 @@ def suggestion(word: str, known: Iterable[str]) -> str | None:
     return f"did you mean {close[0]}?" if close else None
 
 
-def _check_options(command: type[Command], argv: Sequence[str]) -> None:
+def _check_options(command: type[Any], argv: Sequence[str]) -> None:
     """Refuse options that the command lacks, options given twice, and values of the wrong kind."""
     hints = get_type_hints(command, include_extras=True)
     known = {"--help": "help"}

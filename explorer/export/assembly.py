@@ -66,19 +66,18 @@ def _3mf(prototype: Prototype) -> bytes:
     design, unit, home = prototype.design, prototype.design.unit_mm, prototype.design.home_pose
     places, kinds = prototype.chains.places_at(home.position, home.rotation), list(COLOURS)
     by_name = {part.name: part for part in prototype.parts}
-    with mesh.refusals_of_lib3mf("parts"):
-        model = mesh.Model(f"mechanism of {design.name}", design, COLOURS)
-        whole = model.add_group("mechanism")
-        for name, members in part_groups():
-            group = model.add_group(name)
-            for member in members:
-                part, body = by_name[member], by_name[member].body_index
-                corners = part.vertices * unit
-                item = model.add_mesh(part.name, corners, part.faces, kinds.index(part.kind))
-                origin = places.origin[body] * unit
-                group.AddComponent(item, model.transform(places.rotation[body], origin))
-            whole.AddComponent(group, model.untransformed)
-        return model.encode(whole, _DECIMALS)
+    model = mesh.Model(f"mechanism of {design.name}", design, COLOURS)
+    whole = model.add_group("mechanism")
+    for name, members in part_groups():
+        group = model.add_group(name)
+        for member in members:
+            part, body = by_name[member], by_name[member].body_index
+            corners = part.vertices * unit
+            item = model.add_mesh(part.name, corners, part.faces, kinds.index(part.kind))
+            origin = places.origin[body] * unit
+            group.AddComponent(item, model.transform(places.rotation[body], origin))
+        whole.AddComponent(group, model.untransformed)
+    return model.encode(whole, _DECIMALS)
 
 
 def _glb(prototype: Prototype) -> bytes:

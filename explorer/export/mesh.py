@@ -1,4 +1,4 @@
-"""Meshes for printers, CAD and viewers: 3MF, STL, GLB, OBJ and PLY, with names, colours and design.
+"""Meshes for printers, CAD and viewers: 3MF, STL, GLB, OBJ and PLY, with names and colours.
 
 Coordinates are those of the base frame in millimetres; GLB is by its specification in metres with
 y up. 3MF, STL and GLB hold single precision (6e-8 of the largest coordinate), PLY and OBJ double.
@@ -9,12 +9,10 @@ trimesh packs GLB and STL, lib3mf 3MF. PLY and OBJ are written here: those of tr
 
 from __future__ import annotations
 
-import contextlib
-import json
 import math
 import re
 import unicodedata
-from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
@@ -34,25 +32,6 @@ APPLICATION = f"flagged-explorer {__version__}"
 # Largest number of characters of a name in a file.
 LONGEST_NAME = 160
 
-# Readers of PLY take lines of a few hundred characters only. A piece of a comment ends after a
-# comma if it can; never at a blank, which programs trim, nor at a backslash, which in OBJ would
-# append the next line.
-_PIECE = re.compile(r".{1,160}(?<![ \\])(?! )(?:(?<=,)|$)|.{1,160}(?<![ \\])(?! )")
-
-
-def json_line(value: object) -> str:
-    """Return plain values as JSON on one line, in ASCII, that readers of comments stand.
-
-    It has no two backslashes in a row, and not the last word of the header of a PLY file.
-    """
-    text = json.dumps(value, separators=(",", ":")).replace("\\\\", "\\u005c")
-    return text.replace("end_header", "end\\u005fheader")
-
-
-def design_json(design: Design) -> str:
-    """Return the design as JSON, as `json_line` does."""
-    return json_line(json.loads(msgspec.json.encode(design)))
-
 
 def printable_name(name: str) -> str:
     """Return a name as one printable line of 1 to `LONGEST_NAME` characters."""
@@ -63,16 +42,6 @@ def printable_name(name: str) -> str:
 def ascii_name(name: str) -> str:
     """Return a name in ASCII: letters without their accents, others left out; δ1 becomes 1."""
     return printable_name(unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode())
-
-
-def comments(mark: str, text: str) -> list[str]:
-    """Return a text in ASCII as comments of at most 160 characters, each after the same mark.
-
-    Args:
-        mark: Start of a comment, such as "comment design".
-        text: What `json_line` returns; joining what follows the marks gives it back.
-    """
-    return [f"{mark} {piece}" for piece in _PIECE.findall(text)]
 
 
 def check_format(file_format: str, formats: Collection[str], what: str) -> None:
@@ -121,7 +90,7 @@ def glb_bytes(
             "unit": "metre; millimetres of the base frame times 0.001",
             "up": "the first node turns the base frame, whose z is up, to y up",
             "unit_mm": design.unit_mm,
-            "design": json.loads(design_json(design)),
+            "design": msgspec.to_builtins(design),
         }
         tree["asset"] = {"version": "2.0", "generator": APPLICATION, "extras": extras}
         tree["scenes"] = [{"nodes": [0]}]
@@ -139,21 +108,6 @@ def glb_bytes(
 
 NAMESPACE = "urn:flagged-explorer"
 """The XML namespace of the design in a file's metadata."""
-
-
-@contextlib.contextmanager
-def refusals_of_lib3mf(what: str) -> Generator[None]:
-    """Raise an error of lib3mf as an `ExplorerError` that names what it refuses."""
-    import lib3mf  # pyright: ignore[reportMissingTypeStubs]
-
-    library: Any = lib3mf
-    try:
-        yield
-    except library.ELib3MFException as error:
-        raise ExplorerError(
-            f"lib3mf refuses the {what} ({error}); use another format, or a smaller unit if it "
-            "reaches beyond 1000 km"
-        ) from None
 
 
 class Model:
@@ -180,7 +134,9 @@ class Model:
             ("Description", f"{name}; one design unit is {design.unit_mm:g} mm"),
         ):
             about.AddMetaData("", key, value, "xs:string", True)
-        about.AddMetaData(NAMESPACE, "design", design_json(design), "xs:string", True)
+        about.AddMetaData(
+            NAMESPACE, "design", msgspec.json.encode(design).decode(), "xs:string", True
+        )
         group = self._model.AddBaseMaterialGroup()
         self._materials: int = group.GetResourceID()
         self._ids = [
@@ -323,18 +279,16 @@ def _stl(solid: Solid, _: Design, name: str) -> bytes:
     return text.encode()[:80].ljust(80) + data[80:]
 
 
-def _ply(solid: Solid, design: Design, name: str) -> bytes:
+def _ply(solid: Solid, *_: object) -> bytes:
     lines = [
         "ply",
         "format binary_little_endian 1.0",
         f"comment {APPLICATION}",
-        *comments("comment name", json_line(name)[1:-1]),
         "comment unit millimetre",
         *(
             f"comment colour {_join_numbers(colour_of(limit))} {ascii_name(limit)}"
             for limit in solid.limits
         ),
-        *comments("comment design", design_json(design)),
         f"element vertex {len(solid.vertices)}",
         *(f"property double {axis}" for axis in "xyz"),
         f"element face {len(solid.faces)}",
@@ -350,11 +304,10 @@ def _ply(solid: Solid, design: Design, name: str) -> bytes:
     return head + solid.vertices.astype("<f8").tobytes() + faces.tobytes()
 
 
-def _obj(solid: Solid, design: Design, name: str) -> bytes:
+def _obj(solid: Solid, _: Design, name: str) -> bytes:
     lines = [
         f"# {APPLICATION}",
         "# unit millimetre",
-        *comments("# design", design_json(design)),
         f"o {_word(name)}",
         *(f"v {_join_numbers(point)}" for point in solid.vertices.tolist()),
     ]
@@ -381,11 +334,10 @@ def _3mf(solid: Solid, design: Design, name: str) -> bytes:
     largest = float(np.abs(solid.vertices).max())
     decimals = min(16, max(4, 11 - math.floor(math.log10(largest))))
     points = _single(solid, "3mf", decimals).vertices
-    with refusals_of_lib3mf("mesh"):
-        model = Model(name, design, {limit: colour_of(limit) for limit in solid.limits})
-        mesh = model.add_mesh(name, points, solid.faces, 0)
-        model.colour_faces(mesh, solid.limit_of_face)
-        return model.encode(mesh, decimals)
+    model = Model(name, design, {limit: colour_of(limit) for limit in solid.limits})
+    mesh = model.add_mesh(name, points, solid.faces, 0)
+    model.colour_faces(mesh, solid.limit_of_face)
+    return model.encode(mesh, decimals)
 
 
 def _word(name: str) -> str:

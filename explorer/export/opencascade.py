@@ -144,7 +144,7 @@ def primitive(kind: str, *arguments: Any) -> ExactShape:
 
 
 class ExactKernel(Kernel):
-    """Bodies of exact faces; a hole needs no correction for facets."""
+    """A maker of bodies with exact faces."""
 
     def disc(self, circle: Circle, low: float, high: float) -> ExactShape:
         """Return a cylinder along z between two heights."""
@@ -154,6 +154,9 @@ class ExactKernel(Kernel):
     def ball(self, radius: float) -> ExactShape:
         """Return a ball about the origin."""
         return primitive("Sphere", radius)
+
+    # Nothing is to be corrected for facets.
+    hole, cavity = disc, ball
 
     def box(self, low: Triple, high: Triple) -> ExactShape:
         """Return a box between two corners."""

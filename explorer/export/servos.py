@@ -53,15 +53,10 @@ class Servos(NamedTuple):
     weights: FloatArray
     forces: FloatArray
 
-    def droop(self, design: Design, forces: FloatArray) -> FloatArray:
-        """Return displacement (design units) and turn of the tool at home under the weights, (6,).
-
-        Args:
-            design: The manipulator.
-            forces: Forces at the commanded joint values, shape (6,), in N.
-        """
+    def droop(self, design: Design) -> FloatArray:
+        """Return displacement, in design units, and turn of the tool by the weights at home."""
         home = design.home_pose
-        lag = (self.weights - forces) / (1e-3 * design.unit_mm * self.stiffness)
+        lag = (self.weights - self.forces) / (1e-3 * design.unit_mm * self.stiffness)
         twists = twists_of_actuators(Configuration.at(design, home, design.tool.position))
         return twists @ -lag
 

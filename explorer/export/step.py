@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from explorer.errors import ExplorerError, InputError, NoAnswerError
+from explorer.errors import ExplorerError, NoAnswerError
 from explorer.export import opencascade as cad
 from explorer.export.mesh import colour_of
 from explorer.export.opencascade import Document, ExactShape, occ, primitive
@@ -33,8 +33,6 @@ from explorer.workspace.limits.constraints import (
 from explorer.workspace.limits.region import Region, region_of
 from explorer.workspace.slices.volume import workspace_volume
 
-# OpenCASCADE merges points that are nearer than 1e-7, whatever the unit.
-SMALLEST_MM, LARGEST_MM = 1e-1, 1e7
 GOOD_ERROR, LARGEST_ERROR = 1e-6, 1e-4
 """Relative errors of the volume: the first is accepted at once, beyond the last is refused."""
 
@@ -76,9 +74,9 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
 
     Raises:
         MissingExtraError: OpenCASCADE is not installed.
-        InputError: The rotation is not one, or OpenCASCADE cannot hold a workspace of this size.
+        InputError: The rotation is not one.
         NoAnswerError: The workspace is empty.
-        ExplorerError: A boolean operation fails.
+        ExplorerError: A boolean operation fails, or OpenCASCADE is off by too much of the volume.
     """
     cad.check_extra()
     r = orientation_of(design, rotation)
@@ -89,12 +87,6 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
     limits, unit = constraints(design, r), design.unit_mm
     region = region_of(limits)
     lows, highs = (end * unit for end in region.ends)
-    size = float((highs - lows).max())
-    if not SMALLEST_MM <= size <= LARGEST_MM:
-        raise InputError(
-            f"OpenCASCADE takes solids of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; this one is "
-            f"{size:.3g} mm: choose another unit"
-        )
     best, least_error = None, math.inf
     for shape in _Primitives(lows, highs, unit).attempts(limits, region):
         faces = cad.faces_of(shape)

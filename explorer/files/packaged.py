@@ -9,6 +9,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import NamedTuple
 
+from explorer import __version__
 from explorer.errors import InputError
 
 SOURCES = Path(__file__).parents[2]
@@ -32,23 +33,15 @@ def _packaged_folder(folder: str) -> Traversable:
     return packaged if packaged.is_dir() else SOURCES / "assets" / folder
 
 
-LIBRARIES = ("flagged-explorer", "numpy", "scipy", "numba")
-
-
 @functools.cache
 def versions() -> dict[str, str]:
-    """Return the versions of Python and of `LIBRARIES`, by name; callers do not change it."""
-    # The metadata are files, and reading them takes milliseconds.
-    known = {"python": platform.python_version()}
-    for name in LIBRARIES:
-        try:
-            known[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            # A checkout that was never installed has no metadata.
-            from explorer import __version__
+    """Return the versions of Python, of this package and of its numerical libraries, by name.
 
-            known[name] = __version__
-    return known
+    Callers do not change it.
+    """
+    # The metadata are files, and reading them takes milliseconds.
+    numerical = {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
+    return {"python": platform.python_version(), "flagged-explorer": __version__, **numerical}
 
 
 MANUAL_FILES = (

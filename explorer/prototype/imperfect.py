@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError, NoAnswerError
-from explorer.mechanism.configuration import Configuration, tool_offset
+from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import checked_joints, inverse
 from explorer.mechanism.margins import margins, mode_of
@@ -62,11 +62,9 @@ class ImperfectMachine:
         `default_rng(seed)`, as the RMS errors of `explorer.statics.accuracy` take them.
 
         Raises:
-            InputError: The seed is negative, or the design states neither errors nor tolerances
+            InputError: The design states neither errors nor tolerances
                 nor any stiffness, so that no machine differs from it.
         """
-        if seed < 0:
-            raise InputError(f"the seed must not be negative; got {seed}")
         errors = accuracy.source_errors(design)
         if not (errors.any() or is_elastic(design)):
             raise InputError(
@@ -204,19 +202,3 @@ class ImperfectMachine:
         )
         turn = Rotation.from_matrix(true.rotation @ meant.rotation.T)
         return np.concatenate([there - expected, turn.as_rotvec()])
-
-    def linear_tool_error(self) -> FloatArray:
-        """Return what the linear model makes of `tool_error`, shape (6,).
-
-        Raises:
-            NoAnswerError: The home pose is singular.
-        """
-        if not self.deviations.any():
-            return np.zeros(6)
-        home, tool = self.design.home_pose, self.design.tool.position
-        slopes = accuracy.error_by_source(Configuration.at(self.design, home, tool))
-        if not np.isfinite(slopes).all():
-            raise NoAnswerError(
-                "the home pose is singular, so that errors have no bound there; choose another home"
-            )
-        return slopes @ self.deviations

@@ -9,11 +9,10 @@ from __future__ import annotations
 import functools
 import math
 import operator
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +24,6 @@ from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE
 from explorer.prototype.sizes import CLEARANCE, LegSizes, Sizes
 from explorer.prototype.weights import Mass, mesh_mass
 from explorer.workspace.solids.solid import Solid
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
 
 Shape: TypeAlias = Any
 """A body: `+`, `-` and `^` are union, difference and intersection; it has the methods
@@ -43,36 +39,56 @@ class Circle(NamedTuple):
     y: float = 0.0
 
 
-class Kernel(ABC):
-    """A maker of bodies, in millimetres."""
+SEGMENTS = 48
+"""Number of edges of a circle."""
 
-    @abstractmethod
+# Inner radius, rounded down, of the polyhedron with these edges for a ball of radius 1.
+_INSCRIBED = 0.99425
+
+
+class Kernel:
+    """A maker of polyhedra in millimetres: inscribed in round shapes, circumscribed about holes.
+
+    A maker of other bodies overrides every method.
+    """
+
+    @cached_property
+    def _library(self) -> Any:
+        import manifold3d
+
+        return manifold3d
+
     def disc(self, circle: Circle, low: float, high: float) -> Shape:
         """Return a cylinder along z between two heights."""
-
-    @abstractmethod
-    def ball(self, radius: float) -> Shape:
-        """Return a ball about the origin."""
-
-    @abstractmethod
-    def box(self, low: Triple, high: Triple) -> Shape:
-        """Return a box between two corners."""
-
-    @abstractmethod
-    def hull(self, circles: Sequence[Circle], low: float, high: float) -> Shape:
-        """Return a plate between two heights, whose outline is the convex hull of circles."""
+        radius, length = circle.radius, high - low
+        cylinder = self._library.Manifold.cylinder(length, radius, radius, SEGMENTS)
+        return cylinder.translate((circle.x, circle.y, low))
 
     def hole(self, circle: Circle, low: float, high: float) -> Shape:
         """Return the tool that cuts a round hole; its chords lie outside the circle."""
-        return self.disc(circle, low, high)
+        radius = circle.radius / math.cos(math.pi / SEGMENTS)
+        return self.disc(circle._replace(radius=radius), low, high)
+
+    def ball(self, radius: float) -> Shape:
+        """Return a ball about the origin."""
+        return self._library.Manifold.sphere(radius, SEGMENTS)
 
     def cavity(self, radius: float) -> Shape:
         """Return the tool that cuts a seat for a ball about the origin."""
-        return self.ball(radius)
+        return self.ball(radius / _INSCRIBED)
+
+    def box(self, low: Triple, high: Triple) -> Shape:
+        """Return a box between two corners."""
+        x, y, z = (b - a for a, b in zip(low, high, strict=True))
+        return self._library.Manifold.cube((x, y, z)).translate(low)
 
     def union(self, shapes: Sequence[Shape]) -> Shape:
         """Return the union of shapes."""
         return functools.reduce(operator.add, shapes)
+
+    def hull(self, circles: Sequence[Circle], low: float, high: float) -> Shape:
+        """Return a plate between two heights, whose outline is the convex hull of circles."""
+        return self._library.Manifold.batch_hull([self.disc(each, low, high) for each in circles])
 
 
 # Half the width of lugs and arms, over the radius of their eyes.
@@ -264,71 +280,13 @@ class Part:
         return Mass(own.mass * factor, own.centre * metres, own.inertia * (factor * metres**2))
 
 
-SEGMENTS = 48
-"""Number of edges of a circle."""
-
-
 def make_parts(sizes: Sizes) -> tuple[Part, ...]:
     """Make all parts, the base first."""
     unit = sizes.design.unit_mm
-    return tuple(
-        _part(name, body, shape, unit) for name, body, shape in forms_of(sizes, MeshKernel())
-    )
+    return tuple(_part(name, body, shape, unit) for name, body, shape in forms_of(sizes, Kernel()))
 
 
-class MeshKernel(Kernel):
-    """A maker of polyhedra: inscribed in round shapes, circumscribed about round holes."""
-
-    def __init__(self) -> None:
-        import manifold3d
-
-        self._library = manifold3d
-
-    def disc(self, circle: Circle, low: float, high: float) -> Manifold:
-        """Return a cylinder along z between two heights."""
-        radius, length = circle.radius, high - low
-        cylinder = self._library.Manifold.cylinder(length, radius, radius, SEGMENTS)
-        return cylinder.translate((circle.x, circle.y, low))
-
-    def hole(self, circle: Circle, low: float, high: float) -> Manifold:
-        """Return the tool that cuts a round hole; its chords lie outside the circle."""
-        radius = circle.radius / math.cos(math.pi / SEGMENTS)
-        return self.disc(circle._replace(radius=radius), low, high)
-
-    def ball(self, radius: float) -> Manifold:
-        """Return a ball about the origin."""
-        return self._library.Manifold.sphere(radius, SEGMENTS)
-
-    def cavity(self, radius: float) -> Manifold:
-        """Return the tool that cuts a seat for a ball about the origin."""
-        return self.ball(radius / _inscribed_radius())
-
-    def box(self, low: Triple, high: Triple) -> Manifold:
-        """Return a box between two corners."""
-        x, y, z = (b - a for a, b in zip(low, high, strict=True))
-        return self._library.Manifold.cube((x, y, z)).translate(low)
-
-    def union(self, shapes: Sequence[Manifold]) -> Manifold:
-        """Return the union of shapes."""
-        return self._library.Manifold.batch_boolean(list(shapes), self._library.OpType.Add)
-
-    def hull(self, circles: Sequence[Circle], low: float, high: float) -> Manifold:
-        """Return a plate between two heights, whose outline is the convex hull of circles."""
-        return self._library.Manifold.batch_hull([self.disc(each, low, high) for each in circles])
-
-
-@functools.cache
-def _inscribed_radius() -> float:
-    """Return the inner radius of the polyhedron for a ball of radius 1."""
-    mesh: Any = MeshKernel().ball(1.0).to_mesh64()
-    corners = np.array(mesh.vert_properties)[:, :3][np.array(mesh.tri_verts)]
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    normals = np.cross(b - a, c - a)
-    distances = np.einsum("ij,ij->i", normals, a) / np.linalg.norm(normals, axis=1)
-    return float(distances.min())
-
-
-def _part(name: str, body: str, shape: Manifold, unit_mm: float) -> Part:
+def _part(name: str, body: str, shape: Shape, unit_mm: float) -> Part:
     from manifold3d import Error
 
     if shape.status() != Error.NoError:

@@ -74,11 +74,9 @@ def mesh_mass(vertices: FloatArray, faces: NDArray[np.int32], density: float) ->
     """
     import trimesh
 
-    # Far from the middle the integrals of trimesh would cancel.
-    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     untyped: Any = trimesh.triangles
-    found = untyped.mass_properties((vertices - middle)[faces], density=density)
-    return Mass(float(found["mass"]), found["center_mass"] + middle, found["inertia"])
+    found = untyped.mass_properties(vertices[faces], density=density)
+    return Mass(float(found["mass"]), found["center_mass"], found["inertia"])
 
 
 DEFAULT_RADIUS = 0.01

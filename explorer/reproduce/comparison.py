@@ -67,17 +67,9 @@ class Abilities:
 def measure_workspaces() -> Measurement:
     """Compare the volume of the 4-4's workspace with those of six-legged mechanisms."""
     exact = workspace_volume(FREE).volume / OPTIMAL.reach**3
-    return judge_workspace(
-        Workspace("4-4", exact, 0.0),
-        [_workspace(each) for each in _twins()],
-        [_workspace(octahedral(OPTIMAL, size)) for size in SIZES],
-    )
-
-
-def judge_workspace(
-    ours: Workspace, twins: Sequence[Workspace], octahedra: Sequence[Workspace]
-) -> Measurement:
-    """Judge the volumes of workspaces."""
+    ours = Workspace("4-4", exact, 0.0)
+    twins = [_workspace(each) for each in _twins()]
+    octahedra = [_workspace(octahedral(OPTIMAL, size)) for size in SIZES]
     others = (*twins, *octahedra)
     lines = [f"{'':18}{'volume/reach³':>14}{'error':>8}"]
     lines += [f"{each.name:18}{each.volume:14.3f}{each.error:8.3f}" for each in (ours, *others)]
@@ -96,7 +88,10 @@ def judge_workspace(
 
 
 def measure_orientations() -> Measurement:
-    """Compare the orientations of the 4-4 with those of six-legged mechanisms."""
+    """Compare the orientations of the 4-4 with those of six-legged mechanisms.
+
+    Those with carriages in any order are reported only.
+    """
     reach = OPTIMAL.reach
     points = qmc.scale(_points(0), 3 * [-2.0 * reach], 3 * [2.0 * reach])
     rotation = OPTIMAL.home_pose.rotation
@@ -106,13 +101,6 @@ def measure_orientations() -> Measurement:
         _abilities(each.name, each.holds, qmc.scale(_points(0), *each.box), each.home[1])
         for each in (*_twins(), octahedral(OPTIMAL))
     ]
-    return judge_orientations(ours, crossed, others)
-
-
-def judge_orientations(
-    ours: Abilities, crossed: Abilities, others: Sequence[Abilities]
-) -> Measurement:
-    """Judge the orientations; those with crossed carriages are reported only."""
     lines = [f"{'':18}{'mean share':>12}{'error':>8}{'mean tilt':>11}{'error':>8}"]
     lines += [
         f"{a.name:18}{a.share:12.1%}{a.share_error:8.1%}{a.tilt:10.1f}°{a.tilt_error:7.1f}°"

@@ -28,8 +28,6 @@ MOVED, SAME = 300, 1e-10
 # Largest relative rate of a locked actuator.
 LOCKED = 1e-12
 
-Order = set[tuple[tuple[int, ...], tuple[int, ...]]]
-
 
 def measure_strata() -> claim.Measurement:
     """Place poses in the strata by some of six motions, and their neighbours by more of them."""
@@ -40,11 +38,7 @@ def measure_strata() -> claim.Measurement:
     at = claim.random_folds(random, some)
     near = at + NEAR * claim.random_folds(random, more & ~some)
     of, others = (map(tuple, stratum(*from_folds(each), 1.0).tolist()) for each in (at, near))
-    return judge_strata(set(zip(of, others, strict=True)), len(at))
-
-
-def judge_strata(neighbours: Order, count: int) -> claim.Measurement:
-    """Judge by the strata of poses and of neighbours of them, of which there are a number."""
+    neighbours = set(zip(of, others, strict=True))
     found = {w for w, _ in neighbours}
     order = {(w, other) for w in STRATA for other in STRATA if is_below(w, other)}
     outside, missing = len(neighbours - order), len(order - neighbours)
@@ -52,7 +46,7 @@ def judge_strata(neighbours: Order, count: int) -> claim.Measurement:
     words = {
         "strata": len(STRATA),
         "counts": ", ".join(map(str, counts)),
-        "poses": count,
+        "poses": len(at),
         "pairs": len(neighbours),
         "order": len(order),
     }
@@ -74,16 +68,7 @@ def measure_uncoupled_motions() -> claim.Measurement:
             own = min(own, float(change[motion.incidence - 1]))
             others = max(others, float(np.delete(change, motion.incidence - 1).max()))
     of_actuators = _margins_of_actuators(positions, rotations, random)
-    return judge_uncoupled(own, others, of_actuators, _rates_of_freedoms(positions, rotations))
-
-
-def judge_uncoupled(
-    own: float, others: float, of_actuators: dict[str, tuple[str, ...]], rate: float
-) -> claim.Measurement:
-    """Judge by the least own and the largest other change of a margin, over the reach.
-
-    Also by the margins that each actuator alone moves, and the largest rate of one as a fold turns.
-    """
+    rate = _rates_of_freedoms(positions, rotations)
     single = [f"{name} moves {which[0]}" for name, which in of_actuators.items() if len(which) == 1]
     several = [name for name, which in of_actuators.items() if len(which) > 1]
     words = {
@@ -198,28 +183,16 @@ def measure_charts() -> claim.Measurement:
         for rows, columns in zip(found, STRATUM_FOLDS, strict=True)
         if (rows == rows[0]).all() and inversions(tuple(rows[0])) == len(columns)
     }
-    return judge_chart(
-        poses=max(
+    errors = {
+        "poses": max(
             float(np.abs(a - b).max()) for a, b in zip(from_folds(folds), (p, r), strict=True)
         ),
-        folds=_error_of_folds(of_strata, to_folds(*poses)),
-        strata=len(ours),
-        motions=_error_of_motions(claim.random_folds(random, np.full((MADE, 6), True))),
-        margins=float(np.abs(products - margins(p, r)).max()),
-        determinant=float(np.abs(determinants - beta * epsilon).max()),
-        at_home=float(determinants[0]),
-    )
-
-
-def judge_chart(
-    strata: int, determinant: float, at_home: float, **errors: float
-) -> claim.Measurement:
-    """Judge the folds as a chart by largest errors, with the reach as unit of length.
-
-    They are of `poses` by their folds, of the `folds` of a stratum by the pose that they make, of
-    poses that `motions` make, of the `margins` as products, and of the determinant over r².
-    """
-    exact = max(errors.values())
+        "folds": _error_of_folds(of_strata, to_folds(*poses)),
+        "motions": _error_of_motions(claim.random_folds(random, np.full((MADE, 6), True))),
+        "margins": float(np.abs(products - margins(p, r)).max()),
+    }
+    exact, at_home = max(errors.values()), float(determinants[0])
+    determinant = float(np.abs(determinants - beta * epsilon).max())
     words = {
         "poses": POSES,
         "all": len(STRATA),
@@ -227,8 +200,8 @@ def judge_chart(
         "determinant": claim.below(determinant, BY_DIFFERENCES),
     }
     is_exact = exact < EXACT and determinant < BY_DIFFERENCES
-    is_so = is_exact and strata == len(STRATA) and at_home > REGULAR
-    values = {**errors, "strata": strata, "determinant": determinant, "at_home": at_home}
+    is_so = is_exact and len(ours) == len(STRATA) and at_home > REGULAR
+    values = {**errors, "strata": len(ours), "determinant": determinant, "at_home": at_home}
     return claim.judge(is_so, words, values, TABLE)
 
 

@@ -80,17 +80,9 @@ def measure_risk() -> Measurement:
         collides = partial(twin.step_overlaps, rotation=ROTATION)
         mechanisms.append(_interference(twin.name, nodes, six, four, collides))
     ours, *twins, beyond = mechanisms
-    return judge_risk(ours, twins, beyond, float(pairs[:, PAIRS.index((2, 3))].max()))
-
-
-def judge_risk(
-    ours: Interference, twins: Sequence[Interference], beyond: Interference, apart: float
-) -> Measurement:
-    """Judge the risk beside twins with a2 within the reach; that beyond it is only reported.
-
-    The claim is confirmed for legs thinner than half the distance of legs 2 and 3 if for each such
-    radius the 4-4 has as many positions free of collisions as every twin.
-    """
+    apart = float(pairs[:, PAIRS.index((2, 3))].max())
+    # Legs thinner than half the distance of legs 2 and 3 do not meet there. Twins with a2 within
+    # the reach are compared; that beyond it is only reported.
     thin = [k for k, radius in enumerate(RADII) if 2.0 * radius < apart]
     thick = [k for k in range(len(RADII)) if k not in thin]
 
@@ -111,7 +103,6 @@ def judge_risk(
         "clearer": (min(clearer), max(clearer)),
         "medians": (min(medians), max(medians)),
     }
-    mechanisms = (ours, *twins, beyond)
     values = {"legs_2_and_3_apart": apart, "mechanisms": [asdict(each) for each in mechanisms]}
     is_so = is_as_free(thin) and is_as_free(thick) and max(clearer) < 0.5
     condition = (
@@ -130,14 +121,8 @@ def measure_optimum() -> Measurement:
     of_table = _nodes(STEPS[-1], 0.0)
     clearance = leg_clearances(Configuration(OPTIMAL, of_table, ROTATION)).clearance.min(axis=1)
     touching = of_table[clearance < TOUCHING]
-    shares, highest = _shares_of_steps(nodes, _four_collides), touching[:, 2].max(initial=0.0)
-    return judge_optimum(shares, apart, len(touching), len(of_table), float(highest))
-
-
-def judge_optimum(
-    steps: tuple[tuple[float, ...], ...], apart: float, touching: int, nodes: int, highest: float
-) -> Measurement:
-    """Judge by the shares of colliding steps, and the nodes where legs touch, up to a height."""
+    steps = _shares_of_steps(nodes, _four_collides)
+    highest = float(touching[:, 2].max(initial=0.0))
     lines = [f"{'step':>8}" + "".join(f"{axis:>8}" for axis in "xyz")]
     for length, shares in zip(STEPS, steps, strict=True):
         lines.append(f"{length:8g}" + "".join(f"{share:8.1%}" for share in shares))
@@ -147,18 +132,18 @@ def judge_optimum(
         "shortest": shortest,
         "longest": longest,
         "steps": (STEPS[0], STEPS[-1]),
-        "touching": touching,
-        "nodes": nodes,
+        "touching": len(touching),
+        "nodes": len(of_table),
         "highest": highest,
     }
     values = {
         "steps": dict(zip(map(str, STEPS), steps, strict=True)),
         "apart": apart,
-        "touching": {"count": touching, "nodes": nodes, "highest": highest},
+        "touching": {"count": len(touching), "nodes": len(of_table), "highest": highest},
     }
     if shortest < RARE < longest:
         return Measurement("not testable from the paper", words, values, tuple(lines))
-    return judge(shortest == longest == touching == 0, words, values, lines)
+    return judge(shortest == longest == len(touching) == 0, words, values, lines)
 
 
 def _interference(

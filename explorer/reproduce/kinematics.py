@@ -6,8 +6,6 @@ pose, and a singular pose on each path between modes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -50,19 +48,14 @@ def measure_closed_form() -> claim.Measurement:
         missed = max(missed, float(apart.min(axis=1).max()))
         modes = np.sort(mode_of(margins(p, r)), axis=1)
         least = min(least, 1 + int((np.diff(modes) > 0).sum(axis=1).min()))
-    return judge_closed_form(off, missed, least)
-
-
-def judge_closed_form(joints: float, pose: float, modes: int) -> claim.Measurement:
-    """Judge by the largest errors of joints over the reach and of poses, and the modes."""
     words = {
         "poses": POSES,
         "designs": len(PRESETS) + DESIGNS,
-        "joints": claim.below(joints, EXACT),
-        "pose": claim.below(pose, SAME),
+        "joints": claim.below(off, EXACT),
+        "pose": claim.below(missed, SAME),
     }
-    is_so = joints < EXACT and pose < SAME and modes == 8
-    return claim.judge(is_so, words, {"joints": joints, "pose": pose, "modes": modes})
+    is_so = off < EXACT and missed < SAME and least == 8
+    return claim.judge(is_so, words, {"joints": off, "pose": missed, "modes": least})
 
 
 def measure_same_kinematics() -> claim.Measurement:
@@ -84,12 +77,9 @@ def measure_same_kinematics() -> claim.Measurement:
             constant = float(np.median(own / product))
             off = (modes - given, back - joints, (own / constant - product) / design.reach**2)
             errors = np.maximum(errors, [np.abs(each).max() / design.reach for each in off])
-    return judge_same_kinematics(*errors.tolist())
-
-
-def judge_same_kinematics(lengths: float, joints: float, determinant: float) -> claim.Measurement:
-    """Judge by the largest errors of lengths and joints over the reach, and of the determinant."""
-    values = {"lengths": lengths, "joints": joints, "determinant": determinant}
+    values: dict[str, float] = dict(
+        zip(("lengths", "joints", "determinant"), errors.tolist(), strict=True)
+    )
     words = {name: claim.below(value, EXACT) for name, value in values.items()} | {
         "poses": POSES,
         "designs": len(PRESETS) + DESIGNS,
@@ -128,13 +118,6 @@ def measure_flat_tetrahedra() -> claim.Measurement:
         for column in (claim.PHI1, claim.PHI2, claim.PHI3):
             flat = Configuration(design, *claim.flatten(p, r, column)).inverse_condition
             on_planes = max(on_planes, float(flat.max()))
-    return judge_flat(volumes, identity, on_planes, off_planes)
-
-
-def judge_flat(
-    volumes: float, identity: float, on_planes: float, off_planes: float
-) -> claim.Measurement:
-    """Judge by errors of volumes and of det J, and the inverse conditions on and off the planes."""
     errors = {"volumes": volumes, "identity": identity, "on_planes": on_planes}
     words = {name: claim.below(value, FLAT) for name, value in errors.items()} | {
         "poses": FLAT_DESIGNS * FLAT_POSES,
@@ -165,45 +148,34 @@ def _volumes(design: Design, position: FloatArray, rotation: FloatArray) -> Floa
 def measure_mode_paths() -> claim.Measurement:
     """Find a singular pose on random paths between modes, and try to stay off them in a mode."""
     random = np.random.default_rng(8)
-    worst = float(conditions_at_crossings(random_paths(random, PATHS)).max())
+    worst = float(conditions_at_crossings(*random_paths(random, PATHS)).max())
     # The least |δi| on straight lines in the folds, over the smaller of its ends.
     one, other = (to_folds(*claim.random_poses(random, PATHS, OPTIMAL.reach)) for _ in range(2))
     other[:, 3:] = np.copysign(other[:, 3:], one[:, 3:])
     shares = np.linspace(0.0, 1.0, ON_PATH)[:, None, None]
     sizes = np.abs(margins(*from_folds(one + shares * (other - one))))
     kept = float((sizes / np.minimum(sizes[0], sizes[-1])).min())
-    return judge_paths(worst, kept)
-
-
-def judge_paths(worst: float, kept: float) -> claim.Measurement:
-    """Judge by the worst inverse condition at crossings, and the least share of a margin kept."""
     words = {"worst": claim.below(worst, SINGULAR), "kept": kept}
     values = {"paths": PATHS, "largest_inverse_condition": worst, "kept_share_of_margins": kept}
     return claim.judge(worst < SINGULAR and kept > 1.0 - ROUNDING, words, values)
 
 
-@dataclass(frozen=True)
-class Paths:
-    """Curved paths from poses (n, 3), (n, 3, 3) along a way, with a detour, largest in the middle.
+def paths_at(
+    shares: FloatArray, start: FloatArray, rotation: FloatArray, way: FloatArray, detour: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return positions (n, 3) and rotations (n, 3, 3) at a share of each path, shape (n,).
 
-    Way and detour are shifts of b4 and rotation vectors, shape (n, 6).
+    Paths go from a pose along a way, with a detour that is largest in the middle. Both are shifts
+    of b4 and rotation vectors, shape (n, 6).
     """
-
-    position: FloatArray
-    rotation: FloatArray
-    way: FloatArray
-    detour: FloatArray
-
-    def at(self, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return positions (n, 3) and rotations (n, 3, 3) at a share of each path, shape (n,)."""
-        s = shares[:, None]
-        moves = s * self.way + np.sin(np.pi * s) * self.detour
-        turns = np.asarray(Rotation.from_rotvec(moves[:, 3:]).as_matrix())
-        return self.position + moves[:, :3], turns @ self.rotation
+    s = shares[:, None]
+    moves = s * way + np.sin(np.pi * s) * detour
+    turns = np.asarray(Rotation.from_rotvec(moves[:, 3:]).as_matrix())
+    return start + moves[:, :3], turns @ rotation
 
 
-def random_paths(random: np.random.Generator, count: int) -> Paths:
-    """Return paths between two modes of the joints of random poses."""
+def random_paths(random: np.random.Generator, count: int) -> tuple[FloatArray, ...]:
+    """Return paths, as of `paths_at`, between two modes of the joints of random poses."""
     reach = OPTIMAL.reach
     p, r, _ = forward(OPTIMAL, inverse(OPTIMAL, *claim.random_poses(random, count, reach)))
     first, last = random.permuted(np.tile(np.arange(8), (count, 1)), axis=1)[:, :2].T
@@ -212,18 +184,19 @@ def random_paths(random: np.random.Generator, count: int) -> Paths:
     turn = Rotation.from_matrix(end @ np.swapaxes(start, 1, 2)).as_rotvec()
     way = np.concatenate([p[rows, last] - p[rows, first], turn], axis=1)
     detour = random.normal(size=(count, 6)) * [reach, reach, reach, 1.0, 1.0, 1.0]
-    return Paths(p[rows, first], start, way, detour)
+    return p[rows, first], start, way, detour
 
 
-def conditions_at_crossings(paths: Paths) -> FloatArray:
+def conditions_at_crossings(*paths: FloatArray) -> FloatArray:
     """Return the inverse condition of J where a margin changes its sign on each path, shape (n,).
 
-    It is the first margin whose signs at both ends differ. Without one the end of the path counts.
+    The paths are as of `paths_at`. It is the first margin whose signs at both ends differ. Without
+    one the end of the path counts.
     """
-    rows = np.arange(len(paths.position))
+    rows = np.arange(len(paths[0]))
 
     def signs(shares: FloatArray) -> FloatArray:
-        return np.sign(margins(*paths.at(shares)))
+        return np.sign(margins(*paths_at(shares, *paths)))
 
     low, high = np.zeros(len(rows)), np.ones(len(rows))
     start = signs(low)
@@ -232,4 +205,4 @@ def conditions_at_crossings(paths: Paths) -> FloatArray:
         middle = 0.5 * (low + high)
         is_before = (signs(middle) == start)[rows, which]
         low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
-    return Configuration(OPTIMAL, *paths.at(low)).inverse_condition
+    return Configuration(OPTIMAL, *paths_at(low, *paths)).inverse_condition

@@ -79,20 +79,9 @@ def measure_table() -> Measurement:
     }
     as_scanned = msgspec.structs.replace(initial, b3=15.0, home=initial.home_pose)
     off = min(_initial_off(as_scanned, yaw) for yaw in range(-180, 180))
-    return judge_table(rows, by_yaw, off, _beyond_box(optimal))
-
-
-def judge_table(
-    rows: Sequence[Row], by_yaw: Mapping[float, tuple[int, float]], off: float, beyond: float
-) -> Measurement:
-    """Judge the rows, with counts and errors by the yaw in degrees.
-
-    Also given are the error with b3 = 15, as the scan has it, and the volume of the parts of cells
-    beyond the flat faces of the optimum's box.
-    """
-    worst, optimal = max(row.off for row in rows), rows[-1]
-    printed = PRINTED[optimal.preset].volume
-    excess = optimal.nodes.volume - optimal.exact
+    beyond = _beyond_box(optimal)
+    worst, last = max(row.off for row in rows), rows[-1]
+    excess = last.nodes.volume - last.exact
     why = (
         "A node on the boundary counts as a whole cell, so that cells stand out of the workspace. "
         f"Where a face of the optimum's box lies on a plane of nodes it is half a cell: "
@@ -101,8 +90,8 @@ def judge_table(
     near = [difference <= PRINTED_TO for _, difference in by_yaw.values()]
     words = {
         "worst": worst,
-        "optimal": optimal,
-        "excess": excess / optimal.exact,
+        "optimal": last,
+        "excess": excess / last.exact,
         "by_yaw": set_true_minus(
             ", ".join(f"{count} at {yaw:g}°" for yaw, (count, _) in by_yaw.items())
         ),
@@ -129,7 +118,7 @@ def judge_table(
         "nodes_by_yaw": {f"{yaw:g}": count for yaw, (count, _) in by_yaw.items()},
         "note": why,
     }
-    is_within = worst <= PRINTED_TO and optimal.nodes.volume == printed
+    is_within = worst <= PRINTED_TO and last.nodes.volume == PRINTED[last.preset].volume
     condition = "by our reading, whose yaw and steps are fitted to the printed numbers"
     table = (*lines, "", *wrap(why, 88))
     return judge(False, words, values, table, condition if is_within else "")
@@ -237,11 +226,6 @@ def measure_search() -> Measurement:
                 starts,
             )
         )
-    return judge_search(optima)
-
-
-def judge_search(optima: Sequence[Optimum]) -> Measurement:
-    """Judge optima in the order of `measure_search`."""
     paper, matches = optima[1], [each for each in optima[2:] if each.objective is not None]
     exact = abs(1.0 - (paper.measured["volume"] or 0.0) / defaults.PAPER_VOLUME)
     smallest = min(each.measured["reach"] or 0.0 for each in optima if each.starts > 1)

@@ -137,9 +137,7 @@ def test_export_simulation_is_an_mjcf_model(cli: CommandLine, tmp_path: Path) ->
     path, _, *lines = cli.text("simulation", "--out", out, *words).splitlines()
     assert path == str(out)
     assert [line.split()[0] for line in lines[:6]] == list(explorer.JOINTS)
-    moved = math.hypot(*answer["droop_without_forces"]["displacement_mm"])
-    assert lines[6].startswith("at home the weights move the tool by 0 mm and 0°")
-    assert f"{moved:.3g} mm" in lines[6]
+    assert lines[6] == "at home the weights move the tool by 0 mm and 0°"
     assert lines[7] == f"left out: {', '.join(answer['left_out'])}"
     assert out.read_text(encoding="utf-8") == simulation_mjcf(OPTIMAL, 2700.0)
     cli.text("simulation", "--out", out, "--masses", "parts")
@@ -169,12 +167,9 @@ def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is
     assert {name for name, row in rows.items() if row["deviation"]} == {
         *("l1", "a3x", "a3y", "guide tilt z")
     }
-    for key, error in (
-        ("tool_error", machine.tool_error()),
-        ("linear_tool_error", machine.linear_tool_error()),
-    ):
-        assert answer[key]["displacement_mm"] == pytest.approx(error[:3] * 10.0)
-        assert answer[key]["turn_degrees"] == pytest.approx([math.degrees(v) for v in error[3:]])
+    error, found = machine.tool_error(), answer["tool_error"]
+    assert found["displacement_mm"] == pytest.approx(error[:3] * 10.0)
+    assert found["turn_degrees"] == pytest.approx([math.degrees(v) for v in error[3:]])
     assert answer["servo_stiffness_n_mm"] == pytest.approx([1000.0] * 6)
     moved = math.hypot(*answer["droop"]["displacement_mm"])
     assert moved > 0.0

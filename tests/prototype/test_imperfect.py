@@ -113,7 +113,8 @@ def test_machine_reads_the_joints_of_the_design_and_errs_by_the_second_order(see
     rest: list[float] = []
     for share in (0.1, 0.05):
         one = ImperfectMachine(machine.design, share * machine.deviations)
-        linear = one.linear_tool_error()
+        slopes = error_by_source(Configuration.at(design, home, design.tool.position))
+        linear = slopes @ one.deviations
         rest.append(float(np.abs(one.tool_error() - linear).max()))
         assert rest[-1] < 0.05 * np.abs(linear).max()
     assert rest[0] / rest[1] == pytest.approx(4.0, rel=0.1)
@@ -373,8 +374,6 @@ def test_servos_of_machine_without_deviations_are_those_of_the_design() -> None:
 def test_machines_that_cannot_be_made_are_refused() -> None:
     with pytest.raises(InputError, match=r"states no errors.*tolerances, actuators\.error_mm"):
         ImperfectMachine.draw(IDEAL, 0)
-    with pytest.raises(InputError, match="seed must not be negative; got -1"):
-        ImperfectMachine.draw(OFF, -1)
     with pytest.raises(InputError, match="deviations"):
         ImperfectMachine(OFF, np.zeros(28))
     with pytest.raises(InputError, match="deviations"):
@@ -384,8 +383,6 @@ def test_machines_that_cannot_be_made_are_refused() -> None:
         simulation_mjcf(huge)
     singular = Pose(OFF.home_pose.position, (1.0, 0.0, 0.0, 0.0))
     machine = ImperfectMachine.draw(msgspec.structs.replace(OFF, home=singular), 0)
-    with pytest.raises(NoAnswerError, match="singular"):
-        machine.linear_tool_error()
     with pytest.raises(NoAnswerError, match="do not close"):
         simulation_mjcf(machine)
     springs = msgspec.structs.replace(SPRINGS, home=singular)

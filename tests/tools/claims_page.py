@@ -1,19 +1,14 @@
-"""The script that writes the manual's page of claims, and the data of the report's section.
+"""The script that writes the manual's page of claims.
 
 From the checkout: python tests/tools/claims_page.py
 """
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 from explorer.files.packaged import SOURCES
 from explorer.numerics.compiled import warm
 from explorer.reproduce.claim import Result
 from explorer.reproduce.claims import measure_claims
-
-ASSETS = SOURCES / "assets"
 
 HEAD = """\
 # The paper's claims
@@ -68,26 +63,7 @@ def page(results: list[Result]) -> str:
     return "".join([*parts, TAIL])
 
 
-def data(results: list[Result]) -> str:
-    """Return what the report's section needs, as JSON."""
-    rows = [
-        {
-            "claim": result.claim.title,
-            "verdict": verdict_of(result),
-            "reading": result.claim.reading,
-        }
-        for result in results
-    ]
-    return json.dumps(rows, ensure_ascii=False, indent=1) + "\n"
-
-
-def write(assets: Path) -> None:
-    """Write both files into the folder of assets."""
+if __name__ == "__main__":
     warm()
     results = list(measure_claims())
-    (assets / "manual" / "claims.md").write_text(page(results), encoding="utf-8")
-    (assets / "claims" / "claims.json").write_text(data(results), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    write(ASSETS)
+    (SOURCES / "assets" / "manual" / "claims.md").write_text(page(results), encoding="utf-8")

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
+import datetime as dt
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
 
-from explorer.cli import values
-from explorer.cli.options import JsonOptions, PoseOptions, TypicalOptions, carrying_part
-from explorer.cli.output import DISAGREES, assumed_lines, figure, figures, table
+from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
+from explorer.export import assembly, mesh, simulation, step
+from explorer.export.opencascade import check_extra
+from explorer.files.writing import check_writable, write_whole
 from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-
-if TYPE_CHECKING:
-    from explorer.export.simulation import SimulationModel
-    from explorer.prototype.imperfect import ImperfectMachine
+from explorer.prototype.assembly import bill_of_materials, make_prototype
+from explorer.prototype.imperfect import ImperfectMachine
+from explorer.statics import accuracy
+from explorer.workspace.solids.solid import convex_hull
+from explorer.workspace.solids.solids import workspace_solid
 
 What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
 
@@ -32,7 +35,7 @@ OF_ALL = ("what", "out", "format", "design", "json")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export(JsonOptions, TypicalOptions, PoseOptions):
+class Export(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
     """Write the workspace as a mesh, the mechanism as parts or simulation, or the scene.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
@@ -86,8 +89,6 @@ class Export(JsonOptions, TypicalOptions, PoseOptions):
 
     def run(self) -> None:
         """Write the file, and its measures to standard output."""
-        from explorer.files.writing import check_writable, write_whole
-
         file_format = self.format or self.out.suffix.lower().removeprefix(".")
         if not file_format:
             raise InputError(
@@ -115,7 +116,7 @@ def _as_lines(facts: Facts) -> Iterator[str]:
     if "left_out" in facts:
         yield from _simulation_lines(facts)
     if facts.get("agrees") is False:
-        yield f"This differs from the workspace: {DISAGREES}."
+        yield f"This differs from the workspace: {output.DISAGREES}."
     for actuator in facts.get("actuators", []):
         stroke, asked = (
             f"{low:.1f} to {high:.1f}"
@@ -125,20 +126,15 @@ def _as_lines(facts: Facts) -> Iterator[str]:
 
 
 def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    from explorer.export.mesh import FORMATS, check_format, mesh_bytes
-
     if command.what == "workspace" and file_format in ("step", "stp"):
         return _step(command)
-    check_format(file_format, FORMATS, "mesh")
+    mesh.check_format(file_format, mesh.FORMATS, "mesh")
     design = command.read_design()
-    from explorer.workspace.solids.solid import convex_hull
-    from explorer.workspace.solids.solids import workspace_solid
-
     home = command.oriented_home(design)
     if command.load is None:
         solid = workspace_solid(design, home.rotation, command.tolerance)
     else:
-        part = carrying_part(design, home.rotation, command.load, command.tolerance)
+        part = options.carrying_part(design, home.rotation, command.load, command.tolerance)
         solid = part.solid
         if part.factor is not None:
             raise NoAnswerError(
@@ -150,7 +146,7 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
         solid = solid.shifted(shift)
     if command.what == "hull":
         solid = convex_hull(solid)
-    data = mesh_bytes(solid, file_format, design, _name(command, design))
+    data = mesh.mesh_bytes(solid, file_format, design, _name(command, design))
     facts: Facts = {"format": file_format, "volume": solid.volume, "triangles": len(solid.faces)}
     return data, {**facts, "agrees": False} if solid.agrees is False else facts
 
@@ -162,9 +158,6 @@ def _name(command: Export, design: Design) -> str:
 
 
 def _step(command: Export) -> tuple[bytes, Facts]:
-    from explorer.export.opencascade import check_extra
-    from explorer.export.step import exact_workspace, step_bytes
-
     if command.load is not None:
         raise InputError(
             "STEP takes exact faces, and the surface along which a part takes its limit consists "
@@ -174,29 +167,23 @@ def _step(command: Export) -> tuple[bytes, Facts]:
     check_extra()
     design = command.read_design()
     home = command.oriented_home(design)
-    solid = exact_workspace(design, home.rotation)
+    solid = step.exact_workspace(design, home.rotation)
     shift = command.shift(design, home)
     if shift is not None:
         solid = solid.shifted(shift * design.unit_mm)
     volume = solid.volume / design.unit_mm**3
     facts = {"format": "step", "volume": volume, "faces": len(solid.limit_of_face)}
-    return step_bytes(solid, _name(command, design)), facts
+    return step.step_bytes(solid, _name(command, design)), facts
 
 
 def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    from explorer.export.assembly import FORMATS, assembly_bytes
-    from explorer.export.mesh import check_format
-    from explorer.export.opencascade import check_extra
-    from explorer.export.simulation import DENSITY
-    from explorer.prototype.assembly import bill_of_materials, make_prototype
-
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
-    check_format(file_format, FORMATS, "assembly")
+    mesh.check_format(file_format, assembly.FORMATS, "assembly")
     if file_format == "step":
         check_extra()
     prototype = make_prototype(command.read_design())
-    data = assembly_bytes(prototype, file_format)
-    bill = bill_of_materials(prototype, command.density or DENSITY)
+    data = assembly.assembly_bytes(prototype, file_format)
+    bill = bill_of_materials(prototype, command.density or simulation.DENSITY)
     part_keys = ["name", "size_mm", "volume_mm3", "mass_kg"]
     actuator_keys = ["leg", "stroke_mm", "asked_mm", "diameter_mm", "mass_kg"]
     return data, {
@@ -214,27 +201,20 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
 
 def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    from explorer.export.simulation import DENSITY, SimulationModel
-    from explorer.prototype.imperfect import ImperfectMachine
-
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
-    design, density = command.read_design(), command.density or DENSITY
-    masses = None
-    if command.masses == "parts":
-        from explorer.prototype.assembly import make_prototype
-
-        masses = make_prototype(design).masses(density)
-    if command.errors is None:
-        if command.typical:
-            raise InputError("--typical is for the errors of a machine: give --errors SEED")
-        model = SimulationModel(design, density, masses)
-        return model.text().encode(), _simulation_json(model)
-    design, assumed = command.with_typical(design)
-    machine = ImperfectMachine.draw(design, command.errors)
-    model = SimulationModel(machine, density, masses)
-    facts = {**_simulation_json(model), "assumed": assumed, **_imperfect_json(machine)}
-    return model.text().encode(), facts
+    design, density = command.read_design(), command.density or simulation.DENSITY
+    masses = make_prototype(design).masses(density) if command.masses == "parts" else None
+    given: Design | ImperfectMachine = design
+    facts: Facts = {}
+    if command.errors is not None:
+        design, assumed = command.with_typical(design)
+        given = ImperfectMachine.draw(design, command.errors)
+        facts = {"assumed": assumed, **_imperfect_json(given)}
+    elif command.typical:
+        raise InputError("--typical is for the errors of a machine: give --errors SEED")
+    model = simulation.SimulationModel(given, density, masses)
+    return model.text().encode(), {**_simulation_json(model), **facts}
 
 
 def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
@@ -242,8 +222,6 @@ def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
         raise InputError(f"no format {file_format!r} of the scene; there is html")
     design = command.read_design()
     pose = command.pose(design)
-    import datetime as dt
-
     from explorer.app.features.sharing.scene_files import FileCamera, scene_html
     from explorer.app.scene.camera import FIELD_OF_VIEW, framing
     from explorer.app.server import start
@@ -270,39 +248,34 @@ _WRITERS: dict[What, tuple[Callable[[Export, str], tuple[bytes, Facts]], tuple[s
 """The function that writes each object, and its options besides those of all."""
 
 
-def _simulation_json(model: SimulationModel) -> dict[str, Any]:
+def _simulation_json(model: simulation.SimulationModel) -> dict[str, Any]:
     """Return names, servos and what is left out of a model as plain values."""
-    from explorer.export.simulation import SIMULATION_BODIES, SIMULATION_JOINTS
-
     servos = model.servos
     return {
         "format": "mjcf",
-        "bodies": SIMULATION_BODIES[1:],
-        "joints": SIMULATION_JOINTS,
+        "bodies": simulation.SIMULATION_BODIES[1:],
+        "joints": simulation.SIMULATION_JOINTS,
         "servo_stiffness_n_mm": (1e-3 * servos.stiffness).tolist(),
         "servo_forces_n": servos.forces.tolist(),
         "servo_rotors_kg": servos.rotors.tolist(),
-        "droop": _tool_json(model.design, servos.droop(model.design, servos.forces)),
-        "droop_without_forces": _tool_json(model.design, servos.droop(model.design, np.zeros(6))),
+        "droop": _tool_json(model.design, servos.droop(model.design)),
         "left_out": model.left_out,
     }
 
 
 def _imperfect_json(machine: ImperfectMachine) -> dict[str, Any]:
     """Return deviations and errors of the tool at home as plain values."""
-    from explorer.statics.accuracy import SOURCES, UNITS, drawing_values, source_errors
-
     design = machine.design
     off, most = (
-        drawing_values(design, each) for each in (machine.deviations, source_errors(design))
+        accuracy.drawing_values(design, each)
+        for each in (machine.deviations, accuracy.source_errors(design))
     )
-    rows = zip(SOURCES, off.tolist(), most.tolist(), UNITS, strict=True)
+    rows = zip(accuracy.SOURCES, off.tolist(), most.tolist(), accuracy.UNITS, strict=True)
     names = ("name", "deviation", "largest", "unit")
     return {
         "seed": machine.seed,
         "deviations": [dict(zip(names, row, strict=True)) for row in rows],
         "tool_error": _tool_json(design, machine.tool_error()),
-        "linear_tool_error": _tool_json(design, machine.linear_tool_error()),
     }
 
 
@@ -319,26 +292,19 @@ def _simulation_lines(facts: Mapping[str, Any]) -> Iterator[str]:
         yield from _imperfect_lines(facts)
         yield ""
     keys = ("servo_stiffness_n_mm", "servo_forces_n", "servo_rotors_kg")
-    columns = (figures(facts[key]) for key in keys)
+    columns = (output.figures(facts[key]) for key in keys)
     head = ("servo", "stiffness, N/mm", "force at home, N", "rotor, kg")
-    yield table([head, *zip(JOINTS, *columns, strict=True)], "<>>>")
-    words = f"at home the weights move the tool by {_sizes(facts['droop'])}"
-    if facts["droop"] != facts["droop_without_forces"]:
-        words += f"; without the forces at home by {_sizes(facts['droop_without_forces'])}"
-    yield words
+    yield output.table([head, *zip(JOINTS, *columns, strict=True)], "<>>>")
+    displacement, turn = (math.hypot(*each) for each in facts["droop"].values())
+    droop = f"{format_number(displacement, 3)} mm and {format_number(turn, 3)}°"
+    yield f"at home the weights move the tool by {droop}"
     yield f"left out: {', '.join(facts['left_out'])}"
 
 
-def _sizes(error: Mapping[str, list[float]]) -> str:
-    """Return the sizes of a displacement and a turn in words."""
-    moved, turned = (math.hypot(*error[key]) for key in ("displacement_mm", "turn_degrees"))
-    return f"{format_number(moved, 3)} mm and {format_number(turned, 3)}°"
-
-
 def _imperfect_lines(facts: Mapping[str, Any]) -> Iterator[str]:
-    yield from assumed_lines(facts["assumed"])
+    yield from output.assumed_lines(facts["assumed"])
     rows = [
-        (row["name"], figure(row["deviation"]), f"{row['largest']:g}", row["unit"])
+        (row["name"], output.figure(row["deviation"]), f"{row['largest']:g}", row["unit"])
         for row in facts["deviations"]
         if row["largest"] > 0.0
     ]
@@ -346,12 +312,9 @@ def _imperfect_lines(facts: Mapping[str, Any]) -> Iterator[str]:
         yield "the design states neither errors nor tolerances: only its servos give way"
         return
     rows.insert(0, (f"seed {facts['seed']}", "deviation", "within ±", ""))
-    yield from (table(rows, "<>><"), "")
-    errors = [("tool at home off by", "size", *"xyz", "")]
-    for part, unit in (("displacement", "mm"), ("turn", "degrees")):
-        for words, key in (("", "tool_error"), (", linear model", "linear_tool_error")):
-            vector = facts[key][f"{part}_{unit}"]
-            size = float(np.linalg.norm(vector))
-            x, y, z = figures(vector)
-            errors.append((part + words, figure(size), x, y, z, unit))
-    yield table(errors, "<>>>><")
+    yield from (output.table(rows, "<>><"), "")
+    rows = [("tool at home off by", "size", *"xyz", "")]
+    for key, vector in facts["tool_error"].items():
+        part, unit = key.split("_")
+        rows.append((part, output.figure(math.hypot(*vector)), *output.figures(vector), unit))
+    yield output.table(rows, "<>>>><")

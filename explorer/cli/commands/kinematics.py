@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
-from explorer.cli import output
-from explorer.cli.options import JsonOptions, PointOptions, PoseOptions
+from explorer.cli import options, output
 from explorer.cli.values import numbers
 from explorer.errors import NoAnswerError
+from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism import kinematics
 from explorer.mechanism.configuration import Configuration, tool_offset
 from explorer.mechanism.design import JOINTS, Design
@@ -25,13 +25,11 @@ from explorer.mechanism.tilt_torsion import tilt_torsion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity import ellipsoids
 from explorer.singularity.strata import incidences
-
-if TYPE_CHECKING:
-    from explorer.measures.snapshot import Snapshot
+from explorer.workspace.limits.table import joint_ranges
 
 
 @dataclass(frozen=True, kw_only=True)
-class Inverse(JsonOptions, PoseOptions):
+class Inverse(options.JsonOptions, options.PoseOptions):
     """Compute the joints of a pose.
 
     Their order is l1 d1 d2 d3 d4 l4. The violated limits of the design are listed.
@@ -39,8 +37,6 @@ class Inverse(JsonOptions, PoseOptions):
 
     def run(self) -> None:
         """Write the joints of the pose."""
-        from explorer.measures.snapshot import evaluate
-
         design = self.read_design()
         snapshot, tool = evaluate(design, self.pose(design)), self.tool(design)
         self.write(lambda: _inverse_json(snapshot, tool), _inverse_lines(snapshot, tool))
@@ -53,8 +49,6 @@ def _inverse_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
 
 
 def _inverse_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
-    from explorer.workspace.limits.table import joint_ranges
-
     design, ranges = snapshot.design, joint_ranges(snapshot.design)
     rows = [("joint", "units", "mm", "limits")]
     for name, value in zip(JOINTS, snapshot.joints.tolist(), strict=True):
@@ -67,7 +61,7 @@ def _inverse_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Forward(JsonOptions, PointOptions):
+class Forward(options.JsonOptions, options.PointOptions):
     """Compute the eight assembly modes of the joints.
 
     All eight are real or none is. If none is, the exit status is 1 and the message names the
@@ -172,26 +166,15 @@ def _least_change(design: Design, joints: FloatArray) -> str:
         nearest = nearest_feasible(design, joints, index, intervals)
         if nearest is None:
             continue
-        value, closing = float(joints[index]), _shortest_text(design, joints, index, nearest)
-        moves.append((abs(nearest - value), f"{JOINTS[index]} from {value:.10g} to {closing}"))
+        value = float(joints[index])
+        moves.append((abs(nearest - value), f"{JOINTS[index]} from {value:.10g} to {nearest!r}"))
     if not moves:
         return "no change of a single joint closes them"
     return f"the least change of one joint that closes them is {min(moves)[1]}"
 
 
-def _shortest_text(design: Design, joints: FloatArray, joint: int, closing: float) -> str:
-    """Return a closing value of a joint in the fewest digits with which it still closes."""
-    trial = joints.copy()
-    for digits in range(6, 17):
-        written = f"{closing:.{digits}g}"
-        trial[joint] = float(written)
-        if kinematics.forward(design, trial).feasible:
-            return written
-    return repr(closing)
-
-
 @dataclass(frozen=True, kw_only=True)
-class Singularity(JsonOptions, PoseOptions):
+class Singularity(options.JsonOptions, options.PoseOptions):
     """Measure how near a pose is to a singularity, and to which.
 
     A margin is zero where its tetrahedron is flat; δ1 and δ3 are distances, δ2 is a distance times
@@ -203,8 +186,6 @@ class Singularity(JsonOptions, PoseOptions):
 
     def run(self) -> None:
         """Write the margins of the pose and the measures of singularity."""
-        from explorer.measures.snapshot import evaluate
-
         design = self.read_design()
         snapshot, tool = evaluate(design, self.pose(design)), self.tool(design)
         self.write(lambda: _singularity_json(snapshot, tool), _singularity_lines(snapshot, tool))
@@ -247,6 +228,7 @@ def _condition_at(snapshot: Snapshot, tool: Triple) -> float:
 
 
 def _singularity_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
+    # Only this text needs them, and they would delay every command of the module.
     from explorer.cli.blocks import lines
     from explorer.measures.blocks import singularity as blocks
     from explorer.measures.blocks.block import Statement

@@ -6,33 +6,27 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path as File
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 import tyro
 
-from explorer.cli import output, values
-from explorer.cli.options import (
-    EndOptions,
-    JsonOptions,
-    PointOptions,
-    PoseOptions,
-    RadiiOptions,
-    check_has_limits,
-    make_pose,
-    write_files,
-)
+from explorer.cli import blocks, options, output, values
 from explorer.errors import InputError
+from explorer.export.tables import trajectory_csv
+from explorer.files.writing import check_writable
+from explorer.legs import moves
+from explorer.legs.clearance import PAIRS
+from explorer.measures.blocks.clearances import move_clearances, pose_clearances
+from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
+from explorer.paths import planning
+from explorer.paths.crossings import path_margins
+from explorer.paths.loads import PathLoads, path_loads
+from explorer.paths.trajectory import Trajectory, trajectory
 from explorer.statics.reactions import LIMITED, PART_NAMES
-
-if TYPE_CHECKING:
-    from explorer.legs.moves import MoveClearance
-    from explorer.measures.snapshot import Snapshot
-    from explorer.paths.loads import PathLoads
-    from explorer.paths.planning import PlannedPath
-    from explorer.paths.trajectory import Trajectory
+from explorer.workspace.slices.volume import node_step_of
 
 MOST_STEPS = 100_000
 END_OPTIONS = "with --to, --to-quaternion, --to-yaw-pitch-roll, --to-tilt-torsion or --to-folds"
@@ -40,7 +34,9 @@ INSTEAD = values.hint("instead of --from-quaternion")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interference(JsonOptions, RadiiOptions, EndOptions, PoseOptions):
+class Interference(
+    options.JsonOptions, options.RadiiOptions, options.EndOptions, options.PoseOptions
+):
     """Measure the clearances of the legs, in a pose or over a move.
 
     Legs are capsules about their axes; the clearance of two legs is the distance of the axes minus
@@ -60,8 +56,6 @@ class Interference(JsonOptions, RadiiOptions, EndOptions, PoseOptions):
 
     def run(self) -> None:
         """Write the clearances of the pose or of the move."""
-        from explorer.measures.snapshot import evaluate
-
         design = self.with_radii(self.read_design())
         start, tool = self.pose(design), self.tool(design)
         here, end = evaluate(design, start), self.end(start, self.to, tool)
@@ -70,20 +64,15 @@ class Interference(JsonOptions, RadiiOptions, EndOptions, PoseOptions):
                 raise InputError(f"--steps divides a move; say where it goes {END_OPTIONS}")
             self.write(lambda: _pose_json(here, tool), _pose_lines(here, tool))
             return
-        from explorer.legs.moves import move_clearance
-
         steps = self.steps or _steps_of(design, start, end, tool)
-        move = move_clearance(design, start, end, steps=steps, tool=tool)
+        move = moves.move_clearance(design, start, end, steps=steps, tool=tool)
         there = evaluate(design, end)
         self.write(lambda: _move_json(move, here, there), _move_lines(move, here, there))
 
 
 def _steps_of(design: Design, start: Pose, end: Pose, tool: Triple | None) -> int:
     """Return the number of steps in which no leg's end moves farther than a node step."""
-    from explorer.legs.moves import StraightMoves
-    from explorer.workspace.slices.volume import node_step_of
-
-    step, move = node_step_of(design), StraightMoves.along((start, end), tool)
+    step, move = node_step_of(design), moves.StraightMoves.along((start, end), tool)
     arm = float(np.linalg.norm(design.platform_points - move.tool, axis=1).max())
     way = float(np.linalg.norm(move.step) + arm * np.linalg.norm(move.turn))
     count = math.ceil(way / step * (1.0 - 1e-9))
@@ -96,24 +85,18 @@ def _steps_of(design: Design, start: Pose, end: Pose, tool: Triple | None) -> in
 
 
 def _pose_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
-    from explorer.cli.blocks import lines
-    from explorer.measures.blocks.clearances import pose_clearances
-
     design = snapshot.design
     yield from (output.heading(design), output.pose_table(design, snapshot.pose, tool))
     yield output.radii_line(design)
-    yield from (*lines(pose_clearances(snapshot)), "")
+    yield from (*blocks.lines(pose_clearances(snapshot)), "")
     yield from output.limits_lines(snapshot, "the pose is ")
 
 
-def _move_lines(move: MoveClearance, start: Snapshot, end: Snapshot) -> Iterator[str]:
-    from explorer.cli.blocks import lines
-    from explorer.measures.blocks.clearances import move_clearances
-
+def _move_lines(move: moves.MoveClearance, start: Snapshot, end: Snapshot) -> Iterator[str]:
     design = start.design
     yield from (output.heading(design), *_end_lines(design, move.start, move.end, move.tool))
     yield output.radii_line(design)
-    yield from (*lines(move_clearances(move, design)), "")
+    yield from (*blocks.lines(move_clearances(move, design)), "")
     yield from output.limits_lines(start, "the start is ")
     yield from output.limits_lines(end, "the end is ")
 
@@ -124,8 +107,6 @@ def _end_lines(design: Design, start: Pose, end: Pose, tool: Triple | None) -> I
 
 
 def _pose_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
-    from explorer.legs.clearance import PAIRS
-
     legs = snapshot.clearances
     return {
         "pairs": [
@@ -146,9 +127,7 @@ def _pose_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
     }
 
 
-def _move_json(move: MoveClearance, start: Snapshot, end: Snapshot) -> dict[str, object]:
-    from explorer.legs.clearance import PAIRS
-
+def _move_json(move: moves.MoveClearance, start: Snapshot, end: Snapshot) -> dict[str, object]:
     def place(pose: Pose) -> dict[str, object]:
         return output.attributes(pose, "position quaternion") | output.tool_json(pose, move.tool)
 
@@ -176,7 +155,7 @@ def _move_json(move: MoveClearance, start: Snapshot, end: Snapshot) -> dict[str,
 
 
 @dataclass(frozen=True, kw_only=True)
-class Path(JsonOptions, RadiiOptions, EndOptions, PointOptions):
+class Path(options.JsonOptions, options.RadiiOptions, options.EndOptions, options.PointOptions):
     """Plan a path between two poses within limits, margins and clearances.
 
     Both poses must have the same assembly mode. A pose is a position x y z, or a position and yaw
@@ -224,25 +203,21 @@ class Path(JsonOptions, RadiiOptions, EndOptions, PointOptions):
 
     def run(self) -> None:
         """Write the path."""
-        from explorer.export.tables import trajectory_csv
-        from explorer.files.writing import check_writable
-        from explorer.paths.loads import path_loads
-        from explorer.paths.planning import NoPathError, plan_path
-        from explorer.paths.trajectory import trajectory
-
         design = self.with_radii(self.read_design())
         tool = self.tool(design)
-        start = make_pose(self, "from_", design.home_pose, self.from_, tool)
+        start = options.make_pose(self, "from_", design.home_pose, self.from_, tool)
         goal = self.end(start, self.to, tool)
         if goal is None:
             raise InputError(f"say where the path ends {END_OPTIONS}")
         if self.load is not None:
-            check_has_limits(design)
+            options.check_has_limits(design)
         if self.out is not None:
             check_writable(self.out)
         try:
-            path = plan_path(design, start, goal, seconds=self.seconds, tool=tool, load=self.load)
-        except NoPathError as error:
+            path = planning.plan_path(
+                design, start, goal, seconds=self.seconds, tool=tool, load=self.load
+            )
+        except planning.NoPathError as error:
             if self.json:
                 output.write_json({"found": False, "reason": error.reason, "poses": []})
             raise
@@ -251,7 +226,7 @@ class Path(JsonOptions, RadiiOptions, EndOptions, PointOptions):
         if self.load is not None:
             loads = path_loads(design, path.poses, self.load, tool=tool)
         files = {} if self.out is None else {self.out: trajectory_csv(timed).encode()}
-        written, errors = write_files(files)
+        written, errors = options.write_files(files)
         out = next(iter(written), None)
         self.write(
             lambda: _path_json(path, timed, loads, out),
@@ -261,7 +236,7 @@ class Path(JsonOptions, RadiiOptions, EndOptions, PointOptions):
 
 
 def _path_json(
-    path: PlannedPath, timed: Trajectory, loads: PathLoads | None, out: File | None
+    path: planning.PlannedPath, timed: Trajectory, loads: PathLoads | None, out: File | None
 ) -> dict[str, object]:
     names = "time joints position quaternion" + (" tool_position" if path.tool else "")
     largest = loads and {
@@ -284,13 +259,11 @@ def _path_json(
 
 def _path_lines(
     design: Design,
-    path: PlannedPath,
+    path: planning.PlannedPath,
     timed: Trajectory,
     loads: PathLoads | None,
     out: File | None,
 ) -> Iterator[str]:
-    from explorer.paths.crossings import path_margins
-
     least = path_margins(path.poses, tool=path.tool).least
     plural = "" if path.checked == 1 else "s"
     yield output.heading(design)

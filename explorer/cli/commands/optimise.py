@@ -8,29 +8,26 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import msgspec
 
-from explorer.cli import values
-from explorer.cli.options import DesignOptions, JsonOptions, replace_given, write_files
-from explorer.cli.output import attributes, figure, heading, table, write_json
+from explorer.cli import options, output, values
 from explorer.cli.streams import Meter
 from explorer.errors import InputError, NoAnswerError
+from explorer.files.writing import check_writable
 from explorer.measures.catalogue import CATALOGUE, Measurements
 from explorer.measures.measure import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
-from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, compare_designs
-
-if TYPE_CHECKING:
-    from explorer.optimise.outcome import Iterate, Outcome, Settings
-    from explorer.optimise.problem import Box, Problem, Variable
+from explorer.optimise import conflicts, outcome as outcomes, solver
+from explorer.optimise.defaults import make_problem
+from explorer.optimise.problem import Box, Problem, Variable, with_box
 
 
 @dataclass(frozen=True, kw_only=True)
-class Optimise(JsonOptions, DesignOptions):
+class Optimise(options.JsonOptions, options.DesignOptions):
     """Optimise a design by SQP: match a volume, shorten the longest leg, or others.
 
     The gradients are exact, and the search starts from a given design, whose limits hold
@@ -128,9 +125,6 @@ class Optimise(JsonOptions, DesignOptions):
 
     def run(self) -> None:
         """Write the outcome of the search."""
-        from explorer.files.writing import check_writable
-        from explorer.optimise.outcome import encode_record, record_of
-
         record = self.record
         if self.out is not None:
             # A folder has no name to which a suffix could be added.
@@ -145,8 +139,8 @@ class Optimise(JsonOptions, DesignOptions):
         if self.out is not None and outcome.converged:
             files[self.out] = encode_design(optimised_design(outcome))
         if record is not None and (outcome.converged or self.record is not None):
-            files[record] = encode_record(record_of(outcome, settings))
-        written, unwritten = write_files(files)
+            files[record] = outcomes.encode_record(outcomes.record_of(outcome, settings))
+        written, unwritten = options.write_files(files)
         unsolved = [] if outcome.converged else [NoAnswerError(outcome.run.message)]
         self.write(
             lambda: outcome_json(outcome, written),
@@ -154,13 +148,10 @@ class Optimise(JsonOptions, DesignOptions):
             [*unsolved, *unwritten],
         )
 
-    def _problem(self) -> tuple[Problem, Settings]:
+    def _problem(self) -> tuple[Problem, outcomes.Settings]:
         """Return the problem and the settings that the options describe."""
-        from explorer.optimise.defaults import make_problem
-        from explorer.optimise.outcome import Settings, load_record
-
         if self.repeat is not None:
-            record = load_record(self.repeat)
+            record = outcomes.load_record(self.repeat)
             return record.problem, record.settings
         if self.objective == "match-volume" and self.target_volume is None:
             raise InputError("say which volume to match with --target-volume")
@@ -181,57 +172,50 @@ class Optimise(JsonOptions, DesignOptions):
             free=self.free,
             bounds=[_as_variable(word) for word in self.bounds],
         )
-        return problem, Settings(starts=self.starts, seed=self.seed, iterations=self.iterations)
+        return problem, outcomes.Settings(
+            starts=self.starts, seed=self.seed, iterations=self.iterations
+        )
 
     def _start(self) -> Design:
-        """Return the start of the search, whose home is fixed before the box changes."""
-        design = self._loaded(self.read_design())
-        if self.box is None:
-            return design
-        from explorer.optimise.problem import with_box
-
-        return with_box(design, _as_box(self.box) if self.box else None)
-
-    def _loaded(self, design: Design) -> Design:
-        """Return the design with the given force and limits of forces and moments."""
+        """Return the design with the given limits; its home is fixed before its box changes."""
+        design = self.read_design()
         actuators = design.actuators
         if self.most is not None:
             actuators = msgspec.structs.replace(actuators, push_n=self.most, pull_n=None)
-        return msgspec.structs.replace(
+        design = msgspec.structs.replace(
             design,
-            payload=replace_given(design.payload, force_n=self.force),
+            payload=options.replace_given(design.payload, force_n=self.force),
             actuators=actuators,
-            struts=replace_given(design.struts, moment_nm=self.most_bending),
+            struts=options.replace_given(design.struts, moment_nm=self.most_bending),
         )
+        if self.box is None:
+            return design
+        return with_box(design, _as_box(self.box) if self.box else None)
 
     def _check_possible(self, problem: Problem) -> None:
         """Refuse a problem that the limits make infeasible, before kernels are compiled."""
-        from explorer.optimise.conflicts import BOX_LIMIT, find_conflicts, paper_box
-
-        conflicts = find_conflicts(problem)
-        if not conflicts:
+        found = conflicts.find_conflicts(problem)
+        if not found:
             return
-        message = "; ".join(conflict.message for conflict in conflicts)
-        if self.repeat is None and any(conflict.limit == BOX_LIMIT for conflict in conflicts):
+        message = "; ".join(conflict.message for conflict in found)
+        if self.repeat is None and any(each.limit == conflicts.BOX_LIMIT for each in found):
             advice = "lift the box with --box none"
-            box = paper_box(problem)
+            box = conflicts.paper_box(problem)
             if box is not None:
                 corners = " ".join(f"{value:g}" for corner in box for value in corner)
                 advice += f", or take the paper's with --box {corners}"
             message += f": {advice}"
         if self.json:
-            write_json(infeasible_json(problem, conflicts[0].limit, message))
+            output.write_json(infeasible_json(problem, found[0].limit, message))
         raise NoAnswerError(message)
 
 
-def _search(problem: Problem, settings: Settings) -> Outcome:
+def _search(problem: Problem, settings: outcomes.Settings) -> outcomes.Outcome:
     """Run a search with a progress bar."""
-    from explorer.optimise.solver import optimise_design
-
     starts, steps = settings.starts, Counter[int]()
-    symbol = OBJECTIVE_SYMBOLS[problem.objective]
+    symbol = outcomes.OBJECTIVE_SYMBOLS[problem.objective]
 
-    def show(iterate: Iterate) -> None:
+    def show(iterate: outcomes.Iterate) -> None:
         run = iterate.run
         steps[run] += 1
         share = (run + min(1.0, steps[run] / settings.iterations)) / starts
@@ -240,7 +224,7 @@ def _search(problem: Problem, settings: Settings) -> Outcome:
         meter.show(text + (f", missed: {iterate.worst}" if iterate.spare < 0.0 else ""), share)
 
     with Meter() as meter:
-        return optimise_design(
+        return solver.optimise_design(
             problem,
             starts=starts,
             seed=settings.seed,
@@ -255,8 +239,6 @@ def _as_box(six: Six) -> Box:
 
 def _as_variable(word: str) -> Variable:
     """Return the variable in a word such as b1x=-10:10."""
-    from explorer.optimise.problem import Variable
-
     match = re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", word)
     try:
         ends = [float(end) for end in match.groups()[1:]] if match else []
@@ -267,13 +249,13 @@ def _as_variable(word: str) -> Variable:
     return Variable(match[1].strip(), *ends)
 
 
-def optimised_design(outcome: Outcome) -> Design:
+def optimised_design(outcome: outcomes.Outcome) -> Design:
     """Return the design of an outcome, renamed."""
     name = f"{outcome.problem.start.name[:80]}, optimised"
     return msgspec.structs.replace(outcome.design, name=name)
 
 
-def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]:
+def outcome_json(outcome: outcomes.Outcome, written: Sequence[Path]) -> dict[str, object]:
     """Return an outcome as plain values."""
     best, run, problem = outcome.best, outcome.run, outcome.problem
     return {
@@ -283,15 +265,15 @@ def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]
         "volume": best.volume,
         "reach": outcome.design.reach,
         "longest_leg": longest_leg(outcome.design),
-        **attributes(run, "iterations evaluations"),
-        **attributes(outcome, "seconds converged"),
-        **attributes(run, "status holding message"),
+        **output.attributes(run, "iterations evaluations"),
+        **output.attributes(outcome, "seconds converged"),
+        **output.attributes(run, "status holding message"),
         "values": dict(zip(problem.names, best.values, strict=True)),
         "runs": [
             {
                 "status": start.status,
                 "objective": start.best.objective,
-                **attributes(start, "iterations attempts"),
+                **output.attributes(start, "iterations attempts"),
             }
             for start in outcome.runs
         ],
@@ -318,11 +300,13 @@ def infeasible_json(problem: Problem, limit: str, message: str) -> dict[str, obj
     }
 
 
-def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> Iterator[str]:
+def outcome_lines(outcome: outcomes.Outcome, written: Sequence[Path]) -> Iterator[str]:
     """Yield an outcome as lines of text, with the start and the best design side by side."""
     problem = outcome.problem
-    yield heading(optimised_design(outcome))
-    before, after = compare_designs(problem, problem.start, outcome.design, outcome.best.values)
+    yield output.heading(optimised_design(outcome))
+    before, after = outcomes.compare_designs(
+        problem, problem.start, outcome.design, outcome.best.values
+    )
     optimum = "optimum" if outcome.converged else "best so far"
     rows: list[tuple[str, ...]] = [("", "start", optimum, "change")]
     for name, pair in measure_rows(before, after):
@@ -331,7 +315,7 @@ def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> Iterator[str]:
         rows.append((name, *map(_cell, pair), change))
     if outcome.converged:
         yield from (outcome.run.message, "")
-    yield table(rows, "<>>>")
+    yield output.table(rows, "<>>>")
     yield (
         f"\n{len(outcome.runs)} start{'s' if len(outcome.runs) > 1 else ''}, "
         f"{outcome.run.iterations} iterations and {outcome.run.evaluations} evaluations of the "
@@ -361,4 +345,4 @@ def measure_rows(
 def _cell(value: float | None) -> str:
     if value is None:
         return "none"
-    return figure(value) if math.isfinite(value) else "infinite"
+    return output.figure(value) if math.isfinite(value) else "infinite"

@@ -16,6 +16,7 @@ from explorer.cli import values
 from explorer.cli.options import JsonOptions, PoseOptions, load
 from explorer.errors import InputError
 from explorer.files.writing import check_writable, write_whole
+from explorer.optimise.outcome import load_record
 
 FORMATS: dict[str, Literal["html", "pdf"]] = {".html": "html", ".htm": "html", ".pdf": "pdf"}
 
@@ -93,11 +94,7 @@ class Report(JsonOptions, PoseOptions):
         check_writable(self.out)
         design = self.read_design()
         pose = self.pose(design)
-        record = None
-        if self.record is not None:
-            from explorer.optimise.outcome import load_record
-
-            record = load_record(self.record)
+        record = None if self.record is None else load_record(self.record)
         from explorer.app.features.sharing.reporting import make_report
 
         data = make_report(design, pose, record=record, file_format=file_format)

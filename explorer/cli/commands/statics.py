@@ -1,37 +1,41 @@
-"""`explorer forces` and `accuracy`: what a load asks of the parts, and errors and deflection."""
+"""`explorer forces`, `accuracy` and `budget`: what loads, errors and tolerances do in a pose."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
-from explorer.cli import output, values
+from explorer.cli import options, output, values
 from explorer.cli.blocks import lines
-from explorer.cli.options import JsonOptions, PoseOptions, TypicalOptions, replace_given
 from explorer.errors import InputError, NoAnswerError
-from explorer.measures.blocks import forces as blocks
-from explorer.measures.blocks.precision import deflections, tool_errors
+from explorer.files.writing import check_writable
+from explorer.measures.blocks import forces as blocks, precision
+from explorer.measures.box import PositionSet, positions_over
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import DIMENSIONS, Six
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.statics import forces, loaded
-from explorer.statics.accuracy import error_by_geometry
+from explorer.prototype.assembly import make_prototype
+from explorer.prototype.weights import bar_masses, machine_weights
+from explorer.statics import accuracy, budget as budgets, forces, loaded
 from explorer.statics.reactions import LIMITED
 from explorer.statics.weights import Weights
+from explorer.workspace.nearest_carrying import nearest_carrying_pose
 
 B4: Triple = (0.0, 0.0, 0.0)
 PARTS = ("guide", "struts", "actuators")
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadOptions(JsonOptions, PoseOptions):
+class LoadOptions(options.JsonOptions, options.PoseOptions):
     """The options for a load on the platform in a pose."""
 
     load: Annotated[Six, values.LOAD, values.hint("default: none")] = (*B4, *B4)
@@ -43,12 +47,14 @@ class LoadOptions(JsonOptions, PoseOptions):
     def read_loaded_design(self) -> Design:
         """Return the design with the given mass of the payload."""
         design = self.read_design()
-        return replace_given(design, payload=replace_given(design.payload, mass_kg=self.payload))
+        return options.replace_given(
+            design, payload=options.replace_given(design.payload, mass_kg=self.payload)
+        )
 
 
-def check_regular(pose: Pose, values: FloatArray, infinite: str) -> None:
+def check_regular(pose: Pose, results: FloatArray, infinite: str) -> None:
     """Check that results of a pose are finite, and name what is infinite in a singular one."""
-    if np.isfinite(values).all():
+    if np.isfinite(results).all():
         return
     least = forces.SINGULAR * float(np.linalg.norm(pose.position))
     margin = np.abs(margins(pose.position, pose.rotation))
@@ -94,8 +100,6 @@ class Forces(LoadOptions):
         most = np.minimum(*design.actuators.limits) if self.most is None else self.most
         nearest = None
         if found.share > 1.0:
-            from explorer.workspace.nearest_carrying import nearest_carrying_pose
-
             nearest = nearest_carrying_pose(found)
         worst = forces.worst_direction(configuration, most)
         added = None if self.force is None else found.worst_force(self.force)
@@ -111,14 +115,8 @@ class Forces(LoadOptions):
         """Return the weights of legs and platform."""
         if self.density is None:
             return Weights()
-        from explorer.prototype.weights import bar_masses, machine_weights
-
-        if self.parts:
-            from explorer.prototype.assembly import make_prototype
-
-            masses = make_prototype(design).masses(self.density)
-        else:
-            masses = bar_masses(design, self.density)
+        by_parts = self.parts and make_prototype(design).masses(self.density)
+        masses = by_parts or bar_masses(design, self.density)
         return machine_weights(design, masses, payload=False)
 
 
@@ -169,7 +167,7 @@ def _force_lines(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Accuracy(TypicalOptions, LoadOptions):
+class Accuracy(options.TypicalOptions, LoadOptions):
     """Compute the errors and the deflection of the tool in a pose.
 
     Errors, stiffness, struts and tolerances are those of the design; a design without them is
@@ -187,7 +185,9 @@ class Accuracy(TypicalOptions, LoadOptions):
         """Write the errors, the compliance and the deflection."""
         design = self.read_loaded_design()
         given = {"error_mm": self.errors, "stiffness_n_mm": self.stiffness}
-        design = replace_given(design, actuators=replace_given(design.actuators, **given))
+        design = options.replace_given(
+            design, actuators=options.replace_given(design.actuators, **given)
+        )
         design, assumed = self.with_typical(design)
         pose, tool = self.pose(design), self.tool(design)
         found = loaded.ToolPrecision(loaded.LoadedPose(design, pose, self.load, point=tool or B4))
@@ -198,8 +198,8 @@ class Accuracy(TypicalOptions, LoadOptions):
                 [output.heading(design)],
                 output.assumed_lines(assumed),
                 [output.pose_table(design, pose, tool)],
-                lines(tool_errors(found, listed=None)),
-                lines(deflections(found, "the load and the payload's weight")),
+                lines(precision.tool_errors(found, listed=None)),
+                lines(precision.deflections(found, "the load and the payload's weight")),
             ),
         )
 
@@ -223,7 +223,126 @@ def _accuracy_json(found: loaded.ToolPrecision) -> dict[str, object]:
         "displacement_by_actuator": alone.displacement[loaded.BY_ACTUATORS],
         "turn_by_actuator": alone.turn[loaded.BY_ACTUATORS],
         "dimensions": list(DIMENSIONS),
-        "pose_error_by_geometry": error_by_geometry(found.loaded.configuration),
+        "pose_error_by_geometry": accuracy.error_by_geometry(found.loaded.configuration),
         "displacement_by_geometry": alone.displacement[loaded.BY_DIMENSIONS],
         "turn_by_geometry": alone.turn[loaded.BY_DIMENSIONS],
+    }
+
+
+WORDS = {"box": "nodes of a grid over the box", "workspace": "nodes of a grid in the workspace"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Budget(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
+    """Rank what tolerances cost in precision; find those of a wanted precision.
+
+    The sources of errors are the six actuators and the 23 dimensions. The worst error is exact for
+    the linear model, over all combinations of signs, at the worst of the positions; the RMS error
+    is that of independent errors, each uniform within its bounds. The tolerances that are found
+    have the least sum of their reciprocals.
+    """
+
+    over: Annotated[
+        PositionSet | None, values.hint("default: box with --required-box, otherwise pose")
+    ] = None
+    """Positions, at one orientation: that of the pose, nodes of a grid over a box, or nodes of a
+    grid within the limits."""
+
+    required_box: Annotated[values.Box, values.hint("default: the box of the design")] = None
+    """Box of positions of b4 for `--over box`, in design units."""
+
+    wanted: Annotated[values.Positive, values.OPTIONAL] = None
+    """Largest displacement of the tool that is wanted, in mm; tolerances that keep it are found."""
+
+    wanted_turn: Annotated[values.Positive, values.hint("default: any")] = None
+    """Largest turn of the tool that is wanted besides, in degrees."""
+
+    keep_actuators: values.Flag = False
+    """Keep the errors of the actuators as the design states them."""
+
+    out: Annotated[Path | None, values.FILE] = None
+    """File for the design with the tolerances that are found."""
+
+    def run(self) -> None:
+        """Write the costs of the tolerances, and the tolerances that are found."""
+        over, box = self._positions()
+        if self.wanted is None and (self.wanted_turn or self.keep_actuators or self.out):
+            raise InputError(
+                "--wanted-turn, --keep-actuators and --out need a displacement with --wanted"
+            )
+        if self.out is not None:
+            check_writable(self.out)
+        design, assumed = self.with_typical(self.read_design())
+        pose, tool = self.pose(design), self.tool(design)
+        positions = positions_over(design, over, pose, box or design.limits.box)
+        at, found = Configuration(design, positions, pose.rotation, tool), None
+        if self.wanted is not None:
+            found = budgets.tolerance_budget(
+                at, self.wanted, self.wanted_turn, keep_actuators=self.keep_actuators
+            )
+        costs = budgets.source_costs(at) if found is None else found.costs
+        files: dict[Path, bytes] = {}
+        if found is not None and self.out is not None:
+            files[self.out] = encode_design(budgets.with_tolerances(design, found.tolerances))
+        written, errors = options.write_files(files)
+        table = [output.pose_table(design, pose, tool)] if over == "pose" else []
+        self.write(
+            lambda: {
+                "over": over,
+                "assumed": assumed,
+                **_budget_json(costs, found),
+                "stated": accuracy.stated_tolerances(design),
+                "out": next(iter(written), None),
+            },
+            chain(
+                [output.heading(design), *output.assumed_lines(assumed), *table],
+                self._as_lines(design, over, costs, found),
+                ("", str(written[0])) if written else (),
+            ),
+            errors,
+        )
+
+    def _positions(self) -> tuple[PositionSet, tuple[Triple, Triple] | None]:
+        """Return the kind of the positions, and the given box."""
+        given = self.required_box
+        over = self.over or ("pose" if given is None else "box")
+        if over != "box" and given is not None:
+            raise InputError(f"--required-box needs --over box; got --over {over}")
+        for option, value in (("--position", self.position), ("--folds", self.folds)):
+            if over != "pose" and value is not None:
+                raise InputError(f"{option} is one position; leave out --over {over}")
+        if given is None:
+            return over, None
+        lows, highs = given[:3], given[3:]
+        if any(low > high for low, high in zip(lows, highs, strict=True)):
+            raise InputError("--required-box takes three lows, then highs above them")
+        return over, (lows, highs)
+
+    def _as_lines(
+        self,
+        design: Design,
+        over: PositionSet,
+        costs: budgets.SourceCosts,
+        found: budgets.ToleranceBudget | None,
+    ) -> Iterator[str]:
+        if over != "pose":
+            yield f"worst over {costs.count:,} {WORDS[over]}, at one orientation"
+        if over == "workspace" and not design.limits.margin:
+            yield "the limits demand no margin: nearer to singular poses errors are larger"
+        yield from lines(precision.tolerance_budget(costs, found, self.wanted, self.wanted_turn))
+
+
+def _budget_json(
+    costs: budgets.SourceCosts, found: budgets.ToleranceBudget | None
+) -> dict[str, object]:
+    names = "count position turn displacement displacement_within turn_within shares turn_shares"
+    totals = "worst_displacement worst_turn rms_displacement rms_turn"
+    return {
+        "sources": accuracy.SOURCES,
+        "parts": budgets.PARTS,
+        "ranking": [accuracy.SOURCES[k] for k in costs.ranking.tolist()],
+        **output.attributes(costs, f"{names} {totals}"),
+        "tolerances": found and [*map(output.finite, found.tolerances.tolist())],
+        "effort": found and found.effort,
+        "least_effort": found and found.least_effort,
     }

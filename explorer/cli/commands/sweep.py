@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import msgspec
 import tyro
 
-from explorer.cli import values
-from explorer.cli.options import JsonOptions, load, replace_given
-from explorer.cli.output import attributes, figure, table
+from explorer.cli import options, output, values
 from explorer.cli.streams import Meter, write, write_error
 from explorer.errors import InputError
 from explorer.mechanism.design_file import encode_design
-
-if TYPE_CHECKING:
-    from explorer.sweep.results import Summary
-    from explorer.sweep.run import Progress
-    from explorer.sweep.study import Study
-    from explorer.sweep.workers import Workers
+from explorer.sweep import results, study as studies, workers as pools
+from explorer.sweep.cluster import DaskWorkers
+from explorer.sweep.run import Progress, run_study
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sweep(JsonOptions):
+class Sweep(options.JsonOptions):
     """Measure the designs of a study, on every core or a cluster; list the Pareto front.
 
     The results are Parquet files; after an interruption at any point the same command continues.
@@ -67,17 +63,13 @@ class Sweep(JsonOptions):
     def run(self) -> None:
         """Compute the missing designs and summarise the folder."""
         if self.new:
-            from explorer.sweep.study import STUDIES, encode_study
-
-            study = self._load_study(self.study or next(iter(STUDIES)))
-            write(encode_study(study).decode())
+            study = self._load_study(self.study or next(iter(studies.STUDIES)))
+            write(studies.encode_study(study).decode())
             return
         if self.out is None:
             raise InputError("name the folder of the results with --out")
         if self.row is not None:
-            from explorer.sweep.results import design_at
-
-            write(encode_design(design_at(self.out, self.row)).decode())
+            write(encode_design(results.design_at(self.out, self.row)).decode())
         elif self.summary:
             self._write_summary(self.out)
         elif self.study is not None:
@@ -85,16 +77,13 @@ class Sweep(JsonOptions):
         else:
             raise InputError("name a study file, or give --summary to summarise the folder")
 
-    def _load_study(self, name: str) -> Study:
-        from explorer.sweep.study import load_study
-
-        return replace_given(
-            load_study(name), design=None if self.design is None else load(self.design)
+    def _load_study(self, name: str) -> studies.Study:
+        return options.replace_given(
+            studies.load_study(name),
+            design=None if self.design is None else options.load(self.design),
         )
 
-    def _compute(self, study: Study, folder: Path) -> None:
-        from explorer.sweep.run import run_study
-
+    def _compute(self, study: studies.Study, folder: Path) -> None:
         workers = self._workers()
         try:
             with Meter() as meter:
@@ -115,10 +104,10 @@ class Sweep(JsonOptions):
             workers.shutdown(cancel_futures=True)
         self.write(
             lambda: {
-                **attributes(progress, "total done"),
+                **output.attributes(progress, "total done"),
                 "computed": progress.done - progress.kept,
                 "complete": progress.is_complete,
-                "counts": _sort_counts(progress.counts),
+                "counts": dict(progress.counts),
                 "seconds": progress.seconds,
                 "study": study.name,
                 "folder": folder,
@@ -126,15 +115,11 @@ class Sweep(JsonOptions):
             progress_lines(study, folder, progress),
         )
 
-    def _workers(self) -> Workers:
+    def _workers(self) -> pools.Workers:
         if self.scheduler is None:
-            from explorer.sweep.workers import LocalWorkers
-
-            return LocalWorkers(self.workers)
+            return pools.LocalWorkers(self.workers)
         if self.workers is not None:
             raise InputError("give one of --workers and --scheduler, not both")
-        from explorer.sweep.cluster import DaskWorkers
-
         workers = DaskWorkers(self.scheduler)
         if not workers.threads:
             write_error(
@@ -143,9 +128,7 @@ class Sweep(JsonOptions):
         return workers
 
     def _write_summary(self, folder: Path) -> None:
-        from explorer.sweep.results import summarise
-
-        summary = summarise(folder)
+        summary = results.summarise(folder)
         if summary.damaged:
             write_error(f"damaged parts are left out; a run computes them again: {summary.damaged}")
         if summary.strays:
@@ -161,7 +144,7 @@ class Sweep(JsonOptions):
                 "total": summary.study.count,
                 "rows": summary.count,
                 "complete": summary.count == summary.study.count,
-                "counts": _sort_counts(summary.counts),
+                "counts": dict(summary.counts),
                 "incomparable": summary.incomparable,
                 "damaged_parts": summary.damaged,
                 "stray_files": summary.strays,
@@ -188,7 +171,7 @@ def progress_line(progress: Progress) -> str:
     return text + (f", {failed} not done" if failed else "")
 
 
-def progress_lines(study: Study, folder: Path, progress: Progress) -> Iterator[str]:
+def progress_lines(study: studies.Study, folder: Path, progress: Progress) -> Iterator[str]:
     """Yield the progress at the end of a run as lines of text."""
     computed = progress.done - progress.kept
     rate = f", {progress.rate:.3g}/s" if computed else ""
@@ -199,7 +182,7 @@ def progress_lines(study: Study, folder: Path, progress: Progress) -> Iterator[s
         yield "not complete: the same command continues"
 
 
-def summary_lines(summary: Summary) -> Iterator[str]:
+def summary_lines(summary: results.Summary) -> Iterator[str]:
     """Yield the results of a study as lines of text, with the Pareto front."""
     study = summary.study
     yield f"{study.name}: {summary.count} of {study.count} designs"
@@ -216,20 +199,17 @@ def summary_lines(summary: Summary) -> Iterator[str]:
     rows = [summary.front[round(k * step)] for k in range(min(SHOWN, len(summary.front)))]
     if rows:
         cells = [
-            (str(row["index"]), *(figure(float(row[n] or 0.0)) for n in names)) for row in rows
+            (str(row["index"]), *(output.figure(float(row[n] or 0.0)) for n in names))
+            for row in rows
         ]
-        yield table([("index", *names), *cells], ">" * (1 + len(names)))
+        yield output.table([("index", *names), *cells], ">" * (1 + len(names)))
     if len(rows) < len(summary.front):
         yield f"{len(rows)} of them, evenly spread; --json has all"
 
 
 def _count_lines(counts: Mapping[str, int]) -> list[str]:
-    return [f"  {status}: {count}" for status, count in _sort_counts(counts).items()]
-
-
-def _sort_counts(counts: Mapping[str, int]) -> dict[str, int]:
-    """Return counts of statuses, most frequent first."""
-    return dict(sorted(counts.items(), key=lambda count: (-count[1], count[0])))
+    """Return the counts of statuses as lines of text, most frequent first."""
+    return [f"  {status}: {count}" for status, count in Counter(counts).most_common()]
 
 
 def _duration(seconds: float) -> str:

@@ -1,30 +1,25 @@
-"""`explorer workspace`: the measures of the workspace, and of its accessible part."""
+"""`explorer workspace` and `orientation`: the positions and the orientations within the limits."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import chain
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
-from explorer.cli import options, output, values
-from explorer.cli.blocks import lines
+from explorer.cli import blocks, options, output, values
 from explorer.errors import InputError
 from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in
 from explorer.measures.measure import Case
-from explorer.mechanism.design import Design
+from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
-
-if TYPE_CHECKING:
-    from explorer.numerics.arrays import FloatArray
-    from explorer.workspace.accessible.radii import RadiusCurve
-    from explorer.workspace.accessible.workspace import AccessibleWorkspace
-    from explorer.workspace.carried_region import CarriedRegion
-    from explorer.workspace.solids.solid import Solid
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.accessible import radii, workspace as accessible
+from explorer.workspace.orientations import share as shares, tilts
+from explorer.workspace.solids import solids
+from explorer.workspace.solids.solid import Solid, convex_hull
 
 Range = Annotated[tuple[float, float] | None, values.numbers("low high"), values.OPTIONAL]
 
@@ -93,78 +88,84 @@ class Workspace(
     """Position of b4, or of the tool, at which to compute the share of feasible orientations, among
     the given or all."""
 
-    table1: values.Flag = False
-    """Measure the claim table-1 of `explorer reproduce` instead: the paper's Table 1."""
-
     def run(self) -> None:
         """Write the measures of the workspace."""
-        if self.table1:
-            from explorer.cli.commands.reproduce import claim_lines
-            from explorer.reproduce.claims import measure_claims
-
-            (result,) = measure_claims(["table-1"])
-            self.write(lambda: dict(result.measurement.values), claim_lines(result))
-            return
         design = self.with_radii(self.read_design())
         pose = self.oriented_home(design)
-        measures = self._measure(design, pose, self._orientations(pose))
+        orientations = self._orientations(pose)
+        case, shift = Case(design, node_step=self.step, pose=pose), self.shift(design, pose)
+        # Too fine a grid is refused before anything else is computed.
+        answer = _Answer(case, np.zeros(3) if shift is None else shift)
+        self._add_meshes(answer, orientations)
+        if self.capability is not None:
+            count = self.samples or shares.CAPABILITY_ORIENTATIONS
+            chosen = count if orientations is None else orientations
+            tool = self.tool(design)
+            capability = shares.orientation_capability(design, self.capability, chosen, tool)
+            answer.values["orientation_capability"] = capability
+            answer.lines += ["", f"orientation capability {100.0 * capability:.2f} %"]
+        if self.interference:
+            answer.add_accessible(
+                accessible.accessible_workspace(
+                    design, pose.rotation, node_step=self.step, tolerance=self.tolerance
+                )
+            )
+        if self.radius_curve:
+            answer.add_curve(radii.radius_curve(design, pose.rotation))
         angles = "  ".join(output.degrees(yaw_pitch_roll_from_rotation(pose.rotation).tolist()))
         head = [output.heading(design), f"yaw pitch roll  {angles}", ""]
         if self.at == "tool":
-            tool = "  ".join(output.figures(design.tool.position))
-            head.insert(2, f"of the tool point  {tool}")
-        self.write(measures.as_json, chain(head, measures.as_lines()))
+            at = "  ".join(output.figures(design.tool.position))
+            head.insert(2, f"of the tool point  {at}")
+        cubic = (0.1 * design.unit_mm) ** 3
+        rows = [
+            (name, output.figure(volume), output.figure(volume * cubic), remark)
+            for name, volume, remark in answer.volumes
+        ]
+        table = output.table([("", "units³", "cm³", ""), *rows], "<>><")
+        self.write(lambda: answer.values, [*head, table, *answer.lines])
 
-    def _measure(
-        self, design: Design, pose: Pose, orientations: FloatArray | None
-    ) -> WorkspaceMeasures:
-        from explorer.workspace.solids import solids
-        from explorer.workspace.solids.solid import convex_hull
-
-        case, rotation = Case(design, node_step=self.step, pose=pose), pose.rotation
-        # Too fine a grid is refused before anything else is computed.
-        _ = case.paper_nodes
+    def _add_meshes(self, answer: _Answer, orientations: FloatArray | None) -> None:
+        """Add the volumes of the meshes: the workspace and what is asked for besides."""
+        case = answer.case
+        design, rotation = case.design, case.rotation
         solid = solids.workspace_solid(design, rotation, self.tolerance, volume=case.volume)
-        shift, tool = self.shift(design, pose), self.tool(design)
-        measures = WorkspaceMeasures(case, shift, solid if shift is None else solid.shifted(shift))
+        answer.add_mesh("mesh", "mesh", solid)
+        if solid.agrees is False:
+            answer.values["mesh_agrees"] = False
         if self.hull:
-            measures.hull = convex_hull(measures.solid)
+            hull = convex_hull(solid).volume
+            answer.values["hull_volume"] = hull
+            answer.volumes.append(("convex hull", hull, ""))
         if orientations is not None:
-            measures.orientations = len(orientations)
-            measures.inclusive = solids.inclusive_solid(design, orientations, self.tolerance, tool)
-            measures.total = solids.total_solid(design, orientations, self.tolerance, tool)
-        if self.capability is not None:
-            from explorer.workspace.orientations.share import (
-                CAPABILITY_ORIENTATIONS,
-                orientation_capability,
-            )
-
-            count = self.samples or CAPABILITY_ORIENTATIONS
-            chosen = count if orientations is None else orientations
-            measures.capability = orientation_capability(design, self.capability, chosen, tool)
+            count, tool = len(orientations), self.tool(design)
+            answer.values["orientations"] = count
+            for name, solid_of in (
+                ("inclusive", solids.inclusive_solid),
+                ("total", solids.total_solid),
+            ):
+                mesh = solid_of(design, orientations, self.tolerance, tool)
+                key, remark = f"{name}_mesh", f"{count} orientations, "
+                answer.add_mesh(f"{name} workspace", key, mesh, remark)
         if self.load is not None:
-            measures.carrying = options.carrying_part(design, rotation, self.load, self.tolerance)
-        if self.interference:
-            from explorer.workspace.accessible.workspace import accessible_workspace
-
-            measures.accessible = accessible_workspace(
-                design, rotation, node_step=self.step, tolerance=self.tolerance
-            )
-        if self.radius_curve:
-            from explorer.workspace.accessible.radii import radius_curve
-
-            measures.curve = radius_curve(design, rotation)
-        return measures
+            part = options.carrying_part(design, rotation, self.load, self.tolerance)
+            answer.values["held_volume"] = part.held_volume
+            answer.values["held_mesh"] = _mesh_json(part.solid)
+            remark = _mesh_remark(part.solid)
+            if part.factor is not None:
+                answer.values["held_factor"] = part.factor
+                remark += f"; {part.factor:.3g} of load and payload is held somewhere"
+            answer.volumes.append(("that holds the load", part.held_volume, remark))
 
     def _orientations(self, pose: Pose) -> FloatArray | None:
         """Return the requested orientations, shape (n, 3, 3); None without any."""
-        from explorer.workspace.orientations.share import cone_of_directions, yaw_pitch_roll_range
-
         ranges = (self.yaw_range, self.pitch_range, self.roll_range)
         if self.tilt is not None:
             if any(ends is not None for ends in ranges):
                 raise InputError("give ranges of angles or --tilt, not both")
-            return cone_of_directions(pose.rotation, self.tilt, self.samples or SAMPLES_OF_TILT)
+            return shares.cone_of_directions(
+                pose.rotation, self.tilt, self.samples or SAMPLES_OF_TILT
+            )
         if all(ends is None for ends in ranges):
             if self.samples is not None and self.capability is None:
                 raise InputError("--samples needs ranges of angles, --tilt or --capability")
@@ -172,161 +173,120 @@ class Workspace(
         angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
         pairs = [ends or (angle, angle) for ends, angle in zip(ranges, angles, strict=True)]
         count = self.samples or SAMPLES_ON_RANGE
-        return yaw_pitch_roll_range(
+        return shares.yaw_pitch_roll_range(
             [low for low, _ in pairs],
             [high for _, high in pairs],
             [1 if ends is None else count for ends in ranges],
         )
 
 
-@dataclass
-class WorkspaceMeasures:
-    """The measures of a workspace; None if not requested.
+class _Answer:
+    """The measures of a workspace, as they are added: JSON, a table of volumes, lines below it.
 
     Attributes:
+        values: Plain values by their keys.
+        volumes: Name, volume and remark of each row of the table.
+        lines: Lines of text below it.
+
+    Args:
         case: Design and orientation, with the exact volume and the nodes of the workspace.
-        shift: Vector from b4 to the tool point whose workspace it is, shape (3,); None for b4.
-        solid: Mesh of the workspace.
-        hull: Convex hull of the mesh.
-        orientations: Number of orientations of the next two.
-        inclusive: Union of the workspaces over the orientations.
-        total: Intersection of the workspaces over the orientations.
-        capability: Share of feasible orientations at a position, from 0 to 1.
-        carrying: Part where a load is held.
-        accessible: Accessible workspace.
-        curve: Accessible volume as a function of the radius of all legs.
+        shift: Vector from b4 to the point whose workspace it is, shape (3,).
     """
 
-    case: Case
-    shift: FloatArray | None
-    solid: Solid
-    hull: Solid | None = None
-    orientations: int | None = None
-    inclusive: Solid | None = None
-    total: Solid | None = None
-    capability: float | None = None
-    carrying: CarriedRegion | None = None
-    accessible: AccessibleWorkspace | None = None
-    curve: RadiusCurve | None = None
-
-    @cached_property
-    def measured(self) -> Mapping[str, float | None]:
-        """Values of the measures in the catalogue."""
-        return measure_design(self.case, measures_in("workspace")).values
-
-    @property
-    def extent(self) -> FloatArray | None:
-        """The lowest and the highest position of the counted nodes, shape (2, 3)."""
-        extent = self.case.paper_nodes.extent
-        shift = 0.0 if self.shift is None else self.shift
-        return None if extent is None else np.array(extent) + shift
-
-    def as_json(self) -> dict[str, object]:
-        """Return the measures as plain values."""
-        meshes = {"inclusive_mesh": self.inclusive, "total_mesh": self.total}
-        answer: dict[str, object] = {
-            "volume": self.measured["volume"],
-            **output.attributes(self.case.volume, "gradient empty_because"),
-            "node_step": self.measured["node_step"],
-            **self.measured,
-            "extent": self.extent,
-            "mesh": output.mesh_json(self.solid),
+    def __init__(self, case: Case, shift: FloatArray) -> None:
+        self.case, self.shift, nodes = case, shift, case.paper_nodes
+        measured = measure_design(case, measures_in("workspace")).values
+        extent = None if nodes.extent is None else np.array(nodes.extent) + shift
+        self.values: dict[str, object] = {
+            **measured,
+            **output.attributes(case.volume, "gradient empty_because"),
+            "extent": extent,
         }
-        if self.solid.agrees is False:
-            answer["mesh_agrees"] = False
-        if self.hull is not None:
-            answer["hull_volume"] = self.hull.volume
-        if self.orientations is not None:
-            answer["orientations"] = self.orientations
-        answer |= {key: output.mesh_json(mesh) for key, mesh in meshes.items() if mesh is not None}
-        if self.carrying is not None:
-            answer["held_volume"] = self.carrying.held_volume
-            answer["held_mesh"] = output.mesh_json(self.carrying.solid)
-            if self.carrying.factor is not None:
-                answer["held_factor"] = self.carrying.factor
-        if self.capability is not None:
-            answer["orientation_capability"] = self.capability
-        if self.accessible is not None:
-            found = self.accessible
-            answer |= {
-                **output.attributes(found, "accessible_volume accessible_node_count"),
-                "harmless_radius": output.finite(found.harmless_radius),
-                "pairs": [
-                    {
-                        "legs": pair.legs,
-                        "clearance": output.finite(pair.clearance),
-                        "bound": output.finite(pair.bound),
-                        "blocked_volume": pair.blocked_volume,
-                    }
-                    for pair in found.pairs
-                ],
-                "accessible_solid": output.mesh_json(found.solid),
-            }
-        if self.curve is not None:
-            curve = output.attributes(self.curve, "radii volumes harmless harmless_bound")
-            answer["radius_curve"] = {**curve, "closest": self.curve.closest_legs}
-        return answer
-
-    def as_lines(self) -> Iterator[str]:
-        """Yield the measures as lines of text."""
-        design, nodes, volume = self.case.design, self.case.paper_nodes, self.case.volume
-        rows: list[tuple[str, float, str]] = []
+        self.volumes: list[tuple[str, float, str]] = []
+        self.lines: list[str] = []
         others: list[tuple[str, str]] = []
-        for name, value in self.measured.items():
+        for name, value in measured.items():
             measure = CATALOGUE[name]
             if measure.power == CATALOGUE["volume"].power:
                 remark = f"{nodes.count} nodes at multiples of {nodes.step:.6g}"
                 remark = remark if name == "node_volume" else ""
-                rows.append((measure.heading, value or 0.0, remark))
+                self.volumes.append((measure.heading, value or 0.0, remark))
             elif name not in _IN_REMARK:
                 text = "none" if value is None else output.figure(value)
                 others.append((measure.heading, f"{text} {measure.unit_in('units')}".rstrip()))
-        rows += self._volumes_of_meshes()
-        accessible = self.accessible
-        if accessible is not None:
-            remark = f"{accessible.accessible_node_count} of {accessible.node_count} nodes"
-            title = CATALOGUE["accessible_volume"].heading
-            rows.append((title, accessible.accessible_volume, remark))
-        cubic = (0.1 * design.unit_mm) ** 3
-        cells = [(name, output.figure(v), output.figure(v * cubic), text) for name, v, text in rows]
-        yield output.table([("", "units³", "cm³", ""), *cells], "<>><")
         if others:
-            yield output.table(others, "<<")
-        if self.extent is not None:
-            yield from ("", "extent of the nodes")
-            for axis, low, high in zip("xyz", *self.extent.tolist(), strict=True):
-                yield f"  {axis}  {output.figure(low)} to {output.figure(high)}"
-        if volume.empty_because:
-            yield from ("", f"empty because of {', '.join(volume.empty_because)}")
-        if volume.gradient:
-            rates = [(name, output.figure(rate)) for name, rate in volume.gradient.items()]
+            self.lines.append(output.table(others, "<<"))
+        if extent is not None:
+            self.lines += ["", "extent of the nodes"]
+            for axis, low, high in zip("xyz", *extent.tolist(), strict=True):
+                self.lines.append(f"  {axis}  {output.figure(low)} to {output.figure(high)}")
+        if case.volume.empty_because:
+            self.lines += ["", f"empty because of {', '.join(case.volume.empty_because)}"]
+        if case.volume.gradient:
+            rates = [(name, output.figure(rate)) for name, rate in case.volume.gradient.items()]
             head = ("moves with", "units² (yaw: units³ a radian)")
-            yield from ("", output.table([head, *rates], "<>"))
-        if self.capability is not None:
-            yield from ("", f"orientation capability {100.0 * self.capability:.2f} %")
-        if accessible is not None:
-            yield from ("", output.radii_line(design))
-            yield from lines(workspace_clearances(accessible.pairs, design))
-        if self.curve is not None:
-            yield from ("", *_curve_lines(design, self.curve, self.shift))
+            self.lines += ["", output.table([head, *rates], "<>")]
 
-    def _volumes_of_meshes(self) -> Iterator[tuple[str, float, str]]:
-        """Yield the name, the volume and a remark of each mesh."""
-        yield "mesh", self.solid.volume, _mesh_remark(self.solid)
-        if self.hull is not None:
-            yield "convex hull", self.hull.volume, ""
-        for name, solid in (
-            ("inclusive workspace", self.inclusive),
-            ("total workspace", self.total),
-        ):
-            if solid is not None:
-                remark = f"{self.orientations} orientations, {_mesh_remark(solid)}"
-                yield name, solid.volume, remark
-        if self.carrying is not None:
-            remark = _mesh_remark(self.carrying.solid)
-            if self.carrying.factor is not None:
-                remark += f"; {self.carrying.factor:.3g} of load and payload is held somewhere"
-            yield "that holds the load", self.carrying.held_volume, remark
+    def add_mesh(self, name: str, key: str, solid: Solid, remark: str = "") -> None:
+        """Add a mesh about b4, and its volume with a remark."""
+        self.values[key] = _mesh_json(solid)
+        self.volumes.append((name, solid.volume, remark + _mesh_remark(solid)))
+
+    def add_accessible(self, found: accessible.AccessibleWorkspace) -> None:
+        """Add the accessible workspace, and what each pair of legs blocks."""
+        self.values |= {
+            **output.attributes(found, "accessible_volume accessible_node_count"),
+            "harmless_radius": output.finite(found.harmless_radius),
+            "pairs": [
+                {
+                    "legs": pair.legs,
+                    "clearance": output.finite(pair.clearance),
+                    "bound": output.finite(pair.bound),
+                    "blocked_volume": pair.blocked_volume,
+                }
+                for pair in found.pairs
+            ],
+            "accessible_solid": _mesh_json(found.solid),
+        }
+        remark = f"{found.accessible_node_count} of {found.node_count} nodes"
+        title = CATALOGUE["accessible_volume"].heading
+        self.volumes.append((title, found.accessible_volume, remark))
+        design = self.case.design
+        self.lines += ["", output.radii_line(design)]
+        self.lines += blocks.lines(workspace_clearances(found.pairs, design))
+
+    def add_curve(self, curve: radii.RadiusCurve) -> None:
+        """Add a radius curve at a few radii, and the largest radius without a loss."""
+        values = output.attributes(curve, "radii volumes harmless harmless_bound")
+        self.values["radius_curve"] = {**values, "closest": curve.closest_legs}
+        rows = [("radius of all legs", "mm", "accessible (units³)", "share")]
+        # The last radius comes twice: beyond it the volume is zero.
+        last = max(0, len(curve.radii) - 2)
+        for index in sorted({round(last * row / ROWS) for row in range(ROWS + 1)}):
+            radius, volume = float(curve.radii[index]), float(curve.volumes[index])
+            part = volume / float(curve.volumes[0]) if curve.volumes[0] > 0.0 else 0.0
+            lengths = output.lengths(self.case.design, radius)
+            rows.append((*lengths, output.figure(volume), f"{100.0 * part:.1f} %"))
+        self.lines += ["", output.table(rows, ">>>>")]
+        if curve.closest_legs is not None:
+            i, j = curve.closest_legs
+            at = np.array(curve.closest_position) + self.shift
+            place = ", ".join(f"{x:.4g}" for x in at.tolist())
+            if curve.harmless > 0.0:
+                radius = output.figure(curve.harmless)
+                self.lines.append(f"no legs collide up to a radius of {radius}")
+                self.lines.append(f"legs {i} and {j} come closest, at ({place})")
+            else:
+                self.lines.append(f"no radius is harmless: legs {i} and {j} touch at ({place})")
+
+
+def _mesh_json(solid: Solid) -> dict[str, object]:
+    """Return the measures of a mesh as plain values."""
+    return {
+        "volume": solid.volume,
+        "triangles": len(solid.faces),
+        "watertight": solid.is_watertight,
+    }
 
 
 def _mesh_remark(solid: Solid) -> str:
@@ -337,24 +297,113 @@ def _mesh_remark(solid: Solid) -> str:
     return f"{len(solid.faces)} triangles, {state}, tolerance {solid.tolerance:.3g}{off}"
 
 
-def _curve_lines(design: Design, curve: RadiusCurve, shift: FloatArray | None) -> Iterator[str]:
-    """Yield a radius curve at a few radii, and the largest radius without a loss."""
-    rows = [("radius of all legs", "mm", "accessible (units³)", "share")]
-    # The last radius comes twice: beyond it the volume is zero.
-    last = max(0, len(curve.radii) - 2)
-    for index in sorted({round(last * row / ROWS) for row in range(ROWS + 1)}):
-        radius, volume = float(curve.radii[index]), float(curve.volumes[index])
-        share = volume / float(curve.volumes[0]) if curve.volumes[0] > 0.0 else 0.0
-        rows.append(
-            (*output.lengths(design, radius), output.figure(volume), f"{100.0 * share:.1f} %")
+CONNECTED = "connected to tilt zero by a tilt without a gap"
+NOT_CONNECTED = "not connected to tilt zero by a tilt within the limits"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Orientation(options.JsonOptions, options.PointOptions):
+    """Measure the orientations of a position: share of all, greatest tilts, torsion.
+
+    The platform tilts from tilt zero, at one torsion and in each azimuth, until it meets the first
+    limit. Collisions of legs are not among the limits. With `--at tool` the tool stays in its
+    place, and b4 moves about it.
+    """
+
+    position: Annotated[values.Position, values.OF_HOME] = None
+    """Position of b4, or of the tool, in the base frame, in design units."""
+
+    torsion: Annotated[values.Finite, values.OF_HOME] = None
+    """Torsion of the tilts, in degrees."""
+
+    samples: Annotated[int, values.whole_number(2, 1_000_000)] = 100_000
+    """Number of orientations for the share."""
+
+    def run(self) -> None:
+        """Write the measures of the orientations."""
+        design = self.read_design()
+        home, tool = design.home_pose, self.tool(design)
+        position = position_of(design, home, self.at) if self.position is None else self.position
+        share = shares.orientation_share(design, position, self.samples, tool=tool)
+        least = tilts.greatest_tilt(design, position, self.torsion, tool)
+        by_azimuth = tilts.tilt_map(design, position, self.torsion, tool=tool)
+        by_torsion = tilts.tilt_by_torsion(design, position, tool=tool)
+        best = by_torsion.best
+        torsions = tilts.torsion_range(design, position, self.torsion, tool=tool)
+        is_home_connected = tilts.is_connected(design, position, home.rotation, tool=tool)
+        name = "position" if self.at == "b4" else "tool position"
+        rows = [
+            ("share of all orientations", _share_words(share)),
+            ("torsion", *output.degrees([least.torsion])),
+            ("greatest tilt in every azimuth", _least_words(least)),
+            ("largest at any torsion", _best_words(best)),
+            ("torsion range at tilt zero", _range_words(torsions)),
+            ("home orientation", CONNECTED if is_home_connected else NOT_CONNECTED),
+        ]
+        self.write(
+            lambda: {
+                name.replace(" ", "_"): position,
+                **output.attributes(share, "share standard_error orientations"),
+                "torsion": least.torsion,
+                "greatest_tilt": output.finite(least.tilt),
+                "azimuth": output.finite(least.azimuth),
+                "limit": least.limit,
+                "azimuths": by_azimuth.azimuths,
+                "tilts": [*map(output.finite, by_azimuth.tilts.tolist())],
+                "limits": by_azimuth.limits,
+                "torsions": by_torsion.torsions,
+                "tilts_by_torsion": [*map(output.finite, by_torsion.tilts.tolist())],
+                "best_torsion": best.torsion,
+                "best_tilt": output.finite(best.tilt),
+                "torsion_range": [output.finite(torsions.low), output.finite(torsions.high)],
+                "torsion_limits": [torsions.low_limit, torsions.high_limit],
+                "home_connected": is_home_connected,
+            },
+            [
+                output.heading(design),
+                f"{name}  {'  '.join(output.figures(position))}",
+                *("", output.table(rows, "<<"), ""),
+                *([] if math.isnan(least.tilt) else [_azimuth_table(by_azimuth)]),
+            ],
         )
-    yield output.table(rows, ">>>>")
-    if curve.closest_legs is not None:
-        i, j = curve.closest_legs
-        at = np.array(curve.closest_position) + (0.0 if shift is None else shift)
-        place = ", ".join(f"{x:.4g}" for x in at.tolist())
-        if curve.harmless > 0.0:
-            yield f"no legs collide up to a radius of {output.figure(curve.harmless)}"
-            yield f"legs {i} and {j} come closest, at ({place})"
-        else:
-            yield f"no radius is harmless: legs {i} and {j} touch at ({place})"
+
+
+def _azimuth_table(by_azimuth: tilts.TiltMap) -> str:
+    ends = zip(by_azimuth.azimuths.tolist(), by_azimuth.tilts.tolist(), strict=True)
+    rows = [
+        (*output.degrees(pair), limit or "no limit")
+        for pair, limit in zip(ends, by_azimuth.limits, strict=True)
+    ]
+    return output.table([("azimuth", "tilt", "ends at"), *rows], ">><")
+
+
+def _share_words(share: shares.OrientationShare) -> str:
+    if share.share in (0.0, 1.0):
+        return f"{'all' if share.share else 'none'} of {share.orientations:,} orientations"
+    error = f"standard error {output.figure(share.standard_error)}"
+    return f"{output.figure(share.share)} ({error}, {share.orientations:,} orientations)"
+
+
+def _least_words(least: tilts.GreatestTilt) -> str:
+    if math.isnan(least.tilt):
+        return f"none: tilt zero violates {least.limit}"
+    tilt, azimuth = output.degrees([least.tilt, least.azimuth])
+    if least.limit is None:
+        return f"{tilt}, no limit"
+    return f"{tilt} in azimuth {azimuth}, ended by {least.limit}"
+
+
+def _best_words(best: tilts.GreatestTilt) -> str:
+    if math.isnan(best.tilt):
+        return "none: tilt zero violates a limit at every torsion"
+    tilt, torsion = output.degrees([best.tilt, best.torsion])
+    return f"{tilt} at torsion {torsion}"
+
+
+def _range_words(torsions: tilts.TorsionRange) -> str:
+    if math.isnan(torsions.low):
+        return f"none: tilt zero violates {torsions.low_limit}"
+    if torsions.low_limit is None:
+        return "all"
+    low, high = output.degrees([torsions.low, torsions.high])
+    return f"{low} ({torsions.low_limit}) to {high} ({torsions.high_limit})"

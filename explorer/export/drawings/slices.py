@@ -27,14 +27,13 @@ from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, WARN_SHARE, css
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.limits.table import bounds_angles
 from explorer.workspace.position_bands import MEASURE_WORDS, PositionBands, position_bands
-from explorer.workspace.slices.outline import AXES, Edge, Outline, level_loops, slice_outline
+from explorer.workspace.slices.outline import AXES, Edge, level_loops, slice_outline
 
 # The space around a map that has ticks, and between maps.
 LEFT, RIGHT, TOP, BOTTOM = 42.0, 12.0, 26.0, 38.0
 MOST_HEIGHT = 290.0
-_TICKS, _SLICES = 5, 6
+_TICKS = 5
 # The longer side of a workspace in the drawing's own coordinates.
 OWN_SIZE = 1000.0
 # Cells of a grid on the longer side; those of the condition number take long.
@@ -89,15 +88,6 @@ class Slices:
     def contour_step(self) -> float:
         """The step of the margin from one contour to the next, in design units."""
         return round_length(0.15 * float((self.highs - self.lows).max()))
-
-    @property
-    def are_exact(self) -> bool:
-        """Whether outlines are arcs and lines, rather than those of a grid."""
-        return not bounds_angles(self.design)
-
-    def outline(self, axis: str, level: float) -> Outline | None:
-        """Return the exact outline of a slice; None with cones."""
-        return slice_outline(self.design, self.rotation, axis, level)
 
     def map(
         self,
@@ -159,7 +149,7 @@ class Slices:
     def _outline_data(self, axis: str, level: float) -> str:
         """Return the outline of a slice as the data of a path; "" if the slice is empty."""
         lows, scale = self.lows[in_plane(axis)], self.own_scale
-        outline = self.outline(axis, level)
+        outline = slice_outline(self.design, self.rotation, axis, level)
         if outline is not None:
             return "".join(_loop_data(loop, lows, scale) for loop in outline.loops)
         columns, rows, points = self._grid(axis, level, CELLS)
@@ -298,26 +288,6 @@ def slices_through(slices: Slices, position: Sequence[float], name: str = "slice
         maps.append(drawing_text(title, x, TOP - 10.0, "title"))
         left += LEFT + scale * spans[first] + RIGHT
     return svg_drawing(TOP + BOTTOM + scale * high, "Three slices of the workspace", *maps)
-
-
-def slice_strip(slices: Slices) -> tuple[Element, list[tuple[float, float | None]]]:
-    """Return maps of slices at even steps along x, and the level and area of each."""
-    spans = (slices.highs - slices.lows).tolist()
-    width = WIDTH / _SLICES
-    scale = min((width - 10.0) / spans[1], 200.0 / spans[2])
-    bottom = TOP + scale * spans[2]
-    maps: list[Element] = []
-    areas: list[tuple[float, float | None]] = []
-    for index in range(_SLICES):
-        level = float(slices.lows[0] + spans[0] * (index + 0.5) / _SLICES)
-        middle = (index + 0.5) * width
-        left = middle - 0.5 * scale * spans[1]
-        maps.append(_place(slices, "x", level, left, bottom, scale, f"strip-{index}"))
-        title = f"x = {format_number(level, 4)}"
-        maps.append(drawing_text(title, middle, 16.0, "title", anchor="middle"))
-        outline = slices.outline("x", level)
-        areas.append((level, None if outline is None else outline.area))
-    return svg_drawing(bottom + 6.0, "Slices along x", *maps), areas
 
 
 def legend(slices: Slices, unit_mm: float) -> Element:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
-import json
 import math
 import shlex
 from collections.abc import Callable, Iterable, Iterator
 from hashlib import sha256
 from xml.etree.ElementTree import Element
 
-import msgspec
 import numpy as np
 
 from explorer import __version__
@@ -25,7 +23,7 @@ from explorer.files.packaged import packaged_file, versions
 from explorer.measures.blocks import source as sources
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
-from explorer.mechanism.design_file import PRESETS, encode_design
+from explorer.mechanism.design_file import encode_design
 from explorer.numerics.number_text import format_number, power_of_ten
 from explorer.optimise.outcome import OBJECTIVE_SYMBOLS, Curve, Record, curves_of
 from explorer.statics.loaded import LoadedPose
@@ -238,28 +236,6 @@ def _range(curve: Curve) -> tuple[float, float]:
     return low - room, high + room
 
 
-def claims_section(data: ReportData) -> Iterator[Element]:
-    """Yield the section on the paper's claims; nothing for designs other than the paper's."""
-    design = data.design
-    if not any(
-        msgspec.structs.replace(preset, name=design.name, unit_mm=design.unit_mm) == design
-        for preset in PRESETS.values()
-    ):
-        return
-    claims = json.loads(packaged_file("claims", "claims.json").read_text("utf-8"))
-    yield element("h2", "The paper’s claims")
-    yield paragraph(
-        "The command explorer reproduce measures them again, with the paper’s words and the values "
-        "behind each verdict. Numbers mark our reading of what the paper leaves open."
-    )
-    readings = list(dict.fromkeys(claim["reading"] for claim in claims if claim["reading"]))
-    numbers = {"": "", None: "", **{reading: str(n) for n, reading in enumerate(readings, start=1)}}
-    rows = [(claim["claim"], claim["verdict"], numbers[claim["reading"]]) for claim in claims]
-    yield markup.table(("claim", "verdict", "our reading"), rows, "<<<")
-    for reading in readings:
-        yield paragraph(f"{numbers[reading]}. {reading}")
-
-
 def _reproduction(data: ReportData) -> Iterator[Element]:
     yield element("h2", "How to reproduce it")
     name, record = sources.name_of(data.design), data.record
@@ -322,6 +298,5 @@ _SECTIONS: tuple[Callable[[ReportData], Iterable[Element]], ...] = (
     workspace.precision_section,
     mechanism.parts_section,
     search_section,
-    claims_section,
     _reproduction,
 )

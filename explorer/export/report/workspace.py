@@ -13,7 +13,7 @@ import numpy as np
 from explorer.errors import ExplorerError
 from explorer.export.drawings import markup
 from explorer.export.drawings.markup import Cell, Piece, Row, element, number, paragraph, whole
-from explorer.export.drawings.slices import Slices, legend, slice_strip, slices_through
+from explorer.export.drawings.slices import Slices, legend, slices_through
 from explorer.export.drawings.workspace_drawing import workspace_views
 from explorer.export.report.data import ReportData, compute
 from explorer.measures.blocks import forces, precision as blocks
@@ -26,6 +26,7 @@ from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_SHARE
 from explorer.statics.loaded import LoadedPose, WorstForce
 from explorer.workspace.carried_region import CarriedRegion
+from explorer.workspace.limits.table import bounds_angles
 from explorer.workspace.position_bands import position_bands
 from explorer.workspace.solids.solid import Solid, convex_hull
 
@@ -81,26 +82,14 @@ def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
         element("div", slices_through(slices, position), legend(slices, data.design.unit_mm)),
         "Slices through b4 (the cross), axes in design units, coloured by the smallest "
         "of the three margins. ",
-        "Outlines are exact arcs and lines; bands are exact too, since margins are linear "
-        "in the position."
-        if slices.are_exact
-        else "Limits on swings bound it, so the outlines are those of a fine grid.",
+        "Limits on swings bound it, so the outlines are those of a fine grid."
+        if bounds_angles(data.design)
+        else "Outlines are exact arcs and lines; bands are exact too, since margins are linear "
+        "in the position.",
         " Beyond the bands, thin lines mark every ",
         number(slices.contour_step),
         " units of it.",
     )
-    drawn, areas = slice_strip(slices)
-    caption = "Slices along the guide, at one scale, in the same colours."
-    yield markup.illustration(drawn, caption)
-    known = [area for _, area in areas if area is not None]
-    if len(known) == len(areas):
-        square = (0.1 * data.design.unit_mm) ** 2
-        heads = ("slice at", *(f"x = {format_number(x, 4)}" for x, _ in areas))
-        rows = [
-            ("area, units²", *(number(area, 5) for area in known)),
-            ("area, cm²", *(number(area * square, 5) for area in known)),
-        ]
-        yield markup.table(heads, rows, "<" + ">" * len(areas))
 
 
 def _volumes(data: ReportData) -> Element:
@@ -149,8 +138,7 @@ def _extent(data: ReportData) -> Element | None:
 
 def _bounds(solid: Solid) -> Element:
     corners = solid.vertices[solid.faces]
-    size = float(np.ptp(solid.vertices, axis=0).max())
-    sides = (corners[:, 1:] - corners[:, :1]) / size
+    sides = corners[:, 1:] - corners[:, :1]
     areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     shares = np.bincount(solid.limit_of_face, areas, len(solid.limits)) / areas.sum()
     rows = [
