@@ -160,17 +160,7 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         order = checks.one_of("limits.carriage_order", self.carriage_order, get_args(CarriageOrder))
         _set(self, "carriage_order", order)
         if self.box is not None:
-            lows, highs = checks.two("limits.box", self.box)
-            pairs = [
-                checks.ordered_pair(f"limits.box {axis}", low, high)
-                for axis, low, high in zip(
-                    "xyz",
-                    checks.numbers("limits.box lows", lows, 3),
-                    checks.numbers("limits.box highs", highs, 3),
-                    strict=True,
-                )
-            ]
-            _set(self, "box", (tuple(low for low, _ in pairs), tuple(high for _, high in pairs)))
+            _set(self, "box", checks.box("limits.box", self.box))
         if self.margin is not None:
             _set(self, "margin", checks.not_negative("limits.margin", self.margin))
         checks.instance("limits.swing", self.swing, Swing)

@@ -101,6 +101,19 @@ def numbers(name: str, value: Any, count: int, most: float = MOST) -> list[float
     return [number(name, entry, most=most) for entry in entries]
 
 
+def box(name: str, value: Any) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Return the value as lows and highs along x, y and z, no low above its high."""
+    lows, highs = (
+        numbers(f"{name} {end}", each, 3)
+        for end, each in zip(("lows", "highs"), two(name, value), strict=True)
+    )
+    x, y, z = (
+        ordered_pair(f"{name} {axis}", low, high)
+        for axis, low, high in zip("xyz", lows, highs, strict=True)
+    )
+    return (x[0], y[0], z[0]), (x[1], y[1], z[1])
+
+
 def whole(name: str, value: object, low: int, high: int) -> int:
     """Return the value as a plain integer from `low` to `high`."""
     if isinstance(value, bool) or not isinstance(value, SupportsIndex):

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -202,14 +202,14 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 def record_of(outcome: Outcome, settings: Settings) -> Record:
     """Return the record of an optimisation that was run with these settings."""
-    runs = (RunRecord(best=run.best.number, **_fields(RunSummary, run)) for run in outcome.runs)
+    runs = [msgspec.structs.asdict(run) | {"best": run.best.number} for run in outcome.runs]
     return Record(
         problem=outcome.problem,
         settings=settings,
         design=outcome.design,
         chosen=outcome.chosen,
-        runs=tuple(runs),
-        history=tuple(map(step_of, outcome.history)),
+        runs=msgspec.convert(runs, tuple[RunRecord, ...]),
+        history=msgspec.convert(outcome.history, tuple[IterateRecord, ...], from_attributes=True),
         seconds=outcome.seconds,
         versions=versions(),
     )
@@ -237,16 +237,6 @@ def load_record(path: Path) -> Record:
         StorageError: The file cannot be read.
     """
     return decode_record(read_at_most(path, LARGEST_FILE), str(path))
-
-
-def step_of(iterate: Iterate) -> IterateRecord:
-    """Return an iterate without its design."""
-    return IterateRecord(**_fields(IterateRecord, iterate))
-
-
-def _fields(base: type[msgspec.Struct], value: msgspec.Struct) -> dict[str, Any]:
-    """Return the values of those fields that a value has from a base."""
-    return {name: getattr(value, name) for name in base.__struct_fields__}
 
 
 def compare_designs(

@@ -121,34 +121,27 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     tilt: float | None = None
 
     def __post_init__(self) -> None:
-        if self.volume is not None:
-            if not 0.0 < self.volume < math.inf:
-                raise InputError(
-                    f"the volume demanded must be a positive, finite number; got {self.volume:g}"
-                )
-            msgspec.structs.force_setattr(self, "volume", float(self.volume))
-        for field in ("reach", "clearance", "stroke_ratio", "error", "deflection", "tilt"):
+        for field in (
+            "volume",
+            "reach",
+            "clearance",
+            "stroke_ratio",
+            "error",
+            "deflection",
+            "tilt",
+        ):
             value = getattr(self, field)
             if value is not None:
                 label = f"the {field.replace('_', ' ')} demanded"
-                msgspec.structs.force_setattr(self, field, checks.positive(label, value))
+                most = math.inf if field == "volume" else checks.MOST
+                msgspec.structs.force_setattr(self, field, checks.positive(label, value, most))
         for field in ("clearance_margin", "least"):
             value = checks.not_negative(f"the {field.replace('_', ' ')}", getattr(self, field))
             msgspec.structs.force_setattr(self, field, value)
         msgspec.structs.force_setattr(self, "held", bool(self.held))
         if self.required_box is not None:
-            lows, highs = checks.two("the required box", self.required_box)
-            pairs = [
-                checks.ordered_pair(f"the required box {axis}", low, high)
-                for axis, low, high in zip(
-                    "xyz",
-                    checks.numbers("the required box's lows", lows, 3),
-                    checks.numbers("the required box's highs", highs, 3),
-                    strict=True,
-                )
-            ]
-            box = tuple(low for low, _ in pairs), tuple(high for _, high in pairs)
-            msgspec.structs.force_setattr(self, "required_box", box)
+            required = checks.box("the required box", self.required_box)
+            msgspec.structs.force_setattr(self, "required_box", required)
 
 
 class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -195,9 +188,8 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
             home = self.start.home_pose
             with_home = msgspec.structs.replace(self.start, home=home)
             msgspec.structs.force_setattr(self, "start", with_home)
-        if self.objective not in OBJECTIVES:
-            raise InputError(f"no objective {self.objective!r}; there are {', '.join(OBJECTIVES)}")
-        msgspec.structs.force_setattr(self, "objective", str(self.objective))
+        objective = checks.one_of("the objective", self.objective, OBJECTIVES)
+        msgspec.structs.force_setattr(self, "objective", objective)
         msgspec.structs.force_setattr(self, "variables", tuple(self.variables))
         if bounds_angles(self.start):
             raise StartError(
@@ -275,14 +267,10 @@ def with_strokes(design: Design, ratio: float | None) -> Design:
     """Return a design with minimum lengths that keep a ratio, longest over shortest, if any."""
     if ratio is None:
         return design
-    limits = design.limits
-    ranges = {
-        name: (
-            max(getattr(limits, name)[0], design.length_range(name)[1] / ratio),
-            getattr(limits, name)[1],
-        )
-        for name in LENGTHS
-    }
+    ranges: dict[str, tuple[float, float | None]] = {}
+    for name in LENGTHS:
+        low, high = getattr(design.limits, name)
+        ranges[name] = max(low, design.length_range(name)[1] / ratio), high
     return design.with_limits(**ranges)
 
 

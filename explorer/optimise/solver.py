@@ -9,7 +9,7 @@ from explorer.errors import InputError
 from explorer.numerics.compiled import warm_in_background
 from explorer.optimise.outcome import Iterate, Outcome, Run
 from explorer.optimise.problem import Problem
-from explorer.optimise.search.search import SAME, Search
+from explorer.optimise.search.search import Search
 from explorer.optimise.search.sqp import Trail
 from explorer.optimise.search.starts import check_starts, more_starts
 
@@ -72,17 +72,12 @@ def optimise_design(
 def _best(runs: Sequence[Run], trail: Trail) -> int:
     """Return the index of the best run: a converged one, then the one with the best iterate.
 
-    Of runs with the same objective the first one counts.
+    Of runs with the same objective to six digits the first one counts.
     """
 
-    def rank(run: Run) -> tuple[tuple[object, ...], float]:
-        *missed, value = trail.rank(run.best)
-        return (run.status != "converged", *missed), value
+    def rank(index: int) -> tuple[object, ...]:
+        run = runs[index]
+        is_empty, missed, value = trail.rank(run.best)
+        return run.status != "converged", is_empty, missed, float(f"{value:.6g}")
 
-    best = 0
-    for index in range(1, len(runs)):
-        (missed, value), (least_missed, least) = rank(runs[index]), rank(runs[best])
-        is_better = value < least - SAME * abs(least)
-        if missed < least_missed or (missed == least_missed and is_better):
-            best = index
-    return best
+    return min(range(len(runs)), key=rank)

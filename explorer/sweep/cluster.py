@@ -9,69 +9,62 @@ import asyncio
 import contextlib
 import importlib
 import logging
-import math
-import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 from explorer.errors import InputError, MissingExtraError
-from explorer.sweep.workers import Workers
+from explorer.sweep.workers import Arguments, Result, Workers
 
-Arguments = ParamSpec("Arguments")
-Result = TypeVar("Result")
-
-# Seconds between two counts of the workers, which come and go.
-COUNT_SECONDS = 1.0
 # Seconds to wait for a scheduler that may not be there.
 PATIENCE = 15.0
 
 
 class DaskWorkers(Workers):
-    """The workers of a Dask scheduler.
+    """The workers of a Dask scheduler; from the first on, Dask logs only what is critical.
 
     Args:
         address: Address of the scheduler, such as tcp://10.0.0.1:8786.
-        patience: Seconds to wait for the scheduler; `PATIENCE` if None.
+        patience: Seconds to wait for the scheduler.
 
     Raises:
         InputError: There is no scheduler at that address.
         MissingExtraError: Dask is not installed.
     """
 
-    def __init__(self, address: str, *, patience: float | None = None) -> None:
-        distributed = _distributed()
-        timeout = PATIENCE if patience is None else patience
-        with contextlib.ExitStack() as quiet:
-            quiet.enter_context(_silence())
-            try:
-                _try_connection(distributed, address, timeout)
-                self._client: Any = distributed.Client(
-                    address, timeout=timeout, set_as_default=False, name="explorer"
-                )
-            except Exception as error:  # noqa: BLE001 - Dask raises anything for other addresses
-                raise InputError(
-                    f"no Dask scheduler answers at {address} within {timeout:g} s "
-                    f"({type(error).__name__}): start one with dask scheduler, and workers with "
-                    "dask worker and its address, such as tcp://10.0.0.1:8786"
-                ) from None
-            # A scheduler may be lost at any time.
-            self._quiet = quiet.pop_all()
+    def __init__(self, address: str, *, patience: float = PATIENCE) -> None:
+        try:
+            distributed = importlib.import_module("distributed")
+        except ImportError:
+            raise MissingExtraError(
+                "a scheduler needs the extra cluster, in this environment and in that of every "
+                'worker: pip install "flagged-explorer[study,cluster]"'
+            ) from None
+        # Of a lost scheduler Dask would log many lines at any time; the explorer writes one.
+        for name in ("distributed", "distributed.client"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        try:
+            _try_connection(distributed, address, patience)
+            self._client: Any = distributed.Client(
+                address, timeout=patience, set_as_default=False, name="explorer"
+            )
+        except Exception as error:  # noqa: BLE001 - Dask raises anything for other addresses
+            raise InputError(
+                f"no Dask scheduler answers at {address} within {patience:g} s "
+                f"({type(error).__name__}): start one with dask scheduler, and workers with "
+                "dask worker and its address, such as tcp://10.0.0.1:8786"
+            ) from None
         # A task whose worker died must be computed again, although its arguments are the same.
         self._executor: Executor = self._client.get_executor(pure=False)
-        self._size, self._counted = 1, -math.inf
         self.died = (distributed.scheduler.KilledWorker,)
 
     @property
     def size(self) -> int:
-        """Number of threads of the workers, at least one; counted again every second."""
-        now = time.monotonic()
-        if now - self._counted > COUNT_SECONDS:
-            # The count is a request to the scheduler. Without a scheduler the tasks fail.
-            with contextlib.suppress(OSError, TimeoutError):
-                self._size = max(1, self.threads)
-            self._counted = now
-        return self._size
+        """Number of threads of the workers now, at least one; each count asks the scheduler."""
+        # Without a scheduler the tasks fail.
+        with contextlib.suppress(OSError, TimeoutError):
+            return max(1, self.threads)
+        return 1
 
     @property
     def threads(self) -> int:
@@ -91,11 +84,10 @@ class DaskWorkers(Workers):
             wait: Whether to wait until tasks have ended.
             cancel_futures: Whether to drop all tasks.
         """
-        with self._quiet:
-            self._executor.shutdown(wait=wait and not cancel_futures)
-            # The scheduler may be gone.
-            with contextlib.suppress(OSError, TimeoutError):
-                self._client.close()
+        self._executor.shutdown(wait=wait and not cancel_futures)
+        # The scheduler may be gone.
+        with contextlib.suppress(OSError, TimeoutError):
+            self._client.close()
 
 
 def _try_connection(distributed: Any, address: str, timeout: float) -> None:
@@ -109,27 +101,3 @@ def _try_connection(distributed: Any, address: str, timeout: float) -> None:
     # A notebook runs a loop of its own in this thread.
     with ThreadPoolExecutor(1) as thread:
         thread.submit(asyncio.run, connect_once()).result()
-
-
-def _distributed() -> Any:
-    try:
-        return importlib.import_module("distributed")
-    except ImportError:
-        raise MissingExtraError(
-            "a scheduler needs the extra cluster, in this environment and in that of every "
-            'worker: pip install "flagged-explorer[study,cluster]"'
-        ) from None
-
-
-@contextlib.contextmanager
-def _silence() -> Generator[None]:
-    """Keep Dask's log of lost connections off the terminal, where one line is written instead."""
-    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)

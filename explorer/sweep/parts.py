@@ -22,16 +22,10 @@ from filelock import FileLock, Timeout
 from explorer.errors import InputError, MissingExtraError
 from explorer.files.json_text import one_line
 from explorer.files.writing import make_folder, storage_error, write_whole
-from explorer.sweep.rows import Kind, Rows, columns_of
+from explorer.sweep.rows import Rows, columns_of
 from explorer.sweep.study import Study, decode_study, encode_study, study_hash
 
 SUFFIX = ".parquet"
-ARROW_TYPES: dict[Kind, str] = {
-    "count": "int64",
-    "number": "float64",
-    "flag": "bool",
-    "text": "string",
-}
 
 _STUDY, _HASH, _SEED = b"explorer.study", b"explorer.study_hash", b"explorer.seed"
 _CHUNK, _VERSIONS = b"explorer.chunk", b"explorer.versions"
@@ -43,12 +37,11 @@ class BadPartError(InputError):
 
 @dataclass(frozen=True)
 class Part:
-    """Metadata of a part: encoded study, its hash, chunk, and versions of the libraries."""
+    """Metadata of a part: encoded study, its hash, and the chunk."""
 
     study: bytes
     study_hash: str
     chunk: int
-    versions: dict[str, str]
 
 
 def part_path(folder: Path, chunk: int) -> Path:
@@ -115,7 +108,7 @@ def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -
         _VERSIONS: json.dumps(pieces[0].versions, sort_keys=True).encode(),
     }
     kinds = columns_of(study)
-    fields = [(name, arrow.type_for_alias(ARROW_TYPES[kind])) for name, kind in kinds.items()]
+    fields = [(name, arrow.type_for_alias(kind)) for name, kind in kinds.items()]
     columns = {name: [value for piece in pieces for value in piece.columns[name]] for name in kinds}
     table = arrow.table(columns, schema=arrow.schema(fields, metadata=metadata))
     data = io.BytesIO()
@@ -148,7 +141,7 @@ def _part_of(metadata: Mapping[bytes, bytes]) -> Part:
     study, known_hash = metadata[_STUDY], metadata[_HASH].decode()
     if hashlib.sha256(study).hexdigest() != known_hash:
         raise ValueError("its metadata is damaged")
-    return Part(study, known_hash, int(metadata[_CHUNK]), json.loads(metadata[_VERSIONS]))
+    return Part(study, known_hash, int(metadata[_CHUNK]))
 
 
 def sound_parts(
@@ -238,7 +231,6 @@ def claim(folder: Path, study: Study) -> Generator[None]:
     except OSError as error:
         raise InputError(f"cannot lock {str(folder)!r}: {error.strerror}") from None
     try:
-        _check_owner(folder, study)
         for path in folder.iterdir():
             # A killed process was writing it.
             if _is_scratch(path) and path.name != LOCK_FILE:
@@ -250,30 +242,23 @@ def claim(folder: Path, study: Study) -> Generator[None]:
 
 def _check_owner(folder: Path, study: Study) -> None:
     """Raise an `InputError` unless a folder is this study's, or empty."""
-    parts = part_paths(folder)
-    for path in parts:
+    for path in part_paths(folder):
         with contextlib.suppress(BadPartError):
-            if read_part(path, [])[0].study_hash != study_hash(study):
-                raise InputError(
-                    f"{str(folder)!r} holds the results of another study; use another folder, or "
-                    "move them away"
-                )
-            break
-    else:
-        if parts:
+            if read_part(path, [])[0].study_hash == study_hash(study):
+                return
             raise InputError(
-                f"{str(folder)!r} is not empty, and holds no results of a study that can be read: "
-                f"{words_of_paths(parts)} cannot be read and may belong to any study; move such "
-                "files away, and the same command computes them again"
+                f"{str(folder)!r} holds the results of another study; use another folder, or "
+                "move them away"
             )
-        try:
-            is_used = any(not _is_scratch(path) for path in folder.iterdir())
-        except OSError as error:
-            raise storage_error("read", folder, error) from None
-        if is_used:
-            raise InputError(
-                f"{str(folder)!r} is not empty, and holds no results of a study: use another folder"
-            )
+    try:
+        others = sorted(path for path in folder.iterdir() if not _is_scratch(path))
+    except OSError as error:
+        raise storage_error("read", folder, error) from None
+    if others:
+        raise InputError(
+            f"{str(folder)!r} is not empty, and holds no results of a study that can be read: "
+            f"{words_of_paths(others)} cannot be; use another folder, or move them away"
+        )
 
 
 def _is_scratch(path: Path) -> bool:

@@ -44,19 +44,10 @@ def front(columns: Mapping[str, Any], objectives: Sequence[Objective]) -> BoolAr
         objectives: At least one objective.
     """
     cost = costs(columns, objectives)
-    rows = np.flatnonzero(_is_done(columns) & np.isfinite(cost).all(axis=1))
+    rows = np.flatnonzero((columns["status"] == "done") & np.isfinite(cost).all(axis=1))
     is_best = np.zeros(len(cost), dtype=np.bool_)
     is_best[rows[undominated_rows(cost[rows])]] = True
     return is_best
-
-
-def incomparable(columns: Mapping[str, Any], objectives: Sequence[Objective]) -> BoolArray:
-    """Return which rows are done but lack an objective, so that no front has them; see `front`."""
-    return _is_done(columns) & ~np.isfinite(costs(columns, objectives)).all(axis=1)
-
-
-def _is_done(columns: Mapping[str, Any]) -> BoolArray:
-    return np.asarray(columns["status"], dtype=object) == "done"
 
 
 def undominated_rows(cost: FloatArray) -> IntArray:
@@ -114,13 +105,22 @@ class Results:
         """
         if not 0 <= row < self.count:
             raise InputError(f"the row must lie within 0 to {self.count - 1}; got {row}")
-        values = {name: float(self.columns[name][row]) for name in self.study.varied}
-        return design_of_index(self.study, int(self.columns["index"][row]), values)
+        study, index = self.study, int(self.columns["index"][row])
+        values = {name: float(self.columns[name][row]) for name in study.varied}
+        return design_of(study, values, f"{study.name[:80]} #{index}")
 
+    def design_at(self, index: int) -> Design:
+        """Return the design with an index.
 
-def design_of_index(study: Study, index: int, values: Mapping[str, float]) -> Design:
-    """Return the design with given values, named after its study and its index."""
-    return design_of(study, values, f"{study.name[:80]} #{index}")
+        Raises:
+            InputError: There is no such design, or it has not been computed yet.
+        """
+        if not 0 <= index < self.study.count:
+            raise InputError(f"the index must lie within 0 to {self.study.count - 1}; got {index}")
+        rows = np.flatnonzero(self.columns["index"] == index)
+        if not len(rows):
+            raise InputError(f"design {index} has not been computed yet")
+        return self.design_of_row(int(rows[0]))
 
 
 @dataclass(frozen=True)
@@ -147,25 +147,6 @@ class Summary:
     def count(self) -> int:
         """Number of rows."""
         return sum(self.counts.values())
-
-
-def design_at(folder: str | Path, index: int) -> Design:
-    """Return the design with an index, reading no parts after its own.
-
-    Raises:
-        InputError: The folder holds no results, or not yet those of this design.
-    """
-    study, damaged = None, list[Path]()
-    for study, _, table in sound_parts(Path(folder), damaged):
-        places = np.flatnonzero(_column(table, "index", "count") == index)
-        if len(places):
-            row = table.slice(int(places[0]), 1).to_pylist()[0]
-            return design_of_index(study, index, {name: row[name] for name in study.varied})
-    if study is None:
-        raise _no_results(folder, damaged)
-    if index >= study.count:
-        raise InputError(f"the index must lie within 0 to {study.count - 1}; got {index}")
-    raise InputError(f"design {index} has not been computed yet")
 
 
 def load_results(folder: str | Path, study: Study | None = None) -> Results:
@@ -204,7 +185,8 @@ def summarise(folder: str | Path) -> Summary:
         columns = {name: _column(table, name, kind) for name, kind in columns_of(study).items()}
         counts.update(columns["status"].tolist())
         if study.objectives:
-            lacking += int(incomparable(columns, study.objectives).sum())
+            lacks = ~np.isfinite(costs(columns, study.objectives)).all(axis=1)
+            lacking += int((lacks & (columns["status"] == "done")).sum())
             chosen = table.filter(front(columns, study.objectives))
             best += chosen.to_pylist()
             of_best = {
@@ -225,7 +207,7 @@ def _column(table: Any, name: str, kind: Kind) -> Column:
 
 def _dtype(name: str, kind: Kind) -> Any:
     # Missing numbers become NaN; the index and texts are never missing.
-    return object if kind == "text" else np.int64 if name == "index" else np.float64
+    return object if kind == "string" else np.int64 if name == "index" else np.float64
 
 
 def _no_results(folder: str | Path, damaged: Sequence[Path]) -> InputError:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import importlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -29,7 +29,9 @@ from explorer.optimise.problem import YAW, Problem, Variable, start_value, with_
 from explorer.sweep.machine import MACHINE
 from explorer.sweep.study import RADIUS, Study, decode_study
 
-Kind = Literal["count", "number", "flag", "text"]
+Kind = Literal["int64", "float64", "bool", "string"]
+"""Name of the type of a column in a file."""
+
 Value: TypeAlias = float | int | bool | str | None
 """Value of a row; None where there is none."""
 
@@ -66,13 +68,13 @@ def columns_of(study: Study) -> dict[str, Kind]:
     design" (the variables make none), "failed" (an error that is not the design's) or "worker
     died" (each process that tried it died).
     """
-    columns: dict[str, Kind] = {"index": "count"}
+    columns: dict[str, Kind] = {"index": "int64"}
     if study.polish is not None:
-        columns.update((f"{SAMPLE}{name}", "number") for name in study.variables)
-    columns.update((name, "number") for name in (*study.varied, *study.measures))
+        columns.update((f"{SAMPLE}{name}", "float64") for name in study.variables)
+    columns.update((name, "float64") for name in (*study.varied, *study.measures))
     if study.polish is not None:
-        columns.update(objective="number", iterations="count", converged="flag")
-    columns.update(status="text", reason="text")
+        columns.update(objective="float64", iterations="int64", converged="bool")
+    columns.update(status="string", reason="string")
     return columns
 
 
@@ -165,27 +167,6 @@ def _turns(study: Study, sample: Mapping[str, float], yaw: float) -> float:
     return 360.0 * math.ceil((study.polished[YAW][0] - yaw) / 360.0 - ROUNDING)
 
 
-def end_values(
-    study: Study, sample: Mapping[str, float], problem: Problem, values: Sequence[float]
-) -> dict[str, float]:
-    """Return the result of a search by variable, within the study's ranges and their turns.
-
-    Args:
-        study: The study.
-        sample: Values that the search started from.
-        problem: Problem that it solved, see `problem_of`.
-        values: Values of the variables of the problem at its end.
-    """
-    ends = dict(zip(problem.names, values, strict=True))
-    if YAW in ends:
-        ends[YAW] += _turns(study, sample, start_value(problem.start, YAW))
-    for name, value in ends.items():
-        low, high = _bounds(study, sample, name)
-        # Only rounding takes a value out of its bounds.
-        ends[name] = min(max(value, low), high)
-    return ends
-
-
 def check_study(study: Study) -> None:
     """Check that some of many designs of a study can be made or polished, and have its measures.
 
@@ -195,11 +176,16 @@ def check_study(study: Study) -> None:
         InputError: None of them can be used, or all lack what a measure needs.
     """
     first: InputError | None = None
-    tried = _spread_samples(study)
+    # The first points of a sequence or a hypercube are spread like the others.
+    tried = range(min(study.count, MOST_TRIED))
+    if study.sampling.method == "grid" and study.count > MOST_TRIED:
+        # Random indices keep no step with a grid.
+        tried = np.random.default_rng(0).integers(study.count, size=MOST_TRIED).tolist()
     has_needs = any(CATALOGUE[name].needs for name in study.measures)
     cases: list[Case] = []
-    for row in tried:
-        sample = dict(zip(study.variables, row, strict=True))
+    for index in tried:
+        row = samples(study, range(index, index + 1))[0]
+        sample = dict(zip(study.variables, row.tolist(), strict=True))
         try:
             if study.polish is None:
                 design = design_of(study, sample)
@@ -216,17 +202,6 @@ def check_study(study: Study) -> None:
         raise InputError(f"none of {which} designs all over the study can be used: {first}")
     if lacking := unmet_needs(cases, study.measures):
         raise InputError(f"the designs of the study have {lacking}")
-
-
-def _spread_samples(study: Study) -> list[list[float]]:
-    """Return the samples of a study, or `MOST_TRIED` of them that are spread over its ranges."""
-    count = study.count
-    if study.sampling.method != "grid" or count <= MOST_TRIED:
-        # The first points of a sequence or a hypercube are spread like the others.
-        return samples(study, range(min(count, MOST_TRIED))).tolist()
-    # Random indices keep no step with a grid.
-    indices = np.random.default_rng(0).integers(count, size=MOST_TRIED).tolist()
-    return [samples(study, range(index, index + 1))[0].tolist() for index in indices]
 
 
 def load_common() -> None:
@@ -286,8 +261,15 @@ def _measure(study: Study, sample: dict[str, float], row: dict[str, Value]) -> N
     if study.polish is not None:
         from explorer.optimise.solver import optimise_design
 
-        outcome = optimise_design(problem_of(study, sample), iterations=study.polish.iterations)
-        ends = end_values(study, sample, outcome.problem, outcome.best.values)
+        problem = problem_of(study, sample)
+        outcome = optimise_design(problem, iterations=study.polish.iterations)
+        ends = dict(zip(problem.names, outcome.best.values, strict=True))
+        if YAW in ends:
+            ends[YAW] += _turns(study, sample, start_value(problem.start, YAW))
+        for name, value in ends.items():
+            low, high = _bounds(study, sample, name)
+            # Only rounding takes a value out of its bounds.
+            ends[name] = min(max(value, low), high)
         values = {**sample, **ends}
         row |= {
             **ends,

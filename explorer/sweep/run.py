@@ -10,7 +10,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from explorer.errors import ExplorerError
@@ -109,24 +109,23 @@ class _Piece:
     deaths: int = 0
 
 
+@dataclass
 class _Run:
     """One run; see `run_study` for the arguments."""
 
-    def __init__(
-        self, study: Study, folder: Path, workers: Workers, watch: Callable[[Progress], None]
-    ) -> None:
-        self.study = study
-        self.folder = folder
-        self.workers = workers
-        self.watch = watch
-        self.encoded = encode_study(study)
-        self.counts: Counter[str] = Counter()
-        self.retries: deque[_Piece] = deque()
-        # Designs whose evaluation may have killed a worker; each is tried alone.
-        self.suspects: deque[_Piece] = deque()
-        self.under_way: dict[Future[Rows], _Piece] = {}
-        # Rows of the chunks that have no part yet.
-        self.pending: dict[int, list[Rows]] = {}
+    study: Study
+    folder: Path
+    workers: Workers
+    watch: Callable[[Progress], None]
+    counts: Counter[str] = field(default_factory=Counter[str])
+    retries: deque[_Piece] = field(default_factory=deque[_Piece])
+    # Designs whose evaluation may have killed a worker; each is tried alone.
+    suspects: deque[_Piece] = field(default_factory=deque[_Piece])
+    under_way: dict[Future[Rows], _Piece] = field(default_factory=dict[Future[Rows], _Piece])
+    # Rows of the chunks that have no part yet.
+    pending: dict[int, list[Rows]] = field(default_factory=dict[int, list[Rows]])
+    kept: int = 0
+    began: float = 0.0
 
     def run(self, limit: int | None, stop: Callable[[], bool] | None) -> Progress:
         """Compute the missing rows."""
@@ -163,7 +162,8 @@ class _Run:
 
     def _submit_tasks(self, missing: Iterator[_Piece]) -> bool:
         """Keep the workers busy; return whether any task is under way."""
-        while len(self.under_way) < AHEAD * self.workers.size:
+        most = AHEAD * self.workers.size
+        while len(self.under_way) < most:
             piece = self.retries.popleft() if self.retries else next(missing, None)
             if piece is None:
                 break
@@ -173,8 +173,8 @@ class _Run:
         return bool(self.under_way)
 
     def _submit(self, piece: _Piece) -> None:
-        start, stop = piece.indices.start, piece.indices.stop
-        self.under_way[self.workers.submit(evaluate, self.encoded, start, stop)] = piece
+        study, rows = encode_study(self.study), piece.indices
+        self.under_way[self.workers.submit(evaluate, study, rows.start, rows.stop)] = piece
 
     def _collect(self, future: Future[Rows]) -> None:
         """Add the rows of a task, or queue it again if its worker died."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, cast, get_args
@@ -24,14 +24,7 @@ from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.checks import instance, number, one_of, positive, two, whole
-from explorer.optimise.problem import (
-    OBJECTIVES,
-    REACH,
-    YAW,
-    Demands,
-    ObjectiveName,
-    longest_minimum,
-)
+from explorer.optimise import problem as problems
 from explorer.sweep.machine import MACHINE
 from explorer.workspace.least_clearance import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
 
@@ -40,7 +33,7 @@ Sense = Literal["min", "max"]
 
 RADIUS = "radius"
 
-POLISHED = (*VARIABLES, YAW, REACH)
+POLISHED = (*VARIABLES, problems.YAW, problems.REACH)
 """The variables that the optimiser can change."""
 
 NAMES = (*POLISHED, RADIUS, *MACHINE)
@@ -113,17 +106,13 @@ class Polish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         InputError: An unknown objective or variable, an empty range, no iterations.
     """
 
-    objective: ObjectiveName
-    demands: Demands = Demands()
+    objective: problems.ObjectiveName
+    demands: problems.Demands = problems.Demands()
     variables: dict[str, Pair] | None = None
     iterations: int = 100
 
     def __post_init__(self) -> None:
-        if self.objective not in OBJECTIVES:
-            raise InputError(
-                f"no objective {self.objective!r} to polish for; there are {', '.join(OBJECTIVES)}"
-            )
-        _set(self, "objective", str(self.objective))
+        _set(self, "objective", one_of("polish.objective", self.objective, problems.OBJECTIVES))
         iterations = whole("polish.iterations", self.iterations, 1, MOST_ITERATIONS)
         _set(self, "iterations", iterations)
         if self.variables is not None:
@@ -185,9 +174,7 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     chunk: int = 64
 
     def __post_init__(self) -> None:
-        if self.schema != 1:
-            raise InputError(f"schema must be 1; got {self.schema!r}")
-        _set(self, "schema", 1)
+        _set(self, "schema", whole("schema", self.schema, 1, 1))
         if not self.name or len(self.name) > LONGEST_NAME or not self.name.isprintable():
             raise InputError(f"name must be one printable line of 1 to {LONGEST_NAME} characters")
         _set(self, "name", str(self.name))
@@ -208,8 +195,7 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                     f"the objective {objective.measure!r} is neither measured nor a variable of "
                     f"the study; there are {', '.join((*self.varied, *self.measures))}"
                 )
-        named = [objective.measure for objective in self.objectives]
-        _check_unique("objectives", named)
+        _check_unique("objectives", [objective.measure for objective in self.objectives])
 
     @property
     def base(self) -> Design:
@@ -260,8 +246,8 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 raise InputError(f"the radius of legs must not be negative; it starts at {low:g}")
             if name in MACHINE:
                 MACHINE[name].check(name, low)
-            least = longest_minimum(self.base)
-            if name == REACH and not low > least:
+            least = problems.longest_minimum(self.base)
+            if name == problems.REACH and not low > least:
                 raise InputError(
                     f"the reach must stay above every minimum length, so above {least:g}; it "
                     f"starts at {low:g}"
@@ -307,10 +293,6 @@ def decode_study(data: bytes, source: str) -> Study:
         InputError: Not JSON, of another schema, with unknown fields, fields given twice or
             unusable values.
     """
-    if len(data) > LARGEST_FILE:
-        raise InputError(
-            f"{source}: {len(data)} bytes are too many for a study; at most {LARGEST_FILE} are read"
-        )
     return decode_strictly(data, Study, source)
 
 
@@ -374,10 +356,9 @@ def _ranges(
     return ranges
 
 
-def _check_unique(field: str, names: Iterable[str]) -> None:
-    listed = list(names)
-    if len(set(listed)) < len(listed):
-        raise InputError(f"{field} may name each once; got {', '.join(listed)}")
+def _check_unique(field: str, names: Sequence[str]) -> None:
+    if len(set(names)) < len(names):
+        raise InputError(f"{field} may name each once; got {', '.join(names)}")
 
 
 def _load_studies() -> Mapping[str, Study]:

@@ -21,7 +21,6 @@ from explorer.app.features.optimise.actions import (
 )
 from explorer.app.features.optimise.state import (
     PLACE,
-    Comparison,
     Optimisation,
     OptimisationRequest,
     SearchResult,
@@ -55,7 +54,7 @@ from explorer.mechanism.design import VARIABLES, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.mechanism.tilt_torsion import TiltTorsion
-from explorer.optimise.outcome import Iterate, Record, RunRecord, Settings, step_of
+from explorer.optimise.outcome import Iterate, IterateRecord, Record, RunRecord, Settings
 from explorer.optimise.problem import YAW
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -167,7 +166,7 @@ def _record(run: SearchRun, iterates: tuple[Iterate, ...], best: Iterate) -> Rec
                 message="no step made it better",
             ),
         ),
-        history=tuple(map(step_of, iterates)),
+        history=msgspec.convert(iterates, tuple[IterateRecord, ...], from_attributes=True),
         seconds=1 / 3,
         versions={"python": "3.12"},
     )
@@ -204,7 +203,7 @@ MAKERS: tuple[Make, ...] = (
     lambda state, i, share: Advance(Optimisation.of(state).count, iterates_of(state, i)),
     lambda state, i, share: CancelRun(),
     lambda state, i, share: _end(state, i),
-    lambda state, i, share: Compare(Optimisation.of(state).count, Comparison(MEASURED, MEASURED)),
+    lambda state, i, share: Compare(Optimisation.of(state).count, (MEASURED, MEASURED)),
     lambda state, i, share: Accept(),
     lambda state, i, share: Pin(state.design),
     lambda state, i, share: Unpin(i % 3),

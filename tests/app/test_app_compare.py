@@ -50,7 +50,6 @@ from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.buttons import Buttons
-from explorer.app.widgets.palette import NO_OPTION
 from explorer.errors import InputError
 from explorer.measures.catalogue import CATALOGUE, Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
@@ -367,31 +366,17 @@ def test_workspaces_are_drawn_to_true_size_in_their_colours(
     assert not mesh.visible
 
 
-def panel_with(
-    designs: list[Design], server: viser.ViserServer, desk: Desk, buttons: Buttons, folder: Path
-) -> ComparePanel:
-    """Return the panel beside saved designs."""
-    user_data = UserData(Library(folder / "designs"), SessionFile())
-    for design in designs:
-        user_data.library.save(design.name, design)
-    services = services_for(server, desk.session, buttons=buttons, user_data=user_data)
-    assert services.get(SavedDesigns).wait_until_idle()
-    return ComparePanel(services)
-
-
 def test_panel_pins_opens_unpins_and_switches(
     server: viser.ViserServer, desk: Desk, buttons: Buttons, tmp_path: Path
 ) -> None:
-    panel = panel_with([variant(7)], server, desk, buttons, tmp_path)
+    user_data = UserData(Library(tmp_path / "designs"), SessionFile())
+    user_data.library.save("variant 7", variant(7))
+    services = services_for(server, desk.session, buttons=buttons, user_data=user_data)
+    assert services.get(SavedDesigns).wait_until_idle()
+    ComparePanel(services)
     own = desk.state.design
     desk.press(buttons, "compare.pin")
-    options = (NO_OPTION, "variant 7", *PRESETS)
-    updates = list(panel.updates(Frame(desk.state)))
-    # Few designs have a button each, and need no list.
-    assert (panel.another, "options", options) in updates
-    assert (panel.another, "visible", False) in updates
-    panel.another.options = options
-    desk.use(panel.another, "variant 7")
+    desk.press(buttons, "compare.pin", "variant 7")
     desk.press(buttons, "compare.open", "B")
     assert desk.state.design == variant(7)
     desk.press(buttons, "compare.pin")

@@ -20,9 +20,11 @@ from client import wait_for
 from desk import Desk
 from hypothesis import given, strategies as st
 
+from explorer.app.browser.browser_facts import decode_text
 from explorer.app.features.feature import Services
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
-from explorer.app.features.studies.feed import Request, StudyDrawing, StudyFeed
+from explorer.app.features.studies.feature import DECODER, PlotEvent, StudiesPanel
+from explorer.app.features.studies.feed import StudyDrawing, StudyFeed
 from explorer.app.features.studies.figures import PlotRows, parallel, scatter, select_rows, thin_out
 from explorer.app.features.studies.folders import (
     StudyFolders,
@@ -31,7 +33,6 @@ from explorer.app.features.studies.folders import (
     study_folders,
     study_in,
 )
-from explorer.app.features.studies.panel import PlotEvent, StudiesPanel, event_of
 from explorer.app.features.studies.state import (
     Brush,
     Studies,
@@ -283,7 +284,7 @@ def test_plan_offers_what_the_machine_of_the_design_has_and_refuses_the_rest() -
     ],
 )
 def test_message_of_the_script_is_understood_or_ignored(line: str, event: object) -> None:
-    assert event_of(line) == event
+    assert decode_text(line, DECODER) == event
 
 
 @pytest.fixture(scope="module")
@@ -377,7 +378,7 @@ def test_plots_hold_what_was_computed(feed: StudyFeed, home: Path) -> None:
     for dimension in lines["data"][0]["dimensions"]:
         column = results.columns[dimension["name"]][done]
         assert unpacked(dimension["values"]) == column.astype(np.float32).tolist()
-    marked = [trace for trace in points["data"] if trace["mode"] == "markers"]
+    marked = [trace for trace in points["data"] if "markers" in trace["mode"]]
     seen = [index for trace in marked for index in unpacked(trace["customdata"])]
     assert sorted(seen) == results.columns["index"][done].tolist()
     for trace in marked:
@@ -414,7 +415,7 @@ def test_picked_design_is_live_and_one_step_to_undo(desk: Desk, feed: StudyFeed)
     desk.session.do(OpenStudy("some"))
     drawing = draw_study(feed, Studies.of(desk.state))
     index = int(drawing.results.columns["index"][drawing.front[0]])
-    design = drawing.results.design_of_row(drawing.row_of(index))
+    design = drawing.results.design_at(index)
     before = desk.state
     desk.session.do(PickDesign(design, index=index, study="some"))
     assert (desk.state.design, Studies.of(desk.state).picked) == (design, index)
@@ -511,15 +512,13 @@ def test_measure_that_all_designs_lack_or_share_is_no_axis_and_hides_nothing() -
 
 def points_of(figure: dict[str, Any]) -> list[int]:
     """Return the designs that are points of a scatter plot, those picked once."""
-    traces = [each for each in figure["data"] if each["mode"] == "markers"]
+    traces = [each for each in figure["data"] if "markers" in each["mode"]]
     return sorted({index for each in traces for index in unpacked(each["customdata"])})
 
 
 def status_of(results: Results, seen: PlotRows) -> str:
-    request = Request(seen.studies, 1, dark=False)
-    return status(
-        StudyDrawing(request, results, np.flatnonzero(seen.front), seen.inside, seen, None, ())
-    )
+    front = np.flatnonzero(seen.front)
+    return status(StudyDrawing(seen.studies, results, front, seen.inside, seen, None, ()))
 
 
 class Studio:
@@ -536,7 +535,7 @@ class Studio:
 def studio(desk: Desk, tmp_path: Path) -> Generator[Studio]:
     studio = Studio(desk, tmp_path / "studies")
     yield studio
-    studio.runner.stop()
+    studio.runner.worker.stop()
     studio.feed.stop()
 
 
@@ -606,7 +605,7 @@ def test_study_whose_process_dies_is_reported_and_keeps_what_is_finished(studio:
     assert load_results(studio.folders.folder(name)).count > 0
 
 
-def test_buttons_of_the_front_pass_every_design_once(
+def test_new_study_closes_the_open_one_and_shows_the_settings(
     services: Services, desk: Desk, buttons: Buttons, home: Path
 ) -> None:
     theme: Any = SimpleNamespace(is_dark=False)
@@ -614,18 +613,11 @@ def test_buttons_of_the_front_pass_every_design_once(
     shared.give(study_folders, StudyFolders(home))
     panel = StudiesPanel(shared)
     desk.session.do(OpenStudy("some"))
-    drawing = draw_study(panel.feed, Studies.of(desk.state))
+    draw_study(panel.feed, Studies.of(desk.state))
     # Without a request the settings of a new study are not shown while one is open.
     updates = [*panel.updates(Frame(desk.state))]
     assert [v for h, n, v in updates if h is panel.form and n == "visible"] == [False]
-    front = drawing.results.columns["index"][drawing.front].tolist()
-    walked: list[int | None] = []
-    for step in [1] * (len(front) + 1) + [-1] * len(front):
-        desk.press(buttons, "studies.along", step)
-        walked.append(Studies.of(desk.state).picked)
-    # At the ends it stays.
-    assert walked == [*front, front[-1], *front[-2::-1], front[0]]
-    desk.press(buttons, "studies.new", "on")
+    desk.press(buttons, "studies.new")
     updates = [*panel.updates(Frame(desk.state))]
     assert [v for h, n, v in updates if h is panel.form and n == "visible"] == [True]
     panel.feed.stop()

@@ -15,8 +15,8 @@ from playwright.sync_api import Browser, expect
 from tab import Tab
 
 from explorer.app.features.designs.feature import SavedDesigns
+from explorer.app.features.studies.feature import StudiesPanel
 from explorer.app.features.studies.folders import StudyFolders
-from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.server import Running, start
 from explorer.app.storage.library import Library

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from tab import Tab
 
+from explorer.app.features.studies.feature import StudiesPanel
 from explorer.app.features.studies.feed import PlotJson
-from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.features.studies.state import Studies, StudyPlan
 from explorer.app.session.session import UNDO
 from explorer.mechanism.design_file import PRESETS
@@ -83,7 +83,7 @@ def wait_for_plots(tab: Tab) -> None:
 
     def plots() -> tuple[PlotJson, PlotJson] | None:
         drawing, studies = feed.drawing, replace(Studies.of(tab.state), plan=StudyPlan())
-        is_new = drawing is not None and drawing.request.studies == studies and feed.is_current
+        is_new = drawing is not None and drawing.studies == studies and feed.wait_until_idle(0.0)
         return drawing.plots if drawing is not None and is_new else None
 
     shows = """(revision) => { const all = [...document.querySelectorAll(".js-plotly-plot")];

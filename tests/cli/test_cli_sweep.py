@@ -14,7 +14,7 @@ from sweep_faults import HereWorkers
 
 import explorer
 from explorer.app.storage.library import Library
-from explorer.sweep import cluster
+from explorer.sweep.cluster import DaskWorkers
 from explorer.sweep.results import load_results
 from explorer.sweep.study import Objective, Sampling, Study, decode_study, encode_study
 
@@ -148,7 +148,7 @@ def test_sweep_bad_input_is_one_line_and_writes_nothing(
     cli: CommandLine, monkeypatch: pytest.MonkeyPatch, file: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "results"
-    monkeypatch.setattr(cluster, "PATIENCE", 0.3)
+    monkeypatch.setattr(DaskWorkers.__init__, "__kwdefaults__", {"patience": 0.3})
 
     def changed(**changes: object) -> Path:
         path = tmp_path / "changed.json"

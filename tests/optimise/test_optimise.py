@@ -420,7 +420,7 @@ def make_from(start: Design = OPTIMAL, *, bound: Any = None, **arguments: Any) -
         (VOLUME | {"bound": ("b2", 0.0, math.inf)}, "b2 must be a finite number"),
         (VOLUME | {"bound": ("b4", 0.0, 1.0)}, "no variable 'b4'"),
         ({}, "match-volume needs a volume"),
-        ({"volume": -1.0}, "must be a positive, finite number; got -1"),
+        ({"volume": -1.0}, "the volume demanded must be positive; got -1"),
         (VOLUME | {"clearance": math.nan}, "clearance demanded must be a finite"),
         (VOLUME | {"clearance": 0.1, "clearance_margin": 0.0}, "positive clearance"),
         (VOLUME | {"least": 5.0}, "below the least allowed 5"),

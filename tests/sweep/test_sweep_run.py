@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
-import logging
+import json
 import multiprocessing
 import os
 import random
@@ -16,7 +16,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import Future
 from contextlib import ExitStack, suppress
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
@@ -34,9 +33,9 @@ from explorer.errors import MissingExtraError
 from explorer.sweep import run as runs
 from explorer.sweep.cluster import DaskWorkers
 from explorer.sweep.parts import LOCK_FILE, part_path, part_paths, read_part
-from explorer.sweep.results import design_at, front, load_results, summarise
+from explorer.sweep.results import front, load_results, summarise
 from explorer.sweep.rows import columns_of, samples
-from explorer.sweep.run import AHEAD, Progress, RunError, run_study
+from explorer.sweep.run import Progress, RunError, run_study
 from explorer.sweep.study import Objective, Polish, Sampling, Study, encode_study
 from explorer.sweep.workers import LocalWorkers, WorkerDiedError
 
@@ -104,31 +103,17 @@ def test_run_writes_one_row_of_every_design_in_order(whole: Path) -> None:
         design = results.design_of_row(row)
         assert design.name == f"small #{row}"
         assert workspace_volume(design).volume == results.columns["volume"][row]
-        assert design_at(whole, row) == design
-    for read in (results.design_of_row, functools.partial(design_at, whole)):
+        assert results.design_at(row) == design
+    for read in (results.design_of_row, results.design_at):
         with pytest.raises(InputError, match="within 0 to 82"):
             read(83)
     for chunk, path in enumerate(part_paths(whole)):
         part, table = read_part(path)
         assert (part.chunk, part.study) == (chunk, encode_study(STUDY))
-        assert part.versions["numpy"] == np.__version__
-        assert {"python", "scipy", "flagged-explorer"} <= set(part.versions)
+        versions = json.loads(table.schema.metadata[b"explorer.versions"])
+        assert versions["numpy"] == np.__version__
+        assert {"python", "scipy", "flagged-explorer"} <= {*versions}
         assert table.schema.metadata[b"explorer.seed"] == b"4"
-
-
-def test_pandas_polars_and_duckdb_read_the_same_columns(whole: Path) -> None:
-    expected = load_results(whole).columns
-    pandas, polars, duckdb = (
-        importlib.import_module(name) for name in ("pandas", "polars", "duckdb")
-    )
-    by_pandas = pandas.read_parquet(whole)
-    by_polars = polars.read_parquet(whole)
-    by_duckdb = duckdb.sql(f"SELECT * FROM '{whole}/*.parquet' ORDER BY index")
-    assert list(by_pandas.columns) == by_polars.columns == by_duckdb.columns == list(expected)
-    for name, column in expected.items():
-        assert by_pandas[name].tolist() == column.tolist()
-        assert by_polars[name].to_list() == column.tolist()
-        assert [row[0] for row in by_duckdb.select(name).fetchall()] == column.tolist()
 
 
 def test_missing_values_are_null_in_files_and_nan_in_columns(tmp_path: Path) -> None:
@@ -286,10 +271,10 @@ def test_folder_with_only_damaged_parts_names_them(tmp_path: Path) -> None:
     before = contents(tmp_path)
     for chunk in range(2):
         part_path(tmp_path, chunk).write_bytes(b"PAR1")
-    for read in (load_results, summarise, functools.partial(design_at, index=0)):
+    for read in (load_results, summarise):
         with pytest.raises(InputError, match=r"can be read: part-000000.parquet and 1 more"):
             read(tmp_path)
-    with pytest.raises(InputError, match=r"part-000000.parquet and 1 more cannot be.*move"):
+    with pytest.raises(InputError, match=r"part-000000.parquet and 1 more cannot be; .*move"):
         run_study(study, tmp_path, HereWorkers())
     for chunk in range(2):
         part_path(tmp_path, chunk).unlink()
@@ -455,30 +440,6 @@ def test_run_that_stop_ends_writes_nothing_more(tmp_path: Path) -> None:
     assert not part_paths(tmp_path)
 
 
-def test_run_keeps_few_tasks_under_way(tmp_path: Path) -> None:
-    class Watched(HereWorkers):
-        """Counts the tasks whose rows have not become a part yet."""
-
-        most = under_way = 0
-
-        @property
-        def size(self) -> int:
-            return 2
-
-        def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-            self.under_way += 1
-            self.most = max(self.most, self.under_way)
-            return super().submit(fn, *args, **kwargs)
-
-        def see(self, progress: Progress) -> None:
-            self.under_way -= progress.done > 0
-
-    workers = Watched()
-    study = msgspec.structs.replace(STUDY, chunk=2)
-    run_study(study, tmp_path, workers, watch=workers.see)
-    assert workers.most == 2 * AHEAD < study.chunks
-
-
 def test_local_workers_that_start_side_by_side_leave_the_environment_as_it_was() -> None:
     before = dict(os.environ)
     with LocalWorkers(4) as some, LocalWorkers(4) as others:
@@ -519,7 +480,6 @@ def test_run_on_dask_with_a_killed_worker_writes_the_same_bytes(
     whole: Path, tmp_path: Path
 ) -> None:
     distributed: Any = importlib.import_module("distributed")
-    log = logging.getLogger("distributed.batched")
     with (
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
@@ -537,9 +497,6 @@ def test_run_on_dask_with_a_killed_worker_writes_the_same_bytes(
         with DaskWorkers(farm.scheduler_address) as workers:
             assert workers.size == 2
             run_study(STUDY, tmp_path, workers, watch=kill_one)
-            # Dask logs lost connections at any time; the explorer writes one line.
-            assert log.getEffectiveLevel() == logging.CRITICAL
-        assert log.getEffectiveLevel() < logging.CRITICAL
     assert killed
     assert contents(tmp_path) == contents(whole)
 

@@ -28,8 +28,8 @@ from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.optimise.state import OptimisationRequest
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign
+from explorer.app.features.studies.feature import StudiesPanel
 from explorer.app.features.studies.folders import StudyFolders
-from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.features.studies.state import Brush, within
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import draw_page, open_page, settle, stable_picture

@@ -69,7 +69,7 @@ class Sweep(options.JsonOptions):
         if self.out is None:
             raise InputError("name the folder of the results with --out")
         if self.row is not None:
-            write(encode_design(results.design_at(self.out, self.row)).decode())
+            write(encode_design(results.load_results(self.out).design_at(self.row)).decode())
         elif self.summary:
             self._write_summary(self.out)
         elif self.study is not None:

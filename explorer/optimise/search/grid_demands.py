@@ -60,8 +60,6 @@ def first_positions(problem: Problem, design: Design) -> FloatArray:
     surface on which a margin is the least one at which clearance is demanded: with a level platform
     the legs of a column of positions come nearest at its foot.
     """
-    if problem.demands.clearance is None:
-        return np.zeros((0, 3))
     reach = longest_leg(design)
     lows, highs = design.limits.box or ((-reach,) * 3, (reach,) * 3)
 

@@ -17,14 +17,7 @@ from explorer.errors import DesignError
 from explorer.measures.box import box_margins
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.optimise.problem import AZIMUTHS, OF_THE_MACHINE, OVER_BOX, Problem
-from explorer.optimise.search import demands
-from explorer.optimise.search.grid_demands import (
-    CAUSES,
-    ClearanceDemand,
-    DisplacementDemand,
-    LoadDemand,
-    first_positions,
-)
+from explorer.optimise.search import demands, grid_demands
 from explorer.optimise.search.state import UNBOUNDED, State, scaled_bounds, scales
 
 MISSED = 1e3
@@ -80,10 +73,10 @@ class Model:
         here = State(problem, u)
         self.demands: list[demands.Demand] = _demands(problem, here)
         clearance = problem.demands.clearance
-        self._clearance: ClearanceDemand | None = None
+        self._clearance: grid_demands.ClearanceDemand | None = None
         if clearance is not None:
-            positions = first_positions(problem, here.design)
-            self._clearance = ClearanceDemand(clearance, positions)
+            positions = grid_demands.first_positions(problem, here.design)
+            self._clearance = grid_demands.ClearanceDemand(clearance, positions)
         self.raised: demands.Demand | None = None
         if self.raises_worst:
             # The last one, see `_demands`.
@@ -244,11 +237,11 @@ def _demands(problem: Problem, start: State) -> list[demands.Demand]:
         listed += [demands.TiltDemand(start, azimuth, wanted.tilt) for azimuth in azimuths]
     machine: list[demands.Demand] = []
     if wanted.held:
-        machine.append(LoadDemand(start, 1.0))
+        machine.append(grid_demands.LoadDemand(start, 1.0))
     if wanted.error is not None:
-        machine.append(DisplacementDemand(start, "error", wanted.error))
+        machine.append(grid_demands.DisplacementDemand(start, "error", wanted.error))
     if wanted.deflection is not None:
-        machine.append(DisplacementDemand(start, "deflection", wanted.deflection))
+        machine.append(grid_demands.DisplacementDemand(start, "deflection", wanted.deflection))
     listed += machine
     if machine or problem.objective in OF_THE_MACHINE:
         listed.append(demands.MarginDemand(start, is_open=True))
@@ -256,7 +249,9 @@ def _demands(problem: Problem, start: State) -> list[demands.Demand]:
     if problem.objective == "largest-margin":
         listed.append(demands.MarginDemand(start))
     elif problem.objective == "smallest-load":
-        listed.append(LoadDemand(start))
-    elif problem.objective in CAUSES:
-        listed.append(DisplacementDemand(start, CAUSES[problem.objective]))
+        listed.append(grid_demands.LoadDemand(start))
+    elif problem.objective in grid_demands.CAUSES:
+        listed.append(
+            grid_demands.DisplacementDemand(start, grid_demands.CAUSES[problem.objective])
+        )
     return listed

@@ -138,15 +138,15 @@ class Search:
             trail.before_each()
             u = np.array(values) / scales(problem)
             if self._is_closed(u):
-                opened = open_workspace(problem, u, see=self._see_opening)
-                if opened is None:
+                nearby = open_workspace(problem, u, see=self._see_opening)
+                if nearby is None:
                     because = find_emptying_limits(State(problem, u).limits)
                     words = (
                         f"the workspace is empty because of {', '.join(because)}, and no "
                         "design nearby opens it"
                     )
                     return Attempt("infeasible", because[0] if because else "", words, trail.best)
-                values = (opened * scales(problem)).tolist()
+                values = (nearby * scales(problem)).tolist()
             return self._solve(Model(problem, values, trail.before_each, is_relaxed=is_relaxed))
         except Stop:
             if not trail.history:
@@ -190,11 +190,11 @@ class Search:
                 break
             elif self._is_short(at.state) and not has_grown:
                 has_grown = True
-                grown = self._grow(model, at)
-                if grown is None:
+                larger = self._grow(model, at)
+                if larger is None:
                     break
                 model = Model(
-                    self.problem, grown, self.trail.before_each, is_relaxed=model.is_relaxed
+                    self.problem, larger, self.trail.before_each, is_relaxed=model.is_relaxed
                 )
                 at = model.at(model.start)
             elif self.problem.objective == "match-volume" or self.steps == before:
@@ -324,15 +324,14 @@ class Search:
             demanded = format_number(self.problem.demands.clearance or 0.0, 6)
             words = (
                 f"a clearance of {demanded} is not kept everywhere, "
-                f"such as at {_coordinates(missed[0])}"
+                f"such as at ({', '.join(map(format_number, missed[0].tolist()))})"
             )
             return Attempt("not converged", "clearance", words, best)
         if is_done:
             return Attempt("converged", holding, "", self.trail.last_at(at.state))
-        if self.steps_left <= 0:
-            return Attempt("not converged", worst if spare < 0.0 else holding, "", best)
-        if spare < 0.0 or self._is_short(at.state):
-            return Attempt("infeasible", worst if spare < 0.0 else holding, "", best)
+        if self.steps_left <= 0 or spare < 0.0 or self._is_short(at.state):
+            status = "not converged" if self.steps_left <= 0 else "infeasible"
+            return Attempt(status, worst if spare < 0.0 else holding, "", best)
         if at.state.volume <= 0.0:
             because = ", ".join(find_emptying_limits(at.state.limits))
             words = f"the workspace of the best design found is empty because of {because}"
@@ -349,20 +348,12 @@ def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
     value = "infinite" if objective is None else format_ascii(objective, 6, size=size)
     end = f"{name} = {value} after {steps} iterations"
     held = f", held by {attempt.holding}" if attempt.holding else ""
-    match attempt.status:
-        case "converged":
-            return f"converged: {end}{held}"
-        case "infeasible":
-            return f"no design was found that meets all demands: {end}{held}"
-        case "not converged":
-            return f"not converged: {end}{held}; allow more iterations or start elsewhere"
-        case "stalled":
-            return f"stalled: {end}{held}; try several starts"
-        case "outdone":
-            return f"no better than an earlier start, even without the clearance: {end}"
-        case "cancelled":
-            return f"cancelled: {end}"
-
-
-def _coordinates(p: FloatArray) -> str:
-    return f"({', '.join(map(format_number, p.tolist()))})"
+    messages: dict[Status, str] = {
+        "converged": f"converged: {end}{held}",
+        "infeasible": f"no design was found that meets all demands: {end}{held}",
+        "not converged": f"not converged: {end}{held}; allow more iterations or start elsewhere",
+        "stalled": f"stalled: {end}{held}; try several starts",
+        "outdone": f"no better than an earlier start, even without the clearance: {end}",
+        "cancelled": f"cancelled: {end}",
+    }
+    return messages[attempt.status]

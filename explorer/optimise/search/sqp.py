@@ -21,6 +21,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -132,32 +133,30 @@ def solve(
     return accepted[-1], len(accepted) - 1
 
 
+@dataclass
 class Trail:
     """Every iterate of an optimisation.
 
-    Args:
+    Attributes:
         problem: The problem.
         watch: Called with every iterate.
         stop: Called before each evaluation; True ends the search.
+        run: Number of the present run.
+        history: The iterates so far.
+        is_cancelled: Whether `stop` has ended the search.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        watch: Callable[[Iterate], None] | None = None,
-        stop: Callable[[], bool] | None = None,
-    ) -> None:
-        self.problem = problem
-        self.history: list[Iterate] = []
-        self.is_cancelled = False
-        self.run = 0
-        self._watch = watch
-        self._stop = stop
-        self._best: Iterate | None = None
+    problem: Problem
+    watch: Callable[[Iterate], None] | None = None
+    stop: Callable[[], bool] | None = None
+    run: int = 0
+    history: list[Iterate] = field(default_factory=list[Iterate])
+    is_cancelled: bool = False
+    _best: Iterate | None = None
 
     def before_each(self) -> None:
         """Raise `Stop` before an evaluation if the search is to end."""
-        if self.is_cancelled or (self._stop is not None and self._stop()):
+        if self.is_cancelled or (self.stop is not None and self.stop()):
             self.is_cancelled = True
             raise Stop
 
@@ -200,8 +199,8 @@ class Trail:
         if self._best is None or self.rank(iterate) <= self.rank(self._best):
             self._best = iterate
         self.history.append(iterate)
-        if self._watch is not None:
-            self._watch(iterate)
+        if self.watch is not None:
+            self.watch(iterate)
 
     def rank(self, iterate: Iterate) -> tuple[bool, float, float]:
         """Return the key that sorts iterates, the best first.

@@ -17,13 +17,7 @@ from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import REACH, YAW, Box, Problem
-from explorer.workspace.limits.constraints import (
-    YAW as YAW_PARAMETER,
-    BallOrCylinder,
-    Constraint,
-    HalfSpace,
-    constraints,
-)
+from explorer.workspace.limits import constraints
 from explorer.workspace.slices.volume import Volume, workspace_volume
 
 UNBOUNDED = (-np.inf, np.inf)
@@ -81,17 +75,17 @@ class State:
         return BoxStatics(self.design, self.box, self.rotation)
 
     @cached_property
-    def limits(self) -> tuple[Constraint, ...]:
+    def limits(self) -> tuple[constraints.Constraint, ...]:
         """The limits of the workspace."""
-        return constraints(self.design, self.rotation)
+        return constraints.constraints(self.design, self.rotation)
 
     @cached_property
-    def regions(self) -> dict[str, BallOrCylinder | HalfSpace]:
+    def regions(self) -> dict[str, constraints.BallOrCylinder | constraints.HalfSpace]:
         """The limits of the workspace by name, without those that no position keeps."""
         return {
             limit.name: limit
             for limit in self.limits
-            if isinstance(limit, BallOrCylinder | HalfSpace)
+            if isinstance(limit, constraints.BallOrCylinder | constraints.HalfSpace)
         }
 
     @cached_property
@@ -119,7 +113,7 @@ class State:
             unit = np.zeros(n)
             unit[index] = scale
             if name == YAW:
-                chain[YAW_PARAMETER] = np.radians(unit)
+                chain[constraints.YAW] = np.radians(unit)
             elif name == REACH:
                 chain.update({f"{length} maximum": unit for length in LENGTHS})
             else:
@@ -157,7 +151,7 @@ class State:
         return total
 
     def slack(
-        self, limit: BallOrCylinder | HalfSpace, p: FloatArray
+        self, limit: constraints.BallOrCylinder | constraints.HalfSpace, p: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the slacks (k,) of a limit at positions (k, 3), and their derivatives.
 
@@ -166,7 +160,7 @@ class State:
         """
         by_limit = np.ones((len(p), 4))
         match limit:
-            case BallOrCylinder():
+            case constraints.BallOrCylinder():
                 offsets = p - limit.centre
                 if not limit.is_ball:
                     offsets[:, 0] = 0.0
@@ -174,11 +168,11 @@ class State:
                 by_limit[:, :3] = offsets / np.maximum(distance, 1e-300)[:, None]
                 by_limit *= 1.0 if limit.inside else -1.0
                 by_p = -by_limit[:, :3]
-            case HalfSpace():
+            case constraints.HalfSpace():
                 by_limit[:, :3], by_p = -p, np.broadcast_to(-limit.normal, p.shape)
         return limit.slack(p), by_limit @ self.motion(limit), by_p
 
-    def motion(self, limit: BallOrCylinder | HalfSpace) -> FloatArray:
+    def motion(self, limit: constraints.BallOrCylinder | constraints.HalfSpace) -> FloatArray:
         """Return the derivatives of a limit's centre and radius, or normal and offset, (4, n)."""
         if not limit.rates:
             return np.zeros((4, len(self.u)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -24,13 +25,12 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect, choose, turn
 from explorer.app.widgets.markup import box, swatch
-from explorer.app.widgets.palette import NO_OPTION
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 
-# Number of designs that have a button of their own; if there are more, a list has them all.
-MOST_BUTTONS = 5
+# Largest number of designs that have a button of their own: the presets, then the last saved.
+MOST_BUTTONS = 12
 
 
 @dataclass(frozen=True)
@@ -135,17 +135,10 @@ class ComparePanel:
     """The table or bars of the compared designs, and buttons that pin and unpin them."""
 
     def __init__(self, services: Services) -> None:
-        gui, self._session = services.gui, services.session
+        self._session = services.session
         self._feeds = [services.get(feed) for feed in FEEDS]
         self._library = None if services.user_data is None else services.get(SavedDesigns)
-        self.another = gui.add_dropdown(
-            "Pin another design",
-            (NO_OPTION, *PRESETS),
-            hint="Keep a copy of a preset or of a design of yours beside the live one.",
-            visible=False,
-        )
-        self.another.on_update(self._pin_chosen)
-        self.html = gui.add_html("")
+        self.html = services.gui.add_html("")
         self._add_buttons(services.buttons)
         looks = {chip.command.removeprefix("Compare › "): chip for chip in LOOKS}
         self._looks = Chips(services.buttons, services.session, "compare.turn", "", looks)
@@ -156,10 +149,6 @@ class ComparePanel:
         """Yield the updates that make the panel show the frame."""
         compared = frame.state.compared
         choices = self._choices()
-        yield self.another, "options", (NO_OPTION, *choices)
-        yield self.another, "visible", len(choices) > MOST_BUTTONS
-        if not self._session.is_waiting(self):
-            yield self.another, "value", NO_OPTION
         columns = columns_of(frame.state, self._feeds)
         key = (columns, compared, tuple(choices), frame.state.design.name)
         if key != self._key:
@@ -240,21 +229,17 @@ class ComparePanel:
         )
 
     def _choices(self) -> dict[str, Design]:
-        """Return the designs to pin, by name; no saved design has the name of a preset."""
+        """Return the designs with a button, by name; no saved design has the name of a preset."""
         entries = () if self._library is None else self._library.entries
         own = (entry.design for entry in entries if entry.design is not None)
-        return {**{design.name: design for design in own}, **PRESETS}
+        named = {**PRESETS, **{design.name: design for design in own}}
+        return dict(itertools.islice(named.items(), MOST_BUTTONS))
 
     def _pin(self, name: str, client: viser.ClientHandle) -> None:
         """Pin the live design for "", or the one with a name."""
         chosen = self._choices().get(name)
         if chosen is not None or not name:
             self._session.do(lambda state: Pin(chosen or state.design), who=client.client_id)
-
-    def _pin_chosen(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
-        design = self._choices().get(self.another.value)
-        if event.client_id is not None and design is not None:
-            self._session.post(self, lambda _: Pin(design), who=event.client_id)
 
 
 def _open(state: State, slot: int) -> Open:
@@ -277,7 +262,7 @@ def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:
         class_name="ex-chip is-main",
         is_disabled=is_full,
     )
-    if is_full or len(choices) > MOST_BUTTONS:
+    if is_full:
         return live
     others = (
         press_button(

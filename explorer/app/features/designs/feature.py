@@ -58,7 +58,7 @@ class SavedDesigns:
         self.commands: tuple[Command, ...] = ()
         self.last_deleted: str | None = None
         self._requests: LatestWins[_Request] = LatestWins(self._do_all, "designs")
-        services.at_end(self.stop)
+        services.at_end(self._requests.stop)
         self.refresh()
 
     def find(self, name: str) -> Design | None:
@@ -118,10 +118,6 @@ class SavedDesigns:
     def wait_until_idle(self, timeout: float = 10.0) -> bool:
         """Wait until all requests are done; return whether they are."""
         return self._requests.wait_until_idle(timeout)
-
-    def stop(self) -> None:
-        """End the thread."""
-        self._requests.stop()
 
     def _copy(self, design: Design) -> Design:
         taken = {entry.name for entry in self._library.list()} | set(PRESETS)

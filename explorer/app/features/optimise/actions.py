@@ -12,20 +12,14 @@ from typing import ClassVar
 
 import msgspec
 
-from explorer.app.features.optimise.state import (
-    PLACE,
-    Comparison,
-    Optimisation,
-    OptimisationRequest,
-    SearchResult,
-    SearchRun,
-)
-from explorer.app.features.optimise.work import find_refusals, problem_of
+from explorer.app.features.optimise.state import PLACE, Optimisation, SearchResult, SearchRun
+from explorer.app.features.optimise.work import PAPER_REQUEST, find_refusals, problem_of
 from explorer.app.state.actions import Action, Open, Set, check_free, move_to
 from explorer.app.state.parts import parts_kept_on_open, with_value
 from explorer.app.state.state import State
 from explorer.app.storage.library import LONGEST_NAME
 from explorer.errors import InputError, NoAnswerError
+from explorer.measures.catalogue import Measurements
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
 from explorer.optimise import conflicts, defaults
@@ -95,10 +89,8 @@ class TakePaperProblem(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state; refuse while the design is being optimised."""
-        request = OptimisationRequest(volume=defaults.PAPER_VOLUME, clearance=defaults.CLEARANCE)
-        return with_value(
-            Open(defaults.paper_start()).apply(state), "optimisation.request", request
-        )
+        after = Open(defaults.paper_start()).apply(state)
+        return with_value(after, "optimisation.request", PAPER_REQUEST)
 
 
 @dataclass(frozen=True)
@@ -195,7 +187,7 @@ class Compare(Action):
     continues: ClassVar[bool] = True
 
     number: int
-    comparison: Comparison
+    comparison: tuple[Measurements, Measurements]
 
     def apply(self, state: State) -> State:
         """Return the next state."""

@@ -13,13 +13,8 @@ import viser
 
 from explorer.app.features.designs.feature import send_design
 from explorer.app.features.feature import Services
-from explorer.app.features.optimise import actions
+from explorer.app.features.optimise import actions, work
 from explorer.app.features.optimise.state import Optimisation
-from explorer.app.features.optimise.work import (
-    find_refusals,
-    is_paper_box_on_offer,
-    liftable_limits,
-)
 from explorer.app.features.workspace.feeds import send_workspace
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action
@@ -67,7 +62,7 @@ BUTTONS: Mapping[str, Button] = {
     START: Button(
         "Optimise",
         "Search for the best design from the present one; its limits hold throughout.",
-        lambda state: not (state.optimisation.is_on or find_refusals(state)),
+        lambda state: not (state.optimisation.is_on or work.find_refusals(state)),
         lambda _, __: actions.StartRun(),
         (Key("O"),),
     ),
@@ -95,14 +90,16 @@ BUTTONS: Mapping[str, Button] = {
     PAPER_BOX: Button(
         "Take the paper's box",
         "Bound b4 by the box of the paper's optimum; one undo brings yours back.",
-        is_paper_box_on_offer,
+        work.is_paper_box_on_offer,
         lambda _, __: actions.TakePaperBox(),
     ),
     LIFT: Button(
         "Lift the limit",
         "Take the limit that prevents the search out of the design; one undo brings it back.",
-        lambda state: bool(liftable_limits(state)),
-        lambda state, limit: actions.LiftLimit(limit or next(iter(liftable_limits(state)), "")),
+        lambda state: bool(work.liftable_limits(state)),
+        lambda state, limit: actions.LiftLimit(
+            limit or next(iter(work.liftable_limits(state)), "")
+        ),
     ),
     HULL: Button(
         "Download the hull",

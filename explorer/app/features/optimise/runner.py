@@ -12,12 +12,7 @@ import time
 
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import Advance, Compare, EndRun
-from explorer.app.features.optimise.state import (
-    Comparison,
-    Optimisation,
-    SearchResult,
-    SearchRun,
-)
+from explorer.app.features.optimise.state import Optimisation, SearchResult, SearchRun
 from explorer.app.features.optimise.work import optimise
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.session.worker import Worker
@@ -155,7 +150,7 @@ class Optimiser(Runner):
                 "compare",
                 compare_designs,
                 (run.problem, run.own.design, best.design, best.values),
-                lambda both: self._session.do(Compare(run.number, Comparison(*both))),
+                lambda both: self._session.do(Compare(run.number, both)),
                 lambda _: None,
             )
 

@@ -113,14 +113,6 @@ class SearchResult:
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """The measures of the user's design and of the optimised one."""
-
-    before: Measurements
-    after: Measurements
-
-
-@dataclass(frozen=True)
 class SearchRun:
     """A run of the optimiser.
 
@@ -146,7 +138,7 @@ class SearchRun:
     phase: Literal["running", "cancelling", "ended"] = "running"
     iterates: tuple[Iterate, ...] = ()
     verdict: SearchResult | None = None
-    comparison: Comparison | None = field(default=None, metadata=TRANSIENT)
+    comparison: tuple[Measurements, Measurements] | None = field(default=None, metadata=TRANSIENT)
     accepted: bool = False
 
     def __post_init__(self) -> None:

@@ -100,9 +100,15 @@ def result_words(state: State) -> str:
     At most one of its buttons is filled: what prevents a search comes first, then the answer to
     a search that succeeded, then the search itself.
     """
-    run = Optimisation.of(state).run
-    if state.optimisation.is_on:
-        return _running(state)
+    run, notice = Optimisation.of(state).run, search_notice(state)
+    if notice is not None and state.optimisation.is_on:
+        return markup.box(
+            f'<div class="ex-line"><div class="ex-strong">{escape(notice.title)}</div>'
+            f"{buttons.button(buttons.CANCEL, state)}</div>",
+            f'<div class="ex-dim ex-cut">{escape(notice.text) or "&nbsp;"}</div>',
+            "" if notice.share is None else markup.meter(100.0 * notice.share),
+            limits_table(state.design),
+        )
     refusals, limits = work.find_refusals(state), work.liftable_limits(state)
     remedies = "".join(
         buttons.button(
@@ -148,7 +154,7 @@ def result_words(state: State) -> str:
     )
 
 
-def refused_words(refusals: Sequence[Conflict], limits: Sequence[str] = ()) -> str:
+def refused_words(refusals: Sequence[Conflict], limits: Sequence[str]) -> str:
     """Return why no search can start, as HTML; buttons below offer to lift some limits."""
     body = " ".join(markup.sentence(refusal.message) for refusal in refusals)
     if any(refusal.limit not in limits for refusal in refusals):
@@ -157,20 +163,6 @@ def refused_words(refusals: Sequence[Conflict], limits: Sequence[str] = ()) -> s
     is_problem = not any(refusal.limit in NO_PROBLEM for refusal in refusals)
     title = "No design can keep these demands" if is_problem else "This cannot be optimised"
     return markup.alert(title, body)
-
-
-def _running(state: State) -> str:
-    """Return the progress of the search that is under way, as HTML."""
-    notice = search_notice(state)
-    if notice is None:
-        return ""
-    return markup.box(
-        f'<div class="ex-line"><div class="ex-strong">{escape(notice.title)}</div>'
-        f"{buttons.button(buttons.CANCEL, state)}</div>",
-        f'<div class="ex-dim ex-cut">{escape(notice.text) or "&nbsp;"}</div>',
-        "" if notice.share is None else markup.meter(100.0 * notice.share),
-        limits_table(state.design),
-    )
 
 
 def _downloads(state: State) -> str:
@@ -208,11 +200,10 @@ def comparison_table(run: SearchRun) -> str:
     """Return the user's own design and the best one side by side, as HTML."""
     if run.comparison is None:
         return markup.dim("Comparing …")
-    both = run.comparison.before, run.comparison.after
-    columns = [Column(number, each.design, each, 1.0) for number, each in enumerate(both)]
+    columns = [Column(number, each.design, each, 1.0) for number, each in enumerate(run.comparison)]
     rows = (
         _comparison_row(run.problem, name, columns)
-        for name in run.comparison.after.values
+        for name in run.comparison[1].values
         if name != problems.YAW or problems.YAW in run.problem.names
     )
     head = "".join(f'<td class="ex-number">{each}</td>' for each in ("", "old", "new", "change"))

@@ -20,6 +20,9 @@ from explorer.optimise.outcome import Outcome
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.slices.volume import workspace_volume
 
+PAPER_REQUEST = OptimisationRequest(volume=defaults.PAPER_VOLUME, clearance=defaults.CLEARANCE)
+"""The request of the paper's problem."""
+
 # Default volume to match, as a multiple of the present volume.
 MORE = 1.1
 # Edge of the default box, as a share of that of the largest box about home in the workspace.
@@ -87,10 +90,9 @@ def find_refusals(state: State) -> tuple[conflicts.Conflict, ...]:
 def _find_refusals(design: Design, request: OptimisationRequest) -> tuple[conflicts.Conflict, ...]:
     try:
         problem = _problem(design, request)
-    except problems.StartError as error:
-        return (conflicts.Conflict(error.limit, str(error)),)
     except ExplorerError as error:
-        return (conflicts.Conflict("", str(error)),)
+        limit = error.limit if isinstance(error, problems.StartError) else ""
+        return (conflicts.Conflict(limit, str(error)),)
     return conflicts.find_conflicts(problem)
 
 
@@ -98,17 +100,10 @@ def liftable_limits(state: State) -> tuple[str, ...]:
     """Return the limits that prevent a search and can be lifted, one press for each."""
     if state.optimisation.is_on:
         return ()
-    refusals = find_refusals(state)
-    liftable: list[str] = []
-    for limit in dict.fromkeys(refusal.limit for refusal in refusals):
-        lifted = conflicts.without_limit(state.design, limit)
-        if lifted is None:
-            continue
-        after = _find_refusals(lifted, complete_request(state))
-        messages = {refusal.message for refusal in refusals if refusal.limit == limit}
-        if all(left.limit != limit and left.message not in messages for left in after):
-            liftable.append(limit)
-    return tuple(liftable)
+    limits = dict.fromkeys(refusal.limit for refusal in find_refusals(state))
+    return tuple(
+        limit for limit in limits if conflicts.without_limit(state.design, limit) is not None
+    )
 
 
 def is_paper_box_on_offer(state: State) -> bool:
@@ -134,8 +129,7 @@ def box_within(design: Design) -> problems.Box:
         low, high = (half, high) if is_within else (low, half)
     edge = SHARE_OF_BOX * low or 0.1 * design.reach
     # Round numbers read better, and the box need not be exact.
-    unit = 10.0 ** math.floor(math.log10(edge) - 1.0)
-    digits = max(0, -round(math.log10(unit)))
+    digits = max(0, 1 - math.floor(math.log10(edge)))
     lows, highs = (
         [round(float(value), digits) for value in middle + side * 0.5 * edge]
         for side in (-1.0, 1.0)

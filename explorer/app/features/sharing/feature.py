@@ -58,7 +58,8 @@ def send_scene(services: Services, who: Who) -> None:
 
     def make(client: viser.ClientHandle) -> File:
         state, date = services.session.latest_state(), dt.datetime.now().astimezone().date()
-        camera = scene_files.FileCamera.of(client)
+        eye = client.camera
+        camera = scene_files.FileCamera(eye.position, eye.look_at, float(eye.fov))
         data = scene_files.scene_html(services.server, state, camera, date=date)
         return f"{state.design.name}-scene.html", data
 

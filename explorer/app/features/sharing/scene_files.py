@@ -62,12 +62,6 @@ class FileCamera:
     look_at: FloatArray
     fov: float
 
-    @staticmethod
-    def of(client: viser.ClientHandle) -> FileCamera:
-        """Return the camera of a browser."""
-        camera = client.camera
-        return FileCamera(camera.position, camera.look_at, float(camera.fov))
-
     def messages(self) -> list[SceneMessage]:
         """Return the messages that set the camera, also when its view is reset."""
         return [

@@ -10,7 +10,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import TypeAlias
 
 import msgspec
 import numpy as np
@@ -25,7 +25,6 @@ from explorer.numerics.arrays import BoolArray, IntArray
 from explorer.numerics.number_text import format_number
 from explorer.sweep.parts import pyarrow
 from explorer.sweep.results import Results, costs, load_results
-from explorer.sweep.study import Study
 
 MOST_ON_PAGE = 100_000
 """Number of designs of the largest study that the page shows."""
@@ -42,19 +41,9 @@ class PlotJson:
         return self._text
 
 
-@dataclass(frozen=True)
-class Request:
-    """Request to draw a study.
-
-    Attributes:
-        studies: Open study, brushes, axes and pick; without the plan, which changes nothing.
-        version: Version of the results.
-        dark: Whether the page is dark.
-    """
-
-    studies: Studies
-    version: int
-    dark: bool
+Request: TypeAlias = tuple[Studies, int, bool]
+"""What is drawn: the studies without the plan, the version of their results, and whether the page
+is dark."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +51,7 @@ class StudyDrawing:
     """A study that has been drawn.
 
     Attributes:
-        request: Request that it answers.
+        studies: Open study, brushes, axes and pick; without the plan, which changes nothing.
         results: All rows so far.
         front: Rows on the Pareto front, the best in the first objective first.
         inside: Whether each row lies within all brushes, shape (n,).
@@ -71,7 +60,7 @@ class StudyDrawing:
         reasons: Counts of the rows that are not done, by status and reason, most frequent first.
     """
 
-    request: Request
+    studies: Studies
     results: Results
     front: IntArray
     inside: BoolArray
@@ -80,41 +69,14 @@ class StudyDrawing:
     reasons: tuple[tuple[str, str, int], ...]
 
     @property
-    def study(self) -> Study:
-        """The study."""
-        return self.results.study
-
-    @property
     def is_complete(self) -> bool:
         """Whether every design has its row."""
-        return self.results.count >= self.study.count
+        return self.results.count >= self.results.study.count
 
     @property
     def front_inside(self) -> IntArray:
         """The rows of the front that lie within all brushes."""
         return self.front[self.inside[self.front]]
-
-    def row_of(self, index: int) -> int:
-        """Return the row of a design.
-
-        Raises:
-            InputError: It has not been computed yet.
-        """
-        rows = np.flatnonzero(self.results.columns["index"] == index)
-        if not len(rows):
-            raise InputError(f"design {index} has not been computed yet")
-        return int(rows[0])
-
-    def beside(self, picked: int | None, step: int) -> int | None:
-        """Return the index of the design a step along the front; None where there is none.
-
-        Args:
-            picked: Index of the present design; without one on the front, the first is returned.
-            step: 1 for the next design, −1 for the previous one.
-        """
-        indices: list[int] = self.results.columns["index"][self.front_inside].tolist()
-        at = indices.index(picked) + step if picked in indices else 0
-        return indices[at] if 0 <= at < len(indices) else None
 
 
 class StudyFeed:
@@ -146,14 +108,7 @@ class StudyFeed:
         drawing, request = self._drawing, self._request
         if drawing is None or request is None:
             return None
-        return drawing if drawing.request.studies.name == request.studies.name else None
-
-    @property
-    def is_current(self) -> bool:
-        """Whether the drawing answers the last request."""
-        return self._request is None or (
-            self._drawing is not None and self._drawing.request == self._request
-        )
+        return drawing if drawing.studies.name == request[0].name else None
 
     def follow(self, frame: Frame, *, dark: bool = False) -> None:
         """Draw the study of a frame, unless it is drawn already."""
@@ -161,7 +116,7 @@ class StudyFeed:
         if studies.name is None:
             self._request = self._drawing = self.problem = None
             return
-        request = Request(replace(studies, plan=StudyPlan()), self._computed, dark)
+        request = replace(studies, plan=StudyPlan()), self._computed, dark
         if request != self._request:
             self._request = request
             self._jobs.post("draw", time.monotonic(), request)
@@ -189,50 +144,41 @@ class StudyFeed:
                 self.names = tuple(self.folders.by_name())
                 continue
             try:
-                self._drawing, self.problem = self._draw(request), None
-            except ExplorerError as error:
-                self._drawing, self.problem = None, str(error)
+                self._drawing, self.problem = self._draw(*request), None
             except Exception as error:  # noqa: BLE001 - a bad file must not end the thread
-                message = f"the study cannot be drawn: {type(error).__name__}: {error}"
-                self._drawing, self.problem = None, message
+                is_known = isinstance(error, ExplorerError)
+                why = "" if is_known else f"the study cannot be drawn: {type(error).__name__}: "
+                self._drawing, self.problem = None, f"{why}{error}"
         self._redraw()
 
-    def _draw(self, request: Request) -> StudyDrawing:
-        results, front = self._results(str(request.studies.name), request.version)
-        seen, plots = select_rows(results, front, request.studies), None
+    def _draw(self, studies: Studies, version: int, dark: bool) -> StudyDrawing:
+        results, front = self._results(str(studies.name), version)
+        seen, plots = select_rows(results, front, studies), None
         inside = np.ones(results.count, dtype=np.bool_) if seen is None else seen.inside
         if seen is not None:
             revision = next(self._revision)
             plots = (
-                PlotJson(parallel(seen, revision, dark=request.dark)),
-                PlotJson(scatter(seen, revision, dark=request.dark)),
+                PlotJson(parallel(seen, revision, dark=dark)),
+                PlotJson(scatter(seen, revision, dark=dark)),
             )
         ordered = sort_front(results, front)
-        return StudyDrawing(request, results, ordered, inside, seen, plots, reasons(results))
+        return StudyDrawing(studies, results, ordered, inside, seen, plots, reasons(results))
 
     def _results(self, name: str, version: int) -> tuple[Results, BoolArray]:
         key = (name, version)
         if self._read is None or self._read[0] != key:
-            results = results_in(self.folders.folder(name))
+            pyarrow()
+            folder = self.folders.folder(name)
+            study = study_in(folder)
+            if study.count > MOST_ON_PAGE:
+                raise InputError(
+                    f"{study.name} has {format_number(study.count)} designs and the page shows "
+                    f"studies of up to {format_number(MOST_ON_PAGE)}; explorer sweep --summary "
+                    "prints its front"
+                )
+            results = load_results(folder, study)
             self._read = (key, results, results.front())
         return self._read[1:]
-
-
-def results_in(folder: Path) -> Results:
-    """Return the rows of a study that have been computed, if any.
-
-    Raises:
-        InputError: The folder holds no study, or one of too many designs for the page.
-        MissingExtraError: Pyarrow is not installed.
-    """
-    pyarrow()
-    study = study_in(folder)
-    if study.count > MOST_ON_PAGE:
-        raise InputError(
-            f"{study.name} has {format_number(study.count)} designs and the page shows studies of "
-            f"up to {format_number(MOST_ON_PAGE)}; explorer sweep --summary prints its front"
-        )
-    return load_results(folder, study)
 
 
 def reasons(results: Results) -> tuple[tuple[str, str, int], ...]:

@@ -15,15 +15,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.app.features.studies.state import (
-    Range,
-    Studies,
-    label_of,
-    short_title_of,
-    title_of,
-    unit_of,
-    within,
-)
+from explorer.app.features.studies import state
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.sweep.results import Results
 
@@ -42,15 +34,10 @@ NO_SPREAD = 1e-9
 MOST_AS_SVG = 1500
 
 FRONT, PICKED = "#c2185b", "#0a9d6c"
-# Colours of the other designs from the least to the greatest value, by whether the page is dark:
-# as points, and as lines, which are denser.
+# Colours of the other designs from the least to the greatest value, by whether the page is dark.
 SCALE = {
     False: ("#c9d6e6", "#8fb0d2", "#4a7fb5", "#1f4f86"),
     True: ("#34506f", "#4477a6", "#7aabd6", "#cbe2f6"),
-}
-LINE_SCALE = {
-    False: ("#dbe4ee", "#b9cfe4", "#8fb3d6", "#5f8fc0"),
-    True: ("#2d4259", "#3b5d81", "#4f81b0", "#86b4df"),
 }
 # Colours of points without the value that colours the others, and of those outside the brushes.
 PLAIN = "rgba(128,136,148,0.6)"
@@ -89,7 +76,7 @@ class PlotRows:
     results: Results
     front: BoolArray
     inside: BoolArray
-    studies: Studies
+    studies: state.Studies
     axes: tuple[str, ...]
     across: str
     up: str
@@ -105,7 +92,7 @@ class PlotRows:
         return np.asarray(self.results.columns[name], dtype=np.float64)
 
 
-def select_rows(results: Results, front: BoolArray, studies: Studies) -> PlotRows | None:
+def select_rows(results: Results, front: BoolArray, studies: state.Studies) -> PlotRows | None:
     """Return the rows and axes of the plots; None while there is nothing to draw.
 
     Args:
@@ -136,7 +123,7 @@ def select_rows(results: Results, front: BoolArray, studies: Studies) -> PlotRow
     return PlotRows(
         results,
         front,
-        within(columns, studies.brushes),
+        state.within(columns, studies.brushes),
         studies,
         axes,
         across,
@@ -197,7 +184,7 @@ def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
         "cmax": 1.0,
         "showscale": False,
         "colorscale": [
-            *([OTHERS * k / 3, colour] for k, colour in enumerate(LINE_SCALE[dark])),
+            *([OTHERS * k / 3, colour] for k, colour in enumerate(SCALE[dark])),
             [OTHERS + 0.05, FRONT],
             [ON_FRONT + 0.04, FRONT],
             [ON_FRONT + 0.06, PICKED],
@@ -209,7 +196,7 @@ def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
         column = plotted.column(name)[plotted.lines]
         dimension: dict[str, Any] = {
             "name": name,
-            "label": short_title_of(name),
+            "label": state.short_title_of(name),
             "values": pack(column),
             "range": _with_room(column),
             "tickformat": ",~g",
@@ -226,7 +213,6 @@ def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
         "line": line,
         "unselected": {"line": {"color": LEFT_OUT, "opacity": 0.25}},
         "labelangle": -TILT if is_tilted else 0,
-        "labelfont": {"size": 11},
         "tickfont": {"size": 11},
         # The ends are ticks like others; their own digits would run into one another.
         "rangefont": {"size": 1, "color": "rgba(0,0,0,0)"},
@@ -234,7 +220,7 @@ def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
     }
     # Titles have their middle above their axes; a scroll bar may cover the edge of the plot.
     left, right = (
-        math.ceil(0.5 * CHARACTER * len(short_title_of(plotted.axes[end]))) for end in (0, -1)
+        math.ceil(0.5 * CHARACTER * len(state.short_title_of(plotted.axes[end]))) for end in (0, -1)
     )
     margin = {
         "l": max(34, left),
@@ -261,10 +247,13 @@ def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
         "cmin": low,
         "cmax": high,
         "colorbar": {
-            "title": {"text": title_of(plotted.colour), "side": "right", "font": {"size": 11}},
+            "title": {
+                "text": state.title_of(plotted.colour),
+                "side": "right",
+                "font": {"size": 11},
+            },
             "thickness": 9,
             "outlinewidth": 0,
-            "tickfont": {"size": 11},
             "nticks": 5,
         },
     }
@@ -280,9 +269,12 @@ def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
     ]
     if not is_coloured.all():
         traces.append(_points(plotted, others & ~is_coloured, {"size": 6, "color": PLAIN}))
-    if (line := _front_line(plotted)) is not None:
-        traces.append(line)
-    traces += [_points(plotted, inside & front, disc), _points(plotted, is_picked, ring)]
+    on_front = _points(plotted, inside & front, disc)
+    objectives = [objective.measure for objective in plotted.results.study.objectives]
+    if sorted(objectives) == sorted((plotted.across, plotted.up)):
+        # The front's points from left to right, in a line.
+        on_front |= {"mode": "lines+markers", "line": {"color": FRONT, "width": 1.5}}
+    traces += [on_front, _points(plotted, is_picked, ring)]
     figure = _figure(plotted, "scatter", traces, {"l": 62, "r": 10, "t": 12, "b": 42}, dark=dark)
     figure["layout"] |= {
         "xaxis": _axis(plotted.across),
@@ -305,8 +297,9 @@ def pack(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
 
 def _points(plotted: PlotRows, which: BoolArray, marker: Mapping[str, Any]) -> Figure:
     rows = plotted.rows[which]
+    rows = rows[np.argsort(plotted.column(plotted.across)[rows], kind="stable")]
     x, y = (
-        f"{label_of(name)} %{{{axis}:,.5~r}} {unit_of(name)}".replace(" °", "°")
+        f"{state.label_of(name)} %{{{axis}:,.5~r}} {state.unit_of(name)}".replace(" °", "°")
         for axis, name in (("x", plotted.across), ("y", plotted.up))
     )
     return {
@@ -322,31 +315,13 @@ def _points(plotted: PlotRows, which: BoolArray, marker: Mapping[str, Any]) -> F
     }
 
 
-def _front_line(plotted: PlotRows) -> Figure | None:
-    """Return the line through the front; None unless the plot shows the two objectives."""
-    names = [objective.measure for objective in plotted.results.study.objectives]
-    if sorted(names) != sorted((plotted.across, plotted.up)):
-        return None
-    on = plotted.rows[plotted.front[plotted.rows]]
-    x, y = plotted.column(plotted.across)[on], plotted.column(plotted.up)[on]
-    order = np.argsort(x, kind="stable")
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": pack(x[order]),
-        "y": pack(y[order]),
-        "line": {"color": FRONT, "width": 1.5},
-        "hoverinfo": "skip",
-    }
-
-
 def _boxes(plotted: PlotRows) -> list[dict[str, Any]]:
     """Return the brushes of the two axes as boxes, or as bands where one is free."""
     across = plotted.studies.ranges_of(plotted.across)
     up = plotted.studies.ranges_of(plotted.up)
     if not across and not up:
         return []
-    free: tuple[tuple[Range, str], ...] = (((0.0, 1.0), " domain"),)
+    free: tuple[tuple[state.Range, str], ...] = (((0.0, 1.0), " domain"),)
     columns = tuple((ends, "") for ends in across) or free
     rows = tuple((ends, "") for ends in up) or free
     return [
@@ -369,11 +344,10 @@ def _boxes(plotted: PlotRows) -> list[dict[str, Any]]:
 
 def _axis(name: str) -> dict[str, Any]:
     return {
-        "title": {"text": title_of(name), "standoff": 6, "font": {"size": 11}},
+        "title": {"text": state.title_of(name), "standoff": 6, "font": {"size": 11}},
         "gridcolor": GRID,
         "zeroline": False,
         "nticks": 7,
-        "tickfont": {"size": 11},
         "separatethousands": True,
         # A zoom stays as long as the axis is the same.
         "uirevision": name,
@@ -400,7 +374,7 @@ def _figure(
     return {"data": data, "layout": layout, "config": config}
 
 
-def _ends(values: FloatArray) -> Range:
+def _ends(values: FloatArray) -> state.Range:
     if not len(values):
         return 0.0, 1.0
     return float(values.min()), float(values.max())

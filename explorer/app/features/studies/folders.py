@@ -70,13 +70,13 @@ class StudyFolders:
         return folders[name]
 
     def new(self, name: str) -> Path:
-        """Return a folder that does not exist yet, for a new study with this name.
+        """Return a folder that does not exist yet, whose name no study has, for a new study.
 
         Raises:
             StorageError: The folder of studies cannot be made.
         """
         slug, home = plain_words(name, _LONGEST) or "study", make_data_folder(self.home)
-        taken = {path.stem for path in home.iterdir()}
+        taken = {path.stem for path in home.iterdir()} | {*self.by_name()}
         names = (f"{slug}-{number}" for number in itertools.count(1))
         return home / next(name for name in names if name not in taken)
 

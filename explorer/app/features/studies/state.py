@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -19,25 +19,10 @@ from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import BoolArray
 from explorer.numerics.number_text import format_number
 from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
+from explorer.sweep import study as sweeps
 from explorer.sweep.machine import MACHINE
-from explorer.sweep.study import (
-    DEFAULT_MEASURES,
-    LONGEST_NAME,
-    NAMES,
-    RADIUS,
-    Objective,
-    Sampling,
-    Sense,
-    Study,
-)
 
 Range: TypeAlias = tuple[float, float]
-
-FEWEST, MOST = 16, 2000
-"""Smallest and largest number of designs of a study from the page."""
-
-LEAST_PERCENT, MOST_PERCENT = 1.0, 95.0
-"""Least and most that variables may vary, in per cent; with more a3y or b1y could be zero."""
 
 # A variable near zero varies as if it were this share of the reach; an angle by a share of this.
 LEAST_SHARE, RIGHT_ANGLE = 0.05, 90.0
@@ -63,18 +48,23 @@ class StudyPlan:
     """A small study around the live design.
 
     Attributes:
+        COUNTS: Smallest and largest number of designs.
+        PERCENTS: Least and most that variables may vary; with more a3y or b1y could be zero.
         count: Number of designs.
         percent: How far each variable varies, in per cent.
-        variables: Names of the variables that vary, out of `NAMES`.
+        variables: Names of the variables that vary, out of `NAMES` of a study.
         measures: Names of the measures.
         objectives: Measures that span the Pareto front, each with its sense.
     """
 
+    COUNTS: ClassVar[tuple[float, float]] = 16.0, 2000.0
+    PERCENTS: ClassVar[tuple[float, float]] = 1.0, 95.0
+
     count: int = 256
     percent: float = 20.0
     variables: tuple[str, ...] = VARIABLES
-    measures: tuple[str, ...] = DEFAULT_MEASURES
-    objectives: tuple[tuple[str, Sense], ...] = (
+    measures: tuple[str, ...] = sweeps.DEFAULT_MEASURES
+    objectives: tuple[tuple[str, sweeps.Sense], ...] = (
         ("volume", "max"),
         ("reach", "min"),
         ("clearance", "max"),
@@ -82,7 +72,7 @@ class StudyPlan:
 
     def with_variable_toggled(self, name: str) -> StudyPlan:
         """Return the plan in which a variable varies if it did not, and else stays fixed."""
-        return replace(self, variables=_toggle(NAMES, self.variables, name))
+        return replace(self, variables=_toggle(sweeps.NAMES, self.variables, name))
 
     def with_measure_advanced(self, name: str) -> StudyPlan:
         """Return the plan with the next use of a measure.
@@ -146,10 +136,7 @@ def within(columns: Mapping[str, Any], brushes: tuple[Brush, ...]) -> BoolArray:
         if brush.axis not in columns:
             continue
         values = np.asarray(columns[brush.axis], dtype=np.float64)
-        inside = np.zeros(len(values), dtype=np.bool_)
-        for low, high in brush.ranges:
-            inside |= (values >= low) & (values <= high)
-        chosen &= inside
+        chosen &= np.any([(values >= low) & (values <= high) for low, high in brush.ranges], axis=0)
     return chosen
 
 
@@ -162,31 +149,25 @@ def range_around(design: Design, name: str, percent: float) -> Range:
     Raises:
         InputError: No such variable, or a part of the machine that the design does not have.
     """
-    share = percent / 100.0
-    if name == YAW:
-        value, span = start_value(design, YAW), share * RIGHT_ANGLE
-    elif name in MACHINE:
-        found = MACHINE[name].value_in(design)
-        if found is None:
+    least = LEAST_SHARE * design.reach
+    if name in MACHINE:
+        value = MACHINE[name].value_in(design)
+        if value is None:
             raise InputError(f"the design has no {label_of(name)} that could vary")
-        value, span = found, share * abs(found)
-        if MACHINE[name].bound == "any":
-            span = share * max(abs(value), LEAST_SHARE * design.reach)
-    elif name == RADIUS:
-        value = max(design.limits.leg_radii)
-        span = share * max(value, LEAST_SHARE**2 * design.reach)
-        return max(0.0, value - span), value + span
+        least = least if MACHINE[name].bound == "any" else 0.0
+    elif name == sweeps.RADIUS:
+        value, least = max(design.limits.leg_radii), LEAST_SHARE * least
     else:
         value = start_value(design, name)
-        span = share * max(abs(value), LEAST_SHARE * design.reach)
+    span = percent / 100.0 * (RIGHT_ANGLE if name == YAW else max(abs(value), least))
     low = value - span
     if name == REACH:
         # The reach goes at most halfway down to the longest minimum.
         low = max(low, 0.5 * (value + longest_minimum(design)))
-    return low, value + span
+    return max(0.0, low) if name == sweeps.RADIUS else low, value + span
 
 
-def study_around(design: Design, plan: StudyPlan, name: str) -> Study:
+def study_around(design: Design, plan: StudyPlan, name: str) -> sweeps.Study:
     """Return a small study around a design.
 
     Args:
@@ -197,16 +178,13 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> Study:
     Raises:
         InputError: No variable or no measure, or a number that is out of its range.
     """
-    if not FEWEST <= plan.count <= MOST:
-        raise InputError(
-            f"a study from the page has {FEWEST} to {format_number(MOST)} designs; "
-            f"got {format_number(plan.count)}"
-        )
-    if not LEAST_PERCENT <= plan.percent <= MOST_PERCENT:
-        raise InputError(
-            f"variables vary by {format_number(LEAST_PERCENT)} to {format_number(MOST_PERCENT)} %; "
-            f"got {format_number(plan.percent)} %"
-        )
+    for value, ends, words in (
+        (plan.count, plan.COUNTS, "the number of designs of a study from the page"),
+        (plan.percent, plan.PERCENTS, "the per cent by which variables vary"),
+    ):
+        if not ends[0] <= value <= ends[1]:
+            low, high, got = map(format_number, (*ends, value))
+            raise InputError(f"{words} must lie within {low} to {high}; got {got}")
     if not plan.variables:
         raise InputError("choose at least one variable that varies")
     measures = tuple(measure for measure in plan.measures if measure not in plan.variables)
@@ -215,13 +193,13 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> Study:
     if lacking := unmet_needs([Case(design)], measures):
         raise InputError(f"the design has {lacking}")
     ranges = {v: range_around(design, v, plan.percent) for v in plan.variables}
-    return Study(
-        name=name[:LONGEST_NAME],
+    return sweeps.Study(
+        name=name[: sweeps.LONGEST_NAME],
         design=design,
         variables=ranges,
-        sampling=Sampling(method="sobol", count=plan.count),
+        sampling=sweeps.Sampling(method="sobol", count=plan.count),
         measures=measures,
-        objectives=tuple(Objective(measure, sense) for measure, sense in plan.objectives),
+        objectives=tuple(sweeps.Objective(measure, sense) for measure, sense in plan.objectives),
         chunk=max(4, -(-plan.count // PARTS)),
     )
 
@@ -232,7 +210,7 @@ def unit_of(name: str) -> str:
         return CATALOGUE[name].unit_in("units")
     if name in MACHINE:
         return MACHINE[name].unit
-    return "°" if name == YAW else "units" if name in NAMES else ""
+    return "°" if name == YAW else "units" if name in sweeps.NAMES else ""
 
 
 def choices_for(design: Design, plan: StudyPlan) -> tuple[list[str], list[str]]:
@@ -240,7 +218,7 @@ def choices_for(design: Design, plan: StudyPlan) -> tuple[list[str], list[str]]:
     case = Case(design)
     variables = [
         name
-        for name in NAMES
+        for name in sweeps.NAMES
         if name in plan.variables
         or name not in MACHINE
         or MACHINE[name].value_in(design) is not None

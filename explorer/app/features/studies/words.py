@@ -9,14 +9,7 @@ import numpy as np
 
 from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.figures import FRONT, MOST_ROWS, PICKED, SCALE
-from explorer.app.features.studies.state import (
-    RADIUS,
-    Studies,
-    StudyPlan,
-    choices_for,
-    label_of,
-    title_of,
-)
+from explorer.app.features.studies.state import StudyPlan, choices_for, label_of, title_of
 from explorer.app.features.studies.work import StudyRun
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import box, by_theme, dim, meter
@@ -26,7 +19,7 @@ from explorer.numerics.arrays import IntArray
 from explorer.numerics.number_text import decimals_for, format_decimals, format_number
 from explorer.optimise.problem import REACH, YAW
 from explorer.sweep.machine import MACHINE
-from explorer.sweep.study import NAMES, Sense, Study
+from explorer.sweep.study import NAMES, RADIUS, Sense, Study
 
 ROWS = 10
 """Rows of the table of the front."""
@@ -35,8 +28,6 @@ ROWS = 10
 MOST_REASONS = 4
 # Columns of the table besides the index.
 MOST_COLUMNS = 9
-ALONG = {"Previous": -1, "Next": 1}
-"""Steps along the front."""
 ARROWS: dict[str, str] = {"max": "↑", "min": "↓"}
 BUTTONS = {
     "start": (
@@ -45,7 +36,7 @@ BUTTONS = {
     ),
     "cancel": ("Cancel study", "End the study; finished designs are kept."),
     "continue": ("Continue the study", "Compute the designs of the open study that are missing."),
-    "new": ("New study", "Set up a small study around the live design."),
+    "new": ("New study", "Close the study, and set up a small one around the live design."),
     "clear": ("Clear brushes", "Free all axes."),
 }
 """Words and hint of each button, by its name."""
@@ -58,13 +49,13 @@ def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
         drawing: The study.
         is_running: Whether it is being computed, so that its progress stands elsewhere.
     """
-    study, count = drawing.study, drawing.results.count
+    study, count = drawing.results.study, drawing.results.count
     total = "" if drawing.is_complete else f" of {format_number(study.count)}"
     parts = [] if is_running else [f"<b>{format_number(count)}</b>{total} designs"]
     front, inside = len(drawing.front), int(drawing.inside.sum())
     if study.objectives:
         parts.append(f"{_dot(FRONT)}<b>{format_number(front)}</b> on the Pareto front")
-    if drawing.request.studies.brushes:
+    if drawing.studies.brushes:
         hint = BUTTONS["clear"][1]
         clear = press_button("studies.clear", "", "clear", hint=hint, class_name="ex-link")
         parts.append(f"<b>{format_number(inside)}</b> within the brushes {clear}")
@@ -155,16 +146,15 @@ def head(
             f"design, with variables within ± {percent} % of its values."
         )
     elif drawing is not None:
-        is_running = run is not None and run.name == drawing.request.studies.name
+        is_running = run is not None and run.name == drawing.studies.name
         parts.append(status(drawing, is_running=is_running))
     return box(*parts)
 
 
-def acts(studies: Studies, run: StudyRun | None, *, is_new: bool, can_go_on: bool) -> str:
+def acts(run: StudyRun | None, *, is_new: bool, can_go_on: bool) -> str:
     """Return the buttons on top of the tab as HTML.
 
     Args:
-        studies: The open study.
         run: The study that is being computed; None if none is.
         is_new: Whether a new study is being set up.
         can_go_on: Whether designs of the open study are missing.
@@ -172,19 +162,16 @@ def acts(studies: Studies, run: StudyRun | None, *, is_new: bool, can_go_on: boo
     if run is not None:
         buttons = _button("cancel")
     elif is_new:
-        back = press_button(
-            "studies.new", "off", "Back", hint="Return to the open study", class_name="ex-button"
-        )
-        buttons = back * (studies.name is not None) + _button("start", is_main=True)
+        buttons = _button("start", is_main=True)
     else:
-        buttons = _button("continue", is_main=True) * can_go_on + _button("new", value="on")
+        buttons = _button("continue", is_main=True) * can_go_on + _button("new")
     return box(f'<div class="ex-ends ex-acts-line">{buttons}</div>')
 
 
-def _button(name: str, *, value: str = "", is_main: bool = False) -> str:
+def _button(name: str, *, is_main: bool = False) -> str:
     words, hint = BUTTONS[name]
     look = "ex-button is-main" if is_main else "ex-button"
-    return press_button(f"studies.{name}", value, words, hint=hint, class_name=look)
+    return press_button(f"studies.{name}", "", words, hint=hint, class_name=look)
 
 
 def legend(drawing: StudyDrawing) -> str:
@@ -219,8 +206,8 @@ def window(rows: IntArray, picked: int | None, indices: IntArray) -> IntArray:
 
 def table(drawing: StudyDrawing) -> str:
     """Return a part of the front as HTML; each row is a button that opens its design."""
-    results, study = drawing.results, drawing.study
-    rows = window(drawing.front_inside, drawing.request.studies.picked, results.columns["index"])
+    results, study = drawing.results, drawing.results.study
+    rows = window(drawing.front_inside, drawing.studies.picked, results.columns["index"])
     if not len(rows):
         return ""
     objectives = [objective.measure for objective in study.objectives]
@@ -243,24 +230,9 @@ def table(drawing: StudyDrawing) -> str:
     caption = f"Pareto front: {among}, from the best in {label_of(study.objectives[0].measure)}"
     return (
         f'<div class="ex-box ex-front" style="--columns:{len(names)}">'
-        f'<div class="ex-row ex-dim ex-small"><span class="ex-line"><span>{escape(caption)}'
-        f"</span>{_steps()}</span></div>"
+        f'<div class="ex-row ex-dim ex-small">{escape(caption)}</div>'
         f'<div class="ex-row ex-dim ex-small"><span>design</span>{head}</div>{lines}</div>'
     )
-
-
-def _steps() -> str:
-    buttons = (
-        press_button(
-            "studies.along",
-            step,
-            words,
-            hint=f"Open the {words.lower()} design of the front",
-            class_name="ex-link",
-        )
-        for words, step in ALONG.items()
-    )
-    return f'<span class="ex-ends">{"".join(buttons)}</span>'
 
 
 def _line(drawing: StudyDrawing, row: int, decimals: Mapping[str, int]) -> str:
@@ -270,7 +242,7 @@ def _line(drawing: StudyDrawing, row: int, decimals: Mapping[str, int]) -> str:
         f"<span>{format_decimals(float(columns[name][row]), digits)}</span>"
         for name, digits in decimals.items()
     )
-    is_picked = index == drawing.request.studies.picked
+    is_picked = index == drawing.studies.picked
     return press_button(
         "studies.pick",
         index,

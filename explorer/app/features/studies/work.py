@@ -15,7 +15,7 @@ from explorer.app.features.studies.folders import keep_study, study_folders, stu
 from explorer.app.features.studies.state import StudyPlan, study_around
 from explorer.app.session.session import Session, Who
 from explorer.app.session.worker import Channel, Worker
-from explorer.errors import ExplorerError, InputError
+from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
 from explorer.sweep.run import Progress, run_study
 from explorer.sweep.study import Study
@@ -84,7 +84,7 @@ def study_runner(services: Services) -> StudyRunner:
     feed = StudyFeed(services.get(study_folders), services.session.redraw)
     runner = StudyRunner(services.session, feed, services.complain)
     services.at_end(feed.stop)
-    services.at_end(runner.stop)
+    services.at_end(runner.worker.stop)
     return runner
 
 
@@ -121,21 +121,21 @@ class StudyRunner:
             who: Client that gets the message if it cannot be started.
         """
 
-        def make() -> tuple[Study, Path]:
+        def make() -> tuple[str, Study, Path]:
             folder = self.feed.folders.new(design.name)
             study = study_around(design, plan, folder.name)
             # The study can be opened and continued before its first part is there.
             keep_study(folder, study)
-            return study, folder
+            return folder.name, study, folder
 
         self._begin(make, who)
 
     def go_on(self, name: str, who: Who = None) -> None:
         """Continue a study that is not complete."""
 
-        def load() -> tuple[Study, Path]:
+        def load() -> tuple[str, Study, Path]:
             folder = self.feed.folders.folder(name)
-            return study_in(folder), folder
+            return name, study_in(folder), folder
 
         self._begin(load, who)
 
@@ -153,22 +153,14 @@ class StudyRunner:
         """Wait until no study is being computed; return whether none is."""
         return self.worker.wait_until_idle(timeout) and self.run is None
 
-    def stop(self) -> None:
-        """End the process."""
-        self.worker.stop()
-
-    def _begin(self, make_study: Callable[[], tuple[Study, Path]], who: Who) -> None:
+    def _begin(self, make_study: Callable[[], tuple[str, Study, Path]], who: Who) -> None:
         with self._lock:
             if self.run is not None:
                 message = f"the study {self.run.name!r} is being computed: wait, or cancel it"
                 self._complain(message, who)
                 return
             try:
-                study, folder = make_study()
-                folders = self.feed.folders.by_name()
-                name = next((name for name, path in folders.items() if path == folder), None)
-                if name is None:
-                    raise InputError(f"{str(folder)!r} holds no study")
+                name, study, folder = make_study()
             except ExplorerError as error:
                 self._complain(str(error), who)
                 return
