@@ -174,9 +174,7 @@ class Page:
         self._feeds = [
             self.services.get(kind) for kind in kinds if panels or self.services.has(kind)
         ]
-        self._runners = [
-            self.services.get(kind) for each in self._features for kind in each.runners
-        ]
+        self.runners = [self.services.get(kind) for each in self._features for kind in each.runners]
         self.services.cameras.frame_first()
         self._panels = deque(self._add_panels() if panels else ())
         layout = Layout(server, theme, self.services.cameras, self.panels if panels else None)
@@ -196,7 +194,7 @@ class Page:
         """Start the processes that will be needed, that of the page first, in the background."""
 
         def prepare() -> None:
-            for runner in self._runners:
+            for runner in self.runners:
                 runner.prepare()
 
         self.worker.start(then=prepare)
@@ -211,18 +209,6 @@ class Page:
         if self.autosaver is not None:
             self.autosaver.stop()
         self.worker.stop()
-
-    def wait_until_drawn(self, timeout: float = 30.0) -> bool:
-        """Wait until the newest state and all that follows are drawn; return whether they are."""
-        deadline = time.monotonic() + timeout
-        idle = self.session.wait_until_idle(timeout)
-        for runner in self._runners:
-            idle = idle and runner.wait_until_idle(deadline - time.monotonic())
-        # Drawing may request work of the worker, whose result is drawn again.
-        for _ in range(2):
-            idle = idle and self.session.wait_until_idle(deadline - time.monotonic())
-            idle = idle and self.worker.wait_until_idle(deadline - time.monotonic())
-        return idle and self.session.wait_until_idle(deadline - time.monotonic())
 
     def point_cameras(self, view: ViewName) -> None:
         """Point the camera of every open browser."""
@@ -269,7 +255,7 @@ class Page:
         placed = self._placed()
         drawn = [update for part in self._scene for update in part.updates(placed)]
         self._assigner.assign(drawn, since=began)
-        for runner in self._runners:
+        for runner in self.runners:
             runner.follow(frame)
         changed = self._assigner.assign(
             self._panel_updates(frame, is_dragged=is_dragged and not is_drawn), since=began

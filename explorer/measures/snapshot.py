@@ -120,18 +120,6 @@ class Snapshot(PoseIndices):
         """The determinant of the actuator Jacobian J."""
         return float(determinant(self.design, self.joints, self.margins))
 
-    @property
-    def volume_sizes(self) -> FloatArray:
-        """The volumes if all margins were the reach, a scale for rounding errors, shape (3,)."""
-        return tetrahedron_volumes(self.design, np.full(3, self.design.reach))
-
-    @property
-    def determinant_size(self) -> float:
-        """The |determinant| if the smallest margin were the reach, a scale for rounding errors."""
-        enlarged = self.margins.copy()
-        enlarged[np.abs(enlarged).argmin()] = self.design.reach
-        return abs(float(determinant(self.design, self.joints, enlarged)))
-
     @cached_property
     def least_turns(self) -> tuple[float, float, float]:
         """The least turns that lead to each incidence, in radians, in the order δ1, δ2, δ3."""

@@ -30,8 +30,7 @@ All warning values grow with the user's warning length.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.margins import INCIDENCES
@@ -53,8 +52,7 @@ TITLES: dict[Kind, str] = {
 }
 
 
-@dataclass(frozen=True)
-class Warnings:
+class Warnings(NamedTuple):
     """The values below which a pose counts as near a singularity.
 
     Attributes:
@@ -70,8 +68,7 @@ class Warnings:
     condition: float
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(NamedTuple):
     """The nearness of a pose to a singularity.
 
     Attributes:

@@ -235,12 +235,6 @@ def tool_position(pose: Pose, tool: Triple) -> Triple:
     return x, y, z
 
 
-def pose_with(design: Design, at: Point, position: Triple, pose: Pose) -> Pose:
-    """Return a pose with the orientation of another and a point at a position in the base frame."""
-    x, y, z = (np.array(position) - offset_of(design, pose.rotation, at)).tolist()
-    return Pose((x, y, z), pose.quaternion)
-
-
 def offset_of(design: Design, rotation: FloatArray, at: Point) -> FloatArray:
     """Return the vector from b4 to a point along the axes of the base, shape (..., 3)."""
     return tool_offset(rotation, point_of(design, at))

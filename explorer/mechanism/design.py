@@ -24,7 +24,7 @@ from explorer.mechanism.machine import (
     Tolerances,
     Tool,
     check_near,
-    checked_gravity,
+    unit_gravity,
 )
 from explorer.mechanism.margins import margins, mode_of, signs_of
 from explorer.mechanism.points import Variables, platform_points
@@ -250,7 +250,7 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
                 )
         # Searches make thousands of designs that differ in their variables only.
         if self.gravity is not DOWN:
-            gravity = checked_gravity(self.gravity)
+            gravity = unit_gravity(self.gravity)
             _set(self, "gravity", DOWN if gravity == DOWN else gravity)
         for name, point in (
             ("tool.position", self.tool.position),

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
-from explorer.mechanism.kinematics import checked_joints, forward
+from explorer.mechanism.kinematics import forward, joint_array
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.checks import MOST
 
@@ -37,9 +37,9 @@ def feasible_intervals(design: Design, joints: FloatArray) -> tuple[tuple[Interv
     They are (low, high) in design units; those of a joint depend on the other five.
 
     Raises:
-        InputError: The joints are not usable, see `checked_joints`.
+        InputError: The joints are not usable, see `joint_array`.
     """
-    q = checked_joints(joints)
+    q = joint_array(joints)
     # Dividing by the largest length keeps the roots near one, whatever the units.
     scale = max(map(abs, (*design.variables, *q.tolist())))
     polynomials, joint_of = _discriminants(design, q / scale, scale)
@@ -241,12 +241,13 @@ def possible_ranges(design: Design) -> PossibleRanges:
     from_axis = math.hypot(*farthest[1:])
     carriages = [
         _within(
-            (x[0] - b, x[1] + b),
+            (x[0] - abs(b), x[1] + abs(b)),
             # The point of the platform is as far from b1, which leg 1 holds, at every pose.
             (-l1[1] - apart, l1[1] + apart),
             guide,
         )
-        for b, apart in ((b2, _to_b1(design, design.b2)), (b3, _to_b1(design, design.b3)))
+        for b in (design.b2, design.b3)
+        for apart in (math.dist(design.b1, (b, 0.0)),)
     ]
     from_a3 = math.hypot(_farthest(x, a3x), _farthest(y, a3y), farthest[2])
     joints = (
@@ -274,7 +275,3 @@ def _side(design: Design) -> Pair:
     if margin is None:
         return -math.inf, math.inf
     return (margin, math.inf) if design.home_pose.position[2] > 0.0 else (-math.inf, -margin)
-
-
-def _to_b1(design: Design, b: float) -> float:
-    return math.hypot(design.b1[0] - b, design.b1[1])

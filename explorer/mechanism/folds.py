@@ -46,8 +46,6 @@ FOLD_LINES = ("line b2b3", "line a1b4", "guide")
 
 # The cosine and the sine of an angle.
 Direction = tuple[float, float]
-# Number of poses of which sines and cosines stay in the processor's nearest memory.
-BLOCK = 1024
 
 
 def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
@@ -68,12 +66,9 @@ def to_folds(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     positions, rotations, batch = pose_rows(position, rotation)
     count = len(positions)
     coordinates = np.empty((count, 6))
-    sines, cosines = np.empty((2, min(count, BLOCK), 5))
-    for start in range(0, count, BLOCK):
-        rows = coordinates[start : start + BLOCK]
-        part = slice(start, start + len(rows))
-        write_angles(len(rows), positions[part], rotations[part], rows, sines, cosines)
-        np.arctan2(sines[: len(rows)], cosines[: len(rows)], out=rows[:, 1:])
+    sines, cosines = np.empty((2, count, 5))
+    write_angles(count, positions, rotations, coordinates, sines, cosines)
+    np.arctan2(sines, cosines, out=coordinates[:, 1:])
     return coordinates.reshape(*batch, 6)
 
 

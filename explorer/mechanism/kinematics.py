@@ -225,7 +225,7 @@ def forward(design: Design, joints: ArrayLike) -> ForwardKinematics:
         joints: (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units.
 
     Raises:
-        InputError: The joints are not usable, see `checked_joints`.
+        InputError: The joints are not usable, see `joint_array`.
     """
     return ForwardKinematics(*_solve(design, joints)[:3])
 
@@ -239,7 +239,7 @@ def discriminants(design: Design, joints: ArrayLike) -> FloatArray:
     return _solve(design, joints)[3]
 
 
-def checked_joints(joints: ArrayLike) -> FloatArray:
+def joint_array(joints: ArrayLike) -> FloatArray:
     """Return joints (..., 6) as float64 after checking them.
 
     Raises:
@@ -255,7 +255,7 @@ def checked_joints(joints: ArrayLike) -> FloatArray:
 def _solve(
     design: Design, joints: ArrayLike
 ) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
-    q = checked_joints(joints)
+    q = joint_array(joints)
     batch = q.shape[:-1]
     rows = for_kernel(q.reshape(-1, 6))
     count = len(rows)

@@ -235,7 +235,7 @@ class Tolerances(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return tuple(value for name in self.__struct_fields__ for value in getattr(self, name))
 
 
-def checked_gravity(value: object) -> Triple:
+def unit_gravity(value: object) -> Triple:
     """Return a direction of gravity in the base frame as a unit vector; it must not be zero."""
     x, y, z = _unit("gravity", numbers("gravity", value, 3))
     return x, y, z

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import checked_joints, inverse
+from explorer.mechanism.kinematics import inverse, joint_array
 from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import FloatArray, finite_array, position_array
@@ -140,7 +140,7 @@ class ImperfectMachine:
         """
         from scipy.optimize import least_squares
 
-        true = checked_joints(joints) + self.encoder_offsets
+        true = joint_array(joints) + self.encoder_offsets
         size, position, rotation = self.design.reach, np.array(near.position), near.rotation
 
         def pose_at(twist: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -78,3 +78,10 @@ def linear(channel: int) -> float:
     """Return a channel of sRGB, 0 to 255, as linear light from 0 to 1 (IEC 61966-2-1)."""
     share = channel / 255.0
     return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
+
+
+SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Ends of the bands of utilisations of a limit; the last one is the limit."""
+
+SHARE_COLOURS: tuple[Rgb, ...] = (FAR, mix(FAR, CLEAR, 0.5), CLEAR, WARNED, SINGULAR)
+"""Colours of these bands, and of the one beyond the limit."""

@@ -11,7 +11,6 @@ exceeds what is wanted.
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -186,53 +185,38 @@ def _finite(tolerances: FloatArray) -> FloatArray:
     return np.where(np.isfinite(tolerances), tolerances, 0.0)
 
 
-# Least share of its bound that a variable is given.
-LEAST = 1e-15
-
-
-def _solve_cuts(
-    costs: FloatArray, cuts: list[FloatArray], guess: FloatArray
-) -> tuple[FloatArray, float]:
+def _solve_cuts(costs: FloatArray, cuts: list[FloatArray]) -> tuple[FloatArray, float]:
     """Return the x from 0 to 1 of least Σ c_i / x_i with all cuts a · x ≤ 1, and a lower bound.
 
-    The costs c (m,) are positive, and the cuts a (m,) are not negative. With u_i ≥ 1 / x_i, that
-    is |(2, x_i − u_i)| ≤ x_i + u_i, the sum is linear in u. All x are taken over a guess of them,
-    so that they are near 1 whatever the range of the costs.
+    The costs c (m,) are positive, and the cuts a (m,) are not negative. Given a multiplier of each
+    cut, the least Lagrangian is at x_i = √(c_i / s_i), or 1, with s the sum of the cuts times their
+    multipliers; so it is maximised over the multipliers. It bounds the sum from below for any.
     """
-    from scipy import sparse
+    from scipy import optimize
 
-    # The solver has no types.
-    clarabel: Any = importlib.import_module("clarabel")
+    rows = np.array(cuts)
+    # The least sum with the mean of the cuts alone.
+    size = np.sqrt(costs * rows.mean(axis=0)).sum() ** 2
 
-    m, k = len(costs), len(cuts)
-    costs = costs / guess
-    size = float(costs.max())
-    costs = costs / size
-    one, none = sparse.eye_array(m), sparse.csc_array((m, m))
-    # Rows x + u, 2 and x − u of all cones, then in the order of the cones.
-    halves = sparse.block_array([[-one, -one], [none, none], [-one, one]], format="csr")
-    order = np.arange(3 * m).reshape(3, m).T.ravel()
-    rows = np.array(cuts) * guess
-    bounds = sparse.block_array([[sparse.csr_array(rows), sparse.csr_array((k, m))], [one, none]])
-    matrix = sparse.vstack([bounds, halves[order]], format="csc")
-    rights = np.concatenate([np.ones(k), 1.0 / guess, np.tile([0.0, 2.0, 0.0], m)])
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_rel = settings.tol_gap_abs = settings.tol_feas = 1e-11
-    cones = [clarabel.NonnegativeConeT(k + m), *(clarabel.SecondOrderConeT(3),) * m]
-    solution = clarabel.DefaultSolver(
-        sparse.csc_array((2 * m, 2 * m)),
-        np.concatenate([np.zeros(m), costs]),
-        matrix,
-        rights,
-        cones,
-        settings,
-    ).solve()
-    multipliers = np.maximum(np.array(solution.z)[: k + m], 0.0)
-    # The dual function bounds the sum from below for any multipliers.
-    slopes = rows.T @ multipliers[:k] + multipliers[k:]
-    bound = 2.0 * np.sqrt(costs * slopes).sum() - multipliers @ rights[: k + m]
-    return np.clip(np.array(solution.x)[:m] * guess, LEAST, 1.0), size * float(bound)
+    def minimiser(multipliers: FloatArray) -> tuple[FloatArray, FloatArray]:
+        slopes = size * multipliers @ rows
+        return np.sqrt(costs / np.maximum(slopes, costs)), slopes
+
+    def negative_dual(multipliers: FloatArray) -> tuple[float, FloatArray]:
+        x, slopes = minimiser(multipliers)
+        return multipliers.sum() - (costs / x + slopes * x).sum() / size, 1.0 - rows @ x
+
+    untyped: Any = optimize
+    result = untyped.minimize(
+        negative_dual,
+        np.full(len(rows), 1.0 / len(rows)),
+        jac=True,
+        method="SLSQP",
+        bounds=[(0.0, None)] * len(rows),
+        options={"maxiter": 500, "ftol": 1e-13},
+    )
+    multipliers = np.maximum(result.x, 0.0)
+    return minimiser(multipliers)[0], -size * float(negative_dual(multipliers)[0])
 
 
 # Share of the largest influence up to which that of a source is rounding.
@@ -297,12 +281,12 @@ def tolerance_budget(
     influences = source_influences(configuration)
     stated = accuracy.stated_tolerances(configuration.design)
     kept = (np.arange(len(SOURCES)) < len(JOINTS)) & keep_actuators
-    held = np.where(kept, stated, 0.0)
-    _check_kept(costs_of(configuration, influences, held), wanted, wanted_turn)
+    kept_errors = np.where(kept, stated, 0.0)
+    _check_kept(costs_of(configuration, influences, kept_errors), wanted, wanted_turn)
     # Errors as shares of what is wanted; a turn that may be any is no demand.
     shares = influences / np.repeat([wanted, wanted_turn or math.inf], 3)[:, None]
     lengths = error_lengths(configuration.design)
-    found, least = _allocate(shares, lengths, held, ~kept)
+    found, least = _allocate(shares, lengths, kept_errors, ~kept)
     tolerances = np.where(kept, stated, _round_down(found))
     efforts = 1.0 / (tolerances * lengths)[~kept]
     costs = costs_of(configuration, influences, tolerances)
@@ -310,12 +294,12 @@ def tolerance_budget(
 
 
 def _allocate(
-    shares: FloatArray, lengths: FloatArray, held: FloatArray, is_free: BoolArray
+    shares: FloatArray, lengths: FloatArray, kept_errors: FloatArray, is_free: BoolArray
 ) -> tuple[FloatArray, float]:
     """Return the tolerances of least effort, shape (29,), and a lower bound of the effort.
 
     Shares (n, 6, 29) are displacement and turn per error, over what is wanted. Lengths (29,) count
-    for a unit of error. Errors that are kept are `held` (29,), with a worst error below 1.
+    for a unit of error. Kept errors (29,) have a worst error below 1.
     """
     halves = shares.reshape(-1, 2, 3, len(SOURCES))
     largest = np.sqrt((halves**2).sum(axis=2)).max(axis=(0, 1))
@@ -327,9 +311,8 @@ def _allocate(
     # A tolerance over the one at which its source alone uses up what is wanted is from 0 to 1.
     scales = 1.0 / largest[free]
     costs, cuts = 1.0 / (lengths[free] * scales), list[FloatArray]()
-    guess, least = np.sqrt(costs) / np.sqrt(costs).sum(), float(costs.sum())
-    bounds, best = held.copy(), math.inf
-    at_rest = _sizes(shares, held)[0]
+    bounds, best, least = kept_errors.copy(), math.inf, float(costs.sum())
+    at_rest = _sizes(shares, kept_errors)[0]
     x = np.full(len(free), 1.0 / len(free))
     for _ in range(MOST_ROUNDS):
         bounds[free] = x * scales
@@ -347,12 +330,11 @@ def _allocate(
             size = sizes[place, half]
             if size > 0.0:
                 along = np.abs(vectors[place, half] @ halves[place, half]) / size
-                cuts.append(along[free] * scales / (1.0 - float(along @ held)))
-        x, bound = _solve_cuts(costs, cuts, guess)
+                cuts.append(along[free] * scales / (1.0 - float(along @ kept_errors)))
+        x, bound = _solve_cuts(costs, cuts)
         least = max(least, bound)
         if not np.isfinite(x).all():
             break  # The solver has run out of precision; the best so far keeps what is wanted.
-        guess = x
     return tolerances, least
 
 

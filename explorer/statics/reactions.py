@@ -90,20 +90,20 @@ def reactions(
     )
 
 
-def limit_shares(design: Design, held: Reactions) -> FloatArray:
+def limit_shares(design: Design, result: Reactions) -> FloatArray:
     """Return the shares of a design's limits that reactions use, shape (..., 12), as in `LIMITED`.
 
     A share of a part without a limit is 0, unless the pose is singular.
     """
     push, pull = design.actuators.limits
     values = np.concatenate(
-        [held.actuators, held.bending, held.guide_force, held.guide_moment], axis=-1
+        [result.actuators, result.bending, result.guide_force, result.guide_moment], axis=-1
     )
     is_regular = np.isfinite(values)
     values = np.where(is_regular, values, 0.0)
     limits = _limits(design)
-    up = (values + held.spread) / np.concatenate([push, limits])
-    down = (held.spread - values) / np.concatenate([pull, limits])
+    up = (values + result.spread) / np.concatenate([push, limits])
+    down = (result.spread - values) / np.concatenate([pull, limits])
     return np.where(is_regular, np.maximum(up, down), np.inf)
 
 

@@ -20,7 +20,16 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.singularity import colours
-from explorer.singularity.colours import CLEAR, FAR, SINGULAR, WARNED, Rgb, mix
+from explorer.singularity.colours import (
+    CLEAR,
+    FAR,
+    SHARE_COLOURS,
+    SHARES,
+    SINGULAR,
+    WARNED,
+    Rgb,
+    mix,
+)
 from explorer.statics.accuracy import actuator_errors, worst_errors
 from explorer.statics.compliance import compliance_of, deflection, is_elastic, stiffness_of
 from explorer.statics.load_cases import largest_shares, load_case
@@ -43,10 +52,6 @@ measure to that unit. The measures are in 1, N, N m and mm."""
 
 LOAD_MEASURES: tuple[PositionMeasure, ...] = ("share", "force", "bending", "deflection")
 """Measures that depend on the load."""
-
-SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Ends of the bands of shares of a limit; the last one is the limit."""
-SHARE_COLOURS: tuple[Rgb, ...] = (FAR, mix(FAR, CLEAR, 0.5), CLEAR, WARNED, SINGULAR)
 
 STEPS = (1, 2, 5)
 """Ends of the bands of forces, moments and displacements, over powers of ten."""

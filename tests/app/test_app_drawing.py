@@ -18,7 +18,6 @@ from strategies import designs
 from explorer.app.features.mechanism.sketch import FIGURE_WIDTH, HEIGHT, WIDTH, figures
 from explorer.app.features.singularity.feature import measures_table
 from explorer.app.look import read_stylesheet
-from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.scene.camera import (
     FIELD_OF_VIEW,
     FIRST_ASPECT,
@@ -31,7 +30,8 @@ from explorer.app.scene.camera import (
     has_perspective,
 )
 from explorer.app.scene.placing import Placed, around
-from explorer.app.scene.shapes import cylinder, plate, sphere, turned_to
+from explorer.app.scene.shapes import cylinder, plate, sphere, turn_z_to
+from explorer.app.scene.surfaces import COLLIDING, PLAIN
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
 from explorer.app.widgets import charts
@@ -143,7 +143,7 @@ def test_squares_of_the_ground_have_the_size_of_their_label(factor: float, unit_
 def test_rod_points_in_its_direction(directions: list[tuple[float, float, float]]) -> None:
     array = np.array(directions)
     lengths = np.linalg.norm(array, axis=1)
-    wxyz = turned_to(array)
+    wxyz = turn_z_to(array)
     assert np.allclose(np.linalg.norm(wxyz, axis=1), 1.0)
     for quaternion, direction, length in zip(wxyz, array, lengths, strict=True):
         if length > 1e-6:
@@ -289,17 +289,6 @@ def test_camera_of_a_browser_that_missed_its_place_is_put_there_again(
     assert cameras.stands(browser)
 
 
-def test_camera_of_a_browser_that_says_nothing_is_put_again_and_does_not_stand(
-    cameras: Cameras, browser: Any
-) -> None:
-    """What was sent to a browser that is still loading may have been lost."""
-    for looks in range(2, 5):
-        assert not cameras.stands(browser)
-        cameras.look_again(browser)
-        assert len(browser.puts) == looks
-        assert np.allclose(browser.puts[-1], EYE)
-
-
 def test_camera_is_put_last_for_the_shape_that_its_browser_told_last(browser: Any) -> None:
     """While its panels are laid out a browser tells of several, each heard on its own thread."""
     others: list[threading.Thread] = []
@@ -331,19 +320,6 @@ def test_camera_that_somebody_moved_is_left_alone(cameras: Cameras, browser: Any
     browser.camera.aspect = 1.4
     browser.tell(elsewhere)
     assert len(browser.puts) == 1
-
-
-def test_camera_is_put_again_when_its_browser_changes_its_shape(
-    cameras: Cameras, browser: Any
-) -> None:
-    browser.camera.aspect = 1.4
-    browser.tell(EYE)
-    assert np.allclose(browser.puts[-1], framing(POINTS, "isometric", 1.4)[0])
-    cameras.disconnected(browser)
-    browser.camera.aspect = 0.9
-    browser.tell(EYE)
-    assert len(browser.puts) == 2
-    assert cameras.stands(browser)
 
 
 @given(

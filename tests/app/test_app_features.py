@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import viser
 from desk import CLIENT
+from server_clock import wait_until_drawn
 
 import explorer.app
 from explorer.app.features.designs.feature import SavedDesigns
@@ -31,8 +32,7 @@ from explorer.app.features.precision.feature import SetTolerances
 from explorer.app.features.studies.actions import PickDesign
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.view.feature import CAMERA_HINTS
-from explorer.app.inputs.control import At, Bound, Control
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import At, Bound, Control, Controls
 from explorer.app.page import FEATURES, Page
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.server import Running, start
@@ -56,8 +56,7 @@ from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.view import OrientationView
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.palette import PALETTE_KEY, Command, Key, Palette
-from explorer.app.widgets.pieces import Widget, widgets
+from explorer.app.widgets.palette import PALETTE_KEY, Command, Key, Palette, Widget, widgets
 from explorer.errors import ExplorerError
 from explorer.files.packaged import read_page
 from explorer.mechanism.design_file import PRESETS
@@ -163,7 +162,7 @@ def test_control_with_a_path_sets_the_value_there_and_no_other(
             session.do(Set("view", before.view))
         else:
             session.do(UNDO)
-        assert page.wait_until_drawn()
+        assert wait_until_drawn(page)
         assert session.state == before, name
         assert handle.value == shown, name
 
@@ -174,7 +173,7 @@ def test_page_with_the_mechanism_and_one_feature_starts_and_draws(feature: Featu
     features = tuple(each for each in FEATURES if each.name in ("mechanism", feature.name))
     with start_with(features) as page:
         page.session.do(Set("view.labels", False))
-        assert page.wait_until_drawn()
+        assert wait_until_drawn(page)
         assert np.isfinite(page.corners()).all()
         titles = {tab.title for each in features for tab in each.tabs}
         folders = {each.path[0] for each in widgets(page.services.server) if each.path}
@@ -234,7 +233,7 @@ def test_new_feature_appears_on_the_page_in_the_palette_and_in_the_scene() -> No
         for label, key in (("Marker › Warn at three", "5"), ("Marker › Ghost platforms", "6")):
             assert commands[label].keys == (Key(key),)
             commands[label].run(CLIENT)
-        assert page.wait_until_drawn()
+        assert wait_until_drawn(page)
         view = page.session.state.view
         assert (view.warn_below, view.ghosts) == (3.0, True)
         ball = page.services.get(Marker).ball

@@ -237,13 +237,6 @@ def test_page_drawn_again_after_undo_leaves_what_can_be_redone(recorder: Recorde
     recorder.move(len(words))
 
 
-def test_unclosed_length_is_undone_with_its_message(recorder: Recorder) -> None:
-    recorder.do(SetJoint(0, 1000.0))
-    assert recorder.state.unclosed is not None
-    recorder.move(-1)
-    assert (recorder.state.unclosed, recorder.state.joints) == (None, open_state(OPTIMAL).joints)
-
-
 def test_session_undoes_and_redoes_exactly(desk: Desk) -> None:
     first = desk.state
     # Each press is a step, also several in one frame.
@@ -328,21 +321,6 @@ def test_drag_of_many_events_is_one_move_from_where_it_began() -> None:
     expected = move_clearance(OPTIMAL, start.pose, state.pose)
     np.testing.assert_array_equal(move.clearance, expected.clearance)
     np.testing.assert_array_equal(move.overlaps, expected.overlaps)
-
-
-def test_gesture_of_one_press_continues_after_a_rest_and_ends_with_it(moved: State) -> None:
-    first, second = Press(1, 1), Press(1, 2)
-    state = UserAction(SetPosition(0, 15.0), "y", 200.0, first).apply(moved)
-    rested = UserAction(SetPosition(0, 16.0), "y", 200.0 + 60 * PAUSE_SECONDS, first).apply(state)
-    assert start_of(rested) == start_of(state) == moved.pose
-    again = UserAction(SetPosition(0, 17.0), "y", 200.1 + 60 * PAUSE_SECONDS, second).apply(rested)
-    assert start_of(again) == rested.pose
-
-
-def test_event_that_arrives_late_does_not_end_a_move(moved: State) -> None:
-    late = UserAction(SetPosition(0, 15.0), "x", 99.0).apply(moved)
-    on = UserAction(SetPosition(0, 16.0), "x", 100.0 + 0.99 * PAUSE_SECONDS).apply(late)
-    assert start_of(late) == start_of(on) == OPTIMAL.home
 
 
 @pytest.mark.parametrize(

@@ -34,9 +34,9 @@ from explorer.app.features.workspace.feature import WorkspacePanel
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.features.workspace.slice_map import SliceMap
 from explorer.app.features.workspace.words import drawing_words, nothing_words, workspace_details
-from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import SWEPT, TUBE
+from explorer.app.scene.surfaces import COLLIDING, PLAIN
 from explorer.app.session.history import UserAction
 from explorer.app.state.actions import Set, SetPose, SetPosition
 from explorer.app.state.frame import Frame

@@ -29,7 +29,6 @@ from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
 from explorer.app.storage.user_data import PREFERENCES, PreferenceFile, Preferences, UserData
 from explorer.app.widgets.theme import BRAND, BRAND_ON_DARK, Theme
-from explorer.errors import StorageError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 
@@ -188,15 +187,6 @@ def test_preferences_in_a_broken_file_count_as_none_and_are_replaced(
     assert file.chosen == Preferences()
     file.choose(dark=True)
     assert json.loads((tmp_path / PREFERENCES).read_bytes()) == {"dark": True, "tour_seen": False}
-
-
-def test_preferences_in_a_folder_that_takes_no_file_are_refused_in_a_line(tmp_path: Path) -> None:
-    (tmp_path / "taken").write_bytes(b"")
-    file = PreferenceFile(tmp_path / "taken")
-    with pytest.raises(StorageError) as refusal:
-        file.choose(dark=True)
-    assert "\n" not in str(refusal.value)
-    assert file.chosen.dark is True
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,7 @@ from explorer.app.state.parts import value_at
 from explorer.app.state.paths import STRAIGHT_SECONDS, End, Journey
 from explorer.app.state.state import State, angles_of, joints_of, open_state
 from explorer.app.widgets.assigning import Assigner
-from explorer.app.widgets.pieces import widgets
+from explorer.app.widgets.palette import widgets
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.folds import to_folds

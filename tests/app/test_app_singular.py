@@ -39,7 +39,6 @@ from explorer.app.features.singularity.scene import (
 )
 from explorer.app.features.singularity.strata import GOALS, StrataPanel, distances_of
 from explorer.app.scene.placing import Placed
-from explorer.app.session import clock
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetMode, SetPosition
 from explorer.app.state.frame import Frame
@@ -311,7 +310,7 @@ def test_motion_swings_a_ghost_by_a_share_of_the_reach_and_leaves_the_state_alon
     server_clock.advance(FRAME_SECONDS)
     desk.wait(lambda _: len(frames) > drawn)
     server_clock.advance(PERIODS * PERIOD)
-    assert clock.wait_until_quiet(60.0)
+    assert server_clock.wait_until_quiet(60.0)
     assert tips() is None
     assert desk.state == before
     assert desk.session.history == steps
@@ -334,7 +333,7 @@ def test_motion_ends_once_the_platform_is_moved(services: Services, desk: Desk) 
     desk.session.do(UNDO)
     assert not is_shown()
     server_clock.advance(FRAME_SECONDS)
-    assert clock.wait_until_quiet(60.0)
+    assert server_clock.wait_until_quiet(60.0)
 
 
 # Assembly modes

@@ -332,15 +332,6 @@ def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     store.close()
 
 
-def test_folder_that_is_a_file_is_reported_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "data").write_bytes(b"")
-    store = SessionFile(tmp_path / "data" / "sessions")
-    assert store.resume() == (None, ())
-    with pytest.raises(StorageError, match="EXPLORER_DATA") as refusal:
-        store.save(numbered(1))
-    assert "\n" not in str(refusal.value)
-
-
 def test_data_folder_is_that_of_the_environment(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -62,7 +62,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of, open_state
 from explorer.app.storage.session_file import decode_session, encode_session
 from explorer.app.widgets.assigning import Assigner
-from explorer.app.widgets.pieces import widgets
+from explorer.app.widgets.palette import widgets
 from explorer.mechanism.configuration import Point
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS

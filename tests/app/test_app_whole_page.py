@@ -14,6 +14,7 @@ from hypothesis import given, settings, strategies as st
 from monkey import Monkey, explorer_with_data
 from page_props import shown_by, shown_texts
 from sample_states import Sample, samples
+from server_clock import wait_until_drawn
 
 from explorer.app.features.compare.feature import Pin
 from explorer.app.features.optimise.actions import Accept, SetRequest, StartRun
@@ -49,7 +50,7 @@ def running() -> Generator[Running]:
 def _at_first(running: Running) -> None:  # pyright: ignore[reportUnusedFunction]
     running.page.session.do(Open(PRESETS["paper-optimal"]))
     running.page.session.do(Set("view", View()))
-    assert running.page.wait_until_drawn(PATIENCE_SECONDS)
+    assert wait_until_drawn(running.page, PATIENCE_SECONDS)
 
 
 def do(running: Running, action: Action) -> None:
@@ -101,7 +102,7 @@ def test_numbers_of_computed_drawings_are_written_alike(running: Running) -> Non
         ("compared.pinned", (*PRESETS.values(), None)[:3]),
     ):
         do(running, Set(path, value))
-    assert running.page.wait_until_drawn(PATIENCE_SECONDS)
+    assert wait_until_drawn(running.page, PATIENCE_SECONDS)
     check_numbers(running)
 
 
@@ -170,7 +171,7 @@ def test_name_has_one_value_after_an_optimum_and_after_a_turn(running: Running) 
         session.do(SetAngle(0, session.state.yaw_pitch_roll[0] + turn))
         session.do(Set("view.workspace.orientation", orientation))
         session.do(Set("view.workspace.region", region))
-        assert page.wait_until_drawn(PATIENCE_SECONDS)
+        assert wait_until_drawn(page, PATIENCE_SECONDS)
         found = values_by_name(running)
         assert {"volume", "clearance", "nodes", "node volume"} <= found.keys()
         several = {name: values for name, values in found.items() if len(values) > 1}

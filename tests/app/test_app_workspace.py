@@ -27,7 +27,7 @@ from explorer.app.features.workspace.feature import WorkspacePanel
 from explorer.app.features.workspace.slice_map import map_picture
 from explorer.app.features.workspace.words import drawing_words, volume_headline, volume_text
 from explorer.app.features.workspace.work import STEP, Selection, WorkspaceDrawing, export_mesh
-from explorer.app.scene.bands import AT_LIMIT, PLAIN
+from explorer.app.scene.surfaces import AT_LIMIT, PLAIN
 from explorer.app.state.actions import Open, Set, SetAngle, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state

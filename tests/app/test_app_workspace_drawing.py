@@ -19,8 +19,7 @@ from services import StubWorker, services_for
 from explorer.app.features.workspace import work
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED, surface_of
 from explorer.app.features.workspace.words import drawing_words
-from explorer.app.scene.bands import MOST_COLOURED, Colouring, Shell
-from explorer.app.scene.creases import creased_faces
+from explorer.app.scene.surfaces import MOST_COLOURED, Colouring, Shell, creased_faces
 from explorer.app.session import feed as session_feed
 from explorer.app.session.feed import Stage
 from explorer.app.session.worker import CancelledError, Channel, Worker

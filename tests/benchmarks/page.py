@@ -16,6 +16,7 @@ from contextlib import contextmanager
 
 import viser
 from playwright.sync_api import Browser, Page
+from server_clock import wait_until_drawn
 
 from benchmarks.table import Row, seconds
 from explorer import PRESETS
@@ -99,7 +100,7 @@ def _frames(browser: Browser) -> list[list[float]]:
 
 def _openings(browser: Browser) -> list[list[float]]:
     with hello_server() as hello, ready_page() as running:
-        running.page.wait_until_drawn()
+        wait_until_drawn(running.page)
         servers = (hello, running.viser)
         # The first page of each compiles what the browser keeps.
         for server in servers:
@@ -148,7 +149,7 @@ def hello_page(browser: Browser) -> Generator[Page]:
 @contextmanager
 def _own_page(browser: Browser) -> Generator[Page]:
     with ready_page(panels=False) as running:
-        running.page.wait_until_drawn()
+        wait_until_drawn(running.page)
         page, client = open_page(browser, running, SIZE)
         settle(page, client)
         running.page.point_cameras("isometric")

@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 from likeness import decoded
 from playwright.sync_api import expect
+from server_clock import wait_until_drawn
 from tab import Tab
 
 from explorer.app.features.mechanism.panel import JOINT_LABELS
@@ -44,15 +45,15 @@ def red_pixels(tab: Tab) -> int:
     return int((picture[..., 0] > picture[..., 2] + 0.1).sum())
 
 
-def wait_until_drawn(tab: Tab) -> None:
-    assert tab.running.page.wait_until_drawn(PATIENCE_SECONDS)
+def await_drawing(tab: Tab) -> None:
+    assert wait_until_drawn(tab.running.page, PATIENCE_SECONDS)
 
 
 def test_accessible_solid_replaces_the_other_while_the_page_stays_alive(tab: Tab) -> None:
     page = tab.running.page
     tab.push("Solid")
     tab.page.get_by_text("within the limits, in the present orientation").wait_for()
-    wait_until_drawn(tab)
+    await_drawing(tab)
     tab.wait_for(lambda: red_pixels(tab) < MANY, "the solid, without collisions")
     process = page.worker.process_id
     assert process is not None
@@ -75,7 +76,7 @@ def test_accessible_solid_replaces_the_other_while_the_page_stays_alive(tab: Tab
         os.kill(process, signal.SIGCONT)
     accessible = tab.page.get_by_text("units³ accessible")
     accessible.wait_for()
-    wait_until_drawn(tab)
+    await_drawing(tab)
     expect(tab.page.get_by_text("computing …")).to_be_hidden()
     drawing = page.services.get(WORKSPACE_FEED).drawing
     assert drawing is not None

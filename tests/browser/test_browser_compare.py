@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from likeness import decoded
 from playwright.sync_api import expect
+from server_clock import wait_until_drawn
 from tab import Tab
 
 from explorer.app.features.compare.feature import Pin
@@ -22,7 +23,7 @@ MANY = 800
 
 def press(tab: Tab, name: str, is_done: Callable[[], bool]) -> None:
     """Press a button in markup by its hint, once the page is at rest; wait until it has worked."""
-    assert tab.running.page.wait_until_drawn(PATIENCE_SECONDS)
+    assert wait_until_drawn(tab.running.page, PATIENCE_SECONDS)
     tab.settle()
     tab.page.get_by_title(name).first.click()
     tab.wait_for(is_done, name)
@@ -45,7 +46,7 @@ def test_designs_are_pinned_measured_overlaid_and_opened(tab: Tab) -> None:
     tab.choose("Preset", "paper-initial")
     tab.wait_for(lambda: tab.state.design == PRESETS["paper-initial"], "the other preset")
     page = tab.running.page
-    assert page.wait_until_drawn(PATIENCE_SECONDS)
+    assert wait_until_drawn(page, PATIENCE_SECONDS)
     for design in PRESETS.values():
         text = f"{workspace_volume(design).volume:,.2f}"
         expect(tab.page.get_by_role("cell", name=text).first).to_be_attached(
@@ -53,13 +54,13 @@ def test_designs_are_pinned_measured_overlaid_and_opened(tab: Tab) -> None:
         )
     before = purple_pixels(tab)
     press(tab, "Draw the workspaces over one another", lambda: tab.state.compared.look.overlay)
-    assert page.wait_until_drawn(PATIENCE_SECONDS)
+    assert wait_until_drawn(page, PATIENCE_SECONDS)
     assert purple_pixels(tab) > before + MANY
     press(tab, "Make paper-optimal the live design", lambda: tab.state.design == pinned)
     tab.page.get_by_role("button", name="Undo").click()
     tab.wait_for(lambda: tab.state.design == PRESETS["paper-initial"], "what was there before")
     press(tab, "Unpin paper-optimal", lambda: tab.state.compared.is_empty)
-    assert page.wait_until_drawn(PATIENCE_SECONDS)
+    assert wait_until_drawn(page, PATIENCE_SECONDS)
     assert np.abs(purple_pixels(tab) - before) < MANY
 
 

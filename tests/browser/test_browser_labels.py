@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from likeness import decoded
 from limited_designs import scaled_design
+from server_clock import wait_until_drawn
 from tab import Tab
 
 from explorer.app.features.mechanism.marks import ARROW_LENGTH, HANDLE_NAME
@@ -61,7 +62,7 @@ def wide(tab: Tab) -> Tab:
 
 def show(tab: Tab, view: View) -> None:
     tab.running.page.session.do(Set("view", view))
-    assert tab.running.page.wait_until_drawn()
+    assert wait_until_drawn(tab.running.page)
 
 
 def labels_of(tab: Tab) -> dict[str, Any]:
@@ -283,7 +284,7 @@ def test_view_along_an_axis_has_no_perspective_until_it_is_turned(wide: Tab) -> 
 def test_scale_bar_has_the_length_that_it_names_at_any_distance(wide: Tab, factor: float) -> None:
     design = scaled_design(PRESETS["paper-optimal"], factor)
     wide.running.page.session.do(Open(design))
-    assert wide.running.page.wait_until_drawn()
+    assert wait_until_drawn(wide.running.page)
     placed = Placed(Frame(wide.state))
     wide.look_from("isometric")
     scale = wide.page.evaluate(SCALE)

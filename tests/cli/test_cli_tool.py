@@ -16,9 +16,11 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 import explorer
+from explorer.app.state.state import POINTS, open_state
+from explorer.app.state.view import View
 from explorer.cli import COMMANDS
 from explorer.cli.parsing import load_command
-from explorer.mechanism.configuration import pose_with, position_of
+from explorer.mechanism.configuration import position_of
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.singularity.ellipsoids import performance
 from explorer.workspace.orientations.share import orientation_share
@@ -205,8 +207,8 @@ def test_pose_with_a_point_at_a_position_is_inverse_to_the_position_of_the_point
     for r in Rotation.random(50, random_state=rng).as_matrix():
         pose = explorer.Pose.of(rng.normal(size=3), r)
         x, y, z = rng.normal(size=3).tolist()
-        for at in ("b4", "tool"):
-            there = pose_with(TOOLED, at, (x, y, z), pose)
+        for at in POINTS:
+            there = open_state(TOOLED, view=View(at=at)).pose_at((x, y, z), pose)
             assert_allclose(position_of(TOOLED, there, at), (x, y, z), atol=1e-12)
             assert there.quaternion == pose.quaternion
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -105,14 +104,6 @@ def test_unusable_limit_is_refused_in_a_file_and_in_python(
 ) -> None:
     assert words in message_of(PLAIN | {"limits": limits})
     assert refusal(lambda: Limits(**limits), kind=DesignError).startswith(words)
-
-
-@pytest.mark.parametrize("odd", [math.nan, math.inf])
-def test_limit_that_is_not_finite_is_refused(odd: float) -> None:
-    box = ((0.0, 0.0, 0.0), (1.0, 1.0, odd))
-    limits: dict[str, Any] = {"l1": (0.0, odd), "guide": (0.0, odd), "box": box, "margin": odd}
-    for name, limit in limits.items():
-        assert "finite" in refusal(partial(Limits, **{name: limit}), kind=DesignError)
 
 
 @pytest.mark.parametrize(

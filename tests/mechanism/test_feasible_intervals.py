@@ -114,16 +114,6 @@ def test_nearest_feasible_value_closes_and_no_nearer_one_does(
         assert not forward(case.design, with_values(joints, joint, nearer)).feasible.any()
 
 
-@given(ordinary_cases(), joint_indices)
-def test_nearest_feasible_value_of_closing_joints_is_the_present_one(
-    case: Case, joint: int
-) -> None:
-    assume(case.regularity > 1e-2)
-    value = nearest(case.design, case.joints, joint)
-    assert value is not None
-    assert abs(value - case.joints[joint]) <= 1e-12 * case.size
-
-
 @given(singular_cases(among=some_designs), joint_indices)
 def test_nearest_feasible_value_at_a_singular_pose_closes_or_is_none(
     case: Case, joint: int

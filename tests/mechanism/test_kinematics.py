@@ -26,9 +26,9 @@ from strategies import (
 from explorer import PRESETS, Design, forward, inverse, margins, rotation_from_quaternion, stratum
 from explorer.mechanism.kinematics import (
     ForwardKinematics,
-    checked_joints,
     determinant,
     discriminants,
+    joint_array,
     solve_rows,
 )
 from explorer.mechanism.margins import mode_of, signs_of
@@ -273,4 +273,4 @@ def test_unusable_joints_are_refused(joints: Any, words: str) -> None:
     design = PRESETS["paper-initial"]
     for function in (forward, discriminants):
         assert words in refusal(function, design, joints)
-    assert checked_joints([1, -2, 3, -4, 5, 6]).tolist()[1] == -2.0
+    assert joint_array([1, -2, 3, -4, 5, 6]).tolist()[1] == -2.0

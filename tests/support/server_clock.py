@@ -35,6 +35,25 @@ def _shift() -> float:
     return _ahead + (_pace - 1.0) * (time.monotonic() - _paced_at)
 
 
+def wait_until_drawn(page: Page, timeout: float = 30.0) -> bool:
+    """Wait until the newest state and all that follows are drawn; return whether they are."""
+    deadline = time.monotonic() + timeout
+    idle = page.session.wait_until_idle(timeout)
+    for runner in page.runners:
+        idle = idle and runner.wait_until_idle(deadline - time.monotonic())
+    # Drawing may request work of the worker, whose result is drawn again.
+    for _ in range(2):
+        idle = idle and page.session.wait_until_idle(deadline - time.monotonic())
+        idle = idle and page.worker.wait_until_idle(deadline - time.monotonic())
+    return idle and page.session.wait_until_idle(deadline - time.monotonic())
+
+
+def wait_until_quiet(timeout: float) -> bool:
+    """Wait until no pause is pending and no call after one is at work; return whether none is."""
+    with clock.changed:
+        return clock.changed.wait_for(lambda: not clock.pending, timeout)
+
+
 def settle(page: Page, timeout: float) -> bool:
     """Wait until all is drawn and no pause is pending; return whether that is so.
 
@@ -42,13 +61,15 @@ def settle(page: Page, timeout: float) -> bool:
     """
     deadline = time.monotonic() + timeout
     with mock.patch.object(assigning, "QUIET_SECONDS", 0.0):
-        while page.wait_until_drawn(deadline - time.monotonic()):
-            for pause in page.pauses:
-                pause.finish()
-            if not clock.wait_until_quiet(deadline - time.monotonic()):
+        while wait_until_drawn(page, deadline - time.monotonic()):
+            with clock.changed:
+                for pause in page.pauses:
+                    pause.due = clock.now()
+                clock.changed.notify_all()
+            if not wait_until_quiet(deadline - time.monotonic()):
                 return False
             # What happened after a pause may have changed more.
-            if page.session.wait_until_idle(0.0) and clock.wait_until_quiet(0.0):
+            if page.session.wait_until_idle(0.0) and wait_until_quiet(0.0):
                 return True
     return False
 

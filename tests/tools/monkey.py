@@ -26,6 +26,7 @@ import psutil
 import viser
 from client import press_update, presses_in
 from page_props import differences, shown_by
+from server_clock import wait_until_drawn
 from socket_tab import SocketTab
 
 from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns
@@ -148,7 +149,7 @@ class Monkey:
         state, history = page.session.state, page.session.history
         with explorer_with_data() as fresh:
             session: Any = fresh.page.session
-            fresh.page.wait_until_drawn(PATIENCE_SECONDS)
+            wait_until_drawn(fresh.page, PATIENCE_SECONDS)
             session._state, session._history = state, history
             fresh.page.services.theme.choose(dark=page.services.theme.is_dark)
             shelves = [each.services.get(SavedDesigns) for each in (fresh.page, page)]
@@ -160,14 +161,14 @@ class Monkey:
             lists = [each.services.get(DesignsPanel) for each in (fresh.page, page)]
             lists[0].asked = lists[1].asked
             session.redraw()
-            assert fresh.page.wait_until_drawn(PATIENCE_SECONDS)
+            assert wait_until_drawn(fresh.page, PATIENCE_SECONDS)
             self.report.drift += differences(shown_by(self.running), shown_by(fresh))
 
     def _settle(self) -> None:
         page = self.running.page
         deadline = time.monotonic() + PATIENCE_SECONDS
         while time.monotonic() < deadline:
-            assert page.wait_until_drawn(PATIENCE_SECONDS), "the page does not come to rest"
+            assert wait_until_drawn(page, PATIENCE_SECONDS), "the page does not come to rest"
             journey = page.session.state.journey
             is_on = journey is not None and journey.is_playing
             if not is_on and not page.session.state.paths.is_planning:

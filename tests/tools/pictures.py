@@ -21,6 +21,7 @@ import msgspec
 import numpy as np
 from machines import PRESS
 from playwright.sync_api import Browser, FloatRect, Page
+from server_clock import wait_until_drawn
 
 from explorer.app.browser.headless import headless_browser
 from explorer.app.features.compare.feature import Pin
@@ -254,7 +255,7 @@ def draw(
         alter(running)
         for action in scene.actions:
             running.page.session.do(action)
-        assert running.page.wait_until_drawn(60.0), "the explorer does not come to rest"
+        assert wait_until_drawn(running.page, 60.0), "the explorer does not come to rest"
         return draw_page(
             browser,
             running,

@@ -1,16 +1,15 @@
 """A headless Chromium, for pictures, printing and tests, and how it is found on this machine.
 
-The search goes in this order: what EXPLORER_CHROMIUM names, the programs on the PATH, the usual
-places of macOS and Windows, and the one that Playwright has downloaded.
+The search goes in this order: what EXPLORER_CHROMIUM names, the programs on the PATH, the one that
+Playwright has downloaded, and Chrome, or Edge on Windows, where Playwright finds it.
 """
 
 from __future__ import annotations
 
-import itertools
 import os
 import shutil
 import sys
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -61,18 +60,20 @@ def headless_browser(
     found = find_chromium()
     with sync_playwright() as playwright:
         chromium = found or playwright.chromium.executable_path
-        if not os.access(chromium, os.X_OK):
-            raise MissingExtraError(
-                "pictures need a Chromium: install chromium or google-chrome with the system's "
-                "package manager, or run: playwright install chromium"
-            )
+        is_known = os.access(chromium, os.X_OK)
         try:
             browser = playwright.chromium.launch(
-                executable_path=chromium,
+                executable_path=chromium if is_known else None,
+                channel=None if is_known else "msedge" if sys.platform == "win32" else "chrome",
                 args=[*CHROMIUM_FLAGS, *graphics],
                 env={**os.environ, **(environment or {})},
             )
         except Error as error:
+            if not is_known:
+                raise MissingExtraError(
+                    "pictures need a Chromium: install chromium or google-chrome with the system's "
+                    "package manager, or run: playwright install chromium"
+                ) from None
             reason = str(error).splitlines()[0]
             raise PictureError(f"the browser {chromium} did not start: {reason}") from None
         try:
@@ -89,19 +90,9 @@ VARIABLE = "EXPLORER_CHROMIUM"
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
-_MAC_APPS = (
-    "Chromium.app/Contents/MacOS/Chromium",
-    "Google Chrome.app/Contents/MacOS/Google Chrome",
-)
-_WINDOWS_PROGRAMS = (
-    "Google/Chrome/Application/chrome.exe",
-    "Chromium/Application/chrome.exe",
-    "Microsoft/Edge/Application/msedge.exe",
-)
-
 
 def find_chromium() -> str | None:
-    """Return the path of a Chromium of this machine that can be started, or None.
+    """Return the path of the Chromium that the environment names or the PATH has, or None.
 
     Raises:
         InputError: EXPLORER_CHROMIUM is set, but names no program.
@@ -115,8 +106,8 @@ def find_chromium() -> str | None:
                 "or unset it to have one looked for"
             )
         return program
-    on_path = (path for path in map(shutil.which, NAMES) if path and not _is_snap_stub(path))
-    return next(itertools.chain(on_path, _usual_places()), None)
+    on_path = filter(None, map(shutil.which, NAMES))
+    return next((path for path in on_path if not _is_snap_stub(path)), None)
 
 
 def _is_snap_stub(program: str) -> bool:
@@ -125,17 +116,3 @@ def _is_snap_stub(program: str) -> bool:
         start = file.read(4096)
     snap = "/snap/bin/chromium"
     return start.startswith(b"#!") and snap.encode() in start and not Path(snap).exists()
-
-
-def _usual_places() -> Iterator[str]:
-    places: list[Path] = []
-    if sys.platform == "darwin":
-        folders = (Path("/Applications"), Path.home() / "Applications")
-        places = [folder / app for app in _MAC_APPS for folder in folders]
-    elif sys.platform == "win32":
-        roots = ("PROGRAMFILES", "PROGRAMFILES(X86)", "LOCALAPPDATA")
-        folders = tuple(Path(os.environ[root]) for root in roots if root in os.environ)
-        places = [folder / program for program in _WINDOWS_PROGRAMS for folder in folders]
-    for place in places:
-        if os.access(place, os.X_OK):
-            yield str(place)

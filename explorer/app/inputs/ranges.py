@@ -192,28 +192,28 @@ def _position_spans(design: Design, at: Point) -> tuple[Span, ...]:
 
 def length_span(state: State) -> Span:
     """Return the range of a length, such as a margin."""
-    reach = state.base.reach
-    return Span(0.0, round_up(BEYOND * reach), fine_step(reach, 2e3))
+    return _share_span(state.base.reach, BEYOND)
 
 
 def radius_span(state: State) -> Span:
     """Return the range of the radius of a leg."""
-    reach = state.base.reach
-    return Span(0.0, round_up(0.1 * reach), fine_step(reach, 5e3))
+    return _share_span(state.base.reach, 0.1, 5e3)
 
 
 def coordinate_span(state: State) -> Span:
     """Return the range of a coordinate, or of a displacement."""
-    reach = state.base.reach
-    edge = round_up(BEYOND * reach)
-    return Span(-edge, edge, fine_step(reach, 2e3))
+    return _share_span(state.base.reach, BEYOND, is_signed=True)
 
 
 def platform_span(state: State) -> Span:
     """Return the range of a coordinate of a point of the platform, such as that of the tool."""
-    reach = state.base.reach
-    edge = round_up(0.5 * reach)
-    return Span(-edge, edge, fine_step(reach, 2e3))
+    return _share_span(state.base.reach, 0.5, is_signed=True)
+
+
+def _share_span(size: float, share: float, parts: float = 2e3, *, is_signed: bool = False) -> Span:
+    """Return a range up to a share of a size, and from its negative if it is signed."""
+    edge = round_up(share * size)
+    return Span(-edge if is_signed else 0.0, edge, fine_step(size, parts))
 
 
 def variable_span(state: State, index: int) -> Span:

@@ -177,7 +177,7 @@ class Rods(Instances):
         spans = ends - starts
         lengths = np.linalg.norm(spans, axis=1)
         scales = np.stack([radii, radii, np.maximum(lengths, 1e-9)], axis=1)
-        yield from self.place(starts, turned_to(spans), scales)
+        yield from self.place(starts, turn_z_to(spans), scales)
 
 
 class Balls(Instances):
@@ -266,7 +266,7 @@ def dashes(lines: FloatArray, most: int, period: float, drawn: float) -> FloatAr
     return (lines[:, None, :1] + shares[..., None] * spans).reshape(-1, 2, 3)
 
 
-def turned_to(directions: FloatArray) -> FloatArray:
+def turn_z_to(directions: FloatArray) -> FloatArray:
     """Return quaternions (n, 4) that turn the z-axis to directions (n, 3)."""
     lengths = np.linalg.norm(directions, axis=1, keepdims=True)
     unit = np.divide(

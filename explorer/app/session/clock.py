@@ -15,8 +15,8 @@ from collections.abc import Callable
 changed = threading.Condition()
 """Guards all below; notified when a pause is over and when the clock is advanced."""
 
-# The pauses that are not over, or whose call is at work.
-_pending: set[object] = set()
+pending: set[object] = set()
+"""The pauses that are not over, or whose call is at work."""
 
 
 class Pause:
@@ -26,41 +26,38 @@ class Pause:
         seconds: The pause.
         call: Function to call.
         arguments: Its arguments.
+
+    Attributes:
+        due: Time of this clock at which the last pause is over.
     """
 
     def __init__(self, seconds: float, call: Callable[..., None], *arguments: object) -> None:
         self._seconds = seconds
         self._call, self._arguments = call, arguments
-        self._due = 0.0
+        self.due = 0.0
         # The pause that is not over.
         self._current: object = None
 
     def begin(self) -> None:
         """Begin the pause, anew if it is not over."""
         with changed:
-            self._due = now() + self._seconds
+            self.due = now() + self._seconds
             if self._current is not None:
                 return
             self._current = current = object()
-            _pending.add(current)
+            pending.add(current)
         threading.Thread(target=self._run, args=(current,), name="pause", daemon=True).start()
-
-    def finish(self) -> None:
-        """End the pause at once, if there is one."""
-        with changed:
-            self._due = now()
-            changed.notify_all()
 
     def cancel(self) -> None:
         """Call nothing, unless the pause is over."""
         with changed:
-            _pending.discard(self._current)
+            pending.discard(self._current)
             self._current = None
             changed.notify_all()
 
     def _run(self, current: object) -> None:
         with changed:
-            while self._current is current and (left := self._due - now()) > 0.0:
+            while self._current is current and (left := self.due - now()) > 0.0:
                 changed.wait(left)
             if self._current is not current:
                 return
@@ -69,7 +66,7 @@ class Pause:
             self._call(*self._arguments)
         finally:
             with changed:
-                _pending.discard(current)
+                pending.discard(current)
                 changed.notify_all()
 
 
@@ -94,9 +91,3 @@ def now() -> float:
 def moment_of(stamp: float) -> float:
     """Return the time of this clock, in seconds since 1970, for a stamp of the machine's clock."""
     return stamp + ahead()
-
-
-def wait_until_quiet(timeout: float) -> bool:
-    """Wait until no pause is pending and no call after one is at work; return whether none is."""
-    with changed:
-        return changed.wait_for(lambda: not _pending, timeout)

@@ -45,19 +45,14 @@ class UserAction:
     time: float
     press: Press | None = None
 
-    def continues(self, source: object, last: float, press: Press | None) -> bool:
-        """Whether this continues an earlier gesture with the same control.
-
-        Args:
-            source: The control of the earlier gesture.
-            last: Time of its last event, in seconds.
-            press: Its last press, if any.
-        """
-        if self.source != source:
+    def continues(self, earlier: Gesture | Step) -> bool:
+        """Whether this continues an earlier gesture with the same control."""
+        press = earlier.press
+        if self.source != earlier.source:
             return False
         if self.press is not None and press is not None and self.press.client == press.client:
             return self.press == press
-        return self.time - last <= PAUSE_SECONDS
+        return self.time - earlier.last <= PAUSE_SECONDS
 
     def apply(self, state: State) -> State:
         """Return the next state, with the gesture that led to its pose.
@@ -75,7 +70,7 @@ class UserAction:
             # The legs did not move from one pose to the other.
             return None
         gesture = before.gesture
-        if gesture is not None and self.continues(gesture.source, gesture.last, gesture.press):
+        if gesture is not None and self.continues(gesture):
             last = max(gesture.last, self.time)
             return replace(gesture, last=last, press=self.press or gesture.press)
         if after.pose == before.pose:
@@ -135,7 +130,7 @@ class History:
         shown = replace(after, view=_with_point_of(present.state.view, after.view))
         if event.action.continues or shown == present.state:
             return self.with_state(after)
-        if self.is_open and event.continues(present.source, present.last, present.press):
+        if self.is_open and event.continues(present):
             if earlier and earlier[-1].state == after:
                 # The gesture ended where it began, so that its step is dropped.
                 return History(earlier, self.at - 1)

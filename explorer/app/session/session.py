@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from explorer.app.session.clock import moment_of
 from explorer.app.session.history import History, UserAction, restore, start_history
@@ -79,8 +80,7 @@ def move_to(number: int) -> HistoryMove:
     return HistoryMove(lambda history: history.move_to(number))
 
 
-@dataclass(frozen=True)
-class _Posted:
+class _Posted(NamedTuple):
     change: Change | HistoryMove
     key: object
     stamp: float

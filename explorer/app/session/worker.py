@@ -22,9 +22,8 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from logging.handlers import RotatingFileHandler
-from typing import IO, Any, cast
+from typing import IO, Any, NamedTuple, cast
 
 from explorer.app.session.clock import Timer
 from explorer.app.session.latest import LatestWins
@@ -49,8 +48,7 @@ class CancelledError(Exception):
     """The task ends early because its parent cancelled it."""
 
 
-@dataclass(frozen=True)
-class Channel:
+class Channel(NamedTuple):
     """The connection of a task to its parent.
 
     Attributes:
@@ -67,27 +65,23 @@ class Channel:
             raise CancelledError(CANCELLED)
 
 
-@dataclass(frozen=True)
-class _Order:
+class _Order(NamedTuple):
     """A task to do: a function of a module; with `is_sending` its last argument is a `Channel`."""
 
     number: int
-    module: str
-    task: str
+    task: Callable[..., Any]
     arguments: tuple[Any, ...]
     is_sending: bool
 
 
-@dataclass(frozen=True)
-class _Cancel:
+class _Cancel(NamedTuple):
     """A request to cancel the order with a number, so many seconds after its start."""
 
     number: int
     after: float
 
 
-@dataclass(frozen=True)
-class _Reply:
+class _Reply(NamedTuple):
     """The result of an order: a value or a problem, with its traceback if it is unexpected.
 
     If it is not the last one, it is a value that the task sends before it is done.
@@ -109,8 +103,7 @@ def _read_frame(stream: IO[bytes] | None) -> Any:
     return pickle.load(cast("IO[bytes]", stream))  # noqa: S301 - from our own process and pipe
 
 
-@dataclass(frozen=True)
-class _Request:
+class _Request(NamedTuple):
     key: object
     order: _Order
     done: Callable[[Any], None]
@@ -177,7 +170,7 @@ class Worker:
                 takes a `Channel` as its last argument.
         """
         number = next(self._numbers)
-        order = _Order(number, task.__module__, task.__name__, arguments, receive is not None)
+        order = _Order(number, task, arguments, receive is not None)
         self._queue.post(key, number, _Request(key, order, done, failed, receive))
         return number
 
@@ -251,7 +244,7 @@ class Worker:
             request.done(reply.value)
         else:
             if reply.trace:
-                task = request.order.task.replace("_", " ")
+                task = request.order.task.__name__.replace("_", " ")
                 message = f"Something went wrong in the worker ({task}): {reply.problem}"
                 self._report_error(request, message, reply.trace)
             request.failed(reply.problem)
@@ -259,7 +252,7 @@ class Worker:
     def _report_error(self, request: _Request, message: str, trace: str = "") -> None:
         order = request.order
         texts = [repr(each)[:MOST_TEXT] for each in order.arguments]
-        place = f"{trace}{order.module}.{order.task}, called with"
+        place = f"{trace}{order.task.__module__}.{order.task.__name__}, called with"
         self._report(log_error(message, "\n".join((place, *texts))))
 
     def _is_cancelled(self, request: _Request) -> bool:
@@ -360,7 +353,7 @@ def main(preload: Sequence[str]) -> None:
     os.dup2(2, 1)
     for module in preload:
         importlib.import_module(module)
-    # Orders name modules too: two threads that import at a time could wait for each other.
+    # Orders import modules too: two threads that import at a time could wait for each other.
     inbox = _Inbox(os.fdopen(os.dup(0), "rb"))
     # Until the kernels are compiled, or loaded, they run interpreted.
     warm_in_background()
@@ -405,14 +398,14 @@ class _Inbox:
 def _reply(order: _Order, inbox: _Inbox, replies: IO[bytes]) -> _Reply:
     arguments, start = order.arguments, time.monotonic()
     if order.is_sending:
-        channel = Channel(
-            lambda value: _write_frame(replies, _Reply(value, is_last=False)),
-            lambda: inbox.is_cancelled(order.number, start),
-        )
+
+        def send(value: object) -> None:
+            _write_frame(replies, _Reply(value, is_last=False))
+
+        channel = Channel(send, lambda: inbox.is_cancelled(order.number, start))
         arguments = (*arguments, channel)
     try:
-        task: Callable[..., Any] = getattr(importlib.import_module(order.module), order.task)
-        return _Reply(task(*arguments))
+        return _Reply(order.task(*arguments))
     except (ExplorerError, CancelledError) as error:
         return _Reply(problem=str(error))
     except BrokenPipeError:

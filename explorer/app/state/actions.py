@@ -156,7 +156,7 @@ class UseNearest(Action):
             return move_to(state, state.pose)
         value, words = nearest
         after = SetJoint(unclosed.joint, value).apply(state)
-        return replace(after, taken=states.Substituted(after.joints, words))
+        return replace(after, taken=(after.joints, words))
 
 
 @dataclass(frozen=True)

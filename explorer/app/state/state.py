@@ -20,11 +20,12 @@ from explorer.app.state.paths import Journey, Mode, Paths
 from explorer.app.state.presses import Press
 from explorer.app.state.view import View
 from explorer.mechanism import pose as poses, tilt_torsion as tilts
-from explorer.mechanism.configuration import Point, offset_of, point_of, pose_with, position_of
+from explorer.mechanism.configuration import Point, offset_of, point_of, position_of
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics import arrays
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_SHARE
@@ -65,19 +66,6 @@ class Unclosed:
         name = JOINTS[self.joint]
         asked = format_number(self.asked, 6)
         return f"{name} = {asked} cannot close the {kind} {tetrahedra}; {advice}."
-
-
-@dataclass(frozen=True)
-class Substituted:
-    """A length that was taken in the place of the one asked for.
-
-    Attributes:
-        joints: The joints that it led to; the words hold while they are the present ones.
-        words: Why it was taken, a sentence.
-    """
-
-    joints: Joints
-    words: str
 
 
 @dataclass(frozen=True)
@@ -151,7 +139,8 @@ class State:
         hold: Whether the pose or the legs stay when the design changes.
         unclosed: Why the joints do not close; None if they do.
         view: What is shown.
-        taken: The length that was last taken in the place of one that does not close.
+        taken: The joints that a length led to that was taken in the place of one that does not
+            close, and why it was taken, a sentence; None if none was.
         gesture: The gesture that led to the pose; None if none did, as after a change of the
             design.
         paths: The path that is played, and the settings of the next one.
@@ -174,7 +163,7 @@ class State:
     hold: Hold = field(default="pose", metadata=STAYS)
     unclosed: Unclosed | None = None
     view: View = field(default_factory=View, metadata=STAYS)
-    taken: Substituted | None = field(default=None, compare=False, metadata=TRANSIENT)
+    taken: tuple[Joints, str] | None = field(default=None, compare=False, metadata=TRANSIENT)
     gesture: Gesture | None = field(default=None, metadata=TRANSIENT)
     paths: Paths = field(default_factory=Paths)
     optimisation: OptimisationPart = field(
@@ -247,13 +236,14 @@ class State:
         Raises:
             InputError: The position is not finite, or too far away.
         """
-        return pose_with(self.design, self.view.at, position, orientation)
+        b4 = arrays.triple(np.array(position) - self.offset(orientation.rotation))
+        return Pose(b4, orientation.quaternion)
 
     @property
     def remark(self) -> str | None:
         """Why the present length is not the one that the user set; None where it is."""
-        taken = self.taken
-        return taken.words if taken is not None and taken.joints == self.joints else None
+        joints, words = self.taken or (None, "")
+        return words if joints == self.joints else None
 
     @property
     def journey(self) -> Journey | None:

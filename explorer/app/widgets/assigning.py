@@ -123,8 +123,7 @@ def _same(a: object, b: object) -> bool:
     if a is b:
         return True
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        one, other = np.asarray(a), np.asarray(b)
-        return one.shape == other.shape and bool((one == other).all())
+        return np.array_equal(cast("Any", a), cast("Any", b))
     if is_columns(a) and is_columns(b):
         # Where a chart has no value it is not a number.
         pairs = zip(a, b, strict=False)

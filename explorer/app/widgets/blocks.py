@@ -10,8 +10,7 @@ from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, TEAL, VIOLET
 from explorer.app.widgets.markup import box, caption, dim, meter, row, swatch, table
 from explorer.measures.blocks import block as kinds
 from explorer.numerics.number_text import format_decimals
-from explorer.singularity.colours import Rgb, css
-from explorer.workspace.position_bands import SHARE_COLOURS, SHARES
+from explorer.singularity.colours import SHARE_COLOURS, SHARES, Rgb, css
 
 KIND_COLOURS: dict[kinds.Kind, Rgb] = {"actuator": BLUE, "dimension": ORANGE}
 # Between the components of a vector, which stay on one line.

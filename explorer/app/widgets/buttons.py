@@ -179,13 +179,10 @@ def open_button(
     *,
     press: str = "",
     hint: str = "",
-    label: str = "",
     class_name: str = "",
 ) -> str:
     """Return a button as HTML that opens the tab or the dialog with a title."""
-    return press_button(
-        press, "", content, hint=hint, label=label, class_name=class_name, opens=title
-    )
+    return press_button(press, "", content, hint=hint, class_name=class_name, opens=title)
 
 
 def figure(opens: str, name: str, value: str, *, hint: str, look: str = "") -> str:
@@ -202,7 +199,7 @@ def figure(opens: str, name: str, value: str, *, hint: str, look: str = "") -> s
     return open_button(opens, content, hint=hint, class_name="ex-figure")
 
 
-def running(opens: str, title: str, words: str, share: float | None, buttons: str) -> str:
+def activity(opens: str, title: str, words: str, share: float | None, buttons: str) -> str:
     """Return what runs or waits for an answer as HTML, for the bar.
 
     Args:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Annotated
@@ -160,7 +160,7 @@ def _force_lines(
     facts = blocks.largest_loads(found)
     if added is not None:
         more = blocks.worst_force(added, "the added force")
-        facts = replace(facts, facts=(*facts.facts, *more))
+        facts = facts.add(*more)
     refused = (blocks.nearest_carrying(found, nearest, tool),) if found.share > 1.0 else ()
     yield from lines((blocks.verdict(found), *refused, *blocks.reaction_tables(found)))
     yield from lines((blocks.most_of_actuators(worst), facts))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from xml.etree.ElementTree import Element
 
 import msgspec
@@ -224,7 +223,7 @@ def _in_the_pose(data: ReportData) -> Iterator[Block]:
         most = forces.largest_loads(loaded)
         if data.design.payload.force_n:
             worst = forces.worst_force(worst_payload_force(data), "the payload's force")
-            most = replace(most, facts=(*most.facts, *worst))
+            most = most.add(*worst)
         yield most
 
 

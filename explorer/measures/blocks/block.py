@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
+
+import msgspec
 
 from explorer.numerics.number_text import (
     format_column,
@@ -20,7 +21,7 @@ from explorer.numerics.number_text import (
     format_fitted,
     format_number,
 )
-from explorer.workspace.position_bands import SHARES
+from explorer.singularity.colours import SHARES
 
 Look = Literal["within", "close", "beyond"]
 """Whether a value keeps its bounds, is close to them, or beyond."""
@@ -29,13 +30,12 @@ Kind = Literal["actuator", "dimension"]
 """What a bar stands for, which the page shows in its colour."""
 
 CLOSE = SHARES[-2]
-"""Share of a limit from which a load is close to it."""
+"""Utilisation of a limit from which a load is close to it."""
 # Largest share that is told as a number, and distance from the limit up to which with a decimal.
 MOST_SHARE, NEAR = 1e4, 0.005
 
 
-@dataclass(frozen=True, slots=True)
-class Number:
+class Number(msgspec.Struct, frozen=True):
     """A number with its unit.
 
     Attributes:
@@ -61,8 +61,7 @@ class Number:
         return format_number(self.value, self.digits, size=self.size, infinite="∞")
 
 
-@dataclass(frozen=True, slots=True)
-class Vector:
+class Vector(msgspec.Struct, frozen=True):
     """Components of a vector.
 
     Attributes:
@@ -88,21 +87,20 @@ def direction(values: Sequence[float]) -> Vector:
     return Vector(values, digits=2, span=0.5)
 
 
-@dataclass(frozen=True, slots=True)
-class Share:
-    """A share of a limit, of which 1 is the limit; None without a limit."""
+class Share(msgspec.Struct, frozen=True):
+    """The utilisation of a limit, of which 1 is the limit; None without a limit."""
 
     value: float | None
 
     @property
     def look(self) -> Look | None:
-        """Whether the share is within the limit, close to it, or beyond; None without a limit."""
+        """Whether it is within the limit, close to it, or beyond; None without a limit."""
         if self.value is None:
             return None
         return "beyond" if self.value > 1.0 else "close" if self.value > CLOSE else "within"
 
     def text(self, decimals: int = 0) -> str:
-        """Return the share in per cent, with a decimal near the limit; one beyond it says so."""
+        """Return it in per cent, with a decimal near the limit; one beyond the limit says so."""
         if self.value is None:
             return "no limit"
         if not self.value < MOST_SHARE:
@@ -118,8 +116,7 @@ Part: TypeAlias = "str | Number | Vector | Share"
 Words: TypeAlias = "str | tuple[Part, ...]"
 
 
-@dataclass(frozen=True, slots=True)
-class Names:
+class Names(msgspec.Struct, frozen=True):
     """A column of words.
 
     Attributes:
@@ -133,8 +130,7 @@ class Names:
     wide: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
+class Column(msgspec.Struct, frozen=True):
     """A column of numbers with equal decimals.
 
     Attributes:
@@ -174,7 +170,9 @@ class Column:
         texts = [""] * len(self.values)
         for unit in {*self.unit}:
             rows = [row for row, each in enumerate(self.unit) if each == unit]
-            part = replace(self, values=[self.values[row] for row in rows], unit=unit)
+            part = msgspec.structs.replace(
+                self, values=[self.values[row] for row in rows], unit=unit
+            )
             for row, text in zip(rows, part.texts, strict=True):
                 texts[row] = text
         return texts
@@ -194,16 +192,14 @@ class Column:
         return isinstance(self.unit, str)
 
 
-@dataclass(frozen=True, slots=True)
-class Shares:
-    """A column of shares of limits, each beside a bar; None without a limit."""
+class Shares(msgspec.Struct, frozen=True):
+    """A column of utilisations of limits, each beside a bar; None without a limit."""
 
     head: str
     values: Sequence[float | None]
 
 
-@dataclass(frozen=True, slots=True)
-class Bars:
+class Bars(msgspec.Struct, frozen=True):
     """A column of bars.
 
     Attributes:
@@ -215,8 +211,7 @@ class Bars:
     kinds: Sequence[Kind]
 
 
-@dataclass(frozen=True, slots=True)
-class Table:
+class Table(msgspec.Struct, frozen=True):
     """A table, of which the first column names the rows.
 
     Attributes:
@@ -233,8 +228,7 @@ class Table:
     looks: Sequence[Look | None] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Fact:
+class Fact(msgspec.Struct, frozen=True):
     """A thing with its name.
 
     Attributes:
@@ -254,17 +248,19 @@ class Fact:
     wide: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Facts:
+class Facts(msgspec.Struct, frozen=True):
     """Facts below a title."""
 
     title: str
     facts: Sequence[Fact]
     hint: str = ""
 
+    def add(self, *facts: Fact) -> Facts:
+        """Return these facts with others below them."""
+        return Facts(self.title, (*self.facts, *facts), self.hint)
 
-@dataclass(frozen=True, slots=True)
-class Statement:
+
+class Statement(msgspec.Struct, frozen=True):
     """A result in a few words, and a sentence on it.
 
     Attributes:
@@ -282,8 +278,7 @@ class Statement:
     act: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Split:
+class Split(msgspec.Struct, frozen=True):
     """Parts that make a whole: their names, and the share of each.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""The forces that hold a load in a pose, the shares of the limits, and the most that is held."""
+"""The forces that hold a load in a pose, utilisations of the limits, and the most that is held."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ def verdict(loaded: LoadedPose, load: str = "load") -> block.Statement:
     if not has_limits(loaded.design):
         words = "Shares need limits of the actuators, the struts or the guide."
         return block.Statement("No limits are given", words)
-    share, part = loaded.share, PART_NAMES[loaded.worst]
-    if share > 1.0:
-        words = part.capitalize(), " needs ", block.Share(share), " of its limit"
+    utilisation, part = loaded.share, PART_NAMES[loaded.worst]
+    if utilisation > 1.0:
+        words = part.capitalize(), " needs ", block.Share(utilisation), " of its limit"
         return block.Statement(f"Does not hold the {load}", words, "beyond")
-    look = block.Share(share).look
+    look = block.Share(utilisation).look
     near = ", close to a limit" if look == "close" else ""
-    words = "Largest share of a limit: ", part, ", ", block.Share(share)
+    words = "Largest share of a limit: ", part, ", ", block.Share(utilisation)
     return block.Statement(f"Holds the {load}{near}", words, look)
 
 
 def reaction_tables(loaded: LoadedPose) -> Iterator[block.Block]:
     """Yield the forces of the actuators, and the loads of struts and guide, beside their limits."""
-    held, design = loaded.reactions, loaded.design
-    spread = np.where(np.isfinite(held.spread), held.spread, 0.0)
+    result, design = loaded.reactions, loaded.design
+    spread = np.where(np.isfinite(result.spread), result.spread, 0.0)
     push, pull = (side.tolist() for side in design.actuators.limits)
-    values = held.actuators.tolist()
+    values = result.actuators.tolist()
     size = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
-    shares, is_limited = utilisations(loaded), has_limits(design)
+    used, is_limited = utilisations(loaded), has_limits(design)
     if force := design.payload.force_n:
         words = "The payload's force of ", block.Number(force, " N"), " acts too, in any direction."
         yield block.Statement("", words)
@@ -61,7 +61,7 @@ def reaction_tables(loaded: LoadedPose) -> Iterator[block.Block]:
         "Forces of the actuators",
         (
             block.Names("actuator", JOINTS),
-            block.Column("force", values, " N", size=_size(held.actuators, spread[:6])),
+            block.Column("force", values, " N", size=_size(result.actuators, spread[:6])),
             *_process(loaded, spread[:6], " N"),
             block.Names("sense", [_sense(drop_rounding(value, size)) for value in values]),
             *(
@@ -69,12 +69,12 @@ def reaction_tables(loaded: LoadedPose) -> Iterator[block.Block]:
                 for head, limits in (("push at most", push), ("pull at most", pull))
                 if is_limited
             ),
-            *((block.Shares("of its limit", shares[:6]),) if is_limited else ()),
+            *((block.Shares("of its limit", used[:6]),) if is_limited else ()),
         ),
         "A positive force pushes the value of its joint up.",
     )
     metres = np.repeat([1e-3 * design.unit_mm, 1.0, 1e-3 * design.unit_mm], 2)
-    loads = metres * np.concatenate([held.bending, held.guide_force, held.guide_moment])
+    loads = metres * np.concatenate([result.bending, result.guide_force, result.guide_moment])
     guide = design.guide
     limits = [
         math.inf if limit is None else limit
@@ -91,7 +91,7 @@ def reaction_tables(loaded: LoadedPose) -> Iterator[block.Block]:
             *(
                 (
                     block.Column("at most", limits, units, infinite="no limit", wide=True),
-                    block.Shares("of its limit", shares[6:]),
+                    block.Shares("of its limit", used[6:]),
                 )
                 if is_limited
                 else ()

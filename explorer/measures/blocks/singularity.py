@@ -74,14 +74,15 @@ def margin_table(snapshot: Snapshot) -> block.Table:
 
 def tetrahedra(snapshot: Snapshot) -> block.Table:
     """Return the tetrahedra that are flat where a margin is zero, and their volumes."""
-    size = float(snapshot.volume_sizes.max())
     return block.Table(
         "Tetrahedra",
         (
             block.Names("margin", [f"δ{number}" for number in (1, 2, 3)]),
             block.Names("zero when", INCIDENCES),
             block.Names("tetrahedron", [" ".join(points) for points in TETRAHEDRA]),
-            block.Column("volume", snapshot.volumes.tolist(), " units³", size=size),
+            block.Column(
+                "volume", snapshot.volumes.tolist(), " units³", size=snapshot.design.reach**3
+            ),
         ),
         "A margin is zero where its tetrahedron is flat.",
     )
@@ -115,7 +116,7 @@ def conditioning(snapshot: Snapshot) -> block.Facts:
         return (block.Number(float(value), digits=5, size=1.0, span=1.0),)
 
     worst = int(snapshot.transmissions.argmin())
-    determinant = block.Number(snapshot.determinant, " units³", size=snapshot.determinant_size)
+    determinant = block.Number(snapshot.determinant, " units³", size=snapshot.design.reach**3)
     return block.Facts(
         "Conditioning",
         (

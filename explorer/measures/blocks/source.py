@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import Design
@@ -20,8 +19,7 @@ PoseTopic = Literal["singularity", "interference"]
 LoadTopic = Literal["forces", "accuracy"]
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """The command line and the Python that give an answer.
 
     Attributes:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from explorer.app.features.compare import work
 from explorer.app.features.feature import Services
-from explorer.app.scene.creases import Drawn
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import COMPARED, NO_MESH, add_label, add_lines, add_translucent
+from explorer.app.scene.surfaces import Drawn
 from explorer.app.state.compared import SLOTS
 from explorer.app.widgets.assigning import Update
 from explorer.measures.box import corners_of

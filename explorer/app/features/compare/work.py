@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from explorer.app.features.workspace.work import LIVE_TOLERANCE, Rows, rows_of
-from explorer.app.scene.bands import Shell
 from explorer.app.scene.placing import outline
+from explorer.app.scene.surfaces import Shell
 from explorer.app.session.feed import Feed
 from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame

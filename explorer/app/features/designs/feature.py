@@ -14,8 +14,7 @@ from html import escape
 import viser
 
 from explorer.app.features.feature import Export, Feature, Services, Tab
-from explorer.app.inputs.control import Bound
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.session.latest import LatestWins
 from explorer.app.session.session import Who
 from explorer.app.state.actions import MarkSaved, Open, SetName

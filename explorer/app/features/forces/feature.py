@@ -20,8 +20,7 @@ from explorer.app.features.forces.loads import (
 )
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle
 from explorer.app.features.forces.tasks import nearest_position, weights_of_parts
-from explorer.app.inputs.control import Bound
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.state.actions import SetPose
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import Weighed
@@ -115,7 +114,7 @@ class ForcesPanel:
         most, size = forces.largest_loads(loaded), math.hypot(*frame.state.view.forces.force)
         if size > 0.0:
             facts = forces.worst_force(without_force(loaded).worst_force(size), "this force")
-            most = replace(most, facts=(*most.facts, *facts))
+            most = most.add(*facts)
         turn = press_button(WORST, "", "Turn", hint=WORST_HINT, class_name="ex-link")
         return render((most,), {"turn": turn})
 

@@ -156,7 +156,7 @@ class ForcesScene(ScenePart):
         yield from self._shafts.between(tails, necks, radius)
         radii = np.minimum(HEAD * size, heads * HEAD / HEAD_LENGTH)
         scales = np.maximum(np.concatenate([radii, radii, heads], axis=1), NOTHING)
-        yield from self._heads.place(necks, shapes.turned_to(vectors), scales)
+        yield from self._heads.place(necks, shapes.turn_z_to(vectors), scales)
         linear = [shapes.linear_colour(each) for each in colours]
         yield from self._shafts.colour(linear)
         yield from self._heads.colour(linear)

@@ -8,8 +8,7 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 import viser
 
-from explorer.app.inputs.control import At, Bound, Condition, Source
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import At, Bound, Condition, Controls, Source
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import State

@@ -15,7 +15,7 @@ from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.features.machine.actuators import FINE, FORCE, MachineControls, add_actuators
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
 from explorer.app.features.machine.words import DIRECTIONS, direction_name, machine_words
-from explorer.app.inputs.control import At, Bound
+from explorer.app.inputs.controls import At, Bound
 from explorer.app.inputs.ranges import Span, platform_span
 from explorer.app.state.actions import FULL_TURN, Action, Set, check_free
 from explorer.app.state.frame import Frame

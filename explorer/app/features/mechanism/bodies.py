@@ -47,7 +47,7 @@ PLANE_OPACITY = 0.2
 BEYOND = 0.06
 # Ends of a gap.
 BASE, PLATFORM = 0, 1
-ALONG_X = shapes.turned_to(np.array([[1.0, 0.0, 0.0]]))[0]
+ALONG_X = shapes.turn_z_to(np.array([[1.0, 0.0, 0.0]]))[0]
 
 
 class Bodies(ScenePart):

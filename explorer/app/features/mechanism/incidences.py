@@ -289,7 +289,7 @@ class Gaps(ScenePart):
             positions[index], scales[index] = ends.mean(axis=0), 1.0
         # The mark lies in the plane in which the contact is.
         normals = planes_of_singularity(placed.frame.snapshot.rotation)
-        yield from self._contacts.place(positions, shapes.turned_to(normals), scales)
+        yield from self._contacts.place(positions, shapes.turn_z_to(normals), scales)
 
 
 def visible_gaps(placed: Placed, hovered: int | None) -> dict[int, Approach]:

@@ -12,8 +12,7 @@ from explorer.app.features.mechanism.folds import add_fold_sliders
 from explorer.app.features.mechanism.modes import ModesPanel
 from explorer.app.features.mechanism.sketch import sketch
 from explorer.app.inputs import ranges
-from explorer.app.inputs.control import Bound, item
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import Bound, Controls, item
 from explorer.app.inputs.limits import bound_entry, bound_switch, limit_span
 from explorer.app.inputs.ranges import Span
 from explorer.app.state import actions

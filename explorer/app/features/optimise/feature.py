@@ -19,8 +19,7 @@ from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.state import PLACE, Optimisation, SearchRun
 from explorer.app.features.optimise.words import result_words, search_notice
 from explorer.app.features.optimise.work import complete_request, requested_box
-from explorer.app.inputs.control import At, Bound
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import At, Bound, Controls
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import JOINT, add_lines
 from explorer.app.state.actions import Action
@@ -28,7 +27,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets import charts
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import open_button, running
+from explorer.app.widgets.buttons import activity, open_button
 from explorer.measures.box import corners_of
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
@@ -313,7 +312,7 @@ def search_chip(frame: Frame) -> str:
     notice = search_notice(state)
     if notice is not None:
         buttons = "".join(button(name, state, is_main=name == ACCEPT) for name in notice.buttons)
-        return running(TAB, notice.title, notice.text, notice.share, buttons)
+        return activity(TAB, notice.title, notice.text, notice.share, buttons)
     if Optimisation.of(state).run is None and state.design in PRESETS.values():
         paper = BUTTONS[PAPER]
         words = escape(paper.label)

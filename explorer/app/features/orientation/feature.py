@@ -15,8 +15,7 @@ from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Feature, Services, Tab
 from explorer.app.features.orientation import maps, work
 from explorer.app.features.workspace.slice_map import AXES, keeps_above, level_within
-from explorer.app.inputs.control import item
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import Controls, item
 from explorer.app.inputs.ranges import Span
 from explorer.app.look import read_script
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart

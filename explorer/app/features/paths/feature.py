@@ -20,7 +20,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import press_button, running
+from explorer.app.widgets.buttons import activity, press_button
 from explorer.app.widgets.palette import Key
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.pose import rotation_from_quaternion
@@ -71,13 +71,13 @@ def path_chip(frame: Frame) -> str:
     if state.paths.is_planning:
         cancel = press_button("paths.cancel", "", "Cancel", class_name="ex-button")
         words = f"{format_number(state.paths.seconds)} s at most"
-        return running("Paths", "Planning a path", words, None, cancel)
+        return activity("Paths", "Planning a path", words, None, cancel)
     journey = state.journey
     if journey is None or not journey.is_playing:
         return ""
     pause = press_button("paths.play", "off", "Pause", class_name="ex-button")
     share = journey.at / journey.trajectory.duration
-    return running("Paths", "Playing", f"{format_decimals(journey.at, 1)} s", share, pause)
+    return activity("Paths", "Playing", f"{format_decimals(journey.at, 1)} s", share, pause)
 
 
 class PathRunner(Runner):

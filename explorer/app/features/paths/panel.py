@@ -11,8 +11,7 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.paths import actions, plots
-from explorer.app.inputs.control import Bound
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame

@@ -15,8 +15,7 @@ from explorer.app.features.forces.loads import Loads
 from explorer.app.features.optimise.work import requested_box
 from explorer.app.features.precision import tasks
 from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene
-from explorer.app.inputs.control import At
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import At, Controls
 from explorer.app.session.feed import feed_of
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Action, check_free

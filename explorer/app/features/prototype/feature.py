@@ -11,8 +11,7 @@ from explorer.app.features.feature import Export, Feature, Services, Tab
 from explorer.app.features.prototype import work
 from explorer.app.features.prototype.scene import PrototypeScene
 from explorer.app.features.prototype.work import PARTS_FEED, Parts, PartsFeed, parts_to_draw
-from explorer.app.inputs.control import Bound
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Set, draw_as

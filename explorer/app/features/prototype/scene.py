@@ -14,9 +14,9 @@ import viser
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import colliding_legs
 from explorer.app.features.prototype.work import PARTS_FEED, Parts, parts_to_draw
-from explorer.app.scene.creases import Drawn
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import BALL, CARRIAGE, NO_MESH, PLATFORM_BODY, RAIL, ROD, TUBE
+from explorer.app.scene.surfaces import Drawn
 from explorer.app.widgets.assigning import Update
 from explorer.measures.box import corners_of
 from explorer.mechanism.pose import quaternion_from_rotation

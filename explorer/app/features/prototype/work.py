@@ -12,7 +12,7 @@ from typing import TypeAlias
 import msgspec
 import numpy as np
 
-from explorer.app.scene.creases import Drawn, with_creases
+from explorer.app.scene.surfaces import Drawn, with_creases
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.frame import Frame
 from explorer.errors import ExplorerError

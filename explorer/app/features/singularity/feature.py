@@ -13,8 +13,7 @@ from explorer.app.features.mechanism.incidences import HOVER, margin_hover
 from explorer.app.features.singularity import scene
 from explorer.app.features.singularity.strata import StrataPanel
 from explorer.app.features.singularity.work import STRATA_FEED, GoToSingularity, strata_distances
-from explorer.app.inputs.control import At
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import At, Controls
 from explorer.app.inputs.ranges import length_span
 from explorer.app.state.folds import FIRST_FOLD
 from explorer.app.state.frame import Frame

@@ -23,8 +23,7 @@ from explorer.app.features.studies.folders import study_folders
 from explorer.app.features.studies.state import Brush, Studies, StudyPlan, label_of
 from explorer.app.features.studies.words import BUTTONS, acts, chips, head, legend, table
 from explorer.app.features.studies.work import study_runner
-from explorer.app.inputs.control import At, Bound, Control
-from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.controls import At, Bound, Control, Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.look import read_script
 from explorer.app.session.session import Who
@@ -32,7 +31,7 @@ from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Buttons, PressHandler, press_button, running
+from explorer.app.widgets.buttons import Buttons, PressHandler, activity, press_button
 from explorer.app.widgets.markup import alert, beside
 from explorer.app.widgets.palette import NO_OPTION
 from explorer.errors import ExplorerError
@@ -300,7 +299,7 @@ class StudyChip:
             is_disabled=run.is_cancelled,
         )
         done = 0 if run.progress is None else run.progress.done
-        return running("Studies", run.name, f"{format_number(done)} designs", run.share, cancel)
+        return activity("Studies", run.name, f"{format_number(done)} designs", run.share, cancel)
 
 
 STUDIES = Feature(

@@ -13,7 +13,7 @@ import numpy as np
 
 from explorer.app.features.forces.tasks import load_of
 from explorer.app.features.workspace import work
-from explorer.app.scene.bands import Measure
+from explorer.app.scene.surfaces import Measure
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame

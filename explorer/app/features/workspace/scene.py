@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace import feeds, work
-from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Shell
-from explorer.app.scene.creases import Drawn
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH, Patch, add_label, add_lines, add_translucent
+from explorer.app.scene.surfaces import AT_LIMIT, COLLIDING, PLAIN, Drawn, Shell
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Updates
 from explorer.measures.box import corners_of

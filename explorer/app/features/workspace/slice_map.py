@@ -15,7 +15,7 @@ from xml.etree.ElementTree import Element
 import msgspec
 import numpy as np
 
-from explorer.app.scene.bands import Colouring
+from explorer.app.scene.surfaces import Colouring
 from explorer.app.widgets.markup import reading
 from explorer.export.drawings.markup import as_html, coordinate, element
 from explorer.export.drawings.slices import Slices, cross, in_plane, map_transform, ruler

@@ -6,7 +6,7 @@ import numpy as np
 
 from explorer.app.features.workspace import work
 from explorer.app.features.workspace.feeds import orientation_word, turned_suffix
-from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Measure
+from explorer.app.scene.surfaces import AT_LIMIT, COLLIDING, PLAIN, Measure
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State

@@ -12,8 +12,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from explorer.app.features.workspace import slice_map as maps
-from explorer.app.scene.bands import PLAIN, Colouring, Measure, Shell
-from explorer.app.scene.creases import creased_faces
+from explorer.app.scene.surfaces import PLAIN, Colouring, Measure, Shell, creased_faces
 from explorer.app.session.feed import watch_of
 from explorer.app.session.worker import Channel
 from explorer.errors import ExplorerError, InputError
