@@ -22,7 +22,7 @@ from socket_tab import SocketTab
 from explorer.app import look
 from explorer.app.browser import viser_gaps
 from explorer.app.browser.viser_gaps import PLACE
-from explorer.app.features.mechanism.panel import JOINT_LABELS
+from explorer.app.features.mechanism.feature import JOINT_LABELS
 from explorer.app.features.optimise import runner
 from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.optimise.state import OptimisationRequest, SearchResult

@@ -7,6 +7,7 @@ import re
 import threading
 from types import SimpleNamespace
 from typing import Any, cast
+from xml.etree import ElementTree as ET
 
 import msgspec
 import numpy as np
@@ -15,7 +16,7 @@ from hypothesis import given, strategies as st
 from limited_designs import scaled_design
 from strategies import designs
 
-from explorer.app.features.mechanism.sketch import FIGURE_WIDTH, HEIGHT, WIDTH, figures
+from explorer.app.features.mechanism.sketch import FIGURE_WIDTH, HEIGHT, WIDTH, sketch
 from explorer.app.features.singularity.feature import measures_table
 from explorer.app.look import read_stylesheet
 from explorer.app.scene.camera import (
@@ -176,42 +177,45 @@ def test_small_share_is_not_shown_as_zero() -> None:
     assert re.search(r"1/cond J\s+[1-9]\S* × 10⁻[⁷⁸⁹]", text)
 
 
-# Height of type of 11 pixels from the top of b to the bottom of y.
-TYPE_HEIGHT = 11.0
+# Height of type of 11 pixels from the top of b to the bottom of y, and width of a character.
+TYPE_HEIGHT, CHARACTER = 11.0, 6.4
+SHARES = {"start": 0.0, "middle": 0.5, "end": 1.0}
 
 
 @given(designs())
 def test_texts_of_a_sketch_are_within_it_and_do_not_overlap(design: Design) -> None:
-    for figure, left in zip(figures(design), (0.0, WIDTH - FIGURE_WIDTH), strict=True):
-        words = (*figure.words, *(each.word for each in figure.dimensions))
-        for word in words:
-            assert left <= word.left
-            assert word.left + word.width <= left + FIGURE_WIDTH + 1e-9
-            assert 0.5 * TYPE_HEIGHT <= word.at[1] <= HEIGHT - 0.5 * TYPE_HEIGHT
-        for one, other in itertools.combinations(words, 2):
-            right = min(one.left + one.width, other.left + other.width)
-            across = right - max(one.left, other.left)
-            assert across <= 0.0 or abs(one.at[1] - other.at[1]) >= TYPE_HEIGHT, (one, other)
+    boxes: list[tuple[float, float, float, float]] = []
+    for text in ET.fromstring(sketch(design)).iter("text"):
+        name = text.text or ""
+        x, y, width = float(text.attrib["x"]), float(text.attrib["y"]), CHARACTER * len(name)
+        left = x - SHARES[text.attrib["text-anchor"]] * width
+        begin = 0.0 if name == "Base" or name[0] == "a" else WIDTH - FIGURE_WIDTH
+        assert begin - 0.1 <= left <= left + width <= begin + FIGURE_WIDTH + 0.1
+        assert 0.5 * TYPE_HEIGHT <= y <= HEIGHT - 0.5 * TYPE_HEIGHT
+        boxes.append((left, left + width, y - 0.5 * TYPE_HEIGHT, y + 0.5 * TYPE_HEIGHT))
+    assert len(boxes) == 15
+    for one, other in itertools.combinations(boxes, 2):
+        across = min(one[1], other[1]) - max(one[0], other[0])
+        down = min(one[3], other[3]) - max(one[2], other[2])
+        assert min(across, down) <= 0.1, (one, other)
 
 
 @given(designs())
 def test_dimension_is_as_long_as_its_variable_in_one_scale(design: Design) -> None:
     values: dict[str, float] = dict(zip(VARIABLES, design.variables, strict=True))
-    measured: dict[str, float] = {}
-    for figure in figures(design):
-        lengths = {each.word.text: each.line for each in figure.dimensions}
+    drawn: dict[str, float] = {}
+    for group in ET.fromstring(sketch(design)).iter("g"):
+        line = group[2].attrib
+        dx, dy = (float(line[f"{axis}2"]) - float(line[f"{axis}1"]) for axis in "xy")
+        drawn[group.attrib["data-variable"]] = dx if dy == 0.0 else -dy
+    assert sorted(drawn) == sorted(VARIABLES)
+    for names in (VARIABLES[:2], VARIABLES[2:]):
         # One scale for each figure: that of its longest dimension.
-        longest = max(lengths, key=lambda name: abs(values[name]))
-        drawn = {
-            name: (end[0] - start[0]) if start[1] == end[1] else (start[1] - end[1])
-            for name, (start, end) in lengths.items()
-        }
+        longest = max(names, key=lambda name: abs(values[name]))
         scale = drawn[longest] / values[longest]
         assert scale > 0.0
-        for name, length in drawn.items():
-            assert length == pytest.approx(scale * values[name], abs=1e-6 * FIGURE_WIDTH)
-            measured[name] = length
-    assert sorted(measured) == sorted(VARIABLES)
+        for name in names:
+            assert drawn[name] == pytest.approx(scale * values[name], abs=0.3)
 
 
 POINTS = np.random.default_rng(5).uniform(-6.0, 9.0, (20, 3))

@@ -28,7 +28,6 @@ from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
-from explorer.app.features.precision.feature import SetTolerances
 from explorer.app.features.studies.actions import PickDesign
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.view.feature import CAMERA_HINTS
@@ -271,10 +270,7 @@ OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")} |
 }
 """Commands that change the camera, the panels or the clipboard of one browser: none is there."""
 
-WHERE_IT_IS_SHOWN = {
-    StartThere: "Workspace › Go there",
-    SetTolerances: "Precision › Set these tolerances",
-}
+WHERE_IT_IS_SHOWN = {StartThere: "Workspace › Go there"}
 """Actions of commands that do nothing unless something is shown."""
 
 CONTROL_KEYS = {label: keys for feature in FEATURES for label, keys in feature.keys.items()}

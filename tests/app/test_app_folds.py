@@ -16,6 +16,7 @@ from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
 
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.feature import JOINT_LABELS, MovePanel
 from explorer.app.features.mechanism.folds import (
     RADIUS,
     Leaves,
@@ -24,7 +25,6 @@ from explorer.app.features.mechanism.folds import (
     fold_span,
     leaf_corners,
 )
-from explorer.app.features.mechanism.panel import JOINT_LABELS, MovePanel
 from explorer.app.features.singularity.feature import fold_dial
 from explorer.app.scene.placing import Placed
 from explorer.app.session.history import start_history

@@ -20,24 +20,21 @@ from services import StubWorker, services_for
 
 from explorer import Actuators, Guide, Payload, Struts, Tolerances, Tool
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.feature import GO, WORST, ForcesPanel, LoadFigure
+from explorer.app.features.forces.feature import ForcesPanel, load_figure
 from explorer.app.features.forces.loads import (
     FITTING,
     WEIGHTS_FEED,
     Loads,
     SetForce,
     fitting_scale,
+    load_of,
     nearest_feed,
 )
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle, load_tip, tool_point
-from explorer.app.features.forces.tasks import load_of
 from explorer.app.features.precision.feature import (
     BUDGET_FEED,
-    SET,
-    TYPICAL,
     BudgetPart,
     PrecisionPanel,
-    SetTolerances,
     budget_request,
 )
 from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene, drawn_times
@@ -60,6 +57,7 @@ from explorer.mechanism.design_file import PRESETS, typical_machine
 from explorer.mechanism.pose import Pose
 from explorer.singularity.colours import SINGULAR
 from explorer.statics.accuracy import SOURCES, stated_tolerances
+from explorer.statics.budget import with_tolerances
 from explorer.statics.forces import actuator_forces, strut_bending
 from explorer.statics.reactions import limited_parts
 
@@ -126,7 +124,7 @@ def test_verdict_and_bar_name_the_largest_share(factor: float, title: str, look:
     assert f"ex-{look}" in text
     assert "bending of strut 2" in text.lower()
     assert share in text
-    bar = services_for().get(LoadFigure)(Frame(state))
+    bar = services_for().get(load_figure)(Frame(state))
     assert share in bar
     assert ("ex-beyond" in bar) == (look == "beyond")
 
@@ -138,7 +136,7 @@ def test_design_without_limits_shows_forces_and_no_shares() -> None:
     assert "No limits are given" in words_of(state)
     assert "%" not in words(render(reaction_tables(found)))
     assert render([largest_loads(found)]).count("no limit") == 2
-    assert services_for().get(LoadFigure)(Frame(state)) == ""
+    assert services_for().get(load_figure)(Frame(state)) == ""
 
 
 def test_singular_pose_shows_infinite_forces() -> None:
@@ -149,7 +147,7 @@ def test_singular_pose_shows_infinite_forces() -> None:
     assert "nan" not in text.lower()
     assert "pushes<" not in text
     assert "worst direction" not in render([largest_loads(loaded_pose(state))])
-    assert "∞" in services_for().get(LoadFigure)(Frame(state))
+    assert "∞" in services_for().get(load_figure)(Frame(state))
 
 
 def test_weights_are_those_that_are_chosen() -> None:
@@ -191,7 +189,7 @@ def test_nearest_position_that_holds_the_load_is_searched_and_gone_to(
     assert drawing is not None
     assert drawing.pose is not None
     assert "mm from here" in markup(panel, frame.state)
-    desk.press(buttons, GO)
+    desk.press(buttons, "forces.go")
     assert desk.state.pose == drawing.pose
     assert services.get(Loads).of(Frame(desk.state)).share <= 1.0
     feed.follow(Frame(desk.state))
@@ -202,7 +200,7 @@ def test_press_turns_the_force_into_its_worst_direction(services: Services, desk
     ForcesPanel(services)
     show_in(desk, loaded_state())
     before = loaded_pose(desk.state)
-    desk.press(services.buttons, WORST)
+    desk.press(services.buttons, "forces.worst")
     after = desk.state
     assert math.hypot(*after.view.forces.force) == pytest.approx(10.0, rel=1e-3)
     assert loaded_pose(after).share > before.share
@@ -353,7 +351,7 @@ def test_panel_has_the_numbers_of_the_pose(services: Services) -> None:
 def test_ideal_design_is_offered_typical_values(services: Services, desk: Desk) -> None:
     panel = PrecisionPanel(services)
     assert "states no errors" in markup(panel, desk.state)
-    desk.press(services.buttons, TYPICAL)
+    desk.press(services.buttons, "precision.typical")
     assert desk.state.design == typical_machine(OPTIMAL)[0]
     assert "Assume" not in markup(panel, desk.state)
     # What the design states stays.
@@ -438,13 +436,13 @@ def test_budget_keeps_what_is_wanted_and_is_set_in_one_step(
     assert drawing.found is not None
     assert drawing.costs.worst_displacement <= 0.5
     assert len(re.findall('class="ex-meter"', text)) == len(SOURCES)
-    desk.press(services.buttons, SET)
+    desk.press(services.buttons, "precision.set")
     design = desk.state.design
     assert design != before
     # Tolerances that may be any stay.
     endless = list(stated_tolerances(design))
     endless[0], endless[6] = math.inf, math.inf
-    assert SetTolerances(tuple(endless)).apply(desk.state).design == design
+    assert with_tolerances(design, np.array(endless)) == design
     known = np.isfinite(drawing.costs.tolerances)
     np.testing.assert_array_equal(stated_tolerances(design)[known], drawing.costs.tolerances[known])
     # The costs of what is set are those that were told.
@@ -467,7 +465,7 @@ def test_budget_that_cannot_be_kept_is_reported_in_one_line(
     text = words(markup(part, before))
     assert "There is no budget" in text
     assert "actuators" in text
-    desk.press(buttons, SET)
+    desk.press(buttons, "precision.set")
     assert desk.state == before
 
 

@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism import bodies, marks
+from explorer.app.features.mechanism import bodies
 from explorer.app.features.mechanism.incidences import (
     DASHES,
     FADE_FROM,
@@ -29,7 +29,7 @@ from explorer.app.features.mechanism.incidences import (
 )
 from explorer.app.features.singularity.feature import SingularityPanel, distance_table
 from explorer.app.features.singularity.work import GoToSingularity, GoToStratum
-from explorer.app.features.view.ground import TO_SUN, shadow_outlines
+from explorer.app.features.view.feature import TO_SUN, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import linear_colour, plate
 from explorer.app.state.actions import Open, SetJoint, SetPose
@@ -310,22 +310,6 @@ def test_tetrahedron_that_fails_is_outlined_even_if_it_is_switched_off(
     nodes = draw(tetrahedra, viewed(state, tetrahedra=(False, False, False)))
     outlined = {i for i in range(3) if nodes[f"/tetrahedra/{i + 1}/edges"]["visible"]}
     assert outlined == {*state.unclosed.failing} != set()
-
-
-# The gizmo
-
-
-def test_gizmo_is_small_and_faint_where_it_would_hide_a_gap(services: Services) -> None:
-    handle = services.get(marks.DragHandle)
-    # At the last pose b4 is on the base plane.
-    for state, look in (
-        (open_state(OPTIMAL), marks.CLEAR_HANDLE),
-        (approaching(3)[-1], marks.FAINT_HANDLE),
-    ):
-        values = by_name(handle.updates(Placed(Frame(state))))["/handle"]
-        assert (values["scale"], values["opacity"]) == look
-    # a1 on the platform plane is far from b4.
-    assert not marks.hides_a_gap(Placed(Frame(approaching(1)[-1])))
 
 
 # Colours

@@ -19,7 +19,8 @@ from socket_tab import SocketTab
 import explorer.app
 from explorer.app.features.optimise.actions import CancelRun, EndRun, StartRun
 from explorer.app.features.optimise.state import Optimisation, SearchResult
-from explorer.app.features.paths.actions import Advance, CancelPlan, Go, Play, SetPathTime
+from explorer.app.features.paths.actions import Advance, Go, Play, SetPathTime
+from explorer.app.features.paths.panel import CANCEL
 from explorer.app.features.singularity.work import GoToSingularity
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.server import Running
@@ -228,7 +229,7 @@ def test_search_is_one_step_and_no_step_is_undone_meanwhile() -> None:
 
 def test_page_drawn_again_after_undo_leaves_what_can_be_redone(recorder: Recorder) -> None:
     planned = Set("paths.kind", "planned")
-    for action in (planned, Go(), CancelPlan(), StartRun(), EndRun(1, CANCELLED)):
+    for action in (planned, Go(), CANCEL, StartRun(), EndRun(1, CANCELLED)):
         recorder.do(action)
     words = recorder.words
     recorder.move(-len(words))

@@ -14,7 +14,7 @@ from hypothesis import given, strategies as st
 
 from explorer.app.features.feature import Services
 from explorer.app.features.machine.feature import MachinePanel
-from explorer.app.features.mechanism.panel import DesignPanel, MovePanel
+from explorer.app.features.mechanism.feature import DesignPanel, MovePanel
 from explorer.app.inputs.limits import limit_span, push_other_end
 from explorer.app.inputs.ranges import (
     Span,

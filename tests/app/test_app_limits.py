@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, Design, Limits, Pose, evaluate
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.panel import DesignPanel
+from explorer.app.features.mechanism.feature import DesignPanel
 from explorer.app.features.optimise.words import limit_rows
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.state.actions import Open

@@ -16,9 +16,8 @@ from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from explorer.app.features.feature import Services
-from explorer.app.features.machine.feature import MachinePanel, SetToolAngle
+from explorer.app.features.machine.feature import MachinePanel, SetToolAngle, machine_words
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
-from explorer.app.features.machine.words import machine_words
 from explorer.app.scene.placing import HALF_JOINT, Placed
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Open, Set

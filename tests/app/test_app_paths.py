@@ -18,11 +18,10 @@ from desk import Desk
 from services import StubDownloads, StubWorker, services_for
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.tasks import WeightsRequest, load_of, weights_of_parts
+from explorer.app.features.forces.loads import load_of, weights_of_parts
 from explorer.app.features.paths import feature
 from explorer.app.features.paths.actions import (
     Advance,
-    CancelPlan,
     Go,
     Play,
     SetPathTime,
@@ -32,6 +31,7 @@ from explorer.app.features.paths.actions import (
 )
 from explorer.app.features.paths.feature import DIED, PathRunner, PathScene
 from explorer.app.features.paths.panel import (
+    CANCEL,
     ENDS,
     MODES,
     PRESENT,
@@ -322,7 +322,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
     os.kill(process, signal.SIGSTOP)
     bench.do(SetPose(open_state(OPTIMAL).pose), Go())
     assert "Planning, for 2 s at most" in str(plan_words(bench.wait(lambda s: s.paths.is_planning)))
-    bench.do(CancelPlan())
+    bench.do(CANCEL)
     bench.wait_for_plan(2)
     assert bench.runner.worker.wait_until_idle(60.0)
     assert bench.state.paths.problem is None
@@ -337,7 +337,7 @@ def test_plan_of_a_process_keeps_everything_and_can_be_cancelled_and_begun_again
 def test_plan_that_comes_late_or_for_another_design_is_not_taken() -> None:
     state = Go().apply(to_plan())
     journey = Journey("planned", "", OPTIMAL, (open_state(OPTIMAL).pose, GOAL))
-    for late in (CancelPlan().apply(state), Go().apply(state)):
+    for late in (CANCEL.apply(state), Go().apply(state)):
         assert TakePlan(1, journey, None).apply(late) == late
     assert TakePlan(1, journey, None).apply(state).pose == journey.poses[0]
     changed = SetVariable("b2", 2.7).apply(state)
@@ -504,7 +504,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
     PathRunner(services_for()).follow(Frame(state))
     _, task, arguments, *_ = orders[-1]
     poses = task(*arguments).poses
-    own = weights_of_parts(WeightsRequest(PRESS, 3000.0))
+    own = weights_of_parts((PRESS, 3000.0))
     weights = replace(own, on_platform=(*own.on_platform, PRESS.payload))
     along = path_loads(PRESS, poses, load_of(state), tool=state.tool, weights=weights)
     assert 0.5 < along.share <= 1.0 + 1e-4

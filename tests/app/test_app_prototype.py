@@ -16,8 +16,13 @@ from services import StubWorker
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs
 from explorer.app.features.mechanism.marks import DragHandle
-from explorer.app.features.prototype.feature import FIT, PrototypePanel, trouble_of
-from explorer.app.features.prototype.scene import PrototypeScene, places_of
+from explorer.app.features.prototype.feature import (
+    FIT,
+    PrototypePanel,
+    PrototypeScene,
+    places_of,
+    trouble_of,
+)
 from explorer.app.features.prototype.work import (
     PARTS_FEED,
     Parts,
@@ -246,10 +251,10 @@ def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed
     with pytest.raises(InputError) as refusal:
         make_prototype(state.design)
     frame = Frame(state)
-    assert "Making the parts" in (trouble_of(frame, feed) or "")
+    assert "Making the parts" in trouble_of(frame, feed)
     feed.follow(frame)
     assert parts_to_draw(feed) is None
-    trouble = trouble_of(frame, feed) or ""
+    trouble = trouble_of(frame, feed)
     assert str(refusal.value)[1:] in trouble
     assert "carriages 2 and 3" in trouble
     # In this home pose no unit helps, so that none is offered.
@@ -257,10 +262,10 @@ def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed
     turned = Frame(with_prototype(open_state(msgspec.structs.replace(OPTIMAL, home=home))))
     feed.follow(turned)
     assert parts_to_draw(feed) is None
-    assert FIT not in (trouble_of(turned, feed) or "")
+    assert FIT not in trouble_of(turned, feed)
     feed.follow(Frame(with_prototype()))
     assert parts_to_draw(feed) is not None
-    assert trouble_of(Frame(with_prototype()), feed) is None
+    assert trouble_of(Frame(with_prototype()), feed) == ""
 
 
 def test_press_sets_the_unit_with_which_the_parts_fit(
@@ -294,7 +299,7 @@ def test_pose_beyond_the_joint_limits_of_the_parts_is_reported(feed: PartsFeed) 
         parts.prototype.sizes, state.pose.position, state.pose.rotation
     )
     assert hindrances
-    trouble = trouble_of(Frame(state), feed) or ""
+    trouble = trouble_of(Frame(state), feed)
     assert "do not take this pose" in trouble
     assert all(each[1:] in trouble for each in hindrances)
 

@@ -21,8 +21,11 @@ from explorer.app.features.mechanism import modes
 from explorer.app.features.mechanism.feature import limits_figure
 from explorer.app.features.singularity import work
 from explorer.app.features.singularity.feature import (
+    GOALS,
     SingularityPanel,
+    StrataPanel,
     distance_table,
+    distances_of,
     performance_table,
     summary,
 )
@@ -37,7 +40,6 @@ from explorer.app.features.singularity.scene import (
     NearestGhost,
     show_button,
 )
-from explorer.app.features.singularity.strata import GOALS, StrataPanel, distances_of
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetMode, SetPosition

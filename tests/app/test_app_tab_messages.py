@@ -42,7 +42,7 @@ def test_switch_of_the_view_switches_its_part_and_no_other(running: Running) -> 
     def tetrahedron_of(index: int) -> Callable[[View], bool]:
         return lambda view: view.tetrahedra[index]
 
-    parts = {label: part_of(name) for label, name in LAYERS.items()}
+    parts = {label: part_of(name) for label, (name, _) in LAYERS.items()}
     for index, points in enumerate(TETRAHEDRA):
         parts[f"δ{index + 1}: {' '.join(points)}"] = tetrahedron_of(index)
     session = running.page.session

@@ -25,9 +25,9 @@ from explorer.app.features.compare.feature import Pin
 from explorer.app.features.compare.scene import ComparedScene
 from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.feature import MovePanel
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
-from explorer.app.features.mechanism.panel import MovePanel
 from explorer.app.features.orientation.feature import OrientationPanel, OrientationScene
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import Go

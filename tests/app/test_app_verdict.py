@@ -15,8 +15,12 @@ from services import StubWorker, services_for
 from strategies import Case, all_cases
 
 from explorer.app.features.mechanism.modes import modes_table
-from explorer.app.features.singularity.feature import distance_table, summary
-from explorer.app.features.singularity.strata import distances_of, neighbours
+from explorer.app.features.singularity.feature import (
+    distance_table,
+    distances_of,
+    neighbours,
+    summary,
+)
 from explorer.app.features.singularity.work import STRATA_FEED, GoToSingularity
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame

@@ -68,7 +68,7 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
     services, first = services_for(), open_state(OPTIMAL)
     feed = services.get(feeds.VOLUME_FEED)
     assert volume_text(feed.drawing) == "–"
-    assert "computing" in volume_headline(Frame(first), feed)
+    assert "Computing" in volume_headline(Frame(first), feed)
     for state in (first, SetVariable("a3x", 17.0).apply(first)):
         feed.follow(Frame(state))
         assert not feed.is_current

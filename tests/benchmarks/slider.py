@@ -27,7 +27,7 @@ from benchmarks.page import ready_page
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
-from explorer.app.features.mechanism.panel import JOINT_LABELS
+from explorer.app.features.mechanism.feature import JOINT_LABELS
 from explorer.app.scene.placing import scene_scale
 from explorer.app.server import Running
 from explorer.app.state.actions import Open, Set

@@ -12,7 +12,7 @@ from playwright.sync_api import expect
 from server_clock import wait_until_drawn
 from tab import Tab
 
-from explorer.app.features.mechanism.panel import JOINT_LABELS
+from explorer.app.features.mechanism.feature import JOINT_LABELS
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
 from explorer.app.state.actions import Set

@@ -10,7 +10,7 @@ from tab import Tab
 
 from explorer.app.features.mechanism.folds import fold_arcs, leaf_corners
 from explorer.app.features.mechanism.incidences import EDGES, INSET
-from explorer.app.features.view.ground import ground_of, shadow_outlines
+from explorer.app.features.view.feature import ground_of, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import Set, SetPose
 from explorer.app.state.frame import Frame

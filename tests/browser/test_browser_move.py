@@ -11,9 +11,9 @@ from likeness import decoded, likeness
 from playwright.sync_api import Locator, expect
 from tab import SIZE, TRACK, Tab
 
+from explorer.app.features.mechanism.feature import JOINT_LABELS
 from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.features.mechanism.modes import mode_hover
-from explorer.app.features.mechanism.panel import JOINT_LABELS
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame

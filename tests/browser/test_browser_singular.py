@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 from playwright.sync_api import expect
 from tab import SIZE, Tab
 
 from explorer.app.features.mechanism.incidences import margin_hover
-from explorer.app.features.mechanism.marks import (
-    ARROW_LENGTH,
-    CLEAR_HANDLE,
-    FAINT_HANDLE,
-    DragHandle,
-)
-from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
 from explorer.mechanism.margins import INCIDENCES
 
@@ -60,46 +51,6 @@ def test_margin_that_is_pointed_at_fills_its_tetrahedron(tab: Tab) -> None:
     tab.wait_for(lambda: is_visible(tab, "/tetrahedra/faces"), "its tetrahedron")
     assert tab.state == before
     assert tab.running.page.session.history.step.number == number
-
-
-def test_gizmo_that_gives_way_to_a_gap_is_dragged_on(tab: Tab) -> None:
-    tab.resize((1280, 720))
-    session, gizmo = tab.running.page.session, tab.running.page.services.get(DragHandle)
-    # So high that the gap comes within the gizmo on the way down.
-    session.do(SetPosition(2, 5.0))
-    tab.look_from("isometric")
-    before = tab.state
-    assert gizmo.handle.scale == CLEAR_HANDLE[0]
-    placed = Placed(Frame(before))
-    arrow = np.array([0.0, 0.0, 1.0])
-    tip = placed.points["b4"] + 0.7 * ARROW_LENGTH * arrow
-
-    def wait_until_moved(by: float) -> None:
-        # A slow browser reports the drag long after it.
-        def is_there() -> bool:
-            way = placed.scale * (np.array(tab.state.pose.position) - before.pose.position)
-            return bool(np.allclose(way, by * arrow, atol=0.3))
-
-        tab.wait_for(is_there, f"the pose at {by}")
-
-    mouse = tab.page.mouse
-    mouse.move(*tab.on_screen(tip))
-    mouse.down()
-    mouse.move(*tab.on_screen(tip - 3.5 * arrow), steps=12)
-    tab.wait_for(lambda: gizmo.handle.scale == FAINT_HANDLE[0], "the small gizmo")
-    wait_until_moved(-3.5)
-    mouse.move(*tab.on_screen(tip - 1.0 * arrow), steps=12)
-    mouse.up()
-    wait_until_moved(-1.0)
-    tab.wait_for(lambda: gizmo.handle.scale == CLEAR_HANDLE[0], "the gizmo as it was")
-    tab.settle()
-    # The camera turns again with the next drag beside the gizmo.
-    eye = np.array(tab.client.camera.position)
-    mouse.move(640, 600)
-    mouse.down()
-    mouse.move(700, 600, steps=5)
-    mouse.up()
-    tab.wait_for(lambda: not np.allclose(tab.client.camera.position, eye), "another view")
 
 
 def is_visible(tab: Tab, node: str) -> bool:

@@ -7,7 +7,7 @@ A feature is a folder beside this module. It declares all that it adds to the pa
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, TypeVar
 
@@ -16,17 +16,20 @@ import viser
 from explorer.app.browser.downloads import Downloads
 from explorer.app.scene.camera import Cameras
 from explorer.app.scene.placing import ScenePart
-from explorer.app.session.session import Session, Who
+from explorer.app.session.session import Change, HistoryMove, Session, Who
 from explorer.app.session.worker import Worker
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.storage.user_data import Autosaver, PreferenceFile, UserData
-from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Buttons
+from explorer.app.widgets.assigning import Updates
+from explorer.app.widgets.buttons import Buttons, CopyButton, press_button
+from explorer.app.widgets.markup import dim
 from explorer.app.widgets.palette import Command, Key
 from explorer.app.widgets.theme import Theme
+from explorer.app.widgets.under_way import AnyFeed, look_of, problem, progress
 from explorer.errors import StorageError
+from explorer.measures.blocks.source import Source
 
 Place = Literal["build", "analyse", "work", "dialog"]
 Side = Literal["left", "middle", "right"]
@@ -115,11 +118,100 @@ class Services:
         except StorageError as error:
             self.complain(str(error), who)
 
+    def do_on_press(
+        self,
+        name: str,
+        change_of: Callable[[str], Action | Change | HistoryMove | None],
+        values: Container[str] | None = None,
+    ) -> None:
+        """Register that presses on the buttons with a name change the state.
+
+        Args:
+            name: The name, see `Buttons.on`.
+            change_of: Function from the value of a button to what its press does; None for nothing.
+            values: The values that a press may have; any if None.
+        """
+
+        def press(value: str, client: viser.ClientHandle) -> None:
+            change = change_of(value)
+            if change is not None:
+                self.session.do(change, who=client.client_id)
+
+        self.buttons.on(name, press, values=values)
+
+    def link(
+        self,
+        name: str,
+        command: str,
+        hint: str,
+        change: Change,
+        *,
+        words: str = "",
+        is_ready: Callable[[State], bool] | None = None,
+    ) -> str:
+        """Add a button that changes the state, and its command; return it as HTML.
+
+        Args:
+            name: The name of the button, see `Buttons.on`.
+            command: The command, from the tab to what it does.
+            hint: Sentence on what it does.
+            change: Function from the state to the action; None for none.
+            words: The words on it; those of the command if "".
+            is_ready: Function that tells whether it can be pressed; if None, whenever there is an
+                action, which must be found at once.
+        """
+        self.do_on_press(name, lambda _: change)
+
+        def has_effect() -> bool:
+            state = self.session.state
+            return change(state) is not None if is_ready is None else is_ready(state)
+
+        self.buttons.offer(command, hint, name, is_ready=has_effect)
+        words = words or command.rpartition(" › ")[2]
+        return press_button(name, "", words, hint=hint, class_name="ex-link")
+
+    def copy_button(self, tab: str, source_of: Callable[[State], Source]) -> str:
+        """Add the button of a tab that copies how its answer in a state is computed, as HTML."""
+        return CopyButton(self.buttons, tab, lambda: source_of(self.session.latest_state())).html
+
+
+def show(visible: bool, *parts: Any) -> Updates:
+    """Yield the updates that show or hide handles, and parts of the scene with a `show`."""
+    for part in parts:
+        # To look for `show` at a handle would take viser 25 µs.
+        if isinstance(part, viser.SceneNodeHandle):
+            yield part, "visible", visible
+        else:
+            yield from part.show(visible)
+
+
+def html_of(feed: AnyFeed, html: Callable[[Any], str], title: str, button: str = "") -> str:
+    """Return the drawing of a feed as HTML, pale while it is outdated, or why there is none.
+
+    Args:
+        feed: The feed.
+        html: Function from its drawing to HTML.
+        title: Title of a failure.
+        button: Label of the button that repeats a cancelled computation.
+    """
+    if feed.problem is not None:
+        return problem(feed, title, button)
+    if feed.drawing is None:
+        return dim(progress(feed).capitalize())
+    return f'<div class="{look_of(feed)}">{html(feed.drawing)}</div>'
+
+
+def show_html(handle: viser.GuiHtmlHandle, content: str) -> Updates:
+    """Yield the updates that show HTML in a panel, or hide its place if there is none."""
+    yield handle, "visible", content != ""
+    if content:
+        yield handle, "content", content
+
 
 class Panel(Protocol):
     """The content of a tab, or a part of it."""
 
-    def updates(self, frame: Frame, /) -> Iterator[Update]:
+    def updates(self, frame: Frame, /) -> Updates:
         """Yield the updates that make the panel show the frame."""
         ...
 
@@ -192,13 +284,13 @@ class Export:
         title: Name of the thing, such as "Workspace".
         hint: Sentence on what the files hold.
         formats: Names of the formats, each that of a button.
-        sender: Function that makes the function that sends a client a file in a format.
+        send: Function that sends a client a file in a format.
     """
 
     title: str
     hint: str
     formats: tuple[str, ...]
-    sender: Callable[[Services], Callable[[str, Who], None]]
+    send: Callable[[Services, str, Who], None]
 
 
 @dataclass(frozen=True)

@@ -342,7 +342,7 @@ class Set(Action):
             InputError: The state refuses the value, or it belongs to a design that is being
                 optimised.
         """
-        if self.at.startswith("design."):
+        if self.at.startswith("design"):
             check_free(state)
         return with_value(state, self.at, self.value)
 

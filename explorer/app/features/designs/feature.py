@@ -363,7 +363,7 @@ DESIGNS = Feature(
             "Design",
             "A file to open again, here or with explorer --design.",
             ("JSON",),
-            lambda services: lambda _, who: send_design(services, who),
+            lambda services, _, who: send_design(services, who),
         ),
     ),
     passing=lambda services: services.get(SavedDesigns).commands,

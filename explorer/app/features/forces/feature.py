@@ -10,23 +10,17 @@ from typing import get_args
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Services, Tab
-from explorer.app.features.forces.loads import (
-    WEIGHTS_FEED,
-    Loads,
-    SetForce,
-    nearest_feed,
-    round_force,
-)
+from explorer.app.features.feature import BarPart, Feature, InBar, Services, Tab
+from explorer.app.features.forces import loads
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle
-from explorer.app.features.forces.tasks import nearest_position, weights_of_parts
 from explorer.app.inputs.controls import Bound, Controls
-from explorer.app.state.actions import SetPose
+from explorer.app.state.actions import Action, Set, SetPose
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.app.state.view import Weighed
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import render
-from explorer.app.widgets.buttons import CopyButton, figure, press_button
+from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.markup import note
 from explorer.app.widgets.under_way import problem
 from explorer.measures.blocks import forces
@@ -34,17 +28,14 @@ from explorer.measures.blocks.block import Share, Statement
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import PART_NAMES, has_limits
 
-GO, WORST = "forces.go", "forces.worst"
-GO_HINT = "Move the platform to the nearest position that holds the load, turned as it is."
-WORST_HINT = "Turn the force into the direction that uses the largest share of a limit here."
-
 
 class ForcesPanel:
     """The verdict on the load, its controls, and tables of what holds it."""
 
     def __init__(self, services: Services) -> None:
-        gui, self._session = services.gui, services.session
-        self._loads, self._nearest = services.get(Loads), services.get(nearest_feed)
+        gui = services.gui
+        self._loads = services.get(loads.Loads)
+        self._nearest = services.get(loads.nearest_feed)
         self._controls = controls = Controls(gui, services.session)
         self._top = gui.add_html("")
         with gui.add_folder("Load at the tool (axes of the base)"):
@@ -53,7 +44,8 @@ class ForcesPanel:
                 "Force on the platform at the tool point, along x, y and z of the base; its arrow "
                 "in the scene can be dragged.",
                 Bound(
-                    lambda frame: frame.state.view.forces.force, lambda _, force: SetForce(force)
+                    lambda frame: frame.state.view.forces.force,
+                    lambda _, force: loads.SetForce(force),
                 ),
                 step=0.1,
                 small=True,
@@ -80,32 +72,31 @@ class ForcesPanel:
             )
         self._tables = gui.add_html("")
         self._most = gui.add_html("")
-        self._copy = CopyButton(services.buttons, "Forces", lambda: self._loads.source("forces"))
-        services.buttons.on(GO, self._go)
-        services.buttons.on(WORST, self._turn)
-        services.buttons.offer(
-            "Forces › Go to the nearest position that holds",
-            GO_HINT,
-            GO,
-            is_ready=lambda: self._nearest.drawing is not None,
+        self._copy = services.copy_button(
+            "Forces", lambda state: self._loads.source("forces", state)
         )
-        services.buttons.offer(
+        self._go = services.link(
+            "forces.go",
+            "Forces › Go to the nearest position that holds",
+            "Move the platform to the nearest position that holds the load, turned as it is.",
+            self._go_to_nearest,
+            words="Go",
+        )
+        self._turn = services.link(
+            "forces.worst",
             "Forces › Turn the force to its worst direction",
-            WORST_HINT,
-            WORST,
-            is_ready=lambda: any(self._session.state.view.forces.force),
+            "Turn the force into the direction that uses the largest share of a limit here.",
+            self._turn_force,
+            words="Turn",
+            is_ready=lambda state: any(state.view.forces.force),
         )
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         loaded = self._loads.of(frame)
         summary = (forces.verdict(loaded), *self._nearest_position(frame, loaded))
-        go = press_button(GO, "", "Go", hint=GO_HINT, class_name="ex-link")
-        yield (
-            self._top,
-            "content",
-            render(summary, {"go": go}, corner=self._copy.html) + "".join(self._notes(frame)),
-        )
+        top = render(summary, {"go": self._go}, corner=self._copy) + self._notes(frame)
+        yield self._top, "content", top
         yield self._tables, "content", render(forces.reaction_tables(loaded))
         yield self._most, "content", self._largest_loads(frame, loaded)
         yield from self._controls.updates(frame)
@@ -115,19 +106,20 @@ class ForcesPanel:
         if size > 0.0:
             facts = forces.worst_force(without_force(loaded).worst_force(size), "this force")
             most = most.add(*facts)
-        turn = press_button(WORST, "", "Turn", hint=WORST_HINT, class_name="ex-link")
-        return render((most,), {"turn": turn})
+        return render((most,), {"turn": self._turn})
 
-    def _notes(self, frame: Frame) -> Iterator[str]:
+    def _notes(self, frame: Frame) -> str:
+        words = ""
         if not has_limits(frame.state.design):
-            yield note("Give limits in the tab Machine to see shares of them.")
+            words += note("Give limits in the tab Machine to see shares of them.")
         if frame.state.view.is_twin:
-            yield note("These are the forces of the 4-4, not of the 6-4 twin that is drawn.")
+            words += note("These are the forces of the 4-4, not of the 6-4 twin that is drawn.")
         weights = self._loads.weights
         if weights.problem is not None:
-            yield problem(weights, "The legs have no weights", "")
+            words += problem(weights, "The legs have no weights", "")
         elif weights.request is not None and weights.drawing is None:
-            yield note("computing the weights of the parts …")
+            words += note("computing the weights of the parts …")
+        return words
 
     def _nearest_position(self, frame: Frame, loaded: LoadedPose) -> Iterator[Statement]:
         """Yield where the nearest position is that holds the load, once one is searched for."""
@@ -141,19 +133,19 @@ class ForcesPanel:
         else:
             yield forces.nearest_carrying(loaded, feed.drawing.pose, frame.state.tool)
 
-    def _go(self, _: str, client: viser.ClientHandle) -> None:
+    def _go_to_nearest(self, _: State) -> Action | None:
         drawing = self._nearest.drawing
-        if drawing is not None and drawing.pose is not None:
-            self._session.do(SetPose(drawing.pose), who=client.client_id)
+        return None if drawing is None or drawing.pose is None else SetPose(drawing.pose)
 
-    def _turn(self, _: str, client: viser.ClientHandle) -> None:
-        frame = Frame(self._session.latest_state())
-        size = math.hypot(*frame.state.view.forces.force)
-        direction = without_force(self._loads.of(frame)).worst_force(size).direction
-        if size > 0.0 and np.isfinite(direction).all():
-            force = round_force(size * direction, size)
-            action = SetForce(force, title="Force in its worst direction")
-            self._session.do(action, who=client.client_id)
+    def _turn_force(self, state: State) -> Action | None:
+        size = math.hypot(*state.view.forces.force)
+        if size == 0.0:
+            return None
+        direction = without_force(self._loads.of(Frame(state))).worst_force(size).direction
+        if not np.isfinite(direction).all():
+            return None
+        force = loads.round_force(size * direction, size)
+        return Set("view.forces.force", force, "Force", "in its worst direction")
 
 
 def without_force(loaded: LoadedPose) -> LoadedPose:
@@ -161,28 +153,27 @@ def without_force(loaded: LoadedPose) -> LoadedPose:
     return replace(loaded, load=(0.0, 0.0, 0.0, *loaded.load[3:]))
 
 
-class LoadFigure:
-    """The largest share of a limit; nothing for a design without limits."""
+def load_figure(services: Services) -> BarPart:
+    """Return the figure of the largest share of a limit, "" for a design without limits."""
+    of = services.get(loads.Loads).of
 
-    def __init__(self, services: Services) -> None:
-        self._loads = services.get(Loads)
-
-    def __call__(self, frame: Frame) -> str:
-        """Return the figure for a frame, as HTML."""
-        loaded = self._loads.of(frame)
+    def figure_of(frame: Frame) -> str:
+        loaded = of(frame)
         if not has_limits(loaded.design):
             return ""
         hint = f"Largest share of a limit under the load of this tab: {PART_NAMES[loaded.worst]}."
         share = Share(loaded.share)
         return figure("Forces", "Load here", share.text(), hint=hint, look=f"ex-{share.look}")
 
+    return figure_of
+
 
 FORCES = Feature(
     "forces",
     tabs=(Tab("analyse", "Forces", ForcesPanel, viser.Icon.ARROW_DOWN_CIRCLE),),
-    bar=(InBar("middle", LoadFigure),),
+    bar=(InBar("middle", load_figure),),
     scene=(ForcesScene, LoadHandle),
-    later_feeds=(WEIGHTS_FEED, nearest_feed),
-    tasks=(weights_of_parts, nearest_position),
+    later_feeds=(loads.WEIGHTS_FEED, loads.nearest_feed),
+    tasks=(loads.weights_of_parts, loads.nearest_position),
     lists=("Weights",),
 )

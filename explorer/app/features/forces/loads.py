@@ -1,27 +1,33 @@
-"""The load of the page: the action that sets it, the pose under it, and the feeds it needs."""
+"""The load of the page: the action that sets it, the pose under it, and the worker's tasks."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 
-from explorer.app.features.feature import Services
-from explorer.app.features.forces import tasks
 from explorer.app.scene.placing import round_step
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.measures.blocks.source import LoadTopic, Source, load_source
-from explorer.mechanism.pose import Triple
+from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.number_text import format_number
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 from explorer.statics.reactions import has_limits
 from explorer.statics.weights import Weights
+from explorer.workspace.nearest_carrying import nearest_carrying_pose
+
+if TYPE_CHECKING:
+    # The worker imports this module, and needs nothing of the page.
+    from explorer.app.features.feature import Services
 
 # Share of the reach below which and above which the arrow of a typed force has another scale.
 SHORTEST, LONGEST = 0.1, 1.0
@@ -38,12 +44,10 @@ class SetForce(Action):
     Attributes:
         force: The force.
         keeps_scale: Whether its arrow keeps its scale, as while it is dragged.
-        title: Words of the step in the history; the force if empty.
     """
 
     force: Triple
     keeps_scale: bool = False
-    title: str = ""
 
     def apply(self, state: State) -> State:
         """Return the next state.
@@ -58,8 +62,6 @@ class SetForce(Action):
 
     def words(self) -> str:
         """Return what the action does."""
-        if self.title:
-            return self.title
         numbers = ", ".join(format_number(value, 3) for value in self.force)
         return f"Force {numbers} N"
 
@@ -86,15 +88,35 @@ def fitting_scale(force: float, scale: float) -> float:
     return round_step(force / FITTING)
 
 
-def _weights_of(frame: Frame) -> tasks.WeightsRequest | None:
+def load_of(state: State) -> Six:
+    """Return the load at the tool as (F; M), base axes, in N and N × unit."""
+    forces, units = state.view.forces, 1e3 / state.design.unit_mm
+    fx, fy, fz = forces.force
+    mx, my, mz = (units * each for each in forces.moment)
+    return fx, fy, fz, mx, my, mz
+
+
+def weights_of_parts(request: tuple[Design, float]) -> Weights:
+    """Return the weights of a prototype's parts, without the payload, at a density in kg/m³.
+
+    Raises:
+        ExplorerError: The design has no prototype.
+    """
+    from explorer.prototype.assembly import make_prototype
+    from explorer.prototype.weights import machine_weights
+
+    design, density = request
+    return machine_weights(design, make_prototype(design).masses(density), payload=False)
+
+
+def _weights_request(frame: Frame) -> tuple[Design, float] | None:
     view = frame.state.view
     if view.forces.weighed != "payload and legs":
         return None
-    design = msgspec.structs.replace(frame.state.design, name="")
-    return tasks.WeightsRequest(design, view.prototype.density)
+    return msgspec.structs.replace(frame.state.design, name=""), view.prototype.density
 
 
-WEIGHTS_FEED = feed_of(tasks.weights_of_parts, _weights_of)
+WEIGHTS_FEED = feed_of(weights_of_parts, _weights_request)
 
 
 class Loads:
@@ -102,7 +124,6 @@ class Loads:
 
     def __init__(self, services: Services) -> None:
         self.weights = services.get(WEIGHTS_FEED)
-        self._session = services.session
         self._last: tuple[State, Weights | None, ToolPrecision] | None = None
 
     def of(self, frame: Frame) -> LoadedPose:
@@ -114,21 +135,30 @@ class Loads:
         state, weights = frame.state, self.weights.drawing
         if self._last is None or self._last[0] is not state or self._last[1] is not weights:
             weighs_payload = state.view.forces.weighed != "none"
-            loaded = LoadedPose(
-                state.design, state.pose, tasks.load_of(state), weights, weighs_payload
-            )
+            loaded = LoadedPose(state.design, state.pose, load_of(state), weights, weighs_payload)
             self._last = state, weights, ToolPrecision(loaded)
         return self._last[2]
 
-    def source(self, topic: LoadTopic) -> Source:
-        """Return how the present answer of a command is computed."""
-        state = self._session.latest_state()
+    def source(self, topic: LoadTopic, state: State) -> Source:
+        """Return how the answer of a command in a state is computed."""
         loaded = self.of(Frame(state))
         density = None if loaded.own is None else state.view.prototype.density
         return load_source(topic, loaded, density)
 
 
-def nearest_feed(services: Services) -> Feed[LoadedPose, tasks.NearestDrawing]:
+@dataclass(frozen=True)
+class NearestDrawing:
+    """The pose at the nearest position that holds a load; None if none was found."""
+
+    pose: Pose | None
+
+
+def nearest_position(request: LoadedPose) -> NearestDrawing:
+    """Return the nearest position that holds the load of a pose."""
+    return NearestDrawing(nearest_carrying_pose(request))
+
+
+def nearest_feed(services: Services) -> Feed[LoadedPose, NearestDrawing]:
     """Return the feed of the nearest position that holds the load, while the pose does not."""
     loads = services.get(Loads)
 
@@ -136,4 +166,4 @@ def nearest_feed(services: Services) -> Feed[LoadedPose, tasks.NearestDrawing]:
         loaded = loads.of(frame)
         return loaded if has_limits(loaded.design) and loaded.share > 1.0 else None
 
-    return Feed(services.worker, tasks.nearest_position, request_of, services.session.redraw)
+    return Feed(services.worker, nearest_position, request_of, services.session.redraw)

@@ -8,17 +8,16 @@ force.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, show
 from explorer.app.features.forces.loads import Loads, SetForce, fitting_scale, round_force
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import share_colour
 from explorer.measures.blocks.block import Share
 from explorer.measures.blocks.forces import utilisations
@@ -73,20 +72,17 @@ class ForcesScene(ScenePart):
             for name in ("load", "weight", *JOINTS, "strut 2", "strut 3")
         }
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the forces of this frame."""
         loaded = self._loads.of(placed.frame)
-        shown = is_shown(placed)
-        holds = shown and loaded.is_regular
-        yield from self._shafts.show(shown)
-        yield from self._heads.show(shown)
-        yield from self._sleeves.show(holds)
-        for handle in (*self._bending, *self._ordinates):
-            yield handle, "visible", holds
+        visible = is_visible(placed)
+        holds = visible and loaded.is_regular
+        yield from show(visible, self._shafts, self._heads)
+        yield from show(holds, self._sleeves, *self._bending, *self._ordinates)
         for name, label in self._labels.items():
             force = {"load": has_force(placed), "weight": weight_of(loaded) > 0.0}
-            yield label, "visible", shown and force.get(name, holds)
-        if not shown:
+            yield label, "visible", visible and force.get(name, holds)
+        if not visible:
             return
         shares = utilisations(loaded)
         yield from self._draw_arrows(placed, loaded, shares)
@@ -103,26 +99,25 @@ class ForcesScene(ScenePart):
             yield from self._draw_bending(placed, loaded, index, leg, share)
         middles = 0.5 * (feet + tips)
         places = (middles[0], feet[1], middles[1], feet[2], middles[2], middles[3])
-        held = loaded.reactions
-        size = float(np.abs(held.actuators).max())
+        forces, spread = loaded.reactions.actuators, loaded.reactions.spread
+        size = float(np.abs(forces).max())
         for index, joint in enumerate(JOINTS):
             label = self._labels[joint]
-            force, more = (float(each[index]) for each in (held.actuators, held.spread))
-            words = _newtons(drop_rounding(force, size), 3) + (
-                f" ± {_newtons(more, 2)}" if more else ""
-            )
+            words = _newtons(drop_rounding(float(forces[index]), size), 3)
+            if spread[index]:
+                words += f" ± {_newtons(float(spread[index]), 2)}"
             yield label, "text", f"{joint} {words}{_share_suffix(shares[index])}"
             yield label, "position", tuple(places[index].tolist())
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the tip of the load's arrow."""
-        if not (is_shown(placed) and has_force(placed)):
+        if not (is_visible(placed) and has_force(placed)):
             return NO_POINTS
         return load_tip(placed)[None]
 
     def _draw_arrows(
         self, placed: Placed, loaded: LoadedPose, shares: list[float | None]
-    ) -> Iterator[Update]:
+    ) -> Updates:
         state = placed.frame.state
         tails, vectors = np.zeros((8, 3)), np.zeros((8, 3))
         colours: list[Rgb] = [LOAD] * 8
@@ -163,7 +158,7 @@ class ForcesScene(ScenePart):
 
     def _draw_bending(
         self, placed: Placed, loaded: LoadedPose, index: int, leg: int, share: float | None
-    ) -> Iterator[Update]:
+    ) -> Updates:
         """Yield the updates that draw the bending moment of strut 2 or 3 beside it."""
         design = placed.frame.state.design
         foot, tip = (ends[leg - 1] for ends in placed.struts)
@@ -212,10 +207,10 @@ class LoadHandle(ScenePart):
         per_length = scale / (scene_scale(state) * state.design.reach)
         return round_force(per_length * (np.asarray(self.handle.position) - tool), scale)
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that keep the gizmo at the tip of the arrow."""
         state = placed.frame.state
-        visible = is_shown(placed) and state.view.handle and has_force(placed)
+        visible = is_visible(placed) and state.view.handle and has_force(placed)
         yield self.handle, "visible", visible
         # It has no arcs to turn it, and no turn.
         yield self.handle, "wxyz", (1.0, 0.0, 0.0, 0.0)
@@ -235,7 +230,7 @@ class LoadHandle(ScenePart):
             )
 
 
-def is_shown(placed: Placed) -> bool:
+def is_visible(placed: Placed) -> bool:
     """Whether forces are drawn: of the mechanism itself, whose parts are in place."""
     view = placed.frame.state.view
     return view.forces.shown and not view.is_twin and not placed.is_apart

@@ -58,7 +58,9 @@ class HistoryPanel:
         self._list = gui.add_html("")
         self._numbers: set[str] = set()
         self._slider.on_update(self._travel)
-        services.buttons.on(GO, self._go)
+        services.do_on_press(
+            GO, lambda value: move_to(int(value)) if value in self._numbers else None
+        )
 
     def updates(self, _: Frame) -> Updates:
         """Yield the updates that show the history of the session."""
@@ -80,10 +82,6 @@ class HistoryPanel:
             stamp, number = self._slider.update_timestamp, int(self._slider.value)
             self._session.post(self, move_to(number), stamp=stamp, who=event.client_id)
 
-    def _go(self, value: str, client: viser.ClientHandle) -> None:
-        if value in self._numbers:
-            self._session.do(move_to(int(value)), who=client.client_id)
-
 
 def _row(step: Step, here: Step) -> str:
     """Return a step as a button in HTML; steps that were undone stay in the list."""
@@ -102,7 +100,7 @@ class UndoButtons:
 
     def __init__(self, services: Services) -> None:
         self._session = services.session
-        services.buttons.on(MOVE, self._move, values=MOVES)
+        services.do_on_press(MOVE, MOVES.__getitem__, MOVES)
         for name in MOVES:
             # Always ready: a key that is pressed before the page knows of the last step counts.
             hint = f"{name} the last step."
@@ -134,9 +132,6 @@ class UndoButtons:
             class_name="ex-tool ex-arrow",
             is_disabled=words is None or is_busy,
         )
-
-    def _move(self, name: str, client: viser.ClientHandle) -> None:
-        self._session.do(MOVES[name], who=client.client_id)
 
 
 class DesignChange:

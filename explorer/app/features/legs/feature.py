@@ -2,30 +2,44 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Services, Tab
-from explorer.app.features.legs.scene import ClearanceScene, SweptTetrahedra
+from explorer.app.features.feature import Feature, InBar, Services, Tab, show, show_html
 from explorer.app.features.workspace.feeds import workspace_rows, workspace_start
 from explorer.app.features.workspace.work import Selection, Trouble, draw_radius_curve
 from explorer.app.inputs.controls import Controls
+from explorer.app.scene.placing import Placed, ScenePart
+from explorer.app.scene.shapes import (
+    SWEPT,
+    TETRAHEDRON_FACES,
+    TUBE,
+    Balls,
+    Rods,
+    add_label,
+    add_lines,
+    add_translucent,
+)
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.frame import Frame
 from explorer.app.widgets import charts
 from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import render
-from explorer.app.widgets.buttons import CopyButton, figure
+from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.markup import alert, box, dim, row, sentence, swatch, table
 from explorer.app.widgets.under_way import UnderWay, problem, progress
-from explorer.legs.clearance import PAIRS, pair_name
+from explorer.legs.clearance import PAIRS, leg_axes, legs_of, pair_name
+from explorer.legs.interference import swept_tetrahedra
 from explorer.measures.blocks.block import Statement
 from explorer.measures.blocks.clearances import move_clearances, pose_clearances
-from explorer.measures.blocks.source import Source, pose_source
+from explorer.measures.blocks.source import pose_source
+from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
-from explorer.singularity.colours import Rgb
+from explorer.singularity.colours import OUTLINE, Rgb
 from explorer.workspace.accessible.radii import RadiusCurve, with_radius
 
 # Share of the volume without radii; the largest radius that keeps it is marked.
@@ -58,12 +72,9 @@ class LegsPanel:
     def __init__(self, services: Services) -> None:
         gui = services.gui
         self._pose = gui.add_html("")
-
-        def source() -> Source:
-            state = services.session.latest_state()
-            return pose_source("interference", state.design, state.pose)
-
-        self._copy = CopyButton(services.buttons, "Legs", source)
+        self._copy = services.copy_button(
+            "Legs", lambda state: pose_source("interference", state.design, state.pose)
+        )
         self._controls = Controls(gui, services.session)
         with gui.add_folder("Last move"):
             self._controls.checkbox(
@@ -97,15 +108,12 @@ class LegsPanel:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         view, drawing = frame.state.view, self._feed.drawing
-        yield self._pose, "content", render(pose_clearances(frame.snapshot), corner=self._copy.html)
+        yield self._pose, "content", render(pose_clearances(frame.snapshot), corner=self._copy)
         yield from self._controls.updates(frame)
-        yield self._move, "visible", view.swept
-        if view.swept:
-            yield self._move, "content", move_table(frame)
+        yield from show_html(self._move, move_table(frame) if view.swept else "")
         yield from self._under_way.updates()
-        yield self._words, "visible", view.radius_curve
-        if view.radius_curve:
-            yield self._words, "content", radius_words(frame, self._feed)
+        words = radius_words(frame, self._feed) if view.radius_curve else ""
+        yield from show_html(self._words, words)
         curve = drawing if view.radius_curve and isinstance(drawing, RadiusCurve) else None
         has_chart = curve is not None and float(curve.radii[-1]) > 0.0
         yield self._chart, "visible", has_chart
@@ -231,6 +239,93 @@ def clearance_figure(frame: Frame) -> str:
     hint = f"Clearance of the closest legs, {pair}: distance of their axes less their radii."
     look = "ex-beyond" if clearance < 0.0 else ""
     return figure("Legs", "Clearance here", words, hint=hint, look=look)
+
+
+OPACITY = 0.22
+# Vertices 0 and 1 are the base ends at the start and at the end, 2 and 3 the platform ends.
+# Legs 1 and 4 sweep triangles, since their base ends do not move; a face drawn twice would be twice
+# as opaque.
+TRIANGLE = np.array([[0, 2, 3]])
+# The leg before the move has thicker lines of its own, which show the direction of the move.
+START = np.array([(0, 2)])
+EDGES = np.array([edge for edge in itertools.combinations(range(4), 2) if edge != (0, 2)])
+
+
+class ClearanceScene(ScenePart):
+    """The shortest line between the axes of the closest legs, and a capsule for each leg."""
+
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
+        self._line = add_lines(scene, "/clearance/line", 1, OUTLINE, 4.0)
+        self._label = add_label(scene, "/clearance/label", "0", visible=False)
+        self._rods = Rods(scene, "/clearance/rods", [TUBE] * 4, opacity=OPACITY)
+        self._ends = Balls(scene, "/clearance/ends", [TUBE] * 8, opacity=OPACITY)
+
+    def updates(self, placed: Placed) -> Updates:
+        """Yield the updates that draw the closest pair and the capsules of this frame."""
+        state, snapshot = placed.frame.state, placed.frame.snapshot
+        radii = placed.scale * np.array(state.design.limits.leg_radii)
+        has_radii = state.view.legs and not state.view.is_twin and bool(radii.any())
+        yield from show(has_radii, self._rods, self._ends)
+        if has_radii:
+            axes = placed.scale * leg_axes(snapshot)
+            yield from self._rods.between(axes[:, 0], axes[:, 1], radii)
+            yield from self._ends.at(axes.reshape(-1, 3), np.repeat(radii, 2))
+        is_visible = state.view.clearance and not state.view.is_twin
+        yield from show(is_visible, self._line, self._label)
+        if is_visible:
+            clearances = snapshot.clearances
+            pair = int(clearances.closest)
+            ends = placed.scale * clearances.points[pair]
+            yield self._line, "points", ends[None].astype(np.float32)
+            yield self._label, "position", tuple(ends.mean(axis=0).tolist())
+            clearance = format_number(float(clearances.clearance[pair]), 3, size=state.design.reach)
+            yield self._label, "text", f"legs {pair_name(PAIRS[pair])}: {clearance}"
+
+
+class SweptTetrahedra(ScenePart):
+    """Tetrahedra that the legs swept in the last move, taken as one step as in the paper.
+
+    Those that overlap another have the colour of a collision.
+    """
+
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
+        self._meshes = [
+            add_translucent(
+                scene,
+                f"/swept/{leg}",
+                (np.zeros((4, 3)), TRIANGLE if leg in (1, 4) else TETRAHEDRON_FACES),
+                OPACITY,
+                is_flat=True,
+            )
+            for leg in (1, 2, 3, 4)
+        ]
+        self._lines = (
+            (EDGES, add_lines(scene, "/swept/edges", 4 * len(EDGES), None, 1.5)),
+            (START, add_lines(scene, "/swept/starts", 4, None, 4.0)),
+        )
+
+    def updates(self, placed: Placed) -> Updates:
+        """Yield the updates that draw the tetrahedra of this frame's last move."""
+        view = placed.frame.state.view
+        move = placed.frame.last_move if view.swept and not view.is_twin else None
+        lines = (handle for _, handle in self._lines)
+        yield from show(move is not None, *self._meshes, *lines)
+        if move is None:
+            return
+        design = placed.frame.state.design
+        ends = (Configuration.at(design, pose) for pose in (move.start, move.end))
+        tetrahedra = placed.scale * swept_tetrahedra(*ends)
+        colours = [OUTLINE if overlaps else SWEPT for overlaps in legs_of(move.overlaps)]
+        for mesh, corners, colour in zip(self._meshes, tetrahedra, colours, strict=True):
+            yield mesh, "vertices", corners.astype(np.float32)
+            yield mesh, "color", colour
+        for edges, handle in self._lines:
+            points = tetrahedra[:, edges].reshape(-1, 2, 3)
+            yield handle, "points", points.astype(np.float32)
+            ends = np.repeat(np.array(colours, dtype=np.uint8), 2 * len(edges), axis=0)
+            yield handle, "colors", ends.reshape(-1, 2, 3)
 
 
 LEGS = Feature(

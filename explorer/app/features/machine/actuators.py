@@ -10,7 +10,7 @@ import viser
 
 from explorer.app.inputs.controls import At, Bound, Condition, Controls, Source
 from explorer.app.state.actions import Action, Set
-from explorer.app.state.parts import value_at
+from explorer.app.state.parts import value_at, with_value
 from explorer.app.state.state import State
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import STIFFNESSES
@@ -182,9 +182,8 @@ def _add_one(controls: MachineControls, quantity: Quantity, index: int, joint: s
     label = f"{quantity.word} of {joint} ({quantity.unit})"
 
     def write(state: State, value: float) -> Action:
-        values = list(quantity.first(state))
-        values[index] = value
-        return Set(quantity.path, tuple(values), label, format_number(value, 6))
+        values = with_value(quantity.first(state), str(index), value)
+        return Set(quantity.path, values, label, format_number(value, 6))
 
     controls.field(
         label,

@@ -4,28 +4,29 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from html import escape
 
 import msgspec
+import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, Services, Tab
+from explorer.app.features.feature import Feature, Services, Tab, show_html
 from explorer.app.features.machine.actuators import FINE, FORCE, MachineControls, add_actuators
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
-from explorer.app.features.machine.words import DIRECTIONS, direction_name, machine_words
 from explorer.app.inputs.controls import At, Bound
 from explorer.app.inputs.ranges import Span, platform_span
 from explorer.app.state.actions import FULL_TURN, Action, Set, check_free
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.markup import box, note
 from explorer.app.widgets.palette import NO_OPTION
-from explorer.mechanism.machine import Struts, Tolerances
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.design import DOWN, Design
+from explorer.mechanism.machine import Actuators, Struts, Tolerances, Tool
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 
 # Limits that are switched on begin with these: N m and MPa; the tube in mm.
@@ -37,16 +38,10 @@ ANGLES = (
     ("pitch", "about the y that yaw turned, the second of three", 90.0),
     ("roll", "about the tool's x, the third of three", 180.0),
 )
-# Dimensions of three lengths that have tolerances, each with the words for its hint.
-LENGTHS = {
-    "a1": "the base joint of leg 1, along the axes of the base",
-    "a3": "the base joint of leg 4, along the axes of the base",
-    "guide": "the guide's offset, along the axes of the base",
-    "b1": "b1, along the axes of the platform",
-    "b2": "b2, along the axes of the platform",
-    "b3": "b3, along the axes of the platform",
-    "b4": "b4, along the axes of the platform",
-}
+# Dimensions of three lengths that have tolerances, each with the body whose axes they are along.
+LENGTHS = dict.fromkeys(("a1", "a3", "guide"), "base") | dict.fromkeys(
+    ("b1", "b2", "b3", "b4"), "platform"
+)
 EVERY_LENGTH, BOTH_TILTS = "Every length (± mm)", "Both tilts (± °)"
 TILTS = "design.tolerances.guide_tilt_deg"
 
@@ -65,12 +60,10 @@ class SetToolAngle(Action):
             InputError: The angle is not finite, or the design is being optimised.
         """
         check_free(state)
-        angles = list(state.tool_angles)
-        angles[self.axis] = self.value
-        yaw, pitch, roll = angles
+        angles = with_value(state.tool_angles, str(self.axis), self.value)
         quaternion = Pose.of_yaw_pitch_roll((0.0, 0.0, 0.0), angles).quaternion
         changed = with_value(state, "design.tool.quaternion", quaternion)
-        return replace(changed, set_tool_angles=(yaw, pitch, roll))
+        return replace(changed, set_tool_angles=angles)
 
     def words(self) -> str:
         """Return what the action does."""
@@ -115,14 +108,14 @@ class MachinePanel:
         with gui.add_folder("Tolerances", expand_by_default=False):
             self._add_tolerances()
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         state = frame.state
         design = state.design
         yield self._summary, "content", box(_with_units(machine_words(design)))
         weight = design.payload.weight_n
-        yield self._weight, "visible", weight > 0.0
-        yield self._weight, "content", note(f"Its weight is {format_number(weight)} N.")
+        words = note(f"Its weight is {format_number(weight)} N.") if weight > 0.0 else ""
+        yield from show_html(self._weight, words)
         yield self._moment, "content", note(moment_words(design.struts))
         yield from self._controls.updates(frame)
 
@@ -231,10 +224,10 @@ class MachinePanel:
             ),
             step=FINE,
         )
-        for name, meaning in LENGTHS.items():
+        for name, body in LENGTHS.items():
             self._controls.triple(
                 f"{name} (± mm)",
-                f"Tolerance of {meaning}.",
+                f"Tolerance of {name}, along the axes of the {body}.",
                 f"design.tolerances.{name}",
                 step=FINE,
                 small=True,
@@ -250,6 +243,86 @@ def _with_units(words: str) -> str:
     return re.sub(
         r"(?<=\d) (kg|N m|N)\b", lambda unit: unit[0].replace(" ", "&nbsp;"), escape(words)
     )
+
+
+DIRECTIONS: dict[str, Triple] = {
+    "down, −z": DOWN,
+    "up, +z": (0.0, 0.0, 1.0),
+    "along +x": (1.0, 0.0, 0.0),
+    "along −x": (-1.0, 0.0, 0.0),
+    "along +y": (0.0, 1.0, 0.0),
+    "along −y": (0.0, -1.0, 0.0),
+}
+"""Directions of gravity along the axes of the base, by their names."""
+
+# Difference of two coordinates of unit vectors up to which they are the same but for rounding.
+SAME_DIRECTION = 1e-12
+# Significant digits of the numbers in the line.
+DIGITS = 3
+
+
+def machine_words(design: Design) -> str:
+    """Return a line on the machine of a design, such as "Tool 3 units from b4; carries 2 kg"."""
+    payload, guide, moment = design.payload, design.guide, design.struts.largest_moment
+    carried = _all_of((payload.mass_kg, "", "kg"), (payload.force_n, "a force of ", "N"))
+    bears = _all_of((guide.force_n, "", "N"), (guide.moment_nm, "", "N m"))
+    limits = {
+        "actuators": _actuator_words(design.actuators),
+        "struts": f"struts up to {_text(moment)} N m" if math.isfinite(moment) else "",
+        "guide": f"guide up to {bears}" if bears else "",
+    }
+    parts = [_tool_words(design.tool), f"carries {carried or 'nothing'}"]
+    if design.gravity != DOWN:
+        along = f"along ({', '.join(map(_text, design.gravity))})"
+        parts.append(f"gravity {direction_name(design.gravity) or along}")
+    free = [f"the {name}" for name, words in limits.items() if not words]
+    has = "has" if free == ["the guide"] else "have"
+    no_limit = f"{' and '.join(free)} {has} no limit" if free else ""
+    parts += [*limits.values(), "no force is limited" if len(free) == 3 else no_limit]
+    line = "; ".join(filter(None, parts))
+    return f"{line[:1].upper()}{line[1:]}."
+
+
+def _all_of(*values: tuple[float | None, str, str]) -> str:
+    """Return those of some values that are given, each with the words before it and its unit."""
+    return " and ".join(f"{before}{_text(value)} {unit}" for value, before, unit in values if value)
+
+
+def _tool_words(tool: Tool) -> str:
+    w, *axis = tool.quaternion
+    distance = math.hypot(*tool.position)
+    turn = math.degrees(2.0 * math.atan2(math.hypot(*axis), abs(w)))
+    if distance == 0.0 and turn == 0.0:
+        return "no tool"
+    place = "at b4" if distance == 0.0 else f"{_text(distance)} units from b4"
+    return f"tool {place}" + (f", turned by {_text(turn)}°" if turn else "")
+
+
+def direction_name(gravity: Triple) -> str | None:
+    """Return the name of a direction of gravity; None where it is along no axis of the base."""
+    for name, direction in DIRECTIONS.items():
+        if max(abs(a - b) for a, b in zip(gravity, direction, strict=True)) <= SAME_DIRECTION:
+            return name
+    return None
+
+
+def _actuator_words(actuators: Actuators) -> str:
+    push, pull = actuators.limits
+    if np.array_equal(push, pull):
+        return f"actuators up to {_range(push)} N" if np.isfinite(push).all() else ""
+    sides = {"push": push, "pull": pull}
+    words = [f"{side} up to {_range(most)} N" for side, most in sides.items() if most[0] < math.inf]
+    return f"actuators {' and '.join(words)}"
+
+
+def _text(value: float) -> str:
+    return format_number(value, DIGITS)
+
+
+def _range(values: FloatArray) -> str:
+    """Return the range of values, or the value if they are all the same."""
+    low, high = (_text(float(value)) for value in (values.min(), values.max()))
+    return low if low == high else f"{low}–{high}"
 
 
 def moment_words(struts: Struts) -> str:

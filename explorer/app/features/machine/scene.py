@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
-from explorer.app.features.feature import Services
-from explorer.app.features.machine.words import turn_of
+from explorer.app.features.feature import Services, show
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import Rgb
@@ -39,13 +37,11 @@ class ToolScene(ScenePart):
         )
         self._label = shapes.add_label(scene, "/platform/tool-label", "tool", visible=False)
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the tool of this frame."""
         visible, tool = _has_tool(placed), placed.frame.state.design.tool
         yield self._line, "visible", visible and any(tool.position)
-        for handle in (self._frame, self._label):
-            yield handle, "visible", visible
-        yield from self._axes.show(visible)
+        yield from show(visible, self._frame, self._label, self._axes)
         if not visible:
             return
         tip = placed.scale * np.array(tool.position)
@@ -76,11 +72,10 @@ class PayloadScene(ScenePart):
             scene, "/platform/payload-label", "1 kg", fades=False, visible=False
         )
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the payload of this frame."""
         visible, payload = _has_payload(placed), placed.frame.state.design.payload
-        for handle in (self._ball, self._label):
-            yield handle, "visible", visible
+        yield from show(visible, self._ball, self._label)
         if not visible:
             return
         centre = tuple((placed.scale * np.array(payload.centre)).tolist())
@@ -107,7 +102,7 @@ def ball_radius(mass: float) -> float:
 def _has_tool(placed: Placed) -> bool:
     """Whether the design has a tool, and it is drawn."""
     tool = placed.frame.state.design.tool
-    return _is_visible(placed) and (any(tool.position) or turn_of(tool) > 0.0)
+    return _is_visible(placed) and any((*tool.position, *tool.quaternion[1:]))
 
 
 def _has_payload(placed: Placed) -> bool:

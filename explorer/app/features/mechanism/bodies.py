@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, show
 from explorer.app.features.mechanism.incidences import Approach, approaches, margin_hover
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, around
@@ -162,8 +162,7 @@ class Legs(ScenePart):
         """Yield the updates that draw the legs of this frame."""
         view = placed.frame.state.view
         visible = view.legs and not view.is_twin and placed.is_schematic
-        for part in (self._actuators, self._joints, self._balls, self._guide):
-            yield from part.show(visible)
+        yield from show(visible, self._actuators, self._joints, self._balls, self._guide)
         if not visible:
             return
         size, (bases, tips) = placed.thickness, placed.struts
@@ -212,8 +211,7 @@ class TwinLegs(ScenePart):
         """Yield the updates that draw the twin's legs of this frame."""
         view = placed.frame.state.view
         visible = view.legs and view.is_twin
-        for part in (self._actuators, self._balls, self._posts):
-            yield from part.show(visible)
+        yield from show(visible, self._actuators, self._balls, self._posts)
         if not visible:
             return
         p, size = placed.points, placed.thickness
@@ -283,9 +281,7 @@ class Flag:
         """Yield the updates that draw the flag; `size` scales its thicknesses."""
         levels, visible = placed.frame.verdict.levels, _are_visible(placed)
         point, along, across = (proximity_colour(levels[index]) for index in self._deltas)
-        for handle in (self._point, self._line):
-            yield handle, "visible", visible
-        yield from self._patch.show(visible)
+        yield from show(visible, self._point, self._line, self._patch)
         yield self._point, "color", point
         yield self._point, "scale", POINT_RADIUS * size
         yield self._line, "color", along

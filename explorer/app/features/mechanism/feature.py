@@ -2,20 +2,279 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from functools import partial
+
 import viser
 
 from explorer.app.features.designs.feature import DesignName
-from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
+from explorer.app.features.feature import Feature, InBar, Services, StateCommand, Tab
 from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs, TwinLegs
-from explorer.app.features.mechanism.folds import Leaves
+from explorer.app.features.mechanism.folds import Leaves, add_fold_sliders
 from explorer.app.features.mechanism.incidences import Gaps, Tetrahedra
 from explorer.app.features.mechanism.marks import DragHandle, Labels
-from explorer.app.features.mechanism.modes import MODES, Ghosts
-from explorer.app.features.mechanism.panel import DesignPanel, MovePanel
+from explorer.app.features.mechanism.modes import MODES, Ghosts, ModesPanel
+from explorer.app.features.mechanism.sketch import sketch
+from explorer.app.inputs import ranges
+from explorer.app.inputs.controls import Bound, Controls, item
+from explorer.app.inputs.limits import bound_entry, bound_switch, limit_span
+from explorer.app.inputs.ranges import Span
+from explorer.app.state import actions
 from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
+from explorer.app.state.parts import value_at
+from explorer.app.state.state import Hold, State
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import figure
-from explorer.app.widgets.palette import Key, shift
+from explorer.app.widgets.chips import Chip, Chips, Effect
+from explorer.app.widgets.markup import alert, box, note, remark
+from explorer.app.widgets.palette import NO_OPTION, Key, shift
+from explorer.mechanism.design import JOINTS, VARIABLES
+from explorer.mechanism.design_file import PRESETS
+from explorer.workspace.limits.table import LIMITS, Entry, Limit, Switch
+
+JOINT_HINTS = {
+    "l1  leg 1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
+    "d1  leg 2 slide": "Leg 2: position of its carriage on the guide, from a1.",
+    "d2  leg 2": "Leg 2: length of the actuator from the guide, perpendicular to it, to b2.",
+    "d3  leg 3 slide": "Leg 3: position of its carriage on the guide, from a1.",
+    "d4  leg 3": "Leg 3: length of the actuator from the guide, perpendicular to it, to b3.",
+    "l4  leg 4": "Leg 4: length of the actuator from a3 to b4 (U joint, actuator, ball joint).",
+}
+"""Hints by the labels of the joints, in their order."""
+
+JOINT_LABELS = dict(zip(JOINTS, JOINT_HINTS, strict=True))
+ANGLES = (
+    ("yaw", "about the base's z, the first of three", 180.0),
+    ("pitch", "about the y that yaw turned, the second of three", 90.0),
+    ("roll", "about the platform's x, the third of three", 180.0),
+)
+COORDINATES = {
+    "position": ("Position and angles", "Set the position of a point, and yaw, pitch and roll."),
+    "folds": (
+        "Folds",
+        "Set a distance, two angles and the folds, each of which changes one margin.",
+    ),
+}
+POINTS = {
+    "b4": ("b4", "Set the position of b4, and turn about it."),
+    "tool": ("tool point", "Set the position of the design's tool point, and turn about it."),
+}
+VARIABLE_HINTS = {
+    "a3x": "x of a3 in the base frame; leg 4 starts there.",
+    "a3y": "y of a3 in the base frame; never zero.",
+    "b1x": "x of b1 in the platform frame; leg 1 ends there.",
+    "b1y": "y of b1 in the platform frame; never zero.",
+    "b2": "x of b2 in the platform frame; leg 2 ends there.",
+    "b3": "x of b3 in the platform frame; leg 3 ends there, never at b2.",
+}
+HOLDS: dict[str, Hold] = {"hold the pose": "pose", "hold the legs": "legs"}
+
+
+class MovePanel:
+    """Sliders for joints and pose, the table of modes, and messages on lengths."""
+
+    def __init__(self, services: Services) -> None:
+        gui = services.gui
+        self._controls = controls = Controls(gui, services.session)
+        with gui.add_folder("Legs (design units)"):
+            for joint, (label, hint) in enumerate(JOINT_HINTS.items()):
+                controls.slider(
+                    label,
+                    hint,
+                    item(lambda frame: frame.state.joints, joint, actions.SetJoint),
+                    partial(ranges.joint_span, joint=joint),
+                    tinted=lambda frame, joint=joint: frame.snapshot.intervals[joint],
+                    closes_up=True,
+                )
+            self._message = gui.add_html("")
+            self._nearest = controls.button(
+                "Use the nearest length",
+                "Move this leg to the nearest length that closes and stays clear of "
+                "singularities; the other legs stay as they are.",
+                actions.UseNearest,
+                icon=viser.Icon.MAGNET,
+                main=True,
+            )
+
+        def is_point(state: State, at: str) -> bool:
+            return at == "b4" or any(state.design.tool.position)
+
+        self._coordinates = _choice(services, "Set as", "view.coordinates", COORDINATES)
+        self._points = _choice(services, "Position of", "view.at", POINTS, is_point)
+        self._pose = gui.add_folder("")
+        with self._pose:
+            self._choices = gui.add_html("")
+            add_fold_sliders(controls)
+            for axis, name in enumerate("xyz"):
+                controls.slider(
+                    name,
+                    f"The {name} coordinate of b4 or of the tool point in the base frame.",
+                    item(lambda frame: frame.state.position, axis, actions.SetPosition),
+                    partial(ranges.position_span, axis=axis),
+                    visible=_is_by_position,
+                )
+            for axis, (name, order, edge) in enumerate(ANGLES):
+                controls.slider(
+                    f"{name} (°)",
+                    f"Rotation of the platform {order}, in degrees.",
+                    item(lambda frame: frame.state.yaw_pitch_roll, axis, actions.SetAngle),
+                    Span(-edge, edge, 0.1),
+                    visible=_is_by_position,
+                )
+            controls.button(
+                "Home pose",
+                "Return to the pose that the design opens with.",
+                actions.GoHome,
+                icon=viser.Icon.HOME,
+            )
+        self._mode_folder = gui.add_folder("")
+        with self._mode_folder:
+            self._modes = ModesPanel(services)
+
+    def updates(self, frame: Frame) -> Updates:
+        """Yield the updates that make the panel show the frame."""
+        state, unclosed = frame.state, frame.state.unclosed
+        is_by_position = _is_by_position(state)
+        pose = f"Pose of {state.point}" if is_by_position else "Pose by its folds"
+        choices = self._coordinates.html(state) + (self._points.html(state) * is_by_position)
+        yield self._pose, "label", f"{pose} (design units, degrees)"
+        yield self._mode_folder, "label", f"Assembly modes: {state.point} (design units)"
+        yield self._choices, "content", box(choices)
+        yield self._message, "content", message(state)
+        yield self._nearest, "disabled", unclosed is None or unclosed.nearest is None
+        yield from self._controls.updates(frame)
+        yield from self._modes.updates(frame)
+
+
+def _is_by_position(state: State) -> bool:
+    return state.view.coordinates == "position"
+
+
+def _choice(
+    services: Services,
+    title: str,
+    path: str,
+    options: Mapping[str, tuple[str, str]],
+    is_ready: Callable[[State, str], bool] = lambda _, __: True,
+) -> Chips:
+    """Return the options of the value at a path, with words and hint of each, in a titled row."""
+
+    def chip(value: str, words: str, hint: str) -> Chip:
+        effect = Effect(
+            lambda _: actions.Set(path, value, title, words),
+            lambda state: value_at(state, path) == value,
+        )
+        command = f"Pose › {title} › {words}"
+        return Chip(words, command, hint, effect, lambda state: is_ready(state, value))
+
+    chips = {value: chip(value, words, hint) for value, (words, hint) in options.items()}
+    return Chips(services.buttons, services.session, path, title, chips)
+
+
+def message(state: State) -> str:
+    """Return the message on the lengths of the legs as HTML, in a box of constant height."""
+    if state.unclosed is not None:
+        text = alert("", str(state.unclosed))
+    elif state.remark is not None:
+        text = remark("", state.remark)
+    else:
+        text = note("Tinted: values at which the lengths close, the other joints as they are.")
+    return f'<div class="ex-message">{text}</div>'
+
+
+class DesignPanel:
+    """The controls for all values of a design file."""
+
+    def __init__(self, services: Services) -> None:
+        gui = services.gui
+        self._controls = controls = Controls(gui, services.session)
+        with gui.add_folder("Design"):
+            controls.dropdown(
+                "Preset",
+                "Open one of the designs of the paper's Table 1, in its home pose.",
+                (*PRESETS, NO_OPTION),
+                Bound(
+                    _preset_name,
+                    lambda state, name: actions.Open(PRESETS.get(name, state.design)),
+                ),
+            )
+            controls.dropdown(
+                "On a change",
+                "What a change of the design keeps: the pose, or the lengths of the legs.",
+                HOLDS,
+                "hold",
+            )
+            controls.button(
+                "Reset",
+                "Return to the design as it was opened.",
+                actions.Reset,
+                icon=viser.Icon.RESTORE,
+            )
+        with gui.add_folder("Design variables (design units)"):
+            self._sketch = gui.add_html("")
+            for index, name in enumerate(VARIABLES):
+                controls.slider(
+                    name,
+                    VARIABLE_HINTS[name],
+                    Bound(
+                        lambda frame, index=index: frame.state.design.variables[index],
+                        lambda _, value, name=name: actions.SetVariable(name, value),
+                    ),
+                    partial(ranges.variable_span, index=index),
+                )
+            controls.number(
+                "1 unit (mm)",
+                "Millimetres in one design unit; exports use it.",
+                "design.unit_mm",
+                least=1e-6,
+                step=0.001,
+            )
+        with gui.add_folder("Limits (design units)", expand_by_default=False):
+            self._add_limits(in_degrees=False)
+        with gui.add_folder("Radii of the legs (design units)", expand_by_default=False):
+            for leg in range(4):
+                controls.slider(
+                    f"leg {leg + 1}",
+                    f"Radius of leg {leg + 1}, a capsule about its axis.",
+                    f"design.limits.leg_radii.{leg}",
+                    ranges.radius_span,
+                )
+        with gui.add_folder("Swing of the joints (°)", expand_by_default=False):
+            self._add_limits(in_degrees=True)
+
+    def updates(self, frame: Frame) -> Updates:
+        """Yield the updates that make the panel show the frame."""
+        yield self._sketch, "content", sketch(frame.state.design)
+        yield from self._controls.updates(frame)
+
+    def _add_limits(self, *, in_degrees: bool) -> None:
+        """Add the controls of those limits that are angles, or of the others."""
+        switches: list[Switch] = []
+        for limit in LIMITS:
+            if in_degrees != any(entry.is_angle for entry in limit.entries):
+                continue
+            if limit.switch is not None and limit.switch not in switches:
+                switches.append(limit.switch)
+                words = limit.switch.label, limit.switch.hint
+                self._controls.checkbox(*words, bound_switch(limit.switch))
+            for entry in limit.entries:
+                self._add_entry(limit, entry)
+
+    def _add_entry(self, limit: Limit, entry: Entry) -> None:
+        add = self._controls.slider if entry.is_number else self._controls.ends
+        add(
+            entry.label,
+            entry.hint,
+            bound_entry(limit, entry),
+            lambda state: limit_span(state.base, entry),
+            disabled=lambda state: limit.switch is not None and limit.value(state.design) is None,
+        )
+
+
+def _preset_name(frame: Frame) -> str:
+    name = frame.state.design.name
+    return name if PRESETS.get(name) == frame.state.design else NO_OPTION
 
 
 def limits_figure(frame: Frame) -> str:

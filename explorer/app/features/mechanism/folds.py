@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, show
 from explorer.app.inputs.controls import Controls, item
 from explorer.app.inputs.ranges import Span, length_span
 from explorer.app.scene.placing import Placed, ScenePart
@@ -134,10 +134,8 @@ class Leaves(ScenePart):
         state = placed.frame.state
         # They would stand among parts that are drawn apart.
         shown = state.view.leaves and not placed.is_apart
-        for handle in (*self._leaves, *self._wedges, self._edges, self._arcs):
-            yield handle, "visible", shown
-        for label in self._labels:
-            yield label, "visible", shown and state.view.labels
+        yield from show(shown, *self._leaves, *self._wedges, self._edges, self._arcs)
+        yield from show(shown and state.view.labels, *self._labels)
         if not shown:
             return
         hinges, arcs = fold_arcs(placed)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, show
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.widgets.assigning import Updates
@@ -245,8 +245,7 @@ class Gaps(ScenePart):
         ends = {i: each.ends for i, each in shown.items() if each.ends is not None}
         closed = {i: each for i, each in ends.items() if shown[i].is_touching}
         gaps = {i: each for i, each in ends.items() if i not in closed}
-        yield self._dashes, "visible", bool(gaps)
-        yield from self._feet.show(bool(gaps))
+        yield from show(bool(gaps), self._dashes, self._feet)
         yield from self._contacts.show(bool(closed))
         for index, label in enumerate(self._labels):
             yield label, "visible", index in shown and shown[index].has_label

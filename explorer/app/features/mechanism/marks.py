@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import math
 
 import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.incidences import approaches
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.scene.shapes import add_label
-from explorer.app.session.clock import Pause, now
 from explorer.app.state.actions import SetPose
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Updates
@@ -27,10 +24,6 @@ HANDLE_NAME = "/handle"
 HANDLE_SCALE = 1.9
 # Length from the gizmo's origin to the tip of an arrow, as viser draws it.
 ARROW_LENGTH = 1.25 * HANDLE_SCALE
-# Size and opacity of the gizmo, and where it would hide what matters.
-CLEAR_HANDLE, FAINT_HANDLE = (HANDLE_SCALE, 0.85), (0.6 * HANDLE_SCALE, 0.3)
-# Seconds without a movement after which the gizmo's look may change during a drag.
-PAUSE = 0.2
 
 
 class Labels(ScenePart):
@@ -54,21 +47,14 @@ class Labels(ScenePart):
 
 
 class DragHandle(ScenePart):
-    """The gizmo at b4 or at the tool point: arrows move the platform, arcs turn it about the point.
-
-    It is small and faint where it would hide the end of a gap to a near incidence.
-    """
+    """The gizmo at b4 or at the tool point: arrows move the platform, arcs turn it about it."""
 
     def __init__(self, services: Services) -> None:
-        scene, (scale, opacity) = services.scene, CLEAR_HANDLE
-        self.handle = scene.add_transform_controls(
-            HANDLE_NAME, scale=scale, line_width=2.0, depth_test=False, opacity=opacity
+        self.handle = services.scene.add_transform_controls(
+            HANDLE_NAME, scale=HANDLE_SCALE, line_width=2.0, depth_test=False, opacity=0.85
         )
         self._session = services.session
-        self._moved_at = -math.inf
-        self._pause = Pause(PAUSE, services.session.redraw)
         self.handle.on_update(self._move_platform)
-        services.at_end(self._pause.cancel)
 
     def pose(self, state: State) -> Pose:
         """Return the pose of the platform where the gizmo is.
@@ -84,9 +70,6 @@ class DragHandle(ScenePart):
         """Yield the updates that keep the gizmo on the platform."""
         state = placed.frame.state
         yield self.handle, "visible", _is_handle_visible(placed)
-        scale, opacity = self._look(placed)
-        yield self.handle, "scale", scale
-        yield self.handle, "opacity", opacity
         with contextlib.suppress(InputError):
             # A pose that was written back during a drag would move the gizmo under the pointer.
             if self.pose(state) == state.pose:
@@ -100,34 +83,14 @@ class DragHandle(ScenePart):
             return NO_POINTS
         return placed.point + ARROW_LENGTH * placed.frame.snapshot.rotation.T
 
-    def _look(self, placed: Placed) -> tuple[float, float]:
-        """Return size and opacity for a frame, or the present ones while the gizmo moves."""
-        present = self.handle.scale, self.handle.opacity
-        wanted = FAINT_HANDLE if hides_a_gap(placed) else CLEAR_HANDLE
-        # viser's client forgets the movement that it has yet to send when the gizmo's look changes.
-        if wanted == present or now() - self._moved_at > PAUSE:
-            return wanted
-        self._pause.begin()
-        return present
-
     async def _move_platform(self, event: viser.TransformControlsEvent) -> None:
         if event.client_id is not None:
-            self._moved_at = now()
             self._session.post(
                 "drag",
                 lambda state: SetPose(self.pose(state)),
                 stamp=self.handle.update_timestamp,
                 who=event.client_id,
             )
-
-
-def hides_a_gap(placed: Placed) -> bool:
-    """Whether an end of the gap to a near incidence lies within the gizmo."""
-    return any(
-        float(np.linalg.norm(each.ends - placed.point, axis=1).min()) < ARROW_LENGTH
-        for each in approaches(placed, None)
-        if each.ends is not None and each.has_gap
-    )
 
 
 def _is_handle_visible(placed: Placed) -> bool:

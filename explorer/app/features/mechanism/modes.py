@@ -5,7 +5,6 @@ from __future__ import annotations
 from html import escape
 
 import numpy as np
-import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism import bodies
@@ -43,10 +42,12 @@ class ModesPanel:
     """The table of the modes, with the switch for the ghosts of all in its head."""
 
     def __init__(self, services: Services) -> None:
-        self._session, buttons = services.session, services.buttons
+        buttons = services.buttons
         services.get(mode_hover)
         self._table = services.gui.add_html("")
-        buttons.on(GO, self._go, values={str(mode) for mode in range(len(MODES))})
+        services.do_on_press(
+            GO, lambda mode: SetMode(int(mode)), {str(mode) for mode in range(len(MODES))}
+        )
         ghosts = Chip(
             "Ghosts",
             f"Pose › {GHOSTS_LABEL}",
@@ -64,9 +65,6 @@ class ModesPanel:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         yield self._table, "content", modes_table(frame, self._ghosts.buttons(frame.state))
-
-    def _go(self, value: str, client: viser.ClientHandle) -> None:
-        self._session.do(SetMode(int(value)), who=client.client_id)
 
 
 def modes_table(frame: Frame, switch: str) -> str:

@@ -12,7 +12,7 @@ import viser
 
 from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import run_script
-from explorer.app.features.feature import Feature, Services, Tab
+from explorer.app.features.feature import Feature, Services, Tab, html_of, show_html
 from explorer.app.features.orientation import maps, work
 from explorer.app.features.workspace.slice_map import AXES, keeps_above, level_within
 from explorer.app.inputs.controls import Controls, item
@@ -20,12 +20,13 @@ from explorer.app.inputs.ranges import Span
 from explorer.app.look import read_script
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH, add_translucent
+from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.markup import alert, box, caption, dim, row, table
-from explorer.app.widgets.under_way import UnderWay, look_of, problem, progress
+from explorer.app.widgets.under_way import UnderWay, look_of, problem
 from explorer.measures.box import corners_of
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.arrays import BoolArray, FloatArray
@@ -67,7 +68,7 @@ class OrientationPanel:
     """The map of tilts with its numbers and angles, and what is drawn over the workspace."""
 
     def __init__(self, services: Services) -> None:
-        gui, self._session = services.gui, services.session
+        gui = services.gui
         self._here = services.get(work.POSITION_FEED)
         self._tilts, self._ranges = services.get(work.TILTS_FEED), services.get(work.RANGE_FEED)
         self._controls = controls = Controls(gui, services.session)
@@ -116,8 +117,8 @@ class OrientationPanel:
                 visible=_has_range,
             )
             self._volume = gui.add_html("", visible=False)
-        services.buttons.on("orientation.go", self._go)
-        services.buttons.on("orientation.torsion", self._turn)
+        services.do_on_press("orientation.go", _tilt)
+        services.do_on_press("orientation.torsion", _turn)
         run_script(services.server, read_script("tilts"))
 
     def updates(self, frame: Frame) -> Updates:
@@ -132,30 +133,30 @@ class OrientationPanel:
         title = caption("What ends the tilts, by share of azimuths")
         yield self._legend, "content", box(title, maps.legend(tilts))
         yield from self._controls.updates(frame)
-        strip = strip_words(self._here, here, least)
-        yield self._strip, "visible", strip != ""
-        yield self._strip, "content", box(strip)
+        strip = ""
+        if self._here.drawing is not None:
+            strip = maps.torsion_strip(self._here.drawing.by_torsion, here.torsion, least.tilt)
+            strip = box(f'<div class="{look_of(self._here)}">{strip}</div>')
+        yield from show_html(self._strip, strip)
         yield from self._tilts_under_way.updates()
         view = frame.state.view.orientation
-        yield self._scale, "visible", view.tilts
-        if view.tilts:
-            yield self._scale, "content", box(tilts_words(self._tilts))
-        yield self._volume, "visible", view.over != "none"
-        if view.over != "none":
-            yield self._volume, "content", box(range_words(self._ranges))
+        title, button = "The tilts could not be computed", "Compute the tilts"
+        scale = html_of(self._tilts, maps.scale_of_tilts, title, button)
+        yield from show_html(self._scale, box(scale) if view.tilts else "")
+        volume = html_of(self._ranges, range_words, "The solid could not be made")
+        yield from show_html(self._volume, box(volume) if view.over != "none" else "")
 
-    def _go(self, text: str, client: viser.ClientHandle) -> None:
-        """Tilt the platform as a page sent it, (azimuth, tilt) in degrees."""
-        angles: tuple[float, float] | None = decode_text(text, _TILT)
-        if angles is not None:
-            self._session.do(work.GoToTilt(*angles), who=client.client_id)
 
-    def _turn(self, text: str, client: viser.ClientHandle) -> None:
-        """Turn the platform to a torsion that a page sent, in degrees."""
-        torsion: float | None = decode_text(text, _TORSION)
-        if torsion is not None:
-            action = work.SetTiltTorsion(work.ANGLES.index("torsion"), torsion)
-            self._session.do(action, who=client.client_id)
+def _tilt(text: str) -> Action | None:
+    """Return the action that tilts the platform as a page sent it, (azimuth, tilt) in degrees."""
+    angles: tuple[float, float] | None = decode_text(text, _TILT)
+    return None if angles is None else work.GoToTilt(*angles)
+
+
+def _turn(text: str) -> Action | None:
+    """Return the action that turns the platform to a torsion that a page sent, in degrees."""
+    torsion: float | None = decode_text(text, _TORSION)
+    return None if torsion is None else work.SetTiltTorsion(2, torsion)
 
 
 def _has_range(state: State) -> bool:
@@ -184,7 +185,7 @@ def summary(
         share = f"{100.0 * found.share:.2f} % ± {100.0 * found.standard_error:.2f} %"
         if found.share in (0.0, 1.0):
             share = f"{'all' if found.share else 'none'} of {found.orientations:,}"
-        best = best_words(feed.drawing.by_torsion.best, tilt_here(feed, here, least))
+        best = best_words(feed.drawing.by_torsion.best, least.tilt)
     if feed.problem is not None:
         share = best = "unknown"
         yield problem(feed, "The share and the largest tilt could not be computed", "")
@@ -209,22 +210,6 @@ def summary(
     )
 
 
-def strip_words(feed: work.PositionFeed, here: TiltTorsion, least: GreatestTilt) -> str:
-    """Return the strip of torsions as HTML; "" before the first drawing."""
-    if feed.drawing is None:
-        return ""
-    tilt = tilt_here(feed, here, least)
-    strip = maps.torsion_strip(feed.drawing.by_torsion, here.torsion, tilt)
-    return f'<div class="{look_of(feed)}">{strip}</div>'
-
-
-def tilt_here(feed: work.PositionFeed, here: TiltTorsion, least: GreatestTilt) -> float:
-    """Return the greatest tilt at the present torsion, at the position of the drawing."""
-    if feed.drawing is None or feed.is_current:
-        return least.tilt
-    return maps.tilt_at(feed.drawing.by_torsion, here.torsion)
-
-
 def best_words(best: GreatestTilt, tilt: float) -> str:
     """Return the greatest tilt at any torsion in words, beside that at the present one."""
     if math.isnan(best.tilt):
@@ -234,30 +219,15 @@ def best_words(best: GreatestTilt, tilt: float) -> str:
     return f"{_degrees(best.tilt)} at {_degrees(best.torsion)}"
 
 
-def tilts_words(feed: work.TiltsFeed) -> str:
-    """Return the scale of the colours of tilts, or how far they are, as HTML."""
-    if feed.problem is not None:
-        return problem(feed, "The tilts could not be computed", "Compute the tilts")
-    if feed.drawing is None:
-        return dim(progress(feed).capitalize())
-    return f'<div class="{look_of(feed)}">{maps.scale_of_tilts(feed.drawing)}</div>'
-
-
-def range_words(feed: work.RangeFeed) -> str:
+def range_words(drawing: work.RangeDrawing) -> str:
     """Return the volume over a range of tilts, as HTML."""
-    if feed.problem is not None:
-        return problem(feed, "The solid could not be made", "Compute the solid")
-    drawing = feed.drawing
-    if drawing is None:
-        return dim("Computing …")
     solid, design = drawing.solid, drawing.request.design
     if solid.is_empty:
         return alert("This workspace is empty", f"Emptied by: {', '.join(solid.empty_because)}.")
     bound, hint = BOUNDS[drawing.request.over]
     text = f"{bound} {format_number(solid.volume, 5, size=design.reach**3)} units³"
     name = dim(f"{drawing.request.over.capitalize()} workspace")
-    words = table((row(name, text, hint=f"{VOLUME_HINT} {hint}"),))
-    return f'<div class="{look_of(feed)}">{words}</div>'
+    return table((row(name, text, hint=f"{VOLUME_HINT} {hint}"),))
 
 
 def _degrees(angle: float) -> str:

@@ -181,11 +181,6 @@ def _region(tilts: TiltMap, edge: float) -> Iterator[str]:
         yield f'<path class="border" stroke="{css(colour_of(limit))}" d="M{path}"/>'
 
 
-def tilt_at(by_torsion: TiltByTorsion, torsion: float) -> float:
-    """Return the tilt at a torsion between those of the row; NaN where no tilt is possible."""
-    return float(np.interp(torsion, by_torsion.torsions, by_torsion.tilts, period=360.0))
-
-
 def torsion_strip(by_torsion: TiltByTorsion, torsion: float, tilt: float) -> str:
     """Return the tilt by torsion as SVG, with marks at the present and the best torsion.
 

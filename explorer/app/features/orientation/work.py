@@ -49,9 +49,7 @@ class SetTiltTorsion(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        angles = list(state.tilt_torsion)
-        angles[self.axis] = self.value
-        return _tilt_to(state, TiltTorsion(*angles))
+        return _tilt_to(state, state.tilt_torsion._replace(**{ANGLES[self.axis]: self.value}))
 
     def words(self) -> str:
         """Return what the action does."""
@@ -97,13 +95,8 @@ TURNED_ORIENTATIONS = 17
 """The same for each of three torsions, if the range has several."""
 
 
-@dataclass(frozen=True)
-class PositionRequest:
-    """A request for the orientations that a position of b4, or of a tool point, can have."""
-
-    design: Design
-    position: Triple
-    tool: Triple | None = None
+PositionRequest: TypeAlias = tuple[Design, Triple, Triple | None]
+"""A request for the orientations that a position of b4, or of a tool point, can have."""
 
 
 @dataclass(frozen=True)
@@ -116,18 +109,13 @@ class PositionDrawing:
 
 def orientations_at(request: PositionRequest) -> PositionDrawing:
     """Return the orientations that a position can have."""
-    design, position, tool = request.design, request.position, request.tool
+    design, position, tool = request
     share = orientation_share(design, position, tool=tool)
     return PositionDrawing(share, tilt_by_torsion(design, position, tool=tool))
 
 
-@dataclass(frozen=True)
-class TiltsRequest:
-    """A request for the greatest tilts over the workspace of one torsion, in degrees."""
-
-    design: Design
-    torsion: float
-    tool: Triple | None = None
+TiltsRequest: TypeAlias = tuple[Design, float, Triple | None]
+"""A request for the greatest tilts over the workspace of one torsion, in degrees, of a tool."""
 
 
 @dataclass(frozen=True)
@@ -144,18 +132,18 @@ class TiltsDrawing:
 
 def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> TiltsDrawing:
     """Return the greatest tilts over the workspace of tilt zero; `channel` sends progress."""
-    design, watch = request.design, watch_of(channel)
-    rotation = rotation_from_tilt_torsion((0.0, 0.0, request.torsion))
+    (design, torsion, tool), watch = request, watch_of(channel)
+    rotation = rotation_from_tilt_torsion((0.0, 0.0, torsion))
     ends = extent_of(design, rotation)
     if ends is None:
         return TiltsDrawing(np.zeros((0, 3)), np.zeros(0), 0.0)
-    lows, highs = np.array(ends) + tool_offset(rotation, request.tool)
+    lows, highs = np.array(ends) + tool_offset(rotation, tool)
     # On the surface of the workspace no tilt is left.
     nodes = make_cell_grid(lows, highs, NODES).positions.reshape(-1, 3)
     parts: list[FloatArray] = []
     for index, part in enumerate(np.array_split(nodes, PARTS)):
         watch("greatest tilts", index / PARTS)
-        parts.append(greatest_tilts(design, part, request.torsion, tool=request.tool))
+        parts.append(greatest_tilts(design, part, torsion, tool=tool))
     tilts = np.concatenate(parts)
     known = np.isfinite(tilts)
     step = float((highs - lows).max()) / NODES
@@ -204,14 +192,14 @@ def range_solid(request: RangeRequest) -> RangeDrawing:
 
 def _position_of(frame: Frame) -> PositionRequest:
     state = frame.state
-    return PositionRequest(state.design, state.position, state.tool)
+    return state.design, state.position, state.tool
 
 
 def _tilts_of(frame: Frame) -> TiltsRequest | None:
     if not frame.state.view.orientation.tilts:
         return None
     torsion = round(frame.state.tilt_torsion.torsion, DIGITS)
-    return TiltsRequest(frame.state.design, torsion, frame.state.tool)
+    return frame.state.design, torsion, frame.state.tool
 
 
 def _range_of(frame: Frame) -> RangeRequest | None:

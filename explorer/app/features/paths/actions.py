@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from explorer.app.features.forces.tasks import WeightsRequest, weights_of_parts
+from explorer.app.features.forces.loads import weights_of_parts
 from explorer.app.state.actions import Action, move_to
 from explorer.app.state.paths import End, Journey, Paths
 from explorer.app.state.state import Joints, State, joints_of
@@ -179,17 +179,6 @@ class Advance(Action):
 
 
 @dataclass(frozen=True)
-class CancelPlan(Action):
-    """Stop planning."""
-
-    template: ClassVar[str] = "Stop planning"
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return _with(state, planning=None)
-
-
-@dataclass(frozen=True)
 class TakePlan(Action):
     """Accept the path of a request, or why there is none, unless a newer one has replaced it."""
 
@@ -253,6 +242,6 @@ def plan(
     weights = own = None
     if load is not None:
         if weighed == "payload and legs":
-            own = weights_of_parts(WeightsRequest(design, density))
+            own = weights_of_parts((design, density))
         weights = LoadedPose(design, ends[0], load, own, weighed != "none").weights
     return plan_path(design, *ends, seconds=seconds, tool=tool, load=load, weights=weights)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 
 import numpy as np
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab
-from explorer.app.features.forces.tasks import load_of
+from explorer.app.features.forces.loads import load_of
 from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
 from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.scene.placing import Placed, ScenePart
@@ -19,7 +18,7 @@ from explorer.app.session.worker import Worker
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import activity, press_button
 from explorer.app.widgets.palette import Key
 from explorer.mechanism.configuration import position_of
@@ -44,7 +43,7 @@ class PathScene(ScenePart):
         self._line = add_lines(scene, "/path/line", 1, FAR, 2.5)
         self._balls = Balls(scene, "/path/crossings", [SINGULAR] * MOST_CROSSINGS)
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the path of this frame."""
         state, journey = placed.frame.state, placed.frame.state.journey
         yield self._line, "visible", journey is not None
@@ -59,9 +58,8 @@ class PathScene(ScenePart):
         yield self._line, "points", segments.astype(np.float32)
         if crossings:
             centres, radii = np.zeros((MOST_CROSSINGS, 3)), np.full(MOST_CROSSINGS, 1e-6)
-            for index, crossing in enumerate(crossings):
-                centres[index] = position_of(state.design, crossing.pose, state.view.at)
-                radii[index] = RADIUS
+            at = [position_of(state.design, each.pose, state.view.at) for each in crossings]
+            centres[: len(at)], radii[: len(at)] = at, RADIUS
             yield from self._balls.at(placed.scale * centres, radii)
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from html import escape
 from typing import Literal
 
 import viser
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, show_html
 from explorer.app.features.paths import actions, plots
 from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.inputs.ranges import Span
@@ -18,8 +17,8 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.paths import End, PathKind
 from explorer.app.state.state import State, angles_of
 from explorer.app.widgets import markup
-from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Buttons, press_button
+from explorer.app.widgets.assigning import Updates
+from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chip, Chips, choose
 from explorer.errors import InputError
 from explorer.export.tables import trajectory_csv
@@ -56,6 +55,7 @@ KINDS: dict[PathKind, tuple[str, str]] = {
         "Search for a path that keeps all limits, margins and clearances.",
     ),
 }
+CANCEL = Set("paths.planning", None, "Planning", "stopped")
 # Decimals of typed angles and coordinates.
 DECIMALS = 9
 
@@ -119,24 +119,35 @@ class PathsPanel:
                 plots.IncidencePlot(gui, plots.FOLDS),
                 plots.LoadPlot(gui, self._shares),
             )
-        self._add_buttons(services.buttons)
+        services.do_on_press("paths.play", lambda word: actions.Play(word == "on"), ("on", "off"))
+        services.do_on_press("paths.cancel", lambda _: CANCEL)
+        buttons = services.buttons
+        buttons.on("paths.export", self._export)
+        buttons.offer(
+            "Paths › Cancel planning",
+            "Stop the search for a path.",
+            "paths.cancel",
+            is_ready=lambda: self._session.state.paths.is_planning,
+        )
+        buttons.offer(
+            "Paths › Export CSV",
+            "Save time, joints and pose along the path, evenly spaced in time.",
+            "paths.export",
+            is_ready=lambda: self._session.state.journey is not None,
+        )
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         state = frame.state
         for end, handle in self._numbers.items():
             is_typed = _is_typed(state, end)
-            yield handle, "visible", not is_typed
-            if not is_typed:
-                yield handle, "content", end_numbers(state, end)
+            yield from show_html(handle, "" if is_typed else end_numbers(state, end))
         chips = f'<div class="ex-flow">{self._kind_chips.buttons(state)}</div>'
         kinds = markup.box(chips, f'<div class="ex-small">{kind_note(state)}</div>')
         yield self._kinds, "content", kinds
         yield self.go, "disabled", state.paths.is_planning
         yield self._title, "content", plan_words(state) or path_title(state, self._shares.of(frame))
-        demand = plots.demand_note(state)
-        yield self._demand, "visible", bool(demand)
-        yield self._demand, "content", demand
+        yield from show_html(self._demand, plots.demand_note(state))
         for plot in self._plots:
             yield from plot.updates(frame)
         yield from self._controls.updates(frame)
@@ -170,29 +181,6 @@ class PathsPanel:
                 visible=lambda state: _is_typed(state, end),
             )
         return numbers
-
-    def _add_buttons(self, buttons: Buttons) -> None:
-        def do(action: Action, client: viser.ClientHandle) -> None:
-            self._session.do(action, who=client.client_id)
-
-        def play(word: str, client: viser.ClientHandle) -> None:
-            do(actions.Play(word == "on"), client)
-
-        buttons.on("paths.play", play, values=("on", "off"))
-        buttons.on("paths.export", self._export)
-        buttons.on("paths.cancel", lambda _, client: do(actions.CancelPlan(), client))
-        buttons.offer(
-            "Paths › Cancel planning",
-            "Stop the search for a path.",
-            "paths.cancel",
-            is_ready=lambda: self._session.state.paths.is_planning,
-        )
-        buttons.offer(
-            "Paths › Export CSV",
-            "Save time, joints and pose along the path, evenly spaced in time.",
-            "paths.export",
-            is_ready=lambda: self._session.state.journey is not None,
-        )
 
     def _export(self, _: str, client: viser.ClientHandle) -> None:
         journey = self._session.state.journey

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from html import escape
 from typing import Any, NamedTuple
 
@@ -13,12 +13,12 @@ import viser
 from numpy.typing import ArrayLike, NDArray
 from viser import uplot
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, show_html
 from explorer.app.features.forces.loads import Loads
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.charts import (
     BLUE,
     NEUTRAL,
@@ -85,7 +85,7 @@ class TimeChart:
             padding=(8, 0, 0, 0),
         )
 
-    def show(self, columns: tuple[NDArray[Any], ...], *, is_visible: bool) -> Iterator[Update]:
+    def show(self, columns: tuple[NDArray[Any], ...], *, is_visible: bool) -> Updates:
         """Yield the updates that make the chart show its columns."""
         duration = max(float(columns[0][-1]), 1e-9)
         span = float(np.nanmin(columns[-1])), float(np.nanmax(columns[-1]))
@@ -228,13 +228,12 @@ class IncidencePlot:
             has_times=has_times,
         )
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the chart and its legend show the frame."""
         journey, quantity = frame.state.journey, self._quantity
         yield from self._chart.show(incidence_columns(journey, quantity), is_visible=True)
-        yield self._legend, "visible", journey is not None
-        if journey is not None:
-            yield self._legend, "content", legend(journey.pose, quantity)
+        words = "" if journey is None else legend(journey.pose, quantity)
+        yield from show_html(self._legend, words)
 
 
 def incidence_columns(journey: Journey | None, quantity: Quantity) -> tuple[NDArray[Any], ...]:
@@ -321,7 +320,7 @@ class LoadPlot:
             LOAD_HEIGHT,
         )
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the chart show the frame."""
         journey, loads = frame.state.journey, self._shares.of(frame)
         if journey is None or loads is None:

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar
 
-import numpy as np
 import viser
 
-from explorer.app.features.feature import Export, Feature, Services, Tab
+from explorer.app.features.feature import Export, Feature, Services, Tab, html_of, show_html
 from explorer.app.features.forces.loads import Loads
 from explorer.app.features.optimise.work import requested_box
 from explorer.app.features.precision import tasks
@@ -18,30 +14,20 @@ from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoid
 from explorer.app.inputs.controls import At, Controls
 from explorer.app.session.feed import feed_of
 from explorer.app.session.session import Who
-from explorer.app.state.actions import Action, check_free
+from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import render
-from explorer.app.widgets.buttons import CopyButton, press_button
-from explorer.app.widgets.markup import box, dim, note
-from explorer.app.widgets.under_way import problem
+from explorer.app.widgets.markup import box, dim
 from explorer.measures.blocks import precision as answers
 from explorer.measures.box import PositionSet
-from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import typical_machine
 from explorer.statics.budget import with_tolerances
 from explorer.statics.compliance import is_elastic
 from explorer.statics.loaded import ToolPrecision
 
 LOAD = "the load and the weights of the tab Forces"
-TYPICAL = "precision.typical"
-TYPICAL_HINT = (
-    "Give the design typical errors, stiffness, struts and tolerances where it states none; the "
-    "tab Machine shows and changes them."
-)
-
 OVER: dict[str, PositionSet] = {
     "the present pose": "pose",
     "the required box": "box",
@@ -51,48 +37,6 @@ OVER_HINT = (
     "Positions at which the precision is wanted: the present one; the box of the tab Optimise, or "
     "the workspace, at nodes of a grid in the orientation of home."
 )
-SET = "precision.set"
-SET_HINT = "Give the design these tolerances, and these errors of its actuators."
-
-
-@dataclass(frozen=True)
-class AssumeTypical(Action):
-    """Give the design typical errors, stiffness, struts and tolerances where it states none."""
-
-    template: ClassVar[str] = "Typical errors, stiffness and tolerances"
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: The design is being optimised.
-        """
-        check_free(state)
-        return with_value(state, "design", typical_machine(state.design)[0])
-
-
-@dataclass(frozen=True)
-class SetTolerances(Action):
-    """Give the design the tolerances and the errors of its actuators that a budget found.
-
-    Attributes:
-        tolerances: Tolerances in mm and degrees, in the order of `SOURCES`; infinite for any,
-            which the design keeps as it states them.
-    """
-
-    template: ClassVar[str] = "Tolerances of the budget"
-
-    tolerances: tuple[float, ...]
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: The design is being optimised.
-        """
-        check_free(state)
-        design = with_tolerances(state.design, np.array(self.tolerances))
-        return with_value(state, "design", design)
 
 
 def budget_request(state: State) -> tasks.BudgetRequest:
@@ -125,8 +69,7 @@ class BudgetPart:
     """The part of the panel with the budget."""
 
     def __init__(self, services: Services) -> None:
-        gui, self._session = services.gui, services.session
-        self._feed = services.get(BUDGET_FEED)
+        gui, self._feed = services.gui, services.get(BUDGET_FEED)
         self._controls = controls = Controls(gui, services.session)
         controls.checkbox(
             "What each tolerance costs",
@@ -161,46 +104,30 @@ class BudgetPart:
             visible=_is_wanted,
         )
         self._result = gui.add_html("", visible=False)
-        services.buttons.on(SET, self._set)
-        services.buttons.offer(
+        self._set = services.link(
+            "precision.set",
             "Precision › Set these tolerances",
-            SET_HINT,
-            SET,
-            is_ready=lambda: self._found is not None,
+            "Give the design these tolerances, and these errors of its actuators.",
+            self._set_tolerances,
         )
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the part show the frame."""
         yield from self._controls.updates(frame)
-        yield self._result, "visible", self._feed.request is not None
-        yield self._result, "content", self._content()
+        budget = html_of(self._feed, self._budget, "There is no budget")
+        yield from show_html(self._result, "" if self._feed.request is None else budget)
 
-    @property
-    def _found(self) -> tasks.BudgetDrawing | None:
+    def _budget(self, drawing: tasks.BudgetDrawing) -> str:
+        request, costs, found = drawing.request, drawing.costs, drawing.found
+        budget = answers.tolerance_budget(costs, found, request.wanted, request.wanted_turn)
+        return render(budget, {"set": self._set})
+
+    def _set_tolerances(self, state: State) -> Action | None:
         drawing = self._feed.drawing
-        is_found = drawing is not None and drawing.found is not None and self._feed.is_current
-        return drawing if is_found else None
-
-    def _content(self) -> str:
-        feed = self._feed
-        if feed.problem is not None:
-            return problem(feed, "There is no budget", "")
-        if feed.drawing is None:
-            return note("computing …")
-        request = feed.drawing.request
-        button = press_button(SET, "", "Set these tolerances", hint=SET_HINT, class_name="ex-link")
-        return render(
-            answers.tolerance_budget(
-                feed.drawing.costs, feed.drawing.found, request.wanted, request.wanted_turn
-            ),
-            {"set": button},
-        )
-
-    def _set(self, _: str, client: viser.ClientHandle) -> None:
-        found = self._found
-        if found is not None:
-            tolerances = tuple(found.costs.tolerances.tolist())
-            self._session.do(SetTolerances(tolerances), who=client.client_id)
+        if drawing is None or drawing.found is None or not self._feed.is_current:
+            return None
+        design = with_tolerances(state.design, drawing.found.costs.tolerances)
+        return Set("design", design, "Tolerances", "of the budget")
 
 
 def _is_wanted(state: State) -> bool:
@@ -211,8 +138,7 @@ class PrecisionPanel:
     """Errors of the tool, its deflection, and what is drawn of them."""
 
     def __init__(self, services: Services) -> None:
-        gui, self._session = services.gui, services.session
-        self._loads = services.get(Loads)
+        gui, self._loads = services.gui, services.get(Loads)
         self._controls = controls = Controls(gui, services.session)
         self._top = gui.add_html("")
         controls.checkbox(
@@ -237,62 +163,52 @@ class PrecisionPanel:
         )
         with gui.add_folder("Budget of tolerances"):
             self._budget = BudgetPart(services)
-        self._copy = CopyButton(
-            services.buttons, "Precision", lambda: self._loads.source("accuracy")
+        self._copy = services.copy_button(
+            "Precision", lambda state: self._loads.source("accuracy", state)
         )
-        services.buttons.on(TYPICAL, self._assume)
-        services.buttons.offer(
+        self._assume = services.link(
+            "precision.typical",
             "Precision › Assume typical values",
-            TYPICAL_HINT,
-            TYPICAL,
-            is_ready=lambda: bool(_assumed_values(services.session.state.design)),
+            "Give the design typical errors, stiffness, struts and tolerances where it states "
+            "none; the tab Machine shows and changes them.",
+            assume_typical,
+            words="Assume these",
         )
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         precision = self._loads.precision(frame)
-        yield (
-            self._top,
-            "content",
-            render(answers.tool_errors(precision), corner=self._copy.html) + _offer(precision),
-        )
+        errors = render(answers.tool_errors(precision), corner=self._copy)
+        yield self._top, "content", errors + self._offer(precision)
         yield self._deflection, "content", render(answers.deflections(precision, LOAD))
         yield from self._controls.updates(frame)
         yield from self._budget.updates(frame)
 
-    def _assume(self, _: str, client: viser.ClientHandle) -> None:
-        if _assumed_values(self._session.state.design):
-            self._session.do(AssumeTypical(), who=client.client_id)
+    def _offer(self, precision: ToolPrecision) -> str:
+        """Return what typical values can be assumed, with the button that does, as HTML."""
+        design = precision.loaded.design
+        _, assumed = _typical(design)
+        if not assumed or (precision.has_errors and is_elastic(design)):
+            return ""
+        words = f"State them in the tab Machine, or assume typical values: {'; '.join(assumed)}."
+        return box(f"{dim(words)} {self._assume}")
 
 
-@lru_cache(maxsize=1)
-def _assumed_values(design: Design) -> tuple[str, ...]:
-    """Return what typical values the design would get; it stays while the mechanism moves."""
-    return typical_machine(design)[1]
+# A design stays while the mechanism moves.
+_typical = lru_cache(maxsize=1)(typical_machine)
 
 
-def _offer(precision: ToolPrecision) -> str:
-    """Return what typical values can be assumed, with the button that does, as HTML."""
-    design = precision.loaded.design
-    if precision.has_errors and is_elastic(design):
-        return ""
-    assumed = _assumed_values(design)
-    if not assumed:
-        return ""
-    words = dim(f"State them in the tab Machine, or assume typical values: {'; '.join(assumed)}.")
-    button = press_button(TYPICAL, "", "Assume these", hint=TYPICAL_HINT, class_name="ex-link")
-    return box(f"{words} {button}")
+def assume_typical(state: State) -> Action | None:
+    """Return the action that gives the design typical values where it states none; None if all."""
+    design, assumed = _typical(state.design)
+    return Set("design", design, "Machine", "typical values") if assumed else None
 
 
-def _send_tolerances(services: Services) -> Callable[[str, Who], None]:
-    """Return the function that sends the table of the budget, whether it is shown or not."""
-
-    def send(_: str, who: Who) -> None:
-        state = services.session.latest_state()
-        name = f"{state.design.name}-tolerances.csv"
-        services.downloads.compute(who, name, tasks.budget_table, (budget_request(state),))
-
-    return send
+def _send_tolerances(services: Services, _: str, who: Who) -> None:
+    """Send the table of the budget, whether it is shown or not."""
+    state = services.session.latest_state()
+    name = f"{state.design.name}-tolerances.csv"
+    services.downloads.compute(who, name, tasks.budget_table, (budget_request(state),))
 
 
 PRECISION = Feature(

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, show
 from explorer.app.features.forces.loads import Loads
 from explorer.app.features.forces.scene import tool_point
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.scene import shapes
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.placing import Placed, ScenePart, round_step
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.measures.blocks.precision import DIGITS
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
@@ -45,7 +44,7 @@ class ErrorEllipsoidScene(ScenePart):
         self._loads = services.get(Loads)
         self._ellipsoid = Ellipsoid(services.scene, "/precision/ellipsoid")
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ellipsoid of this frame."""
         precision = self._loads.precision(placed.frame)
         shown = (
@@ -82,7 +81,7 @@ class DeflectedScene(ScenePart):
         self._way = shapes.add_lines(scene, "/precision/way", 1, DEFLECTED, 2.5)
         self._label = shapes.add_label(scene, "/precision/label", "0 mm", visible=False)
 
-    def updates(self, placed: Placed) -> Iterator[Update]:
+    def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the deflection of this frame."""
         precision = self._loads.precision(placed.frame)
         view = placed.frame.state.view
@@ -92,10 +91,7 @@ class DeflectedScene(ScenePart):
             and is_elastic(precision.loaded.design)
             and precision.is_regular
         )
-        for handle in (self._plate, self._way, self._label):
-            yield handle, "visible", shown
-        yield from self._legs.show(shown)
-        yield from self._balls.show(shown)
+        yield from show(shown, self._plate, self._way, self._label, self._legs, self._balls)
         if not shown:
             return
         tool, names = tool_point(placed), list(placed.platform_points)
@@ -118,7 +114,7 @@ class DeflectedScene(ScenePart):
 
     def _draw_legs(
         self, placed: Placed, precision: ToolPrecision, tips: FloatArray, times: float
-    ) -> Iterator[Update]:
+    ) -> Updates:
         """Yield the updates that draw legs 1 and 4 straight, and the struts of 2 and 3 bent."""
         feet = placed.struts[0]
         lines = [np.stack([feet[[0, 3]], tips[[0, 3]]], axis=1)]

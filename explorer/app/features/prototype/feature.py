@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from html import escape
 
+import numpy as np
 import viser
 
-from explorer.app.features.feature import Export, Feature, Services, Tab
+from explorer.app.features.feature import Export, Feature, Services, Tab, show_html
+from explorer.app.features.mechanism.bodies import colliding_legs
 from explorer.app.features.prototype import work
-from explorer.app.features.prototype.scene import PrototypeScene
 from explorer.app.features.prototype.work import PARTS_FEED, Parts, PartsFeed, parts_to_draw
 from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.inputs.ranges import Span
+from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
+from explorer.app.scene.shapes import BALL, CARRIAGE, NO_MESH, PLATFORM_BODY, RAIL, ROD, TUBE
+from explorer.app.scene.surfaces import Drawn
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Set, draw_as
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import alert, box, caption, note, row, sentence, table
 from explorer.errors import ExplorerError, TooTightError
+from explorer.measures.box import corners_of
 from explorer.mechanism.design import LENGTHS
+from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
-from explorer.prototype.assembly import Actuator
+from explorer.prototype.assembly import Actuator, exploded_offsets
+from explorer.prototype.chains import BODIES, LEGS, Places
 from explorer.prototype.fitting import broken_joint_limits
+from explorer.singularity.colours import OUTLINE, Rgb
 
 # Format of each file by its name on the page, and end of the name of the file.
 ASSEMBLIES = {
@@ -52,8 +60,7 @@ class PrototypePanel:
         )
         gui.add_html(note("Sized from the design; Export has them for printers and CAD."))
         self._trouble = gui.add_html("", visible=False)
-        self._session = services.session
-        services.buttons.on(FIT, self._set_fitting_unit)
+        services.do_on_press(FIT, self._set_fitting_unit)
         self._folder = gui.add_folder("Parts", visible=False)
         with self._folder:
             controls.slider(
@@ -71,20 +78,15 @@ class PrototypePanel:
             )
             self._bill = gui.add_html("")
 
-    def _set_fitting_unit(self, _: str, client: viser.ClientHandle) -> None:
+    def _set_fitting_unit(self, _: str) -> Set | None:
         fitting = _fitting_unit_mm(self._feed)
-        if fitting is not None:
-            unit = Set("design.unit_mm", fitting, "1 unit (mm)")
-            self._session.do(unit, who=client.client_id)
+        return None if fitting is None else Set("design.unit_mm", fitting, "1 unit (mm)")
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame) -> Updates:
         """Yield the updates that show a frame."""
         feed = self._feed
         yield from self._controls.updates(frame)
-        trouble = trouble_of(frame, feed)
-        yield self._trouble, "visible", trouble is not None
-        if trouble is not None:
-            yield self._trouble, "content", trouble
+        yield from show_html(self._trouble, trouble_of(frame, feed))
         # A failure in the worker takes the parts away at any time.
         parts = parts_to_draw(feed)
         yield self._folder, "visible", parts is not None
@@ -98,10 +100,10 @@ def _fitting_unit_mm(feed: PartsFeed) -> float | None:
     return feed.drawing.fitting_unit_mm if isinstance(feed.drawing, TooTightError) else None
 
 
-def trouble_of(frame: Frame, feed: PartsFeed) -> str | None:
-    """Return as HTML why there are no parts or why they cannot take the pose; None if they can."""
+def trouble_of(frame: Frame, feed: PartsFeed) -> str:
+    """Return as HTML why there are no parts or why they cannot take the pose; "" if they can."""
     if frame.state.view.drawn_as != "prototype":
-        return None
+        return ""
     if feed.problem is not None:
         return alert("The parts could not be made", feed.problem)
     drawing = feed.drawing
@@ -123,7 +125,7 @@ def trouble_of(frame: Frame, feed: PartsFeed) -> str | None:
     broken = broken_joint_limits(
         drawing.prototype.sizes, frame.state.pose.position, frame.snapshot.rotation
     )
-    return alert("The parts do not take this pose", sentence("; ".join(broken))) if broken else None
+    return alert("The parts do not take this pose", sentence("; ".join(broken))) if broken else ""
 
 
 def parts_table(parts: Parts, density: float) -> str:
@@ -189,7 +191,7 @@ def _send_assembly(services: Services, name: str, who: Who) -> None:
     services.downloads.compute(who, file, work.export_assembly, (design, file_format))
 
 
-def _send_simulation(services: Services, who: Who) -> None:
+def _send_simulation(services: Services, _: str, who: Who) -> None:
     state = services.session.latest_state()
     file = f"{state.design.name}-simulation.xml"
     arguments = state.design, state.view.prototype.density
@@ -201,6 +203,100 @@ def _floor(services: Services) -> float | None:
     return None if parts is None else parts.floor
 
 
+COLOURS: dict[str, Rgb] = {
+    "base": PLATFORM_BODY,
+    "cross": TUBE,
+    "carriage": CARRIAGE,
+    "cylinder": RAIL,
+    "rod": ROD,
+    "platform": PLATFORM_BODY,
+    "ball": BALL,
+}
+"""Greys, as for the schematic parts: orange and blue belong to the singularities."""
+
+BALLS = tuple(f"ball {leg}" for leg in LEGS)
+NAMES = (*BODIES, *BALLS)
+ON_BODIES = ("base", "platform")
+"""Parts that the switch of the bodies shows, with the balls; that of the legs shows the rest."""
+
+
+class PrototypeScene(ScenePart):
+    """The parts, assembled or exploded, moved as rigid bodies.
+
+    Each part has a node from the start, which gets a mesh when the design changes and a place in
+    each frame.
+    """
+
+    def __init__(self, services: Services) -> None:
+        scene, self._feed = services.scene, services.get(PARTS_FEED)
+        self._nodes: dict[str, viser.MeshHandle] = {}
+        for name in NAMES:
+            # The platform is the parent of the balls, so that they move with it.
+            path = f"platform/{name}" if name in BALLS else name
+            kind = name.partition(" ")[0]
+            self._nodes[name] = scene.add_mesh_simple(
+                f"/prototype/{path}", *NO_MESH, color=COLOURS[kind], visible=False
+            )
+        self._drawn: tuple[Parts | None, float] = None, 0.0
+        self._meshes: dict[str, Drawn] = {}
+
+    def updates(self, placed: Placed) -> Updates:
+        """Yield the updates that draw the parts of a frame."""
+        view, parts = placed.frame.state.view, parts_to_draw(self._feed)
+        for name, node in self._nodes.items():
+            switch = view.bodies if name in ON_BODIES or name in BALLS else view.legs
+            yield node, "visible", switch and parts is not None
+        if parts is None:
+            return
+        names = [part.name for part in parts.prototype.parts]
+        if self._drawn[0] is not parts or self._drawn[1] != placed.scale:
+            self._drawn, scale = (parts, placed.scale), np.float32(placed.scale)
+            meshes = ((vertices * scale, faces) for vertices, faces in parts.meshes)
+            self._meshes = dict(zip(names, meshes, strict=True))
+        places, platform = places_of(placed, parts), names.index("platform")
+        origins = placed.scale * places.origin
+        turns = quaternion_from_rotation(places.rotation).tolist()
+        for name, origin, turn in zip(names, origins, turns, strict=True):
+            node = self._nodes[name]
+            yield node, "vertices", self._meshes[name][0]
+            yield node, "faces", self._meshes[name][1]
+            place = origin
+            if name in BALLS:
+                place = (origin - origins[platform]) @ places.rotation[platform]
+            else:
+                yield node, "wxyz", tuple(turn)
+            yield node, "position", tuple(place.tolist())
+        alarms = colliding_legs(placed.frame.snapshot)
+        for leg, alarm in zip(LEGS, alarms, strict=True):
+            for kind in ("cylinder", "rod"):
+                colour = OUTLINE if alarm else COLOURS[kind]
+                yield self._nodes[f"{kind} {leg}"], "color", colour
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the corners of boxes about the parts."""
+        parts = parts_to_draw(self._feed)
+        if parts is None:
+            return NO_POINTS
+        places, seen = places_of(placed, parts), list[FloatArray]()
+        for (vertices, _), origin, rotation in zip(
+            parts.meshes, places.origin, places.rotation, strict=True
+        ):
+            corners = corners_of(np.stack([vertices.min(axis=0), vertices.max(axis=0)]))
+            seen.append(placed.scale * (corners @ rotation.T + origin))
+        return np.concatenate(seen)
+
+
+def places_of(placed: Placed, parts: Parts) -> Places:
+    """Return where the parts are drawn, in their order and in design units."""
+    frame = placed.frame
+    places = parts.prototype.places(frame.state.pose.position, frame.snapshot.rotation)
+    share = frame.state.view.prototype.exploded
+    if share == 0.0:
+        return places
+    away = share * exploded_offsets(parts.prototype, places)
+    return Places(places.origin + away, places.rotation)
+
+
 PROTOTYPE = Feature(
     "prototype",
     tabs=(Tab("analyse", "Prototype", PrototypePanel, viser.Icon.ENGINE),),
@@ -209,13 +305,13 @@ PROTOTYPE = Feature(
             "Mechanism",
             "Parts that can be made, assembled in the home pose, in millimetres.",
             tuple(ASSEMBLIES),
-            lambda services: lambda name, who: _send_assembly(services, name, who),
+            _send_assembly,
         ),
         Export(
             "Simulation",
             "A model with joints, masses and servos for MuJoCo and other physics engines.",
             ("MJCF",),
-            lambda services: lambda _, who: _send_simulation(services, who),
+            _send_simulation,
         ),
     ),
     scene=(PrototypeScene,),

@@ -85,10 +85,9 @@ class ExportDialog:
         gui, buttons = services.gui, services.buttons
         sends: dict[str, Callable[[Who], None]] = {}
         for each in services.exports:
-            send = each.sender(services)
             for name in each.formats:
                 value = f"{each.title} as {name}"
-                sends[value] = partial(send, name)
+                sends[value] = partial(each.send, services, name)
                 buttons.offer(f"Export › {each.title} › {name}", each.hint, PRESS, value)
         buttons.on(PRESS, lambda value, client: sends[value](client.client_id), values=sends)
         gui.add_html(box("".join(_row(each) for each in services.exports)))
@@ -154,19 +153,19 @@ SHARING = Feature(
             "Report",
             "The design in its pose on a few pages: drawings, slices, tables, limits.",
             tuple(REPORTS),
-            lambda services: lambda name, who: send_report(services, REPORTS[name], who),
+            lambda services, name, who: send_report(services, REPORTS[name], who),
         ),
         Export(
             "Picture",
             "The scene with its labels, from your camera.",
             tuple(PICTURES),
-            lambda services: lambda name, who: send_picture(services, PICTURES[name], who),
+            lambda services, name, who: send_picture(services, PICTURES[name], who),
         ),
         Export(
             "Scene",
             "One file to turn and zoom in any browser, without network.",
             ("HTML",),
-            lambda services: lambda _, who: send_scene(services, who),
+            lambda services, _, who: send_scene(services, who),
         ),
     ),
 )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, show
 from explorer.app.features.mechanism import bodies
 from explorer.app.scene.ellipsoid import Ellipsoid
 from explorer.app.scene.placing import Placed, ScenePart
@@ -56,8 +56,7 @@ class PlatformGhost:
 
     def show(self, visible: bool) -> Updates:
         """Yield the updates that show or hide the ghost."""
-        yield self._plate, "visible", visible
-        yield self._legs, "visible", visible
+        yield from show(visible, self._plate, self._legs)
 
     def draw(self, placed: Placed, pose: Pose) -> Updates:
         """Yield the updates that draw the ghost in a pose."""
@@ -80,9 +79,7 @@ class NearestGhost(ScenePart):
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the singular pose of this frame."""
         nearest = chosen_ghost(placed)
-        yield from self._ghost.show(nearest is not None)
-        for handle in (self._displacements, self._label):
-            yield handle, "visible", nearest is not None
+        yield from show(nearest is not None, self._ghost, self._displacements, self._label)
         if nearest is None:
             return
         pose = nearest.pose
@@ -147,8 +144,7 @@ class BallScene(ScenePart):
         """Yield the updates that draw the ball of this frame."""
         frame = placed.frame
         is_visible = frame.state.view.singular.ball and not frame.snapshot.is_singular
-        for handle in (self._ball, self._touch, self._line, self._label):
-            yield handle, "visible", is_visible
+        yield from show(is_visible, self._ball, self._touch, self._line, self._label)
         if not is_visible:
             return
         ball = frame.free_ball
@@ -221,9 +217,7 @@ class FreeMotion(ScenePart):
         self._frame, swing = placed.frame, self._swing
         if swing is not None and (swing.is_over or not swing.is_of(placed.frame.state)):
             swing = self._swing = None
-        yield from self._ghost.show(swing is not None)
-        yield self._axis, "visible", swing is not None
-        yield self._label, "visible", swing is not None
+        yield from show(swing is not None, self._ghost, self._axis, self._label)
         if swing is None:
             return
         yield from self._ghost.draw(placed, swing.turn.move(swing.frame.state.pose, swing.angle))

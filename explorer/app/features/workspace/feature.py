@@ -12,7 +12,7 @@ import viser
 
 from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import run_script, run_script_in
-from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
+from explorer.app.features.feature import Export, Feature, InBar, Services, Tab, show_html
 from explorer.app.features.workspace import feeds, words as texts, work
 from explorer.app.features.workspace.scene import WorkspaceScene
 from explorer.app.features.workspace.slice_map import Axis, SliceMap, level_within, map_picture
@@ -20,7 +20,7 @@ from explorer.app.inputs.controls import At, Bound, Controls
 from explorer.app.inputs.ranges import Span, coordinate_span, fine_step, round_up
 from explorer.app.look import call_script, read_script
 from explorer.app.scene.surfaces import Measure
-from explorer.app.session.session import Who
+from explorer.app.session.session import Change
 from explorer.app.state.actions import Action, Set, SetPose, StartThere
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
@@ -78,7 +78,6 @@ class WorkspacePanel:
         self._session = session
         self._feed = services.get(feeds.WORKSPACE_FEED)
         self._volumes = services.get(feeds.VOLUME_FEED)
-        self._nearest_start: Pose | None = None
         # The drawing whose solid is cut, and its map where the page shows it.
         self._drawing: work.WorkspaceDrawing | None = None
         self._mapped: SliceMap | None = None
@@ -94,13 +93,12 @@ class WorkspacePanel:
         )
         self._under_way = UnderWay(gui, "workspace", self._feed)
         self._trouble = gui.add_html("", visible=False)
-        self._go = gui.add_button(
-            "Go there",
-            icon=viser.Icon.MAP_PIN,
-            hint="Move the platform to that position and let the paths start from it.",
-            visible=False,
+        self._start = services.link(
+            "workspace.start",
+            "Workspace › Go there",
+            "Move the platform to that position and let the paths start from it.",
+            self._start_there,
         )
-        self._go.on_click(self._go_there)
         controls.dropdown(
             "Orientation",
             "The orientation of the platform all over the workspace.",
@@ -136,7 +134,7 @@ class WorkspacePanel:
                 At("view.workspace.tolerance", default=feeds.tolerance_of),
                 _tolerance_span,
             )
-        buttons.on("workspace.go", self._go_to)
+        services.do_on_press("workspace.go", _go_to)
         buttons.on("workspace.read", self._read)
         run_script(services.server, read_script("map"))
 
@@ -148,10 +146,9 @@ class WorkspacePanel:
         yield self._top, "content", box(*top, self._show.html(state))
         yield from self._controls.updates(frame)
         yield from self._under_way.updates()
-        yield from self._show_trouble(drawing)
+        yield from show_html(self._trouble, self._trouble_words())
         mapped = None if drawing is None or view.cut is None else drawing.slice_map
         colour = feeds.drawn_measure(state)
-        yield self._legend, "visible", view.colour != "plain" or mapped is not None
         words = texts.missing_input(view.colour) if colour != view.colour else ""
         if colour != "plain" or mapped is not None:
             measure = work.map_measure(state.design, colour, holds=view.region == "held")
@@ -161,14 +158,14 @@ class WorkspacePanel:
         if colour in LOAD_MEASURES and view.region != "held":
             any_direction = colour != "deflection"
             words += note(f"{texts.load_words(state, any_direction=any_direction)}.")
-        yield self._legend, "content", words
+        yield from show_html(self._legend, words)
         yield self._cut, "content", box(self._cuts.html(state))
+        picture = ""
         if mapped is not None:
             mapped = mapped.shift(state.offset(mapped.colouring.rotation))
-            picture = map_picture(mapped, state.position, state.design.reach)
-            yield self._map, "content", box(picture)
+            picture = box(map_picture(mapped, state.position, state.design.reach))
         self._mapped = mapped
-        yield self._map, "visible", mapped is not None
+        yield from show_html(self._map, picture)
         yield self._details, "content", texts.workspace_details(frame, self._feed)
 
     def _level(self, state: State) -> float:
@@ -194,30 +191,19 @@ class WorkspacePanel:
         low, high = (float(end[index]) + offset for end in self._drawing.extent)
         return low, high
 
-    def _show_trouble(self, drawing: work.WorkspaceDrawing | None) -> Updates:
-        """Yield why nothing is accessible, and the nearest position to start from."""
-        trouble = None if drawing is None else drawing.trouble
-        self._nearest_start = None
-        yield self._trouble, "visible", trouble is not None
-        if drawing is not None and trouble is not None:
-            if trouble.nearest is not None:
-                self._nearest_start = Pose.of(trouble.nearest, drawing.request.rotation)
-            title = texts.nothing_words(drawing)
-            yield self._trouble, "content", alert(title, sentence(trouble.reason))
-        yield self._go, "visible", self._nearest_start is not None
+    def _trouble_words(self) -> str:
+        """Return why nothing is accessible, and the nearest position to start from, as HTML."""
+        if self._drawing is None or self._drawing.trouble is None:
+            return ""
+        trouble = self._drawing.trouble
+        words = alert(texts.nothing_words(self._drawing), sentence(trouble.reason))
+        return words if trouble.nearest is None else words + self._start
 
-    def _go_there(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-        if self._nearest_start is not None:
-            self._session.do(StartThere(self._nearest_start), who=event.client_id)
-
-    def _go_to(self, text: str, client: viser.ClientHandle) -> None:
-        """Move the point to a position that a page sent, in the orientation of the map."""
-        position: Triple | None = decode_text(text, _POSITION)
-        if position is not None:
-            self._session.do(
-                lambda state: SetPose(state.pose_at(position, feeds.workspace_pose(Frame(state)))),
-                who=client.client_id,
-            )
+    def _start_there(self, _: State) -> Action | None:
+        trouble = None if self._drawing is None else self._drawing.trouble
+        if self._drawing is None or trouble is None or trouble.nearest is None:
+            return None
+        return StartThere(Pose.of(trouble.nearest, self._drawing.request.rotation))
 
     def _read(self, text: str, client: viser.ClientHandle) -> None:
         """Answer a browser that asks for the words at a position on the map."""
@@ -225,6 +211,14 @@ class WorkspacePanel:
         mapped = self._mapped
         if position is not None and mapped is not None:
             run_script_in(client, call_script("map", text, mapped.words_at(position)))
+
+
+def _go_to(text: str) -> Change | None:
+    """Return the move of the point to a position that a page sent, in the map's orientation."""
+    position: Triple | None = decode_text(text, _POSITION)
+    if position is None:
+        return None
+    return lambda state: SetPose(state.pose_at(position, feeds.workspace_pose(Frame(state))))
 
 
 def _part_chips(services: Services) -> Chips:
@@ -289,12 +283,6 @@ def _tolerance_span(state: State) -> Span:
     return Span(step, round_up(0.05 * reach), step)
 
 
-def _sender(what: feeds.Exported) -> Callable[[Services], Callable[[str, Who], None]]:
-    return lambda services: (
-        lambda name, who: feeds.send_workspace(services, what, name.lower(), who)
-    )
-
-
 def volume_figure(services: Services) -> Callable[[Frame], str]:
     """Return the figure of the volume within the limits, dim while a newer one is computed."""
     feed = services.get(feeds.VOLUME_FEED)
@@ -323,13 +311,15 @@ WORKSPACE = Feature(
             "All positions of b4, or of the tool point if the tab Pose shows it, in the region and "
             "orientation of the tab Workspace; STEP has exact faces.",
             tuple(map(str.upper, feeds.FORMATS)),
-            _sender("workspace"),
+            lambda services, name, who: feeds.send_workspace(
+                services, "workspace", name.lower(), who
+            ),
         ),
         Export(
             "Convex hull",
             "The convex hull of that workspace.",
             tuple(map(str.upper, feeds.HULL_FORMATS)),
-            _sender("hull"),
+            lambda services, name, who: feeds.send_workspace(services, "hull", name.lower(), who),
         ),
     ),
     scene=(WorkspaceScene,),

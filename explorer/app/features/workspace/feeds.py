@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import msgspec
 import numpy as np
 
-from explorer.app.features.forces.tasks import load_of
+from explorer.app.features.forces.loads import load_of
 from explorer.app.features.workspace import work
 from explorer.app.scene.surfaces import Measure
 from explorer.app.session.feed import Feed, feed_of

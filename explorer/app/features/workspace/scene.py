@@ -8,7 +8,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from explorer.app.features.feature import Services
+from explorer.app.features.feature import Services, show
 from explorer.app.features.workspace import feeds, work
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import NO_MESH, Patch, add_label, add_lines, add_translucent
@@ -116,8 +116,7 @@ class WorkspaceScene(ScenePart):
     def _broken_limit(self, placed: Placed) -> Updates:
         """Yield the updates that draw a line from p to the surface of the limit it breaks most."""
         broken = _most_broken(placed.frame)
-        for handle in (self._broken, self._broken_label):
-            yield handle, "visible", broken is not None
+        yield from show(broken is not None, self._broken, self._broken_label)
         if broken is not None:
             name, slack, ends = broken
             yield self._broken, "points", (placed.scale * ends)[None].astype(np.float32)
@@ -166,8 +165,7 @@ class _SingularPlane:
             length = float(np.linalg.norm(normal))
         # If the lines are parallel every position is singular.
         is_drawn = length > 1e-9
-        yield from self._patch.show(is_drawn)
-        yield self._label, "visible", is_drawn
+        yield from show(is_drawn, self._patch, self._label)
         if not is_drawn:
             return
         along = np.cross(normal / length, [0.0, 1.0, 0.0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from explorer.app.features.feature import html_of
 from explorer.app.features.workspace import work
 from explorer.app.features.workspace.feeds import orientation_word, turned_suffix
 from explorer.app.scene.surfaces import AT_LIMIT, COLLIDING, PLAIN, Measure
@@ -12,7 +13,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets import markup
 from explorer.app.widgets.blocks import content_of
-from explorer.app.widgets.under_way import look_of, problem, progress
+from explorer.app.widgets.under_way import problem, progress
 from explorer.export.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
 from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.mechanism.pose import Triple
@@ -24,16 +25,12 @@ from explorer.workspace.position_bands import MEASURE_WORDS, SHARE_COLOURS, SHAR
 
 def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume]) -> str:
     """Return the volume within the limits in large type as HTML."""
-    newest = feed.drawing
-    if feed.problem is not None:
-        return markup.alert("The volume could not be computed", feed.problem)
-    if newest is None:
-        return '<div class="ex-large ex-dim">computing …</div>'
-    measured, design = newest.measured, newest.request.design
-    if measured.volume <= 0.0:
-        causes = ", ".join(measured.empty_because)
-        content = markup.alert("The workspace is empty", f"Emptied by: {causes}.")
-    else:
+
+    def words(newest: work.MeasuredVolume) -> str:
+        measured, design = newest.measured, newest.request.design
+        if measured.volume <= 0.0:
+            causes = ", ".join(measured.empty_because)
+            return markup.alert("The workspace is empty", f"Emptied by: {causes}.")
         litres, size = (0.01 * design.unit_mm) ** 3, design.reach**3
         cubic_cm, text = (
             format_number(factor * measured.volume, 4, size=factor * size)
@@ -42,11 +39,12 @@ def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume
         where = f"within the limits, in the {orientation_word(frame)} orientation"
         of_tool = ", of the tool" if frame.state.view.at == "tool" else ""
         error = markup.dim(f"± {format_number(measured.error, 1)}")
-        content = (
+        return (
             f'<div class="ex-line"><span class="ex-large">{volume_text(newest)}</span>{error}</div>'
             + markup.caption(f"{cubic_cm} cm³ ({text} l) {where}{of_tool}")
         )
-    return f'<div class="{look_of(feed)}">{content}</div>'
+
+    return html_of(feed, words, "The volume could not be computed")
 
 
 def drawing_words(frame: Frame, feed: Feed[work.WorkspaceRequest, work.WorkspaceDrawing]) -> str:
