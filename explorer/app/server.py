@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import logging
 import signal
 import socket
@@ -38,6 +39,9 @@ LOG = "explorer.log"
 """Name of the log of unexpected errors in the user's data folder."""
 # Size in bytes at which a new log is begun, and number of older ones that are kept.
 LARGEST_LOG, OLDER_LOGS = 1_000_000, 2
+# Parameter of glibc's `mallopt`, and its value. The page has dozens of threads: with an arena for
+# each few of them, free memory lies scattered, and an hour of use grows the process by a fifth.
+M_ARENA_MAX, ARENAS = -8, 2
 # Longest delay of an interruption, on systems where it does not end a wait.
 WAKE_SECONDS = 1.0
 
@@ -150,6 +154,7 @@ def serve(
     Raises:
         ServerError: The address or the port cannot be had, or the token or a name cannot be used.
     """
+    limit_arenas()
     start_log(data_folder())
     user_data = open_user_data(resume=design is None)
     for message in user_data.messages:
@@ -178,6 +183,12 @@ def serve(
         sys.stderr.write("Stopped.\n")
     finally:
         running.stop()
+
+
+def limit_arenas() -> None:
+    """Make glibc allocate from few arenas, if it is what this process allocates with."""
+    with contextlib.suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).mallopt(M_ARENA_MAX, ARENAS)
 
 
 def start_log(folder: Path) -> None:

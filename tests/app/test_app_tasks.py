@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from typing import Any
 import pytest
 from client import wait_for
 
-from explorer.app.server import LOG, start_log
+from explorer.app.server import ARENAS, LOG, start_log
 from explorer.app.session.worker import CANCELLED, DIED_TWICE, RESTARTED, Worker, log_error
 from tests.app import telling
 
@@ -358,3 +359,39 @@ def test_log_that_cannot_be_written_hides_no_error(
     log.parent.write_bytes(b"")
     assert log_error("it failed", "Traceback").startswith("it failed")
     assert "it failed" in capfd.readouterr().err
+
+
+THREADS = """
+import ctypes, threading
+from explorer.app.server import limit_arenas
+if {limited}:
+    limit_arenas()
+library, together = ctypes.CDLL(None), threading.Barrier(8)
+def allocate():
+    library.malloc(100_000)
+    together.wait()
+    library.malloc(100_000)
+threads = [threading.Thread(target=allocate) for _ in range(8)]
+for each in threads:
+    each.start()
+for each in threads:
+    each.join()
+library.fdopen.restype = ctypes.c_void_p
+out = ctypes.c_void_p(library.fdopen(1, b"w"))
+library.malloc_info(0, out)
+library.fflush(out)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="arenas are of glibc")
+def test_server_allocates_from_few_arenas_however_many_threads_it_has() -> None:
+    counts = [
+        subprocess.run(
+            [sys.executable, "-c", THREADS.format(limited=limited)],
+            capture_output=True,
+            check=True,
+        ).stdout.count(b"<heap nr=")
+        for limited in (False, True)
+    ]
+    assert counts[0] > ARENAS
+    assert counts[1] <= ARENAS
