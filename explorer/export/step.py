@@ -59,7 +59,7 @@ class ExactSolid:
         """The volume in cubic millimetres, integrated over the exact faces."""
         return cad.volume_of(self.shape)
 
-    def shifted(self, offset: FloatArray) -> ExactSolid:
+    def shift(self, offset: FloatArray) -> ExactSolid:
         """Return the solid moved by a vector in millimetres, shape (3,)."""
         x, y, z = offset.tolist()
         return replace(self, shape=ExactShape(self.shape).translate((x, y, z)).shape)

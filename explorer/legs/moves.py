@@ -23,7 +23,7 @@ from explorer.legs.clearance import PAIRS, joined_pairs, least_rows, leg_clearan
 from explorer.legs.interference import step_overlaps
 from explorer.mechanism.configuration import Configuration, one_tool, tool_offset
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose, Triple, checked_rotation
+from explorer.mechanism.pose import Pose, Triple, rotation_array
 from explorer.numerics import arrays
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 
@@ -176,7 +176,7 @@ def ends_of_moves(
     """
     p = arrays.position_array("start position", start_position)
     q = arrays.position_array("end position", end_position)
-    r, s = checked_rotation(start_rotation), checked_rotation(end_rotation)
+    r, s = rotation_array(start_rotation), rotation_array(end_rotation)
     batch = arrays.batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
     p, q = (arrays.rows_for_kernel(each, batch, 1) for each in (p, q))
     r, s = (arrays.rows_for_kernel(each, batch, 2) for each in (r, s))

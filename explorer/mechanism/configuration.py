@@ -18,7 +18,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import GUIDE_ROWS, LENGTH_ROWS, Design
 from explorer.mechanism.margins import margin_rows
 from explorer.mechanism.points import AttachmentPoints, joints_of, points_of
-from explorer.mechanism.pose import Pose, Triple, checked_rotation
+from explorer.mechanism.pose import Pose, Triple, rotation_array
 from explorer.numerics import arrays
 from explorer.numerics.arrays import FloatArray
 
@@ -54,7 +54,7 @@ class Configuration:
     ) -> None:
         self.design = design
         self.position = arrays.position_array("position", position)
-        self.rotation = checked_rotation(rotation)
+        self.rotation = rotation_array(rotation)
         self.tool = np.zeros(3) if tool is None else arrays.position_array("tool", tool)
         self.batch = self.batch_with()
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.pose import checked_rotation, pose_rows
+from explorer.mechanism.pose import pose_rows, rotation_array
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.numerics.vectors import Vector, column, dot3
@@ -99,7 +99,7 @@ def planes_of_singularity(rotation: ArrayLike) -> FloatArray:
     The gradient of δ2 has the length of the sine between the lines a1a2 and b2b3, which is zero
     if they are parallel; the others have unit length. The rotation has the shape (..., 3, 3).
     """
-    r = checked_rotation(rotation)
+    r = rotation_array(rotation)
     gradients = np.zeros(r.shape)
     gradients[..., 0, :] = -r[..., :, 2]
     gradients[..., 1, 1], gradients[..., 1, 2] = -r[..., 2, 0], r[..., 1, 0]

@@ -105,7 +105,7 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
 
 def quaternion_from_rotation(rotation: ArrayLike) -> FloatArray:
     """Return unit quaternions (w, x, y, z), shape (..., 4), of rotations; w is not negative."""
-    matrix = checked_rotation(rotation)
+    matrix = rotation_array(rotation)
     return Rotation.from_matrix(matrix).as_quat(canonical=True, scalar_first=True)
 
 
@@ -127,11 +127,11 @@ def yaw_pitch_roll_from_rotation(rotation: ArrayLike) -> FloatArray:
     Raises:
         InputError: A matrix is not a rotation.
     """
-    matrix = checked_rotation(rotation)
+    matrix = rotation_array(rotation)
     return Rotation.from_matrix(matrix).as_euler("ZYX", degrees=True, suppress_warnings=True)
 
 
-def checked_rotation(rotation: ArrayLike) -> FloatArray:
+def rotation_array(rotation: ArrayLike) -> FloatArray:
     """Return rotation matrices (..., 3, 3) as float64 after checking them.
 
     Raises:
@@ -163,7 +163,7 @@ def pose_rows(
     Raises:
         InputError: A position is not finite, a rotation is not one, or batch axes do not broadcast.
     """
-    p, r = arrays.position_array("position", position), checked_rotation(rotation)
+    p, r = arrays.position_array("position", position), rotation_array(rotation)
     batch = arrays.batch_shape((p, 1), (r, 2))
     return arrays.rows_for_kernel(p, batch, 1), arrays.rows_for_kernel(r, batch, 2), batch
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from explorer.mechanism.pose import Pose, checked_rotation
+from explorer.mechanism.pose import Pose, rotation_array
 from explorer.numerics.arrays import FloatArray, finite_array
 
 # Sine of the tilt below which the azimuth is rounding noise.
@@ -54,7 +54,7 @@ def tilt_torsion_from_rotation(rotation: ArrayLike) -> FloatArray:
     At tilt 0 every azimuth gives the same rotation, so the azimuth is 0. At tilt 180° only twice
     the azimuth less the torsion is determined, so the torsion is 0.
     """
-    r = checked_rotation(rotation)
+    r = rotation_array(rotation)
     sine = np.hypot(r[..., 0, 2], r[..., 1, 2])
     tilt = np.arctan2(sine, r[..., 2, 2])
     is_free = sine < LEVEL

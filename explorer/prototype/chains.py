@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation, quaternion_from_rotation
+from explorer.mechanism.pose import quaternion_from_rotation, rotation_array
 from explorer.numerics.arrays import FloatArray
 
 LEGS = (1, 2, 3, 4)
@@ -161,7 +161,7 @@ class Chains:
         along = turn[..., rod, :, 2] * joints[..., _LENGTHS, None]
         origin[..., first, :] = origin[..., cylinder, :] = starts
         origin[..., rod, :] = starts + along
-        origin[..., -1, :], turn[..., -1, :, :] = position, checked_rotation(rotation)
+        origin[..., -1, :], turn[..., -1, :, :] = position, rotation_array(rotation)
         return Places(origin, turn)
 
     def places_at(self, position: ArrayLike, rotation: ArrayLike) -> Places:

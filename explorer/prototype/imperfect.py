@@ -19,7 +19,7 @@ from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse, joint_array
 from explorer.mechanism.margins import margins, mode_of
-from explorer.mechanism.pose import Pose, checked_rotation
+from explorer.mechanism.pose import Pose, rotation_array
 from explorer.numerics.arrays import FloatArray, finite_array, position_array
 from explorer.prototype.chains import ACTUATED, Chains, Places
 from explorer.statics import accuracy
@@ -109,7 +109,7 @@ class ImperfectMachine:
             position: Position of the platform's frame in the base frame, shape (3,).
             rotation: Platform to base, shape (3, 3).
         """
-        p, r = position_array("position", position), checked_rotation(rotation)
+        p, r = position_array("position", position), rotation_array(rotation)
         ends = p + self.points @ r.T
         # Seen from its base, a leg is that of the design at another position of the platform.
         seen = np.einsum("kji,kj->ki", self.turns, ends - self.shifts)

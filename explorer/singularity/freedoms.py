@@ -42,7 +42,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTH_ROWS
 from explorer.mechanism.folds import FOLD_LINES
 from explorer.mechanism.margins import ROUNDING, margins
-from explorer.mechanism.pose import Pose, checked_rotation
+from explorer.mechanism.pose import Pose, rotation_array
 from explorer.numerics.arrays import FloatArray, dot, lengths_of, position_array, triple
 from explorer.singularity.strata import incidences, stratum_of
 
@@ -243,7 +243,7 @@ def least_turns(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     They are from 0, for a pose that has the incidence, to a quarter turn. Arguments and errors are
     those of `explorer.mechanism.margins.margins`.
     """
-    p, r = position_array("position", position), checked_rotation(rotation)
+    p, r = position_array("position", position), rotation_array(rotation)
     line = r[..., :, 0]
     from_line = np.cross(line, p)
     distance = np.sqrt(dot(p, p))

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.configuration import Configuration, computed_once
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import INCIDENCES, ROUNDING, margins_at
-from explorer.mechanism.pose import Pose, checked_rotation
+from explorer.mechanism.pose import Pose, rotation_array
 from explorer.numerics.arrays import FloatArray, batch_shape, dot, position_array
 from explorer.numerics.compiled import helper, kernel
 from explorer.singularity.nearest_lines import (
@@ -74,7 +74,7 @@ def displacement(
     """
     p = position_array("position", position)
     q = position_array("other position", other_position)
-    r, s = checked_rotation(rotation), checked_rotation(other_rotation)
+    r, s = rotation_array(rotation), rotation_array(other_rotation)
     batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
     # For close poses the formula with the scatter would cancel; these squares do not.
     moves = (q - p)[..., None, :] + design.platform_points @ np.swapaxes(s - r, -1, -2)

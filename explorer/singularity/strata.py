@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import INCIDENCES, INCIDENT
-from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.pose import rotation_array
 from explorer.numerics.arrays import (
     FloatArray,
     IntArray,
@@ -76,7 +76,7 @@ def stratum(position: ArrayLike, rotation: ArrayLike, length: float | None = Non
         InputError: The position is not finite, or the rotation is not one.
     """
     p = position_array("position", position)
-    r = checked_rotation(rotation)
+    r = rotation_array(rotation)
     shape = batch_shape((p, 1), (r, 2))
     ranks = np.zeros((*shape, 3, 3), dtype=np.int64)
     for (i, j), rank in _ranks_of_pose(p, r, length).items():

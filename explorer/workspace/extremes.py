@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import TOLERANCE, Design
 from explorer.mechanism.margins import planes_of_singularity
-from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.pose import rotation_array
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot, rotate
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
@@ -59,13 +59,13 @@ NEAR = 1e-3
 
 def extent_of(design: Design, rotation: ArrayLike) -> tuple[FloatArray, FloatArray] | None:
     """Return (lows, highs) of a workspace, each (3,), in design units; None if it has no volume."""
-    points = extreme_positions(design, checked_rotation(rotation), np.zeros((0, 3)))
+    points = extreme_positions(design, rotation_array(rotation), np.zeros((0, 3)))
     return (points.min(axis=0), points.max(axis=0)) if len(points) else None
 
 
 def least_margins(design: Design, rotation: ArrayLike) -> FloatArray | None:
     """Return the least |δ1|, |δ2| and |δ3| in a workspace, in design units; None as `extent_of`."""
-    r = checked_rotation(rotation)
+    r = rotation_array(rotation)
     gradients = planes_of_singularity(r)
     points = extreme_positions(design, r, gradients)
     if not len(points):

@@ -37,7 +37,7 @@ from explorer.app.features.precision.feature import (
     PrecisionPanel,
     budget_request,
 )
-from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene, drawn_times
+from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene, magnification
 from explorer.app.features.precision.tasks import budget_of, budget_table
 from explorer.app.scene.placing import SCENE_REACH, Placed
 from explorer.app.scene.shapes import GHOST, linear_colour
@@ -400,7 +400,7 @@ def test_deflected_shape_is_the_linear_motion_magnified(
     placed = Placed(Frame(state))
     precision = services.get(Loads).precision(placed.frame)
     drawn = by_name(DeflectedScene(services).updates(placed))
-    magnified = drawn_times(placed, precision)
+    magnified = magnification(placed, precision)
     assert times in (None, magnified)
     # One that leaves the scene is limited.
     wide = Placed(Frame(state_with(deflected=True, times=1e12)))

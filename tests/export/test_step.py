@@ -149,7 +149,7 @@ def test_step_any_name_is_written_as_the_standard_says(name: str, tmp_path: Path
 def test_step_workspace_shifted_to_the_tool_keeps_faces_and_volume() -> None:
     solid = exact_workspace(OPTIMAL)
     offset = np.array([31.0, -17.5, 120.0])
-    shifted = solid.shifted(offset)
+    shifted = solid.shift(offset)
     assert shifted.limit_of_face == solid.limit_of_face
     assert face_kinds(shifted.shape) == face_kinds(solid.shape)
     assert shifted.volume == pytest.approx(solid.volume, rel=1e-9)

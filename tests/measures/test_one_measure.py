@@ -73,7 +73,7 @@ def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture
         },
         "report": {
             CATALOGUE[name].label: value
-            for name, value in ReportData(design).measured.values.items()
+            for name, value in ReportData(design).measurements.values.items()
         },
     }
 

@@ -22,8 +22,8 @@ from explorer import (
 )
 from explorer.mechanism.pose import (
     ORTHONORMAL_TOLERANCE,
-    checked_rotation,
     quaternion_from_rotation,
+    rotation_array,
 )
 from explorer.mechanism.tilt_torsion import (
     rotation_from_tilt_torsion,
@@ -110,10 +110,10 @@ def test_small_rotations_and_quarter_turns_convert_to_the_last_digits(rotation: 
     ],
 )
 def test_matrix_that_is_no_rotation_is_refused(matrix: Any) -> None:
-    for function in (checked_rotation, quaternion_from_rotation, yaw_pitch_roll_from_rotation):
+    for function in (rotation_array, quaternion_from_rotation, yaw_pitch_roll_from_rotation):
         refusal(function, matrix)
     nearly = np.eye(3) + 1e-8
-    assert_array_equal(checked_rotation(nearly), nearly)
+    assert_array_equal(rotation_array(nearly), nearly)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, Design, InputError, Limits, Pose, evaluate, margins
 from explorer.mechanism.design import LENGTHS, Swing
-from explorer.mechanism.pose import checked_rotation, yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import rotation_array, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
@@ -52,7 +52,7 @@ def test_yaw_pitch_roll_range_is_a_grid_with_its_ends() -> None:
 def test_cone_of_directions_is_even_and_has_no_torsion(half_angle: float) -> None:
     count = 2000
     found = cone_of_directions(HOME.rotation, half_angle, count)
-    checked_rotation(found)
+    rotation_array(found)
     np.testing.assert_allclose(found[0], HOME.rotation, atol=1e-12)
     turn = Rotation.from_matrix(HOME.rotation.T @ found).as_rotvec()
     np.testing.assert_allclose(turn[:, 2], 0.0, atol=1e-9)

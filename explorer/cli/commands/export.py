@@ -143,7 +143,7 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
             )
     shift = command.shift(design, home)
     if shift is not None:
-        solid = solid.shifted(shift)
+        solid = solid.shift(shift)
     if command.what == "hull":
         solid = convex_hull(solid)
     data = mesh.mesh_bytes(solid, file_format, design, _name(command, design))
@@ -170,7 +170,7 @@ def _step(command: Export) -> tuple[bytes, Facts]:
     solid = step.exact_workspace(design, home.rotation)
     shift = command.shift(design, home)
     if shift is not None:
-        solid = solid.shifted(shift * design.unit_mm)
+        solid = solid.shift(shift * design.unit_mm)
     volume = solid.volume / design.unit_mm**3
     facts = {"format": "step", "volume": volume, "faces": len(solid.limit_of_face)}
     return step.step_bytes(solid, _name(command, design)), facts

@@ -60,7 +60,7 @@ class ReportData(Case):
         return "its home pose" if self.is_home else "the pose of this report"
 
     @cached_property
-    def measured(self) -> Measurements:
+    def measurements(self) -> Measurements:
         """Measures of the catalogue that the report lists."""
         return measure_design(self, measures_in("report"))
 
@@ -70,7 +70,7 @@ class ReportData(Case):
         return evaluate(self.design, self.at)
 
     @cached_property
-    def counted(self) -> NodeCount | ExplorerError:
+    def node_count(self) -> NodeCount | ExplorerError:
         """Nodes of the workspace, counted as in the paper."""
         return compute(lambda: self.paper_nodes)
 
@@ -90,7 +90,7 @@ class ReportData(Case):
         return compute(lambda: accessible_workspace(self.design, self.rotation, start=start))
 
     @property
-    def loaded(self) -> LoadedPose:
+    def loaded_pose(self) -> LoadedPose:
         """The pose under the payload's weight and its force of any direction."""
         return LoadedPose(self.design, self.at)
 
@@ -101,7 +101,7 @@ class ReportData(Case):
         return has_load or self.has("is_limited")
 
     @cached_property
-    def carried(self) -> CarriedRegion | ExplorerError | None:
+    def carrying_part(self) -> CarriedRegion | ExplorerError | None:
         """Part of the workspace that holds the payload; None without a payload or limits."""
         if not (self.has("is_loaded") and self.has("is_limited")):
             return None
@@ -113,7 +113,7 @@ class ReportData(Case):
 
         The load is the payload's weight, and its force in the direction that moves the tool most.
         """
-        weighed = ToolPrecision(self.loaded)
+        weighed = ToolPrecision(self.loaded_pose)
         if not (weighed.has_errors or self.has("is_elastic")):
             return None
         force = self.design.payload.force_n

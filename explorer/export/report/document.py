@@ -96,13 +96,13 @@ def _entry(name: Piece, *pieces: Piece) -> Element:
 
 def _headline(data: ReportData) -> Iterator[tuple[Piece, ...]]:
     snapshot, reach = data.snapshot, data.design.reach * data.design.unit_mm
-    for name, value in data.measured.values.items():
+    for name, value in data.measurements.values.items():
         measure = CATALOGUE[name]
         title = f"{measure.heading[:1].upper()}{measure.heading[1:]}"
         if value is None:
-            yield title, "infinite" if name in data.measured.infinite else "–"
-        elif name == "node_volume" and not isinstance(data.counted, ExplorerError):
-            count = element("span", whole(data.counted.count), " nodes")
+            yield title, "infinite" if name in data.measurements.infinite else "–"
+        elif name == "node_volume" and not isinstance(data.node_count, ExplorerError):
+            count = element("span", whole(data.node_count.count), " nodes")
             yield title, value, _unit("units³, "), count
         else:
             yield title, value, _unit(measure.unit_in("units"))
@@ -281,7 +281,7 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
         yield sources.load_source("forces", LoadedPose(design, pose)).command
     if data.precision is not None:
         yield sources.load_source("accuracy", data.precision.loaded).command
-    if data.carried is not None:
+    if data.carrying_part is not None:
         yield f"explorer workspace --design {source}{turned} --load 0 0 0"
     if not isinstance(data.bill, ExplorerError):
         yield f"explorer export mechanism --design {source} --out mechanism.zip"

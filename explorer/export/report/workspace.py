@@ -92,7 +92,7 @@ def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
 
 
 def _volumes(data: ReportData) -> Element:
-    counted, solid, accessible = data.counted, data.solid, data.accessible
+    counted, solid, accessible = data.node_count, data.solid, data.accessible
     is_exact = data.volume.error <= 1e-6 * data.volume.volume
     remarks: dict[str, Cell] = {"volume": "exact" if is_exact else "to four digits"}
     if not isinstance(counted, ExplorerError):
@@ -106,7 +106,7 @@ def _volumes(data: ReportData) -> Element:
         )
         rows.append((name, *cells, remark))
 
-    for name, value in data.measured.values.items():
+    for name, value in data.measurements.values.items():
         measure = CATALOGUE[name]
         if measure.power == CATALOGUE["volume"].power:
             add(measure.heading, value, remarks.get(name) or measure.reason(data))
@@ -126,11 +126,11 @@ def _volumes(data: ReportData) -> Element:
 
 
 def _extent(data: ReportData) -> Element | None:
-    if isinstance(data.counted, ExplorerError) or data.counted.extent is None:
+    if isinstance(data.node_count, ExplorerError) or data.node_count.extent is None:
         return None
     rows = [
         (axis, markup.range_of(ends), markup.range_of([end * data.design.unit_mm for end in ends]))
-        for axis, *ends in zip("xyz", *data.counted.extent, strict=True)
+        for axis, *ends in zip("xyz", *data.node_count.extent, strict=True)
     ]
     return markup.table(("axis", "units", "mm"), rows, "<>>", "Extent of the counted nodes")
 
@@ -161,8 +161,8 @@ def loads_section(data: ReportData) -> Iterator[Element]:
     )
     yield element("div", _payload(data), _limits(data), class_="pair")
     yield from markup.elements(_in_the_pose(data))
-    if data.carried is not None and data.volume.volume > 0.0:
-        yield from _over_the_workspace(data, data.carried)
+    if data.carrying_part is not None and data.volume.volume > 0.0:
+        yield from _over_the_workspace(data, data.carrying_part)
 
 
 def _payload(data: ReportData) -> Element:
@@ -212,7 +212,7 @@ def _limits(data: ReportData) -> Element:
 
 
 def _in_the_pose(data: ReportData) -> Iterator[Block]:
-    loaded = data.loaded
+    loaded = data.loaded_pose
     if not loaded.is_regular or (data.has("is_loaded") and data.has("is_limited")):
         yield forces.verdict(loaded, "payload")
     if not loaded.is_regular:

@@ -18,7 +18,7 @@ from explorer.measures.box import box_margins
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.optimise.problem import AZIMUTHS, OF_THE_MACHINE, OVER_BOX, Problem
 from explorer.optimise.search import demands, grid_demands
-from explorer.optimise.search.state import UNBOUNDED, State, scaled_bounds, scales
+from explorer.optimise.search.state import UNBOUNDED, State, bounds_of, scales
 
 MISSED = 1e3
 """Value of an objective that is not finite or of no design; with a minus, of such a demand."""
@@ -108,7 +108,7 @@ class Model:
     @cached_property
     def bounds(self) -> FloatArray:
         """Lows and highs of the scaled variables, shape (n, 2)."""
-        bounds = scaled_bounds(self.problem)
+        bounds = bounds_of(self.problem)
         return np.vstack([bounds, UNBOUNDED]) if self.raises_worst else bounds
 
     def add_positions(self, positions: FloatArray) -> None:

@@ -17,7 +17,7 @@ from explorer.optimise.problem import DISTANCES, Problem, distance_of
 from explorer.optimise.search.demands import DegenerateDemand, GapDemand
 from explorer.optimise.search.model import MISSED, Model
 from explorer.optimise.search.sqp import Point, slsqp
-from explorer.optimise.search.state import UNBOUNDED, State, scaled_bounds
+from explorer.optimise.search.state import UNBOUNDED, State, bounds_of
 from explorer.workspace.limits.constraints import HalfSpace
 
 # Designs tried for each start, before the bounds are taken to allow no more.
@@ -125,7 +125,7 @@ def open_workspace(
         evaluate,
         lambda x, values: see(State(problem, x[:n]), labels[int(values.argmin())]),
         first,
-        np.vstack([scaled_bounds(problem), [UNBOUNDED] * 3]),
+        np.vstack([bounds_of(problem), [UNBOUNDED] * 3]),
         np.zeros(len(labels), dtype=bool),
         most=MOST_ITERATIONS,
         precision=1e-8,

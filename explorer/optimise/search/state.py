@@ -32,7 +32,7 @@ def scales(problem: Problem) -> FloatArray:
     return np.array([math.degrees(1.0) if name == YAW else problem.size for name in problem.names])
 
 
-def scaled_bounds(problem: Problem) -> FloatArray:
+def bounds_of(problem: Problem) -> FloatArray:
     """Return the lows and highs of the scaled variables, shape (n, 2)."""
     pairs = np.array([(variable.low, variable.high) for variable in problem.variables])
     return pairs / scales(problem)[:, None]

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import TOLERANCE, Design
-from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.pose import rotation_array
 from explorer.numerics.arrays import BoolArray, FloatArray, position_array
 from explorer.workspace.limits import quantities
 from explorer.workspace.limits.quantities import Bound, Demand, LegAngle
@@ -166,7 +166,7 @@ def shift(limit: Constraint, offset: FloatArray) -> Constraint:
 
 def orientation_of(design: Design, rotation: ArrayLike | None = None) -> FloatArray:
     """Return an orientation, shape (3, 3), after checking it; that of the home pose if None."""
-    return design.home_pose.rotation if rotation is None else checked_rotation(rotation)
+    return design.home_pose.rotation if rotation is None else rotation_array(rotation)
 
 
 def constraints(
@@ -179,7 +179,7 @@ def constraints(
     Raises:
         InputError: Not a rotation.
     """
-    r = checked_rotation(rotation)
+    r = rotation_array(rotation)
     return tuple(
         solid for demand in demands_of(design, signs) for solid in _solids(design, r, demand)
     )
@@ -195,7 +195,7 @@ def constraints_over(
     Raises:
         InputError: Not rotations, or not a point.
     """
-    matrices = checked_rotation(rotations)
+    matrices = rotation_array(rotations)
     if matrices.ndim != 3 or not len(matrices):
         raise InputError(f"rotations must have the shape (n, 3, 3); got {matrices.shape}")
     return [

@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from explorer.errors import InputError
 from explorer.mechanism.configuration import one_tool, tool_offset
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation, rotation_from_yaw_pitch_roll
+from explorer.mechanism.pose import rotation_array, rotation_from_yaw_pitch_roll
 from explorer.numerics import arrays
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.checks import whole
@@ -80,7 +80,7 @@ def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> Fl
     Raises:
         InputError: Not a rotation, a half-angle out of its range, or no usable count.
     """
-    untilted = checked_rotation(rotation)
+    untilted = rotation_array(rotation)
     if not 0.0 <= half_angle <= 180.0:
         raise InputError(f"the half-angle of tilts must lie within 0° to 180°; got {half_angle:g}°")
     whole("the number of orientations", count, 1, MOST_ORIENTATIONS)
@@ -213,7 +213,7 @@ def orientations_within(
     carriage order, box, margins with the home's sign triple, and swing demands. Position, tool and
     errors are those of `orientation_capability`.
     """
-    p, r, t = one_position(position), checked_rotation(rotations), one_tool(tool)
+    p, r, t = one_position(position), rotation_array(rotations), one_tool(tool)
     if r.ndim != 3 or not len(r):
         raise InputError(f"rotations must have the shape (n, 3, 3); got {r.shape}")
     return _are_within(design, p, r, t)

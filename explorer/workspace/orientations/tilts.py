@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.mechanism.configuration import one_tool
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.pose import rotation_array
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion, tilt_torsion_of
 from explorer.numerics import arrays
 from explorer.numerics.arrays import FloatArray
@@ -336,7 +336,7 @@ def is_connected(
     """
     p = one_position(position)
     given = [each for each in (rotation, other) if each is not None]
-    ends = [tilt_torsion_of(checked_rotation(each)) for each in given]
+    ends = [tilt_torsion_of(rotation_array(each)) for each in given]
     for azimuth, tilt, torsion in ends:
         reached = tilt_map(design, p, torsion, [azimuth], tool).tilts[0]
         if not reached >= tilt - ANGLE_TOLERANCE:

@@ -50,7 +50,7 @@ class Solid:
     empty_because: tuple[str, ...] = ()
     agrees: bool | None = None
 
-    def shifted(self, offset: FloatArray) -> Solid:
+    def shift(self, offset: FloatArray) -> Solid:
         """Return the solid moved by a vector in design units, shape (3,).
 
         A constant-orientation workspace moved by `offset_of` the tool is that of the tool point.

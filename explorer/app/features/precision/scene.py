@@ -96,7 +96,7 @@ class DeflectedScene(ScenePart):
             return
         tool, names = tool_point(placed), list(placed.platform_points)
         points = np.array([*(placed.points[name] for name in names), tool])
-        times = drawn_times(placed, precision)
+        times = magnification(placed, precision)
         moved = points + times * placed.scale * _displacements(precision, placed, points)
         yield from self._draw_legs(placed, precision, moved[:4], times)
         yield from self._balls.at(moved, np.full(5, 1.6 * RADIUS * placed.thickness))
@@ -142,7 +142,7 @@ def _displacements(precision: ToolPrecision, placed: Placed, points: FloatArray)
     return precision.deflection[:3] + arms @ np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
 
 
-def drawn_times(placed: Placed, precision: ToolPrecision) -> float:
+def magnification(placed: Placed, precision: ToolPrecision) -> float:
     """Return the magnification of the drawn deflection."""
     reach = placed.frame.state.design.reach
     points = np.array([*placed.points.values(), tool_point(placed)])

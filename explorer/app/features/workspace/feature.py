@@ -148,7 +148,7 @@ class WorkspacePanel:
         yield from self._under_way.updates()
         yield from show_html(self._trouble, self._trouble_words())
         mapped = None if drawing is None or view.cut is None else drawing.slice_map
-        colour = feeds.drawn_measure(state)
+        colour = feeds.measure_of_colour(state)
         words = texts.missing_input(view.colour) if colour != view.colour else ""
         if colour != "plain" or mapped is not None:
             measure = work.map_measure(state.design, colour, holds=view.region == "held")
@@ -292,7 +292,7 @@ def volume_figure(services: Services) -> Callable[[Frame], str]:
         which = feeds.orientation_word(frame)
         hint = f"Exact volume of the workspace within the limits, in the {which} orientation."
         if drawing is not None:
-            name += feeds.turned_suffix(drawing.request.design, drawing.request.rotation)
+            name += feeds.orientation_suffix(drawing.request.design, drawing.request.rotation)
             if drawing.measured.volume <= 0.0:
                 hint += f" It is emptied by: {', '.join(drawing.measured.empty_because)}."
         text, look = texts.volume_text(drawing), look_of(feed)

@@ -40,7 +40,7 @@ def orientation_word(frame: Frame) -> str:
     return "home" if frame.state.view.workspace.orientation == "home" else "present"
 
 
-def turned_suffix(design: Design, rotation: work.Rows) -> str:
+def orientation_suffix(design: Design, rotation: work.Rows) -> str:
     """Return what follows the names of a workspace's measures; "" in the orientation of home."""
     is_home = np.allclose(rotation, design.home_pose.rotation, atol=SAME)
     return "" if is_home else ", turned"
@@ -79,7 +79,7 @@ def loaded_design(state: State) -> Design:
     return msgspec.structs.replace(design, payload=payload)
 
 
-def drawn_measure(state: State) -> Measure:
+def measure_of_colour(state: State) -> Measure:
     """Return the measure that colours the surface; "plain" for one that would be zero everywhere.
 
     Shares are zero without limits, errors without errors of actuators, and the deflection of a
@@ -121,7 +121,7 @@ def workspace_request(frame: Frame) -> work.WorkspaceRequest | None:
         # The worker counts in coordinates of b4.
         level -= float(frame.state.offset(workspace_pose(frame).rotation)["xyz".index(view.cut)])
     coloured = view.colour == "margin" or is_cut
-    colour = drawn_measure(frame.state)
+    colour = measure_of_colour(frame.state)
     # The load changes no drawing that does not show it.
     is_loaded = colour in LOAD_MEASURES or view.region == "held"
     return work.WorkspaceRequest(

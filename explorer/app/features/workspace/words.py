@@ -6,7 +6,7 @@ import numpy as np
 
 from explorer.app.features.feature import html_of
 from explorer.app.features.workspace import work
-from explorer.app.features.workspace.feeds import orientation_word, turned_suffix
+from explorer.app.features.workspace.feeds import orientation_suffix, orientation_word
 from explorer.app.scene.surfaces import AT_LIMIT, COLLIDING, PLAIN, Measure
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
@@ -144,7 +144,7 @@ def workspace_details(
 def _numbers(drawing: work.WorkspaceDrawing, state: State) -> str:
     """Return the table of nodes, extent and volumes."""
     nodes, part, request = drawing.nodes, drawing.part, drawing.request
-    suffix = turned_suffix(request.design, request.rotation)
+    suffix = orientation_suffix(request.design, request.rotation)
     rows: list[str] = []
 
     def add(name: str, value: str, hint: str) -> None:

@@ -377,7 +377,7 @@ def export_mesh(
 
         exact = exact_workspace(design, rotation)
         if offset is not None:
-            exact = exact.shifted(design.unit_mm * np.array(offset))
+            exact = exact.shift(design.unit_mm * np.array(offset))
         return step_bytes(exact, f"{name} of {design.name}")
     from explorer.export.mesh import mesh_bytes
 
@@ -391,7 +391,7 @@ def export_mesh(
         _, solid = answer
     solid = convex_hull(solid) if what == "hull" else solid
     if offset is not None:
-        solid = solid.shifted(np.array(offset))
+        solid = solid.shift(np.array(offset))
     return mesh_bytes(solid, file_format, design, f"{design.name} {name}")
 
 
