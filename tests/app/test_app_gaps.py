@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import functools
 import itertools
 import math
+import time
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +18,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism import bodies
+from explorer.app.features.mechanism import bodies, marks
 from explorer.app.features.mechanism.incidences import (
     DASHES,
     FADE_FROM,
@@ -32,7 +35,7 @@ from explorer.app.features.singularity.work import GoToSingularity, GoToStratum
 from explorer.app.features.view.feature import TO_SUN, shadow_outlines
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import linear_colour, plate
-from explorer.app.state.actions import Open, SetJoint, SetPose
+from explorer.app.state.actions import GoHome, Open, SetJoint, SetPose
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
 from explorer.mechanism.design_file import PRESETS
@@ -310,6 +313,30 @@ def test_tetrahedron_that_fails_is_outlined_even_if_it_is_switched_off(
     nodes = draw(tetrahedra, viewed(state, tetrahedra=(False, False, False)))
     outlined = {i for i in range(3) if nodes[f"/tetrahedra/{i + 1}/edges"]["visible"]}
     assert outlined == {*state.unclosed.failing} != set()
+
+
+# The gizmo
+
+
+def test_gizmo_is_put_back_only_once_the_platform_has_followed_its_last_movement(
+    services: Services, desk: Desk
+) -> None:
+    handle = marks.DragHandle(services)
+    gizmo: Any = handle.handle
+
+    def written() -> bool:
+        return "position" in by_name(handle.updates(Placed(Frame(desk.state))))["/handle"]
+
+    assert written()
+    # A browser has moved it, and the session is yet to hear of that.
+    gizmo.position, gizmo._impl_aux.last_updated = (8.0, 3.0, 9.5), time.time() + 1.0
+    assert not written()
+    for callback in gizmo._impl_aux.update_cb:
+        asyncio.run(callback(SimpleNamespace(client_id=1)))
+    assert desk.state.pose == handle.pose(desk.state)
+    assert not written()
+    desk.session.do(GoHome())
+    assert written()
 
 
 # Colours

@@ -434,7 +434,8 @@ def test_changes_during_a_press_of_a_browser_are_one_step(
             clients: list[Any] = list(running.viser.get_clients().values())
             fields = [each.gui._gui_input_handle_from_uuid for each in clients]
             both = [pair for each in fields for pair in tuple(each.items())]
-            return [uuid for uuid, field in both if field.label == "Press"]
+            # A field is there before the explorer listens to it.
+            return [uuid for uuid, f in both if f.label == "Press" and f._impl.update_cb]
 
         wait_for(inboxes)
         (inbox,) = inboxes()

@@ -61,6 +61,10 @@ class Newcomer:
         """Return the first button with these words; what runs has its buttons in the bar too."""
         return self.page.get_by_role("button", name=words, exact=True).first
 
+    def wait(self) -> None:
+        """Wait until the page shows all that follows from what was done."""
+        self._tab.settle()
+
     def press(self, words: Words, role: Role = "button") -> None:
         """Press a button, a checkbox or a tab, once the page has drawn all that was sent."""
         self.presses += 1
@@ -94,12 +98,13 @@ class Newcomer:
         return self.page.get_by_role("textbox", name=words, exact=True).first
 
     def type(self, words: str, text: str) -> None:
-        """Press a field, replace what is in it, and press Enter."""
+        """Press a field, replace what is in it, and press Enter, without a pause between keys."""
         self.presses += 2
         self.field(words).click()
-        self.page.keyboard.press("ControlOrMeta+a")
-        self.page.keyboard.type(text)
-        self.page.keyboard.press("Enter")
+        with self._tab.slow_time():
+            self.page.keyboard.press("ControlOrMeta+a")
+            self.page.keyboard.type(text)
+            self.page.keyboard.press("Enter")
 
     def choose(self, words: str, option: str) -> None:
         """Open a list and press an option."""
@@ -118,10 +123,10 @@ class Newcomer:
 
     def drag_slider(self, words: str, pixels: float) -> None:
         """Drag the thumb of a slider to the right."""
-        thumb = self.page.get_by_role("slider", name=words, exact=True)
-        thumb.scroll_into_view_if_needed()
-        x, y = middle(thumb)
-        self.drag((x, y), (x + pixels, y))
+        self.presses += 1
+        x, y = self._tab.grab(self.page.get_by_role("slider", name=words, exact=True))
+        self.page.mouse.move(x + pixels, y, steps=5)
+        self.page.mouse.up()
 
     def export(self, what: str, file_format: str) -> bytes:
         """Return the file that the dialog Export gives."""
@@ -189,17 +194,10 @@ class Newcomer:
         return presses
 
     def reload(self) -> None:
-        """Load the page again."""
+        """Load the page again, once it has drawn all that was sent."""
         self.presses += 1
+        self._tab.settle()
         self._tab.reload()
-
-
-def middle(it: Locator) -> tuple[float, float]:
-    """Return the middle of something on the page."""
-    # There is none of what is drawn anew at this moment.
-    while (box := it.bounding_box()) is None:
-        pass
-    return box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
 
 
 def hue(it: Locator) -> float:

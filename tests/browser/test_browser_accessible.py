@@ -66,7 +66,10 @@ def test_accessible_solid_replaces_the_other_while_the_page_stays_alive(tab: Tab
         before = tab.state
         goal = tab.drag(JOINT_LABELS["l4"], 0.5)
         tab.wait_for(lambda: abs(tab.state.joints[5] - goal) < 0.2, "the length dragged to")
-        tab.wait_until_shown(JOINT_LABELS["l4"], tab.state.joints[5])
+        # The last of the drag may still be on its way.
+        tab.wait_for(
+            lambda: tab.stands(JOINT_LABELS["l4"], tab.state.joints[5]), "the length of the state"
+        )
         assert tab.state.pose != before.pose
         assert red_pixels(tab) < MANY
         assert not page.services.get(WORKSPACE_FEED).is_current
@@ -75,7 +78,8 @@ def test_accessible_solid_replaces_the_other_while_the_page_stays_alive(tab: Tab
     finally:
         os.kill(process, signal.SIGCONT)
     accessible = tab.page.get_by_text("units³ accessible")
-    accessible.wait_for()
+    # It takes seconds of the processor, which are minutes on a busy machine.
+    accessible.wait_for(timeout=240_000)
     await_drawing(tab)
     expect(tab.page.get_by_text("computing …")).to_be_hidden()
     drawing = page.services.get(WORKSPACE_FEED).drawing

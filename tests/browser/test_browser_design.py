@@ -6,8 +6,8 @@ import re
 
 import numpy as np
 import pytest
-from playwright.sync_api import expect
-from tab import TRACK, Tab
+from playwright.sync_api import Locator, expect
+from tab import TRACK, Tab, middle
 
 from explorer.app.screenshot import SCENE_CANVAS
 from explorer.app.state.state import joints_of, open_state
@@ -79,6 +79,7 @@ def test_design_is_opened_changed_by_a_variable_and_reset_in_its_pose(tab: Tab) 
 def limits(tab: Tab) -> Tab:
     """A tab turned to the limits of the design."""
     # The test before may have left them open.
+    tab.settle()
     if not tab.label("l1").is_visible():
         tab.page.get_by_text("Limits (design units)", exact=True).click()
     tab.label("l1").wait_for()
@@ -91,20 +92,16 @@ def type_end(tab: Tab, words: str, end: int, text: str) -> None:
     tab.page.keyboard.press("Tab")
 
 
-def thumbs(tab: Tab, words: str) -> list[tuple[float, float]]:
-    """Return the middles of the thumbs of a range, in pixels."""
+def thumbs(tab: Tab, words: str) -> Locator:
+    """Return the thumbs of a range."""
     # The sliders' own label names no input, so that their row is found by its parts.
     row = tab.label(words).locator("xpath=ancestor::*[.//*[contains(@class, 'multi-slider')]][1]")
-    boxes = [thumb.bounding_box() for thumb in row.locator(".multi-slider-thumb").all()]
-    return [(b["x"] + 0.5 * b["width"], b["y"] + 0.5 * b["height"]) for b in boxes if b]
+    return row.locator(".multi-slider-thumb")
 
 
 def drag_thumb(tab: Tab, words: str, end: int, by: float) -> None:
     """Drag a thumb of a range by pixels."""
-    tab.label(words).scroll_into_view_if_needed()
-    x, y = thumbs(tab, words)[end]
-    tab.page.mouse.move(x, y)
-    tab.page.mouse.down()
+    x, y = tab.grab(thumbs(tab, words).nth(end))
     tab.page.mouse.move(x + by, y, steps=12)
     tab.page.mouse.up()
 
@@ -119,6 +116,8 @@ def test_end_that_is_typed_is_a_limit_and_is_disabled_where_nothing_is_bounded(
     type_end(limits, "d2", 0, "2.5")
     limits.wait_for(lambda: limits.state.design.limits.d2 == (2.5, None), "the minimum")
     assert limits.state.design.limits.l4 == (0.0, None)
+    reach = limits.row("Maxima at the reach").locator("input[type=checkbox]")
+    expect(reach).not_to_be_checked()
     limits.switch("Maxima at the reach", on=True)
     limits.wait_for(lambda: limits.state.design.limits.l1 == (0.0, None), "at the reach")
     field = limits.field("d1, d3 ends").first
@@ -151,7 +150,10 @@ def test_thumb_stops_at_the_other_and_a_typed_end_pushes_it(limits: Tab) -> None
     type_end(limits, "b4 x", 0, "-40")
     limits.wait_for(lambda: x_range() == (-40.0, 5.0), "an end beyond the track")
     # The track has become longer, and the thumbs stand in it.
-    limits.wait_for(lambda: np.ptp(thumbs(limits, "b4 x"), axis=0)[0] > 5.0, "thumbs apart")
+    limits.wait_for(
+        lambda: np.ptp([middle(each)[0] for each in thumbs(limits, "b4 x").all()]) > 5.0,
+        "thumbs apart",
+    )
     drag_thumb(limits, "b4 x", 1, 10.0)
     limits.wait_for(lambda: x_range()[1] > 5.0, "the upper thumb dragged")
     assert x_range()[0] == -40.0
@@ -177,8 +179,8 @@ def test_row_in_use_is_marked_in_the_sketch_and_its_hint_stands_beside_the_panel
     tab.field("b1x").fill("3")
     tab.page.keyboard.press("ArrowUp")
     tab.wait_for(lambda: tab.state.design.b1[0] > 3.0, "another design")
-    assert is_marked()
     tab.settle()
+    assert is_marked()
     tab.row("b2").locator(TRACK).hover()
     row = tab.row("b2").bounding_box()
     assert row is not None

@@ -200,19 +200,14 @@ def test_drawer_is_as_wide_as_the_scene_which_ends_above_it(tab: Tab) -> None:
         return beside and touches and at_the_foot and low["y"] > 100
 
     tab.wait_for(is_below_the_scene, "the drawer below the scene")
-    grip = box_of(drawer.locator("[data-dock-resize=top]"))
-    x, y = grip["x"] + 0.5 * grip["width"], grip["y"] + 0.5 * grip["height"]
     for pull in (-150, 200, -400):
+        tab.settle()
         before = height_of(drawer)
-        tab.page.mouse.move(x, y)
-        tab.page.mouse.down()
-        y += pull
-        tab.page.mouse.move(x, y, steps=4)
+        x, y = tab.grab(drawer.locator("[data-dock-resize=top]"))
+        tab.page.mouse.move(x, y + pull, steps=4)
         tab.page.mouse.up()
         tab.wait_for(lambda before=before: height_of(drawer) != before, "another height")
         tab.wait_for(is_below_the_scene, "the drawer below the scene")
-        grip = box_of(drawer.locator("[data-dock-resize=top]"))
-        y = grip["y"] + 0.5 * grip["height"]
     for less in (150, 250):
         tab.page.set_viewport_size({"width": width, "height": height - less})
         tab.wait_for(is_below_the_scene, "the drawer in a smaller window")

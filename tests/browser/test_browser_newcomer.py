@@ -8,9 +8,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from newcomer import Newcomer, hue, middle, numbers
+from newcomer import Newcomer, hue, numbers
 from playwright.sync_api import expect
-from tab import Tab
+from tab import Tab, middle
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design
@@ -68,6 +68,7 @@ def test_pose_near_a_singularity_is_named_in_amber_with_its_distance(newcomer: N
     assert 90.0 < hue(newcomer.sees("Clear of singularities")) < 150.0
     newcomer.type("z", "0.5")
     assert 25.0 < hue(newcomer.sees("Near a singularity")) < 50.0
+    newcomer.wait()
     words = newcomer.sees(re.compile(r"mm from δ1 = 0, a1 on the platform plane")).inner_text()
     assert 0.0 < numbers(words)[0] < 1.0
     nearest = newcomer.figure("Nearest singular pose")
@@ -107,8 +108,13 @@ def test_workspace_is_cut_in_its_middle_and_a_value_is_read(newcomer: Newcomer) 
     newcomer.press("x")
     expect(newcomer.field("Cut at")).to_have_value(re.compile(r"^10(\.0+)?$"))
     chart = newcomer.page.get_by_role("img", name="Map of the slice at x = 10")
+    newcomer.wait()
     chart.scroll_into_view_if_needed()
     newcomer.page.mouse.move(*middle(chart))
+    newcomer.sees(READING)
+    # Scrolling to the words may have moved the map.
+    newcomer.page.mouse.move(*middle(chart))
+    newcomer.wait()
     found = READING.search(newcomer.sees(READING).inner_text())
     assert found is not None
     assert float(found[3]) > 0.0
@@ -139,6 +145,7 @@ def test_problem_of_the_paper_is_solved_in_two_presses(newcomer: Newcomer) -> No
     # A search takes minutes on a busy machine.
     newcomer.page.get_by_text("Converged", exact=True).first.wait_for(timeout=300_000)
     newcomer.sees(re.compile("^Converged$"))
+    newcomer.wait()
     assert newcomer.presses_for() == 2
     assert newcomer.filled() == ["Accept"]
     expect(newcomer.button("Accept")).to_be_in_viewport(ratio=1.0)
@@ -185,12 +192,13 @@ def test_path_is_planned_and_played(newcomer: Newcomer, monkeypatch: pytest.Monk
     expect(newcomer.field("Time (s)")).not_to_have_value(re.compile(r"^0(\.0*)?$"))
     newcomer.press_running("Pause")
     newcomer.sees("Singular 2 times")
+    newcomer.button("Play").wait_for()
+    newcomer.wait()
     # The axis of time has numbers, though the charts were given data all along.
     of_margins, of_folds = newcomer.page.evaluate(AXIS_TEXTS)
     assert [of_margins[0], of_margins[2]] == [[], ["flat"]]
     assert of_folds == [["0", "20", "40", "60"], ["0", "90", "180"], ["flat", "flat"]]
     assert 0.0 < float(newcomer.field("Time (s)").input_value()) < 60.0
-    newcomer.button("Play").wait_for()
     assert newcomer.presses_for() == 5
     newcomer.press("Home pose")
     expect(newcomer.field("roll (°)")).to_have_value("0")
@@ -222,6 +230,7 @@ def test_study_is_started_brushed_and_a_design_of_it_picked(newcomer: Newcomer) 
     newcomer.button("New study").wait_for()
     assert newcomer.presses_for() == 4
     newcomer.wait_for_plots()
+    newcomer.wait()
     # The words of an axis stand above its middle.
     x, y = middle(newcomer.sees("volume [u³]"))
     newcomer.drag((x, y + BRUSH[0]), (x, y + BRUSH[1]))
@@ -229,6 +238,7 @@ def test_study_is_started_brushed_and_a_design_of_it_picked(newcomer: Newcomer) 
     assert 0.0 < within[-1] < 32.0
     # It comes with the pointer.
     newcomer.button("Expand plot").wait_for()
+    newcomer.wait()
     row = newcomer.button(re.compile(r"^\d+ [\d,]+ "))
     name, volume = row.inner_text().split()[:2]
     newcomer.press(re.compile(f"^{name} "))
@@ -291,6 +301,7 @@ def test_theme_palette_and_keys_are_found_in_the_bar(newcomer: Newcomer) -> None
     assert newcomer.presses_for() == 2
     newcomer.type("x", "12")
     newcomer.press(re.compile("^Commands"))
+    expect(newcomer.page.get_by_placeholder("Search commands")).to_be_focused()
     newcomer.page.keyboard.type("home pose")
     newcomer.press(re.compile("^Pose › Home pose"))
     expect(dialog).to_have_count(0)

@@ -38,14 +38,9 @@ def steps(tab: Tab) -> int:
 
 def grab(tab: Tab, words: str) -> tuple[float, float, float]:
     """Press the thumb of a slider; return its place, and how wide the slider is."""
-    thumb = tab.slider(words)
-    thumb.scroll_into_view_if_needed()
-    box, track = thumb.bounding_box(), tab.row(words).locator(TRACK).bounding_box()
-    assert box is not None
+    x, y = tab.grab(tab.slider(words))
+    track = tab.row(words).locator(TRACK).bounding_box()
     assert track is not None
-    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
-    tab.page.mouse.move(x, y)
-    tab.page.mouse.down()
     return x, y, track["width"]
 
 
@@ -76,7 +71,6 @@ def test_drag_of_a_slider_or_of_the_gizmo_is_one_step_however_long_it_rests(tab:
         move(tab, x + 0.08 * width, y)
         tab.page.mouse.up()
         # The last of the moves may arrive after the release.
-        tab.wait_for(lambda: tab.stands("x", tab.state.pose.position[0]), "the last value")
         tab.settle()
         assert steps(tab) == drag
     for _ in range(2):
@@ -92,17 +86,20 @@ def test_drag_of_a_slider_or_of_the_gizmo_is_one_step_however_long_it_rests(tab:
         move(tab, *tab.on_screen(tip + share * arrow))
         tab.advance(REST_SECONDS)
     tab.page.mouse.up()
+    tab.settle()
     assert steps(tab) == 1
 
 
 def test_release_that_is_reported_late_or_lost_ends_the_press(tab: Tab) -> None:
     x, y, width = grab(tab, "x")
     move(tab, x + 0.05 * width, y)
+    tab.settle()
     # The last value that a busy page sends late belongs to the press.
     tab.page.evaluate(BUSY_AT_RELEASE)
     before = tab.state.pose
     tab.page.mouse.up()
     tab.wait_for(lambda: tab.state.pose != before, "the last value")
+    tab.settle()
     assert steps(tab) == 1
     tab.push("Home pose")
     tab.wait_until_shown("x", 10.0)
@@ -128,7 +125,8 @@ def test_press_counts_after_a_reload_and_on_markup_that_is_replaced_meanwhile(ta
     for value in (11.0, 12.0):
         tab.running.page.session.do(SetPosition(0, value))
         tab.page.get_by_role("button", name=f"Undo x = {value:g}").click()
-        tab.wait_for(lambda: tab.stands("x", 10.0), "the pose of before")
+        tab.wait_for(lambda: tab.state.pose.position[0] == 10.0, "the pose of before")
+        tab.wait_until_shown("x", 10.0)
         tab.reload()
     tab.page.get_by_role("button", name="Help", exact=True).hover()
     tab.page.mouse.down()

@@ -41,7 +41,7 @@ def test_margin_that_is_pointed_at_fills_its_tetrahedron(tab: Tab) -> None:
         words.hover()
         tab.wait_for(lambda row=row: hovered.row == row, f"the pointer on δ{row}")
         tab.wait_for(lambda: is_visible(tab, "/tetrahedra/faces"), "a filled tetrahedron")
-        assert is_visible(tab, "/gaps/dashes")
+        tab.wait_for(lambda: is_visible(tab, "/gaps/dashes"), "its gap")
     # Its button shows it to the keyboard too.
     tab.page.mouse.move(SIZE[0] // 2, 4)
     tab.wait_for(lambda: not is_visible(tab, "/tetrahedra/faces"), "no filled tetrahedron")

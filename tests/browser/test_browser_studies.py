@@ -198,11 +198,15 @@ def click_until_picked(tab: Tab, place: Callable[[], tuple[float, float]], index
         x, y = place()
         tab.page.mouse.move(x - 3, y)
         tab.page.mouse.move(x, y, steps=3)
-        # Longer than the throttle of Plotly's hover; two clicks would be a double one within 0.3 s.
+        # Longer than the throttle of Plotly's hover.
         tab.page.wait_for_timeout(100)
         tab.page.mouse.click(x, y)
+        tab.settle()
+        if studies_of(tab).picked == index:
+            return True
+        # Two clicks would be a double one within 0.3 s.
         tab.page.wait_for_timeout(400)
-        return studies_of(tab).picked == index
+        return False
 
     tab.wait_for(is_picked, f"a pick of design {index}")
 

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from functools import partial
 from unittest import mock
 
+from explorer.app.features.designs.feature import SavedDesigns
+from explorer.app.features.studies.feature import StudiesPanel
 from explorer.app.page import Page
 from explorer.app.session import clock
 from explorer.app.widgets import assigning
@@ -57,11 +61,18 @@ def wait_until_quiet(timeout: float) -> bool:
 def settle(page: Page, timeout: float) -> bool:
     """Wait until all is drawn and no pause is pending; return whether that is so.
 
-    What waits for a pause of the user happens at once.
+    What waits for a pause of the user happens at once. Saved designs and studies are read on
+    threads of their own.
     """
     deadline = time.monotonic() + timeout
+    services = page.services
+    waits: list[Callable[[float], bool]] = [partial(wait_until_drawn, page)]
+    if services.has(SavedDesigns):
+        waits.append(services.get(SavedDesigns).wait_until_idle)
+    if services.has(StudiesPanel):
+        waits.append(services.get(StudiesPanel).feed.wait_until_idle)
     with mock.patch.object(assigning, "QUIET_SECONDS", 0.0):
-        while wait_until_drawn(page, deadline - time.monotonic()):
+        while all(wait(deadline - time.monotonic()) for wait in waits):
             with clock.changed:
                 for pause in page.pauses:
                     pause.due = clock.now()

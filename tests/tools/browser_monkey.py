@@ -6,7 +6,6 @@ From the checkout, for as long as one likes: python tests/tools/browser_monkey.p
 from __future__ import annotations
 
 import random
-import re
 import sys
 import time
 from collections.abc import Callable
@@ -43,14 +42,6 @@ KEYS = (
     *"abcdefghijklmnopqrstuvwxyz0123456789?",
 )
 TEXTS = ("0", "12.5", "-3", "1e9", "abc", "", "-", "99999999999999999999", "δ")
-
-# viser's page does the updates of a frame after its removals, and then complains: a card that
-# is put away within a frame of its last change. And it is told of removals that were before its
-# time, if a page that was reloaded has not been given up by then, which viser itself calls OK.
-LATE = re.compile(
-    r"error: Tried to update non-existent component '[\w-]+' \{content: "
-    r"|warning: \(OK\) Tried to remove non-existent component [\w-]+$"
-)
 
 # What can be clicked and lies open, as its middle and its kind; but for viser's own settings,
 # by which the page can be sent to another server.
@@ -126,7 +117,7 @@ class BrowserMonkey:
             self._page.wait_for_timeout(PAUSE_MS)
             if count % BETWEEN_LOOKS == 0 or count == actions:
                 self.look()
-        complaints = tuple(each for each in self._tab.complaints() if not LATE.match(each))
+        complaints = tuple(self._tab.complaints())
         self._tab.close()
         return Outcome(actions, complaints, tuple(self._drift))
 

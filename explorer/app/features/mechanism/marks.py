@@ -54,6 +54,8 @@ class DragHandle(ScenePart):
             HANDLE_NAME, scale=HANDLE_SCALE, line_width=2.0, depth_test=False, opacity=0.85
         )
         self._session = services.session
+        # Time of the last movement that the platform has followed.
+        self._followed = self.handle.update_timestamp
         self.handle.on_update(self._move_platform)
 
     def pose(self, state: State) -> Pose:
@@ -70,6 +72,9 @@ class DragHandle(ScenePart):
         """Yield the updates that keep the gizmo on the platform."""
         state = placed.frame.state
         yield self.handle, "visible", _is_handle_visible(placed)
+        # Put back, the gizmo would lose a movement that the platform is yet to follow.
+        if self.handle.update_timestamp != self._followed:
+            return
         with contextlib.suppress(InputError):
             # A pose that was written back during a drag would move the gizmo under the pointer.
             if self.pose(state) == state.pose:
@@ -87,10 +92,14 @@ class DragHandle(ScenePart):
         if event.client_id is not None:
             self._session.post(
                 "drag",
-                lambda state: SetPose(self.pose(state)),
+                self._follow,
                 stamp=self.handle.update_timestamp,
                 who=event.client_id,
             )
+
+    def _follow(self, state: State) -> SetPose:
+        self._followed = self.handle.update_timestamp
+        return SetPose(self.pose(state))
 
 
 def _is_handle_visible(placed: Placed) -> bool:
