@@ -20,7 +20,14 @@ from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
 from explorer.app.features.studies.feed import PlotJson, StudyDrawing
 from explorer.app.features.studies.folders import study_folders
-from explorer.app.features.studies.state import Brush, Studies, StudyPlan, label_of
+from explorer.app.features.studies.state import (
+    COUNTS,
+    PERCENTS,
+    Brush,
+    Studies,
+    StudyPlan,
+    label_of,
+)
 from explorer.app.features.studies.words import BUTTONS, acts, chips, head, legend, table
 from explorer.app.features.studies.work import study_runner
 from explorer.app.inputs.controls import At, Bound, Control, Controls
@@ -215,14 +222,14 @@ class StudiesPanel:
             "How many designs are computed, spread evenly over the ranges by a Sobol sequence; "
             "powers of two spread best.",
             At("studies.plan.count", convert=round),
-            Span(*StudyPlan.COUNTS, 1.0),
+            Span(*COUNTS, 1.0),
         )
         controls.slider(
             "Range, ± %",
             "How far each variable goes to both sides of its value in the live design: a share of "
             "the value, or of a 20th of the reach where that is more; for the yaw a share of 90°.",
             "studies.plan.percent",
-            Span(*StudyPlan.PERCENTS, 1.0),
+            Span(*PERCENTS, 1.0),
         )
         self.chips = gui.add_html("")
 

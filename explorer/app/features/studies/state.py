@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -43,22 +43,22 @@ class Brush:
     ranges: tuple[Range, ...]
 
 
+# Smallest and largest number of designs of a study from the page, and least and most per cent by
+# which its variables vary; with more, a3y or b1y could be zero.
+COUNTS, PERCENTS = (16.0, 2000.0), (1.0, 95.0)
+
+
 @dataclass(frozen=True)
 class StudyPlan:
     """A small study around the live design.
 
     Attributes:
-        COUNTS: Smallest and largest number of designs.
-        PERCENTS: Least and most that variables may vary; with more a3y or b1y could be zero.
         count: Number of designs.
         percent: How far each variable varies, in per cent.
         variables: Names of the variables that vary, out of `NAMES` of a study.
         measures: Names of the measures.
         objectives: Measures that span the Pareto front, each with its sense.
     """
-
-    COUNTS: ClassVar[tuple[float, float]] = 16.0, 2000.0
-    PERCENTS: ClassVar[tuple[float, float]] = 1.0, 95.0
 
     count: int = 256
     percent: float = 20.0
@@ -179,8 +179,8 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> sweeps.Study:
         InputError: No variable or no measure, or a number that is out of its range.
     """
     for value, ends, words in (
-        (plan.count, plan.COUNTS, "the number of designs of a study from the page"),
-        (plan.percent, plan.PERCENTS, "the per cent by which variables vary"),
+        (plan.count, COUNTS, "the number of designs of a study from the page"),
+        (plan.percent, PERCENTS, "the per cent by which variables vary"),
     ):
         if not ends[0] <= value <= ends[1]:
             low, high, got = map(format_number, (*ends, value))
