@@ -39,9 +39,10 @@ LOG = "explorer.log"
 """Name of the log of unexpected errors in the user's data folder."""
 # Size in bytes at which a new log is begun, and number of older ones that are kept.
 LARGEST_LOG, OLDER_LOGS = 1_000_000, 2
-# Parameter of glibc's `mallopt`, and its value. The page has dozens of threads: with an arena for
-# each few of them, free memory lies scattered, and an hour of use grows the process by a fifth.
-M_ARENA_MAX, ARENAS = -8, 2
+# glibc's parameters M_ARENA_MAX and M_MMAP_THRESHOLD, with their values. The page has dozens of
+# threads: with an arena for each few of them, and large arrays in these, free memory lies scattered
+# between used one, and the process grows by a fifth within an hour of use.
+ALLOCATOR = {-8: 2, -3: 131_072}
 # Longest delay of an interruption, on systems where it does not end a wait.
 WAKE_SECONDS = 1.0
 
@@ -154,7 +155,7 @@ def serve(
     Raises:
         ServerError: The address or the port cannot be had, or the token or a name cannot be used.
     """
-    limit_arenas()
+    set_allocator()
     start_log(data_folder())
     user_data = open_user_data(resume=design is None)
     for message in user_data.messages:
@@ -185,10 +186,12 @@ def serve(
         running.stop()
 
 
-def limit_arenas() -> None:
-    """Make glibc allocate from few arenas, if it is what this process allocates with."""
+def set_allocator() -> None:
+    """Make glibc, where it allocates the memory of this process, return what is free."""
     with contextlib.suppress(AttributeError, OSError, TypeError):
-        ctypes.CDLL(None).mallopt(M_ARENA_MAX, ARENAS)
+        library = ctypes.CDLL(None)
+        for parameter, value in ALLOCATOR.items():
+            library.mallopt(parameter, value)
 
 
 def start_log(folder: Path) -> None:

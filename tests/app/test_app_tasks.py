@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from client import wait_for
 
-from explorer.app.server import ARENAS, LOG, start_log
+from explorer.app.server import ALLOCATOR, LOG, start_log
 from explorer.app.session.worker import CANCELLED, DIED_TWICE, RESTARTED, Worker, log_error
 from tests.app import telling
 
@@ -363,9 +363,9 @@ def test_log_that_cannot_be_written_hides_no_error(
 
 THREADS = """
 import ctypes, threading
-from explorer.app.server import limit_arenas
-if {limited}:
-    limit_arenas()
+from explorer.app.server import set_allocator
+if {is_set}:
+    set_allocator()
 library, together = ctypes.CDLL(None), threading.Barrier(8)
 def allocate():
     library.malloc(100_000)
@@ -387,11 +387,12 @@ library.fflush(out)
 def test_server_allocates_from_few_arenas_however_many_threads_it_has() -> None:
     counts = [
         subprocess.run(
-            [sys.executable, "-c", THREADS.format(limited=limited)],
+            [sys.executable, "-c", THREADS.format(is_set=is_set)],
             capture_output=True,
             check=True,
         ).stdout.count(b"<heap nr=")
-        for limited in (False, True)
+        for is_set in (False, True)
     ]
-    assert counts[0] > ARENAS
-    assert counts[1] <= ARENAS
+    arenas = ALLOCATOR[-8]
+    assert counts[0] > arenas
+    assert counts[1] <= arenas

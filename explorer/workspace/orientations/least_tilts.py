@@ -229,3 +229,20 @@ def least_tilt_rows(
             if found < best:
                 best, towards[index], limits[index] = found, azimuth, limit
         least[index] = best
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], i8[::1])")
+def tilt_rows(
+    row: FloatArray,
+    demands: FloatArray,
+    p: FloatArray,
+    tool: FloatArray,
+    torsion: float,
+    azimuths: FloatArray,
+    tilts: FloatArray,
+    limits: IntArray,
+) -> None:
+    """Write the greatest tilts of a position in m azimuths, shape (m,), angles in radians."""
+    search = TurnSearch(row, demands, p, tool, np.zeros((3, 3, 3)), np.zeros(SCRATCH))
+    for k in range(azimuths.shape[0]):
+        tilts[k], limits[k] = tilt_in(search, azimuths[k], torsion)

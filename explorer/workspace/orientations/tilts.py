@@ -23,7 +23,7 @@ from explorer.numerics import arrays
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.table import by_quantity, demands_of
 from explorer.workspace.limits.valid_poses import Rules
-from explorer.workspace.orientations.least_tilts import least_tilt_rows
+from explorer.workspace.orientations.least_tilts import least_tilt_rows, tilt_rows
 from explorer.workspace.orientations.share import MOST_ANGLES, even_angles, one_angle, one_position
 from explorer.workspace.orientations.turns import NO_LIMIT, turn_rows
 
@@ -96,9 +96,12 @@ def tilt_map(
             raise InputError(
                 f"azimuths must be 1 to {MOST_ANGLES:,} angles; got the shape {directions.shape}"
             )
-    angles = np.broadcast_arrays(directions, [[0.0], [90.0], [180.0]], sigma)
-    tilts, limits = _end_of_turns(design, p, np.stack(angles, axis=-1), tool)
-    return TiltMap(sigma, directions, tilts, names_of(design, limits))
+    count = len(directions)
+    tilts, limits = np.empty(count), np.empty(count, dtype=np.int64)
+    rules = Rules.of(design).without_clearances()
+    at = arrays.for_kernel(p), one_tool(tool), math.radians(sigma), np.radians(directions)
+    tilt_rows(ROWS_OF_TURN * count, *rules, *at, tilts, limits)
+    return TiltMap(sigma, directions, in_degrees(tilts), names_of(design, limits.tolist()))
 
 
 def greatest_tilt(
@@ -248,22 +251,18 @@ def torsion_range(
     arguments and errors are those of `greatest_tilt`.
     """
     p, sigma = one_position(position), _torsion_of(design, torsion)
-    still = one_angle("azimuth", azimuth), one_angle("tilt", tilt)
-
-    def turn_both_ways(start: float) -> tuple[list[float], tuple[str | None, ...]]:
-        torsions = start + np.outer([0.0, 90.0, 180.0], [-1.0, 1.0])
-        angles = np.stack(np.broadcast_arrays(*still, torsions), axis=-1)
-        ends, limits = _end_of_turns(design, p, angles, tool)
-        return ends.tolist(), names_of(design, limits)
-
-    (down, up), names = turn_both_ways(sigma)
+    r = rotation_from_tilt_torsion([one_angle("azimuth", azimuth), one_angle("tilt", tilt), sigma])
+    angles, limits = _end_of_turns(design, p, _turns_about_z(r), tool)
+    down, up = in_degrees(angles).tolist()
+    names = names_of(design, limits)
     if names[0] is None and names[1] is None:
         return TorsionRange(sigma - 180.0, sigma + 180.0, None, None)
     if names[0] is None or names[1] is None:
         # Half a turn one way ends where the other way ends, beyond that half turn.
-        more, rest_names = turn_both_ways(sigma + 180.0)
+        half = r * np.array([-1.0, -1.0, 1.0])
+        angles, limits = _end_of_turns(design, p, _turns_about_z(half), tool)
         # Where the half turn ends on a limit, rounding may make the start of the rest invalid.
-        more = np.fmax(more, 0.0).tolist()
+        more, rest_names = np.maximum(np.degrees(angles), 0.0).tolist(), names_of(design, limits)
         if names[0] is None:
             down = min(180.0 + more[0], 360.0 - up)
             names = rest_names[0] or names[1], names[1]
@@ -300,20 +299,22 @@ def tilt_by_torsion(
 
 
 def _end_of_turns(
-    design: Design, position: FloatArray, angles: FloatArray, tool: ArrayLike | None
+    design: Design, position: FloatArray, turns: FloatArray, tool: ArrayLike | None
 ) -> tuple[FloatArray, list[int]]:
-    """Return the angles (n,) in degrees at which turns about one axis each end, and their limits.
-
-    A turn is given by azimuth, tilt and torsion at its start, after a quarter and after half a
-    turn, shape (3, n, 3).
-    """
-    start, quarter, half = rotation_from_tilt_torsion(angles)
-    turns = np.stack([start, 2.0 * quarter - start - half, half], axis=-1)
+    """Return the angles (n,) in radians at which turns (n, 3, 3, 3) end, and their limits."""
     count = len(turns)
-    ends, limits = np.empty(count), np.empty(count, dtype=np.int64)
+    angles, limits = np.empty(count), np.empty(count, dtype=np.int64)
     rules, p = Rules.of(design).without_clearances(), arrays.for_kernel(position)
-    turn_rows(ROWS_OF_TURN * count, *rules, p, one_tool(tool), turns, ends, limits)
-    return in_degrees(ends), limits.tolist()
+    turn_rows(count, *rules, p, one_tool(tool), turns, angles, limits)
+    return angles, limits.tolist()
+
+
+def _turns_about_z(rotation: FloatArray) -> FloatArray:
+    """Return the turns down and up from a rotation about the platform's z-axis, (2, 3, 3, 3)."""
+    # For a decreasing torsion the platform's x-axis turns towards its negative y-axis.
+    sine = 2.0 * np.column_stack([rotation[:, 1], -rotation[:, 0], np.zeros(3)])
+    end = rotation * np.array([-1.0, -1.0, 1.0])
+    return np.stack([np.stack([rotation, side * sine, end], axis=-1) for side in (-1.0, 1.0)])
 
 
 # Error of an angle that is computed in two ways, in degrees.
