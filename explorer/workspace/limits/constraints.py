@@ -9,6 +9,7 @@ variables, the yaw and its limit, so that derivatives of volumes follow by the c
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
@@ -37,12 +38,12 @@ ACROSS = np.array([0.0, 1.0, 1.0])
 PARALLEL = 1e-15
 
 
-class _Distances:
+class _Distances(ABC):
     """Distances that follow from the slack of a limit."""
 
+    @abstractmethod
     def slack(self, p: FloatArray) -> FloatArray:
         """Return the slack of positions (..., 3); negative where violated."""
-        raise NotImplementedError
 
     def signed_distance(self, p: FloatArray) -> FloatArray:
         """Return the distances of positions (..., 3) from the surface, negative outside."""
