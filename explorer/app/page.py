@@ -16,16 +16,15 @@ from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.compare.feature import COMPARE
 from explorer.app.features.designs.feature import DESIGNS
 from explorer.app.features.feature import Feature, Panel, Services
-from explorer.app.features.forces.feature import FORCES
 from explorer.app.features.help.feature import HELP
 from explorer.app.features.history.feature import HISTORY
 from explorer.app.features.legs.feature import LEGS
+from explorer.app.features.loads.feature import LOADS
 from explorer.app.features.machine.feature import MACHINE
 from explorer.app.features.mechanism.feature import MECHANISM
 from explorer.app.features.optimise.feature import OPTIMISE
 from explorer.app.features.orientation.feature import ORIENTATION
 from explorer.app.features.paths.feature import PATHS
-from explorer.app.features.precision.feature import PRECISION
 from explorer.app.features.prototype.feature import PROTOTYPE
 from explorer.app.features.sharing.feature import SHARING
 from explorer.app.features.singularity.feature import SINGULARITY
@@ -54,8 +53,8 @@ from explorer.numerics.arrays import FloatArray
 TITLE = "Flagged 4-4 explorer"
 # The features, in the order of their tabs and of their parts of the bar.
 FEATURES: tuple[Feature, ...] = (
-    DESIGNS, MECHANISM, MACHINE, HISTORY, VIEW, SINGULARITY, WORKSPACE, ORIENTATION, LEGS, FORCES,
-    PRECISION, PROTOTYPE, OPTIMISE, STUDIES, COMPARE, PATHS, SHARING, HELP,
+    DESIGNS, MECHANISM, MACHINE, HISTORY, VIEW, SINGULARITY, WORKSPACE, LEGS, ORIENTATION, LOADS,
+    PROTOTYPE, OPTIMISE, STUDIES, COMPARE, PATHS, SHARING, HELP,
 )  # fmt: skip
 # Modules that the worker imports at its start.
 TASKS = tuple({task.__module__: None for feature in FEATURES for task in feature.tasks})

@@ -23,7 +23,7 @@ from server_clock import wait_until_drawn
 import explorer.app
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
-from explorer.app.features.forces.loads import WEIGHTS_FEED, SetForce
+from explorer.app.features.loads.load import WEIGHTS_FEED, SetForce
 from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
@@ -266,7 +266,8 @@ OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakeP
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
 OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")} | {
-    f"{tab} › Copy the command line" for tab in ("Forces", "Legs", "Precision", "Singularity")
+    f"{answer} › Copy the command line"
+    for answer in ("Loads › Forces", "Loads › Precision", "Singularity", "Workspace › Clearance")
 }
 """Commands that change the camera, the panels or the clipboard of one browser: none is there."""
 

@@ -20,25 +20,28 @@ from services import StubWorker, services_for
 
 from explorer import Actuators, Guide, Payload, Struts, Tolerances, Tool
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.feature import ForcesPanel, load_figure
-from explorer.app.features.forces.loads import (
+from explorer.app.features.loads.budget import budget_of, budget_table
+from explorer.app.features.loads.feature import ForcesPanel, load_figure
+from explorer.app.features.loads.load import (
     FITTING,
     WEIGHTS_FEED,
     Loads,
     SetForce,
     fitting_scale,
-    load_of,
     nearest_feed,
 )
-from explorer.app.features.forces.scene import ForcesScene, LoadHandle, load_tip, tool_point
-from explorer.app.features.precision.feature import (
+from explorer.app.features.loads.precision import (
     BUDGET_FEED,
     BudgetPart,
     PrecisionPanel,
     budget_request,
 )
-from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene, magnification
-from explorer.app.features.precision.tasks import budget_of, budget_table
+from explorer.app.features.loads.precision_scene import (
+    DeflectedScene,
+    ErrorEllipsoidScene,
+    magnification,
+)
+from explorer.app.features.loads.scene import ForcesScene, LoadHandle, load_tip, tool_point
 from explorer.app.scene.placing import SCENE_REACH, Placed
 from explorer.app.scene.shapes import GHOST, linear_colour
 from explorer.app.state.actions import Set
@@ -272,7 +275,7 @@ def test_typed_force_has_an_arrow_that_can_be_seen() -> None:
 @pytest.mark.parametrize("unit_mm", [1.0, 10.0, 1000.0])
 def test_moment_is_in_newton_metres_whatever_the_unit(unit_mm: float) -> None:
     design = msgspec.structs.replace(OPTIMAL, unit_mm=unit_mm)
-    load = load_of(loaded_state(design, moment=(0.0, 2.0, 0.0)))
+    load = loaded_state(design, moment=(0.0, 2.0, 0.0)).load
     assert tuple(load[:5]) == (0.0, 0.0, -10.0, 0.0, 2e3 / unit_mm)
 
 

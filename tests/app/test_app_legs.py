@@ -21,8 +21,8 @@ from services import StubWorker, services_for
 from explorer.app.features.feature import Feed, Services
 from explorer.app.features.legs.feature import (
     RADIUS_FEED,
+    ClearancePanel,
     ClearanceScene,
-    LegsPanel,
     SweptTetrahedra,
     chart_columns,
     move_table,
@@ -433,7 +433,7 @@ def test_words_of_the_curve_show_its_radii_shares_and_first_contacts() -> None:
 
 
 def test_chart_appears_once_its_curve_is_computed(services: Services, worker: StubWorker) -> None:
-    panel, feed = LegsPanel(services), services.get(RADIUS_FEED)
+    panel, feed = ClearancePanel(services), services.get(RADIUS_FEED)
     state = show_curve(open_state(OPTIMAL))
 
     def chart(state: State) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from desk import Desk
 from services import StubDownloads, StubWorker, services_for
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.loads import load_of, weights_of_parts
+from explorer.app.features.loads.load import weights_of_parts
 from explorer.app.features.paths import feature
 from explorer.app.features.paths.actions import (
     Advance,
@@ -506,7 +506,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
     poses = task(*arguments).poses
     own = weights_of_parts((PRESS, 3000.0))
     weights = replace(own, on_platform=(*own.on_platform, PRESS.payload))
-    along = path_loads(PRESS, poses, load_of(state), tool=state.tool, weights=weights)
+    along = path_loads(PRESS, poses, state.load, tool=state.tool, weights=weights)
     assert 0.5 < along.share <= 1.0 + 1e-4
 
 
@@ -515,10 +515,10 @@ def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
     journey = journey_of(state)
     found = PathShares(services).of(Frame(state))
     assert found is not None
-    expected = path_loads(PRESS, journey.poses, load_of(state), tool=journey.tool)
+    expected = path_loads(PRESS, journey.poses, state.load, tool=journey.tool)
     np.testing.assert_array_equal(found.path.shares, expected.shares)
     timed = journey.trajectory
     np.testing.assert_allclose(np.interp(found.time, timed.time, timed.at), expected.at, atol=1e-9)
     pose = journey.pose_at(found.seconds)
-    here = path_loads(PRESS, (pose, pose), load_of(state))
+    here = path_loads(PRESS, (pose, pose), state.load)
     assert (here.share, here.part) == (pytest.approx(expected.share), expected.part)

@@ -26,7 +26,7 @@ SIZES = ((1280, 720), (1024, 768), (768, 1024))
 LEAST_SHARE = 0.4
 TABS = {
     *("Pose", "Design", "Machine", "Show"),
-    *("Singularity", "Workspace", "Tilt", "Legs", "Forces", "Precision", "Prototype"),
+    *("Singularity", "Workspace", "Tilt", "Loads", "Prototype"),
     *("Optimise", "Compare", "Paths"),
 }
 DIALOGS = ("History", "Export", "Help")

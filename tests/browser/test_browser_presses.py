@@ -135,15 +135,25 @@ def test_press_counts_after_a_reload_and_on_markup_that_is_replaced_meanwhile(ta
     tab.page.get_by_role("dialog", name="Help").wait_for()
 
 
-@pytest.mark.parametrize("topic", ["Forces", "Precision", "Singularity"])
-def test_command_and_python_of_an_answer_are_copied(tab: Tab, topic: str) -> None:
+@pytest.mark.parametrize(
+    ("title", "commands"),
+    [
+        ("Loads", ("forces", "accuracy")),
+        ("Singularity", ("singularity",)),
+        ("Workspace", ("interference",)),
+    ],
+)
+def test_command_and_python_of_an_answer_are_copied(
+    tab: Tab, title: str, commands: tuple[str, ...]
+) -> None:
     tab.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-    command = {"Precision": "accuracy"}.get(topic, topic.lower())
-    tab.turn_to(topic)
-    tab.page.get_by_role("button", name="Copy the command line").locator("visible=true").click()
+    tab.turn_to(title)
+    buttons = tab.page.get_by_role("button", name="Copy the command line").locator("visible=true")
+    for button, command in zip(buttons.all(), commands, strict=True):
+        button.click()
 
-    def is_copied() -> bool:
-        text = str(tab.page.evaluate("navigator.clipboard.readText()"))
-        return text.startswith(f"explorer {command} --design ") and "import explorer" in text
+        def is_copied(start: str = f"explorer {command} --design ") -> bool:
+            text = str(tab.page.evaluate("navigator.clipboard.readText()"))
+            return text.startswith(start) and "import explorer" in text
 
-    tab.wait_for(is_copied, "the command in the clipboard")
+        tab.wait_for(is_copied, "the command in the clipboard")

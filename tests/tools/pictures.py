@@ -162,7 +162,7 @@ SCENES = {
             ),
         ),
         panels=True,
-        tab="Forces",
+        tab="Loads",
     ),
     "precision": Scene(
         actions=(
@@ -176,7 +176,7 @@ SCENES = {
             ),
         ),
         panels=True,
-        tab="Precision",
+        tab="Loads",
         size=(1280, 900),
     ),
     # Shares grow beyond all bounds towards the base plane.

@@ -170,9 +170,9 @@ class Services:
         words = words or command.rpartition(" › ")[2]
         return press_button(name, "", words, hint=hint, class_name="ex-link")
 
-    def copy_button(self, tab: str, source_of: Callable[[State], Source]) -> str:
-        """Add the button of a tab that copies how its answer in a state is computed, as HTML."""
-        return CopyButton(self.buttons, tab, lambda: source_of(self.session.latest_state())).html
+    def copy_button(self, answer: str, source_of: Callable[[State], Source]) -> str:
+        """Add the button that copies how an answer in a state is computed; return it as HTML."""
+        return CopyButton(self.buttons, answer, lambda: source_of(self.session.latest_state())).html
 
 
 def show(visible: bool, *parts: Any) -> Updates:

@@ -23,6 +23,7 @@ from explorer.mechanism import pose as poses, tilt_torsion as tilts
 from explorer.mechanism.configuration import Point, offset_of, point_of, position_of
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.kinematics import inverse
+from explorer.mechanism.machine import Six
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_of
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics import arrays
@@ -238,6 +239,14 @@ class State:
         """
         b4 = arrays.triple(np.array(position) - self.offset(orientation.rotation))
         return Pose(b4, orientation.quaternion)
+
+    @property
+    def load(self) -> Six:
+        """The load at the tool as (F; M), base axes, in N and N × unit."""
+        forces, units = self.view.forces, 1e3 / self.design.unit_mm
+        fx, fy, fz = forces.force
+        mx, my, mz = (units * each for each in forces.moment)
+        return fx, fy, fz, mx, my, mz
 
     @property
     def remark(self) -> str | None:

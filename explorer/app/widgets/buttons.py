@@ -20,7 +20,7 @@ from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import element_id, run_script, run_script_in
 from explorer.app.look import read_script
 from explorer.app.widgets.markup import meter
-from explorer.app.widgets.palette import Command, Key
+from explorer.app.widgets.palette import STEP, Command, Key
 from explorer.measures.blocks.source import Source
 
 PressHandler = Callable[[str, viser.ClientHandle], None]
@@ -229,14 +229,14 @@ class CopyButton:
 
     Args:
         buttons: Buttons of the page.
-        tab: Title of the panel's tab.
+        answer: Name of the answer, from the tab on, such as "Loads › Forces".
         source: Function that returns how the present answer is computed.
     """
 
-    def __init__(self, buttons: Buttons, tab: str, source: Callable[[], Source]) -> None:
-        self._name, self._source = f"{tab.lower()}.copy", source
+    def __init__(self, buttons: Buttons, answer: str, source: Callable[[], Source]) -> None:
+        self._name, self._source = f"{answer.rsplit(STEP, maxsplit=1)[-1].lower()}.copy", source
         buttons.on(self._name, self._copy)
-        buttons.offer(f"{tab} › Copy the command line", HINT, self._name)
+        buttons.offer(f"{answer}{STEP}Copy the command line", HINT, self._name)
         self.html = press_button(
             self._name, "", ICON, hint=HINT, label="Copy the command line", class_name="ex-copy"
         )

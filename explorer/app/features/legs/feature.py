@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-import viser
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab, show, show_html
 from explorer.app.features.workspace.feeds import workspace_rows, workspace_start
@@ -66,29 +65,29 @@ RADIUS_FEED = feed_of(draw_radius_curve, _request_for, has_stages=True)
 """The feed of the accessible volume over the radius of the legs, while it is shown."""
 
 
-class LegsPanel:
+class ClearancePanel:
     """The table of clearances, that of the last move, and the radius curve."""
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
-        self._pose = gui.add_html("")
         self._copy = services.copy_button(
-            "Legs", lambda state: pose_source("interference", state.design, state.pose)
+            "Workspace › Clearance",
+            lambda state: pose_source("interference", state.design, state.pose),
         )
-        self._controls = Controls(gui, services.session)
-        with gui.add_folder("Last move"):
-            self._controls.checkbox(
+        self._controls = controls = Controls(gui, services.session)
+        with gui.add_folder("Clearance"):
+            self._pose = gui.add_html("")
+            controls.checkbox(
                 "Swept tetrahedra",
                 "Draw the tetrahedra that the legs swept in the last move, and compare the paper's "
                 "test for interference with the exact one.",
                 "view.swept",
             )
             self._move = gui.add_html("", visible=False)
-        with gui.add_folder("Leg radius"):
-            self._controls.checkbox(
-                "Volume against radius",
+            controls.checkbox(
+                "Volume against leg radius",
                 "Draw the accessible volume over one radius of all four legs, for the orientation "
-                "and the start of the tab Workspace.",
+                "and the start above.",
                 "view.radius_curve",
             )
             self._chart = charts.add_chart(
@@ -238,7 +237,7 @@ def clearance_figure(frame: Frame) -> str:
     pair = pair_name(PAIRS[closest])
     hint = f"Clearance of the closest legs, {pair}: distance of their axes less their radii."
     look = "ex-beyond" if clearance < 0.0 else ""
-    return figure("Legs", "Clearance here", words, hint=hint, look=look)
+    return figure("Workspace", "Clearance here", words, hint=hint, look=look)
 
 
 OPACITY = 0.22
@@ -330,7 +329,7 @@ class SweptTetrahedra(ScenePart):
 
 LEGS = Feature(
     "legs",
-    tabs=(Tab("analyse", "Legs", LegsPanel, viser.Icon.LINE),),
+    tabs=(Tab("analyse", "Workspace", ClearancePanel),),
     bar=(InBar("middle", lambda _: clearance_figure),),
     scene=(ClearanceScene, SweptTetrahedra),
     feeds=(RADIUS_FEED,),

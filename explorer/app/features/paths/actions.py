@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from explorer.app.features.forces.loads import weights_of_parts
+from explorer.app.features.loads.load import weights_of_parts
 from explorer.app.state.actions import Action, move_to
 from explorer.app.state.paths import End, Journey, Paths
 from explorer.app.state.state import Joints, State, joints_of

@@ -9,7 +9,6 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab
-from explorer.app.features.forces.loads import load_of
 from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
 from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.scene.placing import Placed, ScenePart
@@ -118,7 +117,7 @@ class PathRunner(Runner):
     def _plan(self, state: State) -> None:
         number, design, paths = self._request, state.design, state.paths
         tool, view = state.tool, state.view
-        load = load_of(state) if paths.holds_load else None
+        load = state.load if paths.holds_load else None
         weighed, density = view.forces.weighed, view.prototype.density
 
         def take_path(path: PlannedPath) -> None:

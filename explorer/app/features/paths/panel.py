@@ -80,7 +80,7 @@ class PathsPanel:
             self._kinds = gui.add_html("")
             self._controls.checkbox(
                 "Hold the load",
-                "Demand that the load of the tab Forces, with the weights chosen there, stays "
+                "Demand that the load of the tab Loads, with the weights chosen there, stays "
                 "within the limits of actuators, struts and guide all along the path.",
                 "paths.holds_load",
                 visible=_is_planned,

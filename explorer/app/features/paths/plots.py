@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from viser import uplot
 
 from explorer.app.features.feature import Services, show_html
-from explorer.app.features.forces.loads import Loads
+from explorer.app.features.loads.load import Loads
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State

@@ -87,7 +87,7 @@ class WorkspacePanel:
             "Region",
             "All positions within the limits, those that a path without a collision of legs leads "
             "to, from home or from the present position, or those at which the load of the tab "
-            "Forces is held.",
+            "Loads is held.",
             REGIONS,
             Bound(_region, _set_region),
         )
@@ -108,7 +108,7 @@ class WorkspacePanel:
         controls.dropdown(
             "Colour by",
             f"One colour, the smallest margin |δ| ({MARGIN_KINDS}), 1 / cond J, what the load of "
-            "Forces asks of actuators and struts, or how far errors of actuators or that load move "
+            "Loads asks of actuators and struts, or how far errors of actuators or that load move "
             "the tool.",
             COLOURINGS,
             "view.workspace.colour",

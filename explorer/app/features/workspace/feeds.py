@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Literal
 import msgspec
 import numpy as np
 
-from explorer.app.features.forces.loads import load_of
 from explorer.app.features.workspace import work
 from explorer.app.scene.surfaces import Measure
 from explorer.app.session.feed import Feed, feed_of
@@ -137,7 +136,7 @@ def workspace_request(frame: Frame) -> work.WorkspaceRequest | None:
         hull=view.hull,
         # The length changes no drawing that is not coloured by it.
         warn_below=frame.state.warn_below if coloured else 1.0,
-        load=load_of(frame.state) if is_loaded else None,
+        load=frame.state.load if is_loaded else None,
     )
 
 
@@ -168,7 +167,7 @@ def send_workspace(
     start = workspace_start(frame) if region == "accessible" else None
     design, load = state.design, None
     if region == "held":
-        design, load = loaded_design(state), load_of(state)
+        design, load = loaded_design(state), state.load
     offset: Triple | None = None
     if state.view.at == "tool":
         x, y, z = state.offset(rows).tolist()

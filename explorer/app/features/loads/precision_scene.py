@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from explorer.app.features.feature import Services, show
-from explorer.app.features.forces.loads import Loads
-from explorer.app.features.forces.scene import tool_point
+from explorer.app.features.loads.load import Loads
+from explorer.app.features.loads.scene import tool_point
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.scene import shapes
 from explorer.app.scene.ellipsoid import Ellipsoid

@@ -13,7 +13,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services, show
-from explorer.app.features.forces.loads import Loads, SetForce, fitting_scale, round_force
+from explorer.app.features.loads.load import Loads, SetForce, fitting_scale, round_force
 from explorer.app.scene import shapes
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart, scene_scale
 from explorer.app.state.state import State

@@ -1,4 +1,4 @@
-"""The load on the platform as a tab: the verdict on it, its controls, and tables of reactions."""
+"""Loads as a tab: the verdict on the load, its controls, tables of reactions, and precision."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import BarPart, Feature, InBar, Services, Tab
-from explorer.app.features.forces import loads
-from explorer.app.features.forces.scene import ForcesScene, LoadHandle
+from explorer.app.features.loads import budget, load, precision
+from explorer.app.features.loads.precision_scene import DeflectedScene, ErrorEllipsoidScene
+from explorer.app.features.loads.scene import ForcesScene, LoadHandle
 from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.state.actions import Action, Set, SetPose
 from explorer.app.state.frame import Frame
@@ -34,8 +35,8 @@ class ForcesPanel:
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
-        self._loads = services.get(loads.Loads)
-        self._nearest = services.get(loads.nearest_feed)
+        self._loads = services.get(load.Loads)
+        self._nearest = services.get(load.nearest_feed)
         self._controls = controls = Controls(gui, services.session)
         self._top = gui.add_html("")
         with gui.add_folder("Load at the tool (axes of the base)"):
@@ -45,7 +46,7 @@ class ForcesPanel:
                 "in the scene can be dragged.",
                 Bound(
                     lambda frame: frame.state.view.forces.force,
-                    lambda _, force: loads.SetForce(force),
+                    lambda _, force: load.SetForce(force),
                 ),
                 step=0.1,
                 small=True,
@@ -73,18 +74,18 @@ class ForcesPanel:
         self._tables = gui.add_html("")
         self._most = gui.add_html("")
         self._copy = services.copy_button(
-            "Forces", lambda state: self._loads.source("forces", state)
+            "Loads › Forces", lambda state: self._loads.source("forces", state)
         )
         self._go = services.link(
             "forces.go",
-            "Forces › Go to the nearest position that holds",
+            "Loads › Go to the nearest position that holds",
             "Move the platform to the nearest position that holds the load, turned as it is.",
             self._go_to_nearest,
             words="Go",
         )
         self._turn = services.link(
             "forces.worst",
-            "Forces › Turn the force to its worst direction",
+            "Loads › Turn the force to its worst direction",
             "Turn the force into the direction that uses the largest share of a limit here.",
             self._turn_force,
             words="Turn",
@@ -144,7 +145,7 @@ class ForcesPanel:
         direction = without_force(self._loads.of(Frame(state))).worst_force(size).direction
         if not np.isfinite(direction).all():
             return None
-        force = loads.round_force(size * direction, size)
+        force = load.round_force(size * direction, size)
         return Set("view.forces.force", force, "Force", "in its worst direction")
 
 
@@ -155,7 +156,7 @@ def without_force(loaded: LoadedPose) -> LoadedPose:
 
 def load_figure(services: Services) -> BarPart:
     """Return the figure of the largest share of a limit, "" for a design without limits."""
-    of = services.get(loads.Loads).of
+    of = services.get(load.Loads).of
 
     def figure_of(frame: Frame) -> str:
         loaded = of(frame)
@@ -163,17 +164,21 @@ def load_figure(services: Services) -> BarPart:
             return ""
         hint = f"Largest share of a limit under the load of this tab: {PART_NAMES[loaded.worst]}."
         share = Share(loaded.share)
-        return figure("Forces", "Load here", share.text(), hint=hint, look=f"ex-{share.look}")
+        return figure("Loads", "Load here", share.text(), hint=hint, look=f"ex-{share.look}")
 
     return figure_of
 
 
-FORCES = Feature(
-    "forces",
-    tabs=(Tab("analyse", "Forces", ForcesPanel, viser.Icon.ARROW_DOWN_CIRCLE),),
+LOADS = Feature(
+    "loads",
+    tabs=(
+        Tab("analyse", "Loads", ForcesPanel, viser.Icon.ARROW_DOWN_CIRCLE),
+        Tab("analyse", "Loads", precision.PrecisionPanel),
+    ),
     bar=(InBar("middle", load_figure),),
-    scene=(ForcesScene, LoadHandle),
-    later_feeds=(loads.WEIGHTS_FEED, loads.nearest_feed),
-    tasks=(loads.weights_of_parts, loads.nearest_position),
-    lists=("Weights",),
+    exports=(precision.TOLERANCES,),
+    scene=(ForcesScene, LoadHandle, ErrorEllipsoidScene, DeflectedScene),
+    later_feeds=(load.WEIGHTS_FEED, load.nearest_feed, precision.BUDGET_FEED),
+    tasks=(load.weights_of_parts, load.nearest_position, budget.budget_of, budget.budget_table),
+    lists=("Weights", "Worst over"),
 )

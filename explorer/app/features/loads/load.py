@@ -16,7 +16,6 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.measures.blocks.source import LoadTopic, Source, load_source
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.number_text import format_number
@@ -88,14 +87,6 @@ def fitting_scale(force: float, scale: float) -> float:
     return round_step(force / FITTING)
 
 
-def load_of(state: State) -> Six:
-    """Return the load at the tool as (F; M), base axes, in N and N × unit."""
-    forces, units = state.view.forces, 1e3 / state.design.unit_mm
-    fx, fy, fz = forces.force
-    mx, my, mz = (units * each for each in forces.moment)
-    return fx, fy, fz, mx, my, mz
-
-
 def weights_of_parts(request: tuple[Design, float]) -> Weights:
     """Return the weights of a prototype's parts, without the payload, at a density in kg/m³.
 
@@ -135,7 +126,7 @@ class Loads:
         state, weights = frame.state, self.weights.drawing
         if self._last is None or self._last[0] is not state or self._last[1] is not weights:
             weighs_payload = state.view.forces.weighed != "none"
-            loaded = LoadedPose(state.design, state.pose, load_of(state), weights, weighs_payload)
+            loaded = LoadedPose(state.design, state.pose, state.load, weights, weighs_payload)
             self._last = state, weights, ToolPrecision(loaded)
         return self._last[2]
 

@@ -1,16 +1,13 @@
-"""The precision of the tool as a tab: its errors, its deflection, and the budget of tolerances."""
+"""The precision of the tool: its errors, its deflection, and the budget of tolerances."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
-import viser
-
-from explorer.app.features.feature import Export, Feature, Services, Tab, html_of, show_html
-from explorer.app.features.forces.loads import Loads
+from explorer.app.features.feature import Export, Services, html_of, show_html
+from explorer.app.features.loads import budget as tasks
+from explorer.app.features.loads.load import Loads
 from explorer.app.features.optimise.work import requested_box
-from explorer.app.features.precision import tasks
-from explorer.app.features.precision.scene import DeflectedScene, ErrorEllipsoidScene
 from explorer.app.inputs.controls import At, Controls
 from explorer.app.session.feed import feed_of
 from explorer.app.session.session import Who
@@ -27,7 +24,7 @@ from explorer.statics.budget import with_tolerances
 from explorer.statics.compliance import is_elastic
 from explorer.statics.loaded import ToolPrecision
 
-LOAD = "the load and the weights of the tab Forces"
+LOAD = "the load and the weights above"
 OVER: dict[str, PositionSet] = {
     "the present pose": "pose",
     "the required box": "box",
@@ -106,7 +103,7 @@ class BudgetPart:
         self._result = gui.add_html("", visible=False)
         self._set = services.link(
             "precision.set",
-            "Precision › Set these tolerances",
+            "Loads › Set these tolerances",
             "Give the design these tolerances, and these errors of its actuators.",
             self._set_tolerances,
         )
@@ -140,35 +137,36 @@ class PrecisionPanel:
     def __init__(self, services: Services) -> None:
         gui, self._loads = services.gui, services.get(Loads)
         self._controls = controls = Controls(gui, services.session)
-        self._top = gui.add_html("")
-        controls.checkbox(
-            "Error ellipsoid in the scene",
-            "Draw the ellipsoid of the tool's RMS displacement, for errors uniform within their "
-            "bounds, magnified as its label says.",
-            "view.precision.ellipsoid",
-        )
-        self._deflection = gui.add_html("")
-        controls.checkbox(
-            "Deflected shape in the scene",
-            "Draw platform and legs as the load of the tab Forces deflects them, magnified.",
-            "view.precision.deflected",
-        )
-        controls.number(
-            "Magnification (0: automatic)",
-            "How many times larger the deflection is drawn than it is.",
-            _zero_for_none("view.precision.times"),
-            least=0.0,
-            step=1.0,
-            visible=lambda state: state.view.precision.deflected,
-        )
+        with gui.add_folder("Precision"):
+            self._top = gui.add_html("")
+            controls.checkbox(
+                "Error ellipsoid in the scene",
+                "Draw the ellipsoid of the tool's RMS displacement, for errors uniform within "
+                "their bounds, magnified as its label says.",
+                "view.precision.ellipsoid",
+            )
+            self._deflection = gui.add_html("")
+            controls.checkbox(
+                "Deflected shape in the scene",
+                "Draw platform and legs as the load deflects them, magnified.",
+                "view.precision.deflected",
+            )
+            controls.number(
+                "Magnification (0: automatic)",
+                "How many times larger the deflection is drawn than it is.",
+                _zero_for_none("view.precision.times"),
+                least=0.0,
+                step=1.0,
+                visible=lambda state: state.view.precision.deflected,
+            )
         with gui.add_folder("Budget of tolerances"):
             self._budget = BudgetPart(services)
         self._copy = services.copy_button(
-            "Precision", lambda state: self._loads.source("accuracy", state)
+            "Loads › Precision", lambda state: self._loads.source("accuracy", state)
         )
         self._assume = services.link(
             "precision.typical",
-            "Precision › Assume typical values",
+            "Loads › Assume typical values",
             "Give the design typical errors, stiffness, struts and tolerances where it states "
             "none; the tab Machine shows and changes them.",
             assume_typical,
@@ -211,19 +209,9 @@ def _send_tolerances(services: Services, _: str, who: Who) -> None:
     services.downloads.compute(who, name, tasks.budget_table, (budget_request(state),))
 
 
-PRECISION = Feature(
-    "precision",
-    tabs=(Tab("analyse", "Precision", PrecisionPanel, viser.Icon.RULER_MEASURE),),
-    exports=(
-        Export(
-            "Tolerances",
-            "The dimensions by part, with their tolerances and what they cost at the tool.",
-            ("CSV",),
-            _send_tolerances,
-        ),
-    ),
-    scene=(ErrorEllipsoidScene, DeflectedScene),
-    later_feeds=(BUDGET_FEED,),
-    tasks=(tasks.budget_of, tasks.budget_table),
-    lists=("Worst over",),
+TOLERANCES = Export(
+    "Tolerances",
+    "The dimensions by part, with their tolerances and what they cost at the tool.",
+    ("CSV",),
+    _send_tolerances,
 )

@@ -1,1 +1,0 @@
-"""The load on the platform, and the reactions to it."""
