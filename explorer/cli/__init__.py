@@ -52,11 +52,7 @@ def main() -> None:
 
 
 def run(argv: Sequence[str]) -> int:
-    """Run a command line and return its exit status.
-
-    Args:
-        argv: Arguments after the name of the program.
-    """
+    """Run a command line, given after the program's name, and return its exit status."""
     try:
         streams.prepare()
         _dispatch(list(argv))

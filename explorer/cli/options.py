@@ -106,10 +106,8 @@ class JsonOptions:
     ) -> None:
         """Write the answer to standard output: as JSON with `--json`, otherwise as text.
 
-        Args:
-            as_json: Returns the answer as plain values.
-            lines: Lines of the text; those of a generator are computed only if they are written.
-            errors: Errors that keep the answer from being whole.
+        Lines of a generator are computed only if they are written. Errors, which keep the answer
+        from being whole, are raised after it.
         """
         if self.json:
             write_json(as_json())

@@ -27,11 +27,7 @@ from explorer.numerics.number_text import format_ascii, format_fixed
 
 
 def write_json(answer: Mapping[str, object]) -> None:
-    """Write the one JSON object of a command to standard output.
-
-    Args:
-        answer: Plain values, lists, mappings, arrays, designs and paths; no NaN or infinity.
-    """
+    """Write the one JSON object of a command: plain values, arrays, designs, paths, and no NaN."""
     write(json.dumps(answer, allow_nan=False, default=_plain) + "\n")
 
 
@@ -84,9 +80,7 @@ def limits_json(snapshot: Snapshot) -> dict[str, object]:
 def limits_lines(snapshot: Snapshot, subject: str = "") -> Iterator[str]:
     """Yield whether a pose is within the limits or singular, and the limits that it violates.
 
-    Args:
-        snapshot: Snapshot of the pose.
-        subject: Words before the verdict, such as "the start is ".
+    The subject stands before the verdict, such as "the start is ".
     """
     kept = "within the limits, but singular" if snapshot.is_singular else "within the limits"
     yield f"{subject}{'outside the limits:' if snapshot.violations else kept}"
@@ -94,12 +88,7 @@ def limits_lines(snapshot: Snapshot, subject: str = "") -> Iterator[str]:
 
 
 def table(rows: Sequence[Sequence[str]], align: str) -> str:
-    """Return rows as lines of aligned columns.
-
-    Args:
-        rows: Rows of cells, all of the same length.
-        align: One letter per column, "<" or ">".
-    """
+    """Return rows of equally many cells as aligned columns, with a letter "<" or ">" for each."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(
@@ -115,12 +104,7 @@ def indent(text: str) -> list[str]:
 
 
 def figure(value: float, size: float = 0.0) -> str:
-    """Return a number with six significant digits.
-
-    Args:
-        value: Number to write.
-        size: Magnitude of the terms that it is computed from; their rounding errors read 0.
-    """
+    """Return a number with six significant digits; rounding errors of terms of a size read 0."""
     return format_ascii(value, 6, size=size, padded=True)
 
 

@@ -87,12 +87,7 @@ class Meter(AbstractContextManager["Meter"]):
             write_progress("\r" + " " * self._last_width + "\r")
 
     def show(self, text: str, share: float) -> None:
-        """Show a line, unless the last update is too recent.
-
-        Args:
-            text: Text beside the bar.
-            share: Completed share of the work, from 0 to 1.
-        """
+        """Show a line beside a bar of the completed share, unless the last update is too recent."""
         pause = IN_TERMINAL if self.is_terminal else ELSEWHERE
         if time.monotonic() - self._last_update < pause:
             return

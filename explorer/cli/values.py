@@ -21,13 +21,9 @@ from explorer.numerics.checks import LEAST, MOST, STIFFEST, size_problem
 
 
 class UsageError(ExplorerError):
-    """Invalid arguments.
+    """Invalid arguments of a program or command; the reason is one line.
 
     The class is no ValueError, so that tyro does not replace its message.
-
-    Args:
-        reason: Reason, in one line.
-        program: Program or command that the arguments are for.
     """
 
     def __init__(self, reason: str, program: str = "explorer") -> None:
@@ -38,9 +34,7 @@ class UsageError(ExplorerError):
 def hint(words: str, metavar: str | None = None) -> Any:
     """Return the marker of an option whose help has these words in place of the default.
 
-    Args:
-        words: Hint; the help puts it in parentheses.
-        metavar: Name of the value in the help; that of its type if None.
+    The help puts the words in parentheses; without a metavar, it names the type of the value.
     """
     return tyro.conf.arg(metavar=metavar, help_behavior_hint=f"({words})")
 
@@ -81,12 +75,9 @@ def _value(
 def numbers(
     order: str, *, or_one: bool = False, or_none: bool = False
 ) -> PrimitiveConstructorSpec[Any]:
-    """Return the type of an option with one finite number per name.
+    """Return the type of an option with one finite number per name, names separated by spaces.
 
-    Args:
-        order: Names of the numbers in their order, separated by spaces.
-        or_one: Whether a single number may stand for all of them.
-        or_none: Whether the word none may stand for them, which gives ().
+    If it may, a single number stands for all of them, or the word none, which gives ().
     """
 
     def read(words: list[str]) -> Numbers:

@@ -111,13 +111,7 @@ NAMESPACE = "urn:flagged-explorer"
 
 
 class Model:
-    """A model of lib3mf with one group of materials.
-
-    Args:
-        name: Title of the file.
-        design: The design that the file is of.
-        colours: Colours of the materials by their names, one at least.
-    """
+    """A model of lib3mf: a title, a design, and colours of materials by name, at least one."""
 
     def __init__(self, name: str, design: Design, colours: Mapping[str, Rgb]) -> None:
         import lib3mf  # pyright: ignore[reportMissingTypeStubs]
@@ -147,13 +141,9 @@ class Model:
     def add_mesh(
         self, name: str, points: FloatArray, faces: NDArray[np.integer], material: int
     ) -> Any:
-        """Add a mesh of one material and return it.
+        """Add a mesh of one material, given by its index, and return it.
 
-        Args:
-            name: Name of the mesh.
-            points: Corners in millimetres, shape (n, 3).
-            faces: Indices of the corners of each triangle, shape (m, 3).
-            material: Index of its material.
+        Corners (n, 3) are in millimetres; the faces (m, 3) are indices of them.
         """
         mesh = self._model.AddMeshObject()
         mesh.SetName(name)
@@ -190,12 +180,7 @@ class Model:
         return transform
 
     def encode(self, item: Any, decimals: int) -> bytes:
-        """Return the file that shows one object.
-
-        Args:
-            item: The object.
-            decimals: Decimals of the coordinates, which lib3mf writes with a fixed number.
-        """
+        """Return the file that shows one object; lib3mf writes a fixed number of decimals."""
         self._model.AddBuildItem(item, self.untransformed)
         writer = self._model.QueryWriter("3mf")
         writer.SetDecimalPrecision(decimals)

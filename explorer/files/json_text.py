@@ -94,8 +94,7 @@ def decode_text(data: bytes) -> str:
 def check_unique_fields(text: str) -> None:
     """Check that a text gives no field twice, since readers differ in which value they take.
 
-    Args:
-        text: JSON that has been decoded once, so that its depth is known to be small.
+    The text has been decoded once, so that its depth is known to be small.
 
     Raises:
         InputError: A field is given twice.

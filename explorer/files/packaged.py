@@ -84,10 +84,7 @@ def list_pages() -> tuple[ManualPage, ...]:
 
 
 def read_page(file: str) -> str:
-    """Return the Markdown of a page.
-
-    Args:
-        file: Name of the page's file, such as "glossary.md".
+    """Return the Markdown of a page by the name of its file, such as "glossary.md".
 
     Raises:
         InputError: The manual has no such page.

@@ -98,12 +98,7 @@ def reason_for_missing(case: Case, measurements: Measurements) -> str:
 
 
 def unmet_needs(cases: Collection[Case], names: Iterable[str]) -> str:
-    """Return which needs of measures none of some cases has, "" if each need is met by one.
-
-    Args:
-        cases: Designs with what they have.
-        names: Names of measures out of `CATALOGUE`.
-    """
+    """Return which needs of measures none of some cases meets, "" if each need is met by one."""
     labels: dict[str, list[str]] = {}
     for name in names:
         for need in CATALOGUE[name].needs:

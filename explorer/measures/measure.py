@@ -286,11 +286,7 @@ class Measure:
         return self.title or self.label
 
     def unit_in(self, length: str) -> str:
-        """Return the unit, "" for a plain number or a share.
-
-        Args:
-            length: Unit of lengths, such as "mm".
-        """
+        """Return the unit for a unit of lengths, such as "mm"; "" for a plain number or a share."""
         if self.power:
             return f"{length}{POWERS[self.power]}"
         return "" if self.unit == "share" else self.unit

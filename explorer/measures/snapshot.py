@@ -94,12 +94,7 @@ class PoseIndices(Configuration):
 
 
 class Snapshot(PoseIndices):
-    """A design in one pose, and the values that follow from both; lengths in design units.
-
-    Args:
-        design: The manipulator.
-        pose: The pose of the platform.
-    """
+    """A design in one pose, and the values that follow from both; lengths in design units."""
 
     def __init__(self, design: Design, pose: Pose) -> None:
         super().__init__(design, pose.position, pose.rotation)

@@ -101,11 +101,7 @@ class Verdict(NamedTuple):
         return TITLES[self.kind]
 
     def reason(self, unit_mm: float) -> str:
-        """Return the reason, such as "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting".
-
-        Args:
-            unit_mm: Millimetres in one design unit.
-        """
+        """Return the reason, such as "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting"."""
         if self.kind == "singular":
             return "; ".join(f"δ{index} = 0: {INCIDENCES[index - 1]}" for index in self.incidences)
         first = self.incidences[0]
@@ -118,11 +114,7 @@ class Verdict(NamedTuple):
         return f"{away} from δ{first} = 0, {INCIDENCES[first - 1]}"
 
     def brief(self, unit_mm: float) -> str:
-        """Return the verdict in a few words, such as "10.3 mm to δ1 = 0", "7° to δ2 = 0".
-
-        Args:
-            unit_mm: Millimetres in one design unit.
-        """
+        """Return the verdict in a few words, such as "10.3 mm to δ1 = 0", "7° to δ2 = 0"."""
         names = " and ".join(f"δ{index} = 0" for index in self.incidences)
         if self.kind == "singular":
             return f"Singular: {names}"
@@ -139,11 +131,9 @@ class Verdict(NamedTuple):
 
 
 def warnings(reach: float, warn_below: float | None = None) -> Warnings:
-    """Return the warning values.
+    """Return the warning values for a reach and a warning length of margins, in design units.
 
-    Args:
-        reach: Reach of the design, in design units.
-        warn_below: Warning length of the margins, in design units; None for a share of the reach.
+    Without the latter it is a share of the reach.
     """
     default = WARN_SHARE * reach
     margin = default if warn_below is None else warn_below
@@ -152,11 +142,9 @@ def warnings(reach: float, warn_below: float | None = None) -> Warnings:
 
 
 def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
-    """Return the verdict on a pose.
+    """Return the verdict on a pose, by a warning length of margins in design units.
 
-    Args:
-        snapshot: The design in the pose.
-        warn_below: Warning length of the margins, in design units; None for a share of the reach.
+    If that is None, it is a share of the reach.
     """
     warn = warnings(snapshot.design.reach, warn_below)
     holding, condition = incidences(snapshot.stratum), float(snapshot.inverse_condition)

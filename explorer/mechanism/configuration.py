@@ -26,19 +26,13 @@ Value = TypeVar("Value")
 
 
 class Configuration:
-    """A design in one pose or in a batch of poses, with a tool point.
+    """A design in one pose or in a batch of poses, with a tool point; all are attributes too.
 
     Args:
         design: The manipulator.
         position: b4 in the base frame, shape (..., 3), in design units.
         rotation: Platform to base, shape (..., 3, 3).
         tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
-
-    Attributes:
-        design: The manipulator.
-        position: b4, shape (..., 3).
-        rotation: Platform to base, shape (..., 3, 3).
-        tool: Tool point in the platform frame, shape (..., 3).
 
     Raises:
         InputError: The position or the tool is not finite, the rotation is not one, or their

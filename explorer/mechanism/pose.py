@@ -76,21 +76,16 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return Pose.of(position, rotation_from_yaw_pitch_roll(yaw_pitch_roll))
 
     def turn(self, point: FloatArray, vector: FloatArray) -> Pose:
-        """Return the pose after a turn about an axis through a point of the base frame.
+        """Return the pose after a turn about an axis through a point, (3,), in design units.
 
-        Args:
-            point: Point of the axis, shape (3,), in design units.
-            vector: Rotation vector in the base frame, shape (3,), in radians.
+        The rotation vector, (3,), is in radians; both are in the base frame.
         """
         turn = Rotation.from_rotvec(vector).as_matrix()
         return Pose.of(point + turn @ (np.array(self.position) - point), turn @ self.rotation)
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
-    """Return rotation matrices (..., 3, 3) of quaternions (w, x, y, z) of any length but zero.
-
-    Args:
-        quaternion: Shape (..., 4).
+    """Return rotation matrices (..., 3, 3) of quaternions (..., 4) of any length but zero.
 
     Raises:
         InputError: A quaternion is not finite, or it is zero.

@@ -34,10 +34,7 @@ _NOT_A_SEQUENCE = (str, bytes, bytearray, Set, Mapping)
 def size_problem(value: float, least: float = 0.0, most: float = MOST) -> str:
     """Return what is wrong with the size of a number, to follow its name; "" if nothing is.
 
-    Args:
-        value: The number.
-        least: Least size of a number that is not zero.
-        most: Largest size.
+    It must be finite, at most the largest size and, unless it is zero, at least the least one.
     """
     if not math.isfinite(value):
         return f"must be a finite number; got {value}"

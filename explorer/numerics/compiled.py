@@ -49,10 +49,8 @@ _warm_lock = threading.Lock()
 class Kernel(Generic[Arguments]):
     """A function over arrays that runs interpreted or compiled, with the same result.
 
-    Args:
-        function: Function in the subset of Python that Numba compiles; it writes its results
-            into arrays among its arguments.
-        signature: Numba's type signature, with which it can compile before any call.
+    It is in the subset of Python that Numba compiles, and writes its results into arrays among its
+    arguments; with the type signature it can be compiled before any call.
     """
 
     def __init__(self, function: Callable[Arguments, None], signature: str) -> None:

@@ -269,13 +269,7 @@ def lengths_of_moves(design: Design, poses: Sequence[Pose]) -> FloatArray:
 
 
 def smooth(proofs: Proofs, poses: Sequence[Pose], seed: int = 0) -> tuple[Pose, ...]:
-    """Return a shorter path with the same ends.
-
-    Args:
-        proofs: Proofs that moves are valid.
-        poses: Corners of the path.
-        seed: Seed of the random shortcuts.
-    """
+    """Return a shorter path with the same ends, by proved shortcuts, some of them random."""
     rng = np.random.default_rng(seed)
     corners, idle_rounds = list(poses), 0
 

@@ -105,9 +105,7 @@ class ImperfectMachine:
     def chain_joints(self, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
         """Return the true joint values of all chains in a pose, shape (12,), as `CHAIN_JOINTS`.
 
-        Args:
-            position: Position of the platform's frame in the base frame, shape (3,).
-            rotation: Platform to base, shape (3, 3).
+        The position (3,) is that of the platform's frame, the rotation (3, 3) platform to base.
         """
         p, r = position_array("position", position), rotation_array(rotation)
         ends = p + self.points @ r.T

@@ -94,13 +94,10 @@ def leg_radii(design: Design) -> tuple[float, ...]:
 
 
 def machine_weights(design: Design, masses: Mapping[str, Mass], *, payload: bool = True) -> Weights:
-    """Return the weights of bodies and of the design's payload.
+    """Return the weights of bodies and, unless it is left out, of the design's payload.
 
-    Args:
-        design: The manipulator.
-        masses: Masses of the bodies in their own frames, in metres and kilograms, such as
-            `explorer.prototype.assembly.Prototype.masses`.
-        payload: Whether the design's payload is among them.
+    The masses of the bodies are in their own frames, in metres and kilograms, such as
+    `explorer.prototype.assembly.Prototype.masses`.
     """
     units = 1e3 / design.unit_mm
     x, y, z = (units * masses["platform"].centre).tolist()

@@ -78,12 +78,7 @@ class DaskWorkers(Workers):
         return self._executor.submit(fn, *args, **kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Leave the scheduler; it and its workers stay.
-
-        Args:
-            wait: Whether to wait until tasks have ended.
-            cancel_futures: Whether to drop all tasks.
-        """
+        """Leave the scheduler, which stays with its workers; wait for tasks, or drop all."""
         self._executor.shutdown(wait=wait and not cancel_futures)
         # The scheduler may be gone.
         with contextlib.suppress(OSError, TimeoutError):

@@ -23,25 +23,16 @@ from explorer.sweep.study import Objective, Study
 
 
 def costs(columns: Mapping[str, Any], objectives: Sequence[Objective]) -> FloatArray:
-    """Return the objectives of each row with such signs that less is better, shape (n, m).
-
-    Args:
-        columns: Columns by name, shape (n,) each.
-        objectives: The m objectives.
-    """
+    """Return m objectives of n rows with such signs that less is better, shape (n, m)."""
     signs = [1.0 if objective.sense == "min" else -1.0 for objective in objectives]
     values = [np.asarray(columns[objective.measure], np.float64) for objective in objectives]
     return np.column_stack(values) * signs
 
 
 def front(columns: Mapping[str, Any], objectives: Sequence[Objective]) -> BoolArray:
-    """Return which rows are on the Pareto front, shape (n,).
+    """Return which rows are on the Pareto front of one objective or more, shape (n,).
 
     Only rows that are done and have all objectives can be on it; equal rows are on it together.
-
-    Args:
-        columns: Columns by name, shape (n,) each, with the status among them.
-        objectives: At least one objective.
     """
     cost = costs(columns, objectives)
     rows = np.flatnonzero((columns["status"] == "done") & np.isfinite(cost).all(axis=1))
@@ -95,10 +86,7 @@ class Results:
         return front(self.columns, self.study.objectives)
 
     def design_of_row(self, row: int) -> Design:
-        """Return the design of a row.
-
-        Args:
-            row: Row from 0; where parts are missing it is not the design's index.
+        """Return the design of a row from 0; where parts are missing it is not the design's index.
 
         Raises:
             InputError: There is no such row.

@@ -79,13 +79,7 @@ def columns_of(study: Study) -> dict[str, Kind]:
 
 
 def evaluate(study: bytes, start: int, stop: int) -> Rows:
-    """Return the rows of some designs.
-
-    Args:
-        study: Study encoded by `encode_study`.
-        start: Index of the first design.
-        stop: Index after the last one.
-    """
+    """Return the rows of the designs of an encoded study from one index to before another."""
     decoded = _decode_study(study)
     indices = range(start, stop)
     values = samples(decoded, indices)
@@ -106,12 +100,9 @@ def rows_of_dead_workers(study: Study, indices: range, reason: str) -> Rows:
 
 
 def design_of(study: Study, values: Mapping[str, float], name: str | None = None) -> Design:
-    """Return the design with given values of the variables of a study.
+    """Return the design with given values of variables of a study, and maybe another name.
 
-    Args:
-        study: The study.
-        values: Values by variable; others are those of the study's design.
-        name: Name of the design; that of the study's design if None.
+    What is not given is as in the study's design.
     """
     design = with_values(study.base, values)
     if RADIUS in values:

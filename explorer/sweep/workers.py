@@ -66,10 +66,7 @@ class Workers(Executor, ABC):
 
 
 class LocalWorkers(Workers):
-    """Processes on this machine.
-
-    Args:
-        size: Number of processes; one for each core that this process may use if None.
+    """Processes on this machine; if no number is given, one for each core that this one may use.
 
     Raises:
         InputError: Fewer than one process, or more than `MOST_WORKERS`.
@@ -99,11 +96,9 @@ class LocalWorkers(Workers):
         return self._threads.submit(self._call, (fn, args, kwargs))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes.
+        """End the processes, and wait for that, or let them end with this process.
 
-        Args:
-            wait: Whether to return only when they have ended; else they end with this process.
-            cancel_futures: Whether to drop tasks that have not begun, and kill those that have.
+        Tasks that have not begun may be dropped, and those that have killed.
         """
         self._is_over = True
         self._threads.shutdown(wait=False, cancel_futures=cancel_futures)

@@ -38,9 +38,6 @@ def nearest_carrying_pose(loaded: LoadedPose) -> Pose | None:
 
     It keeps all limits and clearances of the design and has the signs of the margins of the given
     pose, so that no singular plane lies between; the straight way there need not hold the load.
-
-    Args:
-        loaded: A pose under a load and weights.
     """
     design, pose = loaded.design, loaded.pose
     own = np.sign(margins(pose.position, pose.rotation)).astype(np.int64).tolist()

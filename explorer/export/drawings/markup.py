@@ -119,13 +119,9 @@ def whole(value: int) -> Element:
 def table(
     heads: Sequence[str], rows: Iterable[Sequence[Cell]], align: str, caption: Piece = None
 ) -> Element:
-    """Return a table.
+    """Return a table; () stands for no headings, and a cell is one piece or several.
 
-    Args:
-        heads: Headings of the columns; () for none.
-        rows: Rows of cells; a cell is one piece or several.
-        align: One letter per column, "<" for words and ">" for numbers.
-        caption: Caption above the table.
+    The alignment has one letter per column, "<" for words and ">" for numbers.
     """
 
     def row_of(tag: str, cells: Sequence[Cell]) -> Element:

@@ -92,13 +92,9 @@ def extents(name: ViewName, points: FloatArray) -> tuple[FloatArray, FloatArray]
 def fit_view(
     name: ViewName, points: FloatArray, frame: Frame, scale: float | None = None
 ) -> Projection:
-    """Return the view in which points (n, 3) fill a frame, in its middle.
+    """Return the view in which points (n, 3) fill a frame on paper, in its middle.
 
-    Args:
-        name: Name of the view.
-        points: Points to show, shape (n, 3).
-        frame: Frame on paper.
-        scale: Points of paper per design unit; the largest that fits if None.
+    The scale is in points of paper per design unit, the largest that fits if None.
     """
     lows, highs = extents(name, points)
     corners = np.array(frame).reshape(2, 2)
@@ -113,12 +109,9 @@ def fit_view(
 def labels(
     names: Sequence[tuple[str, FloatArray]], lines: Sequence[FloatArray], within: Frame
 ) -> Iterator[Element]:
-    """Yield labels of points, each where it covers least.
+    """Yield labels of points, shape (2,), each where it covers least within a frame.
 
-    Args:
-        names: Words of each label and its point, shape (2,).
-        lines: Straight lines to keep clear, by their ends, each of shape (2, 2).
-        within: Frame of the labels.
+    Straight lines to keep clear are given by their ends, each of shape (2, 2).
     """
     distance, angle = _PLACES.T
     taken = [np.concatenate([point - 4.5, point + 4.5]) for _, point in names]

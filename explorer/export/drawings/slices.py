@@ -264,10 +264,8 @@ def _clip(polygon: FloatArray, values: FloatArray) -> FloatArray:
 def slices_through(slices: Slices, position: Sequence[float], name: str = "slice") -> Element:
     """Return the three maps of the slices through a position, side by side at one scale.
 
-    Args:
-        slices: The slices.
-        position: The position, shape (3,), in design units.
-        name: First part of the names of the maps, unique in the document.
+    The position is in design units, (3,); the names of the maps, unique in the document, begin with
+    the given one.
     """
     spans = (slices.highs - slices.lows).tolist()
     wide, high = 2.0 * spans[0] + spans[1], max(spans[1], spans[2])

@@ -26,13 +26,7 @@ MOST_HEIGHT = 380.0
 
 
 def workspace_views(snapshot: Snapshot, solid: Solid, slices: Slices) -> Element:
-    """Return the workspace with the mechanism in it, and cut open at the pose's y.
-
-    Args:
-        snapshot: Measures of the design in its pose.
-        solid: Mesh of its workspace, not empty.
-        slices: Slices of the same workspace.
-    """
+    """Return a workspace, not empty, with the mechanism in it, and cut open at the pose's y."""
     points = np.concatenate([drawings.points_to_show(snapshot), solid.vertices])
     lows, highs = drawings.extents("isometric", points)
     half = 0.5 * WIDTH

@@ -37,13 +37,9 @@ _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
 def report_html(data: ReportData, date: dt.date) -> str:
-    """Return the report as HTML that needs no other file and no network.
+    """Return the report of a date as HTML that needs no other file and no network.
 
     Equal data give equal reports, except for the date and the versions of the libraries.
-
-    Args:
-        data: Data of the report.
-        date: Date of the report.
     """
     title = f"{_name(data)} – design report"
     style = packaged_file("export/report", "style.css").read_text("utf-8")

@@ -31,13 +31,10 @@ def names_of(pairs: Iterable[bool]) -> str:
 def verdict(
     clearance: FloatArray, bound: FloatArray, design: Design, where: str = ""
 ) -> block.Statement:
-    """Return whether legs collide, touch or are clear, and the least clearance.
+    """Return whether legs collide, touch or are clear, and the least clearance, in words.
 
-    Args:
-        clearance: Clearance of each pair in design units, shape (6,).
-        bound: Lower bound of each, shape (6,).
-        design: The manipulator.
-        where: Words for where that is, after a blank.
+    Clearances and their lower bounds, shape (6,), are in design units. The words for where that is
+    follow a blank.
     """
     title, look = f"Legs are clear{where}", "within"
     if (clearance < 0.0).any():
@@ -129,9 +126,7 @@ def move_clearances(move: MoveClearance, design: Design) -> Iterator[block.Block
 def workspace_clearances(pairs: Sequence[PairCost], design: Design) -> Iterator[block.Block]:
     """Yield whether legs collide in a workspace, and what each pair blocks; nothing if it is empty.
 
-    Args:
-        pairs: Least clearance and blocked volume of each pair, in the order of `PAIRS`.
-        design: The manipulator.
+    The pairs are in the order of `PAIRS`.
     """
     clearance = np.array([pair.clearance for pair in pairs])
     if not np.isfinite(clearance).any():

@@ -25,12 +25,7 @@ def utilisations(loaded: LoadedPose) -> list[float | None]:
 
 
 def verdict(loaded: LoadedPose, load: str = "load") -> block.Statement:
-    """Return whether a load is held, and which part is nearest to its limit.
-
-    Args:
-        loaded: The pose under the load.
-        load: Noun for the load, such as "payload".
-    """
+    """Return whether a load, such as a "payload", is held, and the part nearest to its limit."""
     if not loaded.is_regular:
         return block.Statement("Singular pose", "The forces are infinite.", "beyond")
     if not has_limits(loaded.design):
@@ -156,11 +151,9 @@ def _largest_force(
 
 
 def worst_force(worst: WorstForce, force: str) -> Iterator[block.Fact]:
-    """Yield the worst direction of a force; nothing in a singular pose or without limits.
+    """Yield the worst direction of a force in words, such as "this force".
 
-    Args:
-        worst: The direction.
-        force: The force in words, such as "this force".
+    There is none in a singular pose or without limits.
     """
     if np.isfinite(worst.direction).all():
         remark = f"{PART_NAMES[worst.part]} at ", block.Share(worst.share)
@@ -172,10 +165,8 @@ def nearest_carrying(
 ) -> block.Statement:
     """Return where the nearest position is that holds the load of a pose that does not.
 
-    Args:
-        loaded: The pose under its load.
-        nearest: The nearest pose; None if none was found.
-        tool: Point whose position is told, in the platform frame; None for b4.
+    The nearest pose is None if none was found. The position told is that of the tool, a point in
+    the platform frame, or of b4 if it is None.
     """
     if nearest is None:
         return block.Statement(

@@ -23,9 +23,7 @@ LISTED = 8
 def tool_errors(precision: ToolPrecision, listed: int | None = LISTED) -> Iterator[block.Block]:
     """Yield the errors of the tool, and what each source does alone.
 
-    Args:
-        precision: The precision.
-        listed: Number of sources that are listed, from the largest; all if None.
+    So many sources are listed, from the largest; all if the number is None.
     """
     if not precision.has_errors:
         yield block.Statement("The design states no errors")
@@ -103,10 +101,8 @@ def deflections(
 ) -> Iterator[block.Block]:
     """Yield the deflection of the tool, what gives way, and the softest directions.
 
-    Args:
-        precision: The precision.
-        load: The load in words, such as "the load and the weights".
-        has_force: Whether this load is the payload's force in its worst direction.
+    The load is in words, such as "the load and the weights"; if it has a force, that is the
+    payload's force in its worst direction.
     """
     design = precision.loaded.design
     if not is_elastic(design):
@@ -191,11 +187,8 @@ def tolerance_budget(
 ) -> Iterator[block.Block]:
     """Yield the errors that tolerances allow, and what each of them costs, the costliest first.
 
-    Args:
-        costs: Costs of the tolerances.
-        found: The tolerances, if they were found for a wanted precision.
-        wanted: Largest displacement of the tool that was wanted, in mm; None for any.
-        wanted_turn: Largest turn of the tool that was wanted, in degrees; None for any.
+    The tolerances may have been found for a largest displacement of the tool, in mm, and a largest
+    turn, in degrees; None stands for any.
     """
     has_tolerances = bool(costs.tolerances[np.isfinite(costs.tolerances)].any())
     if has_tolerances:
@@ -240,12 +233,7 @@ def _errors(costs: SourceCosts, wanted: float | None, wanted_turn: float | None)
 
 
 def _costs(costs: SourceCosts, *, per_unit: bool) -> block.Table:
-    """Return the table of the sources of errors.
-
-    Args:
-        costs: Costs of the tolerances.
-        per_unit: Whether displacements are those by unit errors, in place of the tolerances.
-    """
+    """Return the table of sources, with displacements by unit errors or by the tolerances."""
     moved = costs.displacement / costs.lengths if per_unit else costs.displacement_within
     ranking: list[int] = costs.ranking.tolist()
     return block.Table(

@@ -211,9 +211,7 @@ def _free_turn(snapshot: Snapshot, turn: FreeTurn) -> block.Statement:
 def gains(performance: Performance, point: str) -> block.Table:
     """Return the least and the largest gain of speed and of force, by the reach for turning.
 
-    Args:
-        performance: The ellipsoids of the pose.
-        point: Point of the platform, such as "b4".
+    They are those of a point of the platform, such as "b4".
     """
     moves, turns = performance.translation, performance.rotation
     axes = moves.gain, moves.force, turns.gain, turns.force
@@ -274,10 +272,7 @@ def ellipsoids(performance: Performance, point: str) -> Iterator[block.Table]:
 def free_ball(snapshot: Snapshot, ball: SingularityFreeBall, point: str) -> block.Fact:
     """Return the radius of the largest ball of positions without a singular one.
 
-    Args:
-        snapshot: The pose.
-        ball: The ball.
-        point: Point of the platform, such as "b4".
+    They are the positions of a point of the platform, such as "b4".
     """
     unit = snapshot.design.unit_mm
     hint = f"No position of {point} within this radius is singular at this orientation"

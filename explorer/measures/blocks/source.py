@@ -48,10 +48,7 @@ def name_of(design: Design) -> str:
 def pose_options(design: Design, pose: Pose, tool: Triple | None = None) -> str:
     """Return the options for a pose, each after a blank; none for the home pose.
 
-    Args:
-        design: The manipulator.
-        pose: The pose.
-        tool: Point whose position is given, in the platform frame; None for b4.
+    The position is that of the tool, a point in the platform frame, or of b4 if it is None.
     """
     if pose == design.home_pose:
         return ""
@@ -76,10 +73,7 @@ def pose_source(topic: PoseTopic, design: Design, pose: Pose) -> Source:
 def load_source(topic: LoadTopic, loaded: LoadedPose, density: float | None = None) -> Source:
     """Return how the forces or the precision at the tool of a loaded pose are computed.
 
-    Args:
-        topic: The command.
-        loaded: The pose under its load.
-        density: Density of the prototype's parts in kg/m³, if their weights count.
+    The density of the prototype's parts, in kg/m³, is given if their weights count.
     """
     design, pose = loaded.design, loaded.pose
     imports = ["import explorer", "from explorer.statics.loaded import LoadedPose"]

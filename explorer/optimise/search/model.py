@@ -46,13 +46,10 @@ class Evaluation:
 
 
 class Model:
-    """A problem from one start, ready for a solver.
+    """A problem from values of its variables to start from, ready for a solver.
 
-    Args:
-        problem: The problem.
-        start: Values of its variables to start from.
-        before_each: Called before each evaluation; may raise to end the search.
-        is_relaxed: Whether the clearance, by far the most expensive demand, is left out.
+    What is called before each evaluation may raise, to end the search. A relaxed problem leaves out
+    the clearance, by far the most expensive demand.
     """
 
     def __init__(

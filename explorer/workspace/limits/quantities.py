@@ -320,11 +320,7 @@ class Demand:
         return f"{format_number(value, **form)}{'°' if self.angle else ''}"
 
     def words(self, unit: float = 1.0) -> str:
-        """Return the range in words.
-
-        Args:
-            unit: Design unit in the unit of lengths that is asked for.
-        """
+        """Return the range in words; the design unit is given in the unit that is asked for."""
         factor = unit if self.angle is None else 1.0
 
         def number(bound: Bound) -> str:

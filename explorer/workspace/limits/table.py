@@ -309,10 +309,8 @@ def demands_of(
 ) -> tuple[Demand, ...]:
     """Return the demands of a design that are in force, in the order of the table.
 
-    Args:
-        design: The manipulator.
-        signs: Sign triple to demand instead of the home's, even if no margin is demanded.
-        order: Sign of d3 − d1 to demand, 0 for either; the design's if None.
+    A sign triple may be demanded in place of the home's, even if no margin is, and a sign of
+    d3 − d1, 0 for either, in place of the design's.
     """
     return tuple(
         demand

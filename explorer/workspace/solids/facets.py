@@ -146,11 +146,9 @@ def ball(
 
 
 def sphere_part(angle: float, edge: float) -> Facets:
-    """Return the part of the unit sphere within an angle of z, or more, as regular triangles.
+    """Return the unit sphere within an angle of z or more, π for all, as regular triangles.
 
-    Args:
-        angle: Angle in radians, π for the whole sphere.
-        edge: Approximate length of edges.
+    The angle is in radians; edges have about a given length.
     """
     # Rings are as far apart as an equilateral triangle is high.
     step = edge * math.sqrt(3.0) * CIRCUMRADIUS
