@@ -24,11 +24,9 @@ STYLE = "border:1px solid rgba(128,128,128,0.35);border-radius:4px"
 
 
 class Shown:
-    """A running explorer that a notebook displays; it ends with the last reference to it.
+    """A running explorer that a notebook displays in a frame, with its height in pixels.
 
-    Args:
-        running: The explorer.
-        height: Height of the frame, in pixels.
+    It ends with the last reference to it.
     """
 
     def __init__(self, running: Running, height: int) -> None:

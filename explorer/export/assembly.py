@@ -39,11 +39,7 @@ _DECIMALS = 6
 
 
 def assembly_bytes(prototype: Prototype, file_format: str) -> bytes:
-    """Return a file of a prototype, assembled in the home pose.
-
-    Args:
-        prototype: Prototype with its parts.
-        file_format: One of `FORMATS`.
+    """Return a file of a prototype in one of `FORMATS`, assembled in the home pose.
 
     Raises:
         InputError: The format is unknown.

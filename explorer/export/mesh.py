@@ -208,13 +208,9 @@ ROUNDING = 1e-5
 
 
 def mesh_bytes(solid: Solid, file_format: str, design: Design, name: str) -> bytes:
-    """Return a file of a solid.
+    """Return a file in one of `FORMATS` of a solid in design units, closed and not empty.
 
-    Args:
-        solid: Solid in design units, closed and not empty.
-        file_format: One of `FORMATS`.
-        design: Design of the solid, which gives the unit.
-        name: Name of the solid in the file.
+    The solid has a name in the file; its design gives the unit.
 
     Raises:
         InputError: The format is unknown, or too coarse for coordinates of this size.

@@ -68,9 +68,7 @@ class ExactSolid:
 def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactSolid:
     """Return the constant-orientation workspace with its exact faces.
 
-    Args:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
+    The rotation is from platform to base, shape (3, 3); that of the home pose if None.
 
     Raises:
         MissingExtraError: OpenCASCADE is not installed.

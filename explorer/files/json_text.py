@@ -55,12 +55,9 @@ class _Place(NamedTuple):
 
 
 def decode_strictly(data: bytes, kind: type[T], source: str) -> T:
-    """Return the value that a JSON text holds.
+    """Return the value of a type, whose structs forbid unknown fields, that a JSON text holds.
 
-    Args:
-        data: The text in any encoding that `decode_text` knows.
-        kind: Type of the value, whose structs forbid unknown fields.
-        source: Name of the text in an error message.
+    The text is in any encoding that `decode_text` knows; errors name its source.
 
     Raises:
         InputError: The text is not JSON or not of that type, or it gives a field twice.
@@ -117,13 +114,8 @@ def located_errors(
 ) -> Generator[str]:
     """Yield the text in some bytes, and raise every error of reading it with its place.
 
-    The message is one printable line of limited length, which begins with the source.
-
-    Args:
-        data: The bytes.
-        kind: Type of the value in the text.
-        source: Name of the text.
-        error: Type of the error to raise.
+    The message is one printable line of limited length, which begins with the source; it names
+    fields as the type of the value in the text has them.
 
     Raises:
         InputError: The text cannot be read; the error is of type `error`.

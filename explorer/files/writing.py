@@ -74,11 +74,7 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def read_at_most(path: Path, largest: int) -> bytes:
-    """Return the contents of a plain file.
-
-    Args:
-        path: Path of the file.
-        largest: Largest accepted size in bytes.
+    """Return the contents of a plain file that has no more than a number of bytes.
 
     Raises:
         StorageError: The file cannot be read, is no plain file, or is larger.

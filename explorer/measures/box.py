@@ -88,10 +88,6 @@ def box_margins(box: tuple[Triple, Triple], rotation: FloatArray) -> FloatArray:
 
     Margins are linear in the position, so that the corners decide: of one sign, they have the
     least value; of both, there is a zero between them. What is zero but for rounding is 0.
-
-    Args:
-        box: Lows and highs of the positions.
-        rotation: Platform to base, shape (3, 3).
     """
     corners = corners_of(box)
     at = margins(corners, rotation)

@@ -59,11 +59,9 @@ class Measurements:
 
 
 def measure_design(case: Case, names: Iterable[str]) -> Measurements:
-    """Return the values of measures for a design.
+    """Return the values of measures out of `CATALOGUE` for a design.
 
-    Args:
-        case: The design, and what its measures need.
-        names: Out of `CATALOGUE`; measures are left out whose needs the case does not have.
+    Measures are left out whose needs the case does not have.
 
     Raises:
         ExplorerError: A mesh that is needed cannot be made.

@@ -34,11 +34,7 @@ class _Versioned(msgspec.Struct):
 
 
 def decode_design(data: bytes, source: str) -> Design:
-    """Return the design in a JSON text.
-
-    Args:
-        data: The text, UTF-8 or UTF-16.
-        source: Name of the text in an error message.
+    """Return the design in a JSON text, UTF-8 or UTF-16; errors name its source.
 
     Raises:
         DesignError: The text is not JSON, is of another schema, or has unknown fields,

@@ -63,14 +63,10 @@ _IS_ODD = np.array([sum(a > b for a, b in itertools.combinations(x, 2)) % 2 for 
 
 
 def surface_below_zero(values: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return the surface where values on a grid change their sign.
+    """Return the surface where values on a grid, (nx, ny, nz), change their sign.
 
-    Args:
-        values: Values at the nodes, shape (nx, ny, nz); none on the grid's boundary is negative.
-
-    Returns:
-        Vertices in grid steps, linearly interpolated, shape (n, 3); faces, shape (m, 3),
-        counter-clockwise as seen from the side of positive values.
+    No value on the grid's boundary is negative. Vertices (n, 3) are in grid steps, linearly
+    interpolated; faces (m, 3) are counter-clockwise as seen from the side of positive values.
     """
     shape = np.array(values.shape)
     strides = np.array([shape[1] * shape[2], shape[2], 1])

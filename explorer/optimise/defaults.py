@@ -52,23 +52,13 @@ def make_problem(
 ) -> problem.Problem:
     """Return a problem with sensible bounds and margins where none are given.
 
-    Args:
-        start: Design to start from.
-        objective: One of `OBJECTIVES`.
-        volume: See `Demands`; the start's own for the smallest reach if None.
-        reach: See `Demands`; the start's own for the largest volume if None.
-        clearance: See `Demands`.
-        clearance_margin: See `Demands`; a 20th of the start's reach if None.
-        least: See `Demands`; if None a 20th of the start's largest variable, or less where
-            the start itself is half as far from degenerate.
-        stroke_ratio: See `Demands`.
-        required_box: See `Demands`.
-        held: See `Demands`.
-        error: See `Demands`.
-        deflection: See `Demands`.
-        tilt: See `Demands`.
-        free: Variables of `OPTIONAL` that may change besides the six design variables.
-        bounds: Variables with other bounds than the default ones.
+    The start, the objective and the demands are those of `Problem` and `Demands`. A demand of None
+    is none, but for the volume of the smallest reach and the reach of the largest volume, which are
+    the start's own; for `clearance_margin`, a 20th of the start's reach; and for `least`, a 20th of
+    the start's largest variable, or less where the start itself is half as far from degenerate.
+
+    Besides the six design variables those of `OPTIONAL` may change that are free, or have bounds;
+    a variable without bounds here has the default ones.
 
     Raises:
         InputError: See `Problem`.

@@ -81,6 +81,8 @@ AZIMUTHS = 12
 """Number of azimuths, at equal distances from the yaw of home, in which a tilt is demanded."""
 
 MOST_TILT = 90.0
+# The demands that are positive numbers.
+POSITIVE = ("volume", "reach", "clearance", "stroke_ratio", "error", "deflection", "tilt")
 
 
 class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -121,15 +123,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     tilt: float | None = None
 
     def __post_init__(self) -> None:
-        for field in (
-            "volume",
-            "reach",
-            "clearance",
-            "stroke_ratio",
-            "error",
-            "deflection",
-            "tilt",
-        ):
+        for field in POSITIVE:
             value = getattr(self, field)
             if value is not None:
                 label = f"the {field.replace('_', ' ')} demanded"

@@ -90,12 +90,8 @@ class LegSizes:
     def stroke(self, required: Stroke, home_length: float) -> Stroke:
         """Return the required stroke, or the part of it that a single rod covers.
 
-        A rod no longer than its cylinder can at most double the length of a leg. Of a longer
-        stroke it covers a part about the home length, shifted where that part would pass an end.
-
-        Args:
-            required: The required stroke.
-            home_length: The length of the leg at home.
+        A rod no longer than its cylinder can at most double the length of a leg. Of a longer stroke
+        it covers a part about the home length, shifted where that part would pass an end.
         """
         shortest = max(
             required.shortest,

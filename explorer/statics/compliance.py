@@ -161,10 +161,7 @@ def deflection(compliance: FloatArray, load: ArrayLike) -> FloatArray:
     """Return the displacement and the turn (v; ω) of the tool under a load, shape (..., 6).
 
     They are in design units and radians along the axes of the base, infinite in a singular pose.
-
-    Args:
-        compliance: C at the tool, shape (..., 6, 6).
-        load: (F; M) at the tool, shape (..., 6), in N and N × unit.
+    The compliance, (..., 6, 6), and the load (F; M), (..., 6), in N and N × unit, are at the tool.
 
     Raises:
         InputError: The load is not finite.

@@ -21,11 +21,9 @@ PATIENCE = 15.0
 
 
 class DaskWorkers(Workers):
-    """The workers of a Dask scheduler; from the first on, Dask logs only what is critical.
+    """The workers of a Dask scheduler at an address such as tcp://10.0.0.1:8786.
 
-    Args:
-        address: Address of the scheduler, such as tcp://10.0.0.1:8786.
-        patience: Seconds to wait for the scheduler.
+    From the first on, Dask logs only what is critical. The patience is in seconds.
 
     Raises:
         InputError: There is no scheduler at that address.

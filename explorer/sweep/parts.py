@@ -88,13 +88,7 @@ def _visible(folder: Path) -> list[Path]:
 
 
 def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -> None:
-    """Write the part of a chunk.
-
-    Args:
-        folder: Results folder.
-        study: The study.
-        chunk: Number of the chunk.
-        pieces: Rows of the chunk, in order and without gaps.
+    """Write the part of a chunk into a results folder: its rows, in order and without gaps.
 
     Raises:
         StorageError: The part cannot be written; a part that was there is unchanged.
@@ -117,11 +111,7 @@ def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -
 
 
 def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, Any]:
-    """Return the metadata and the table of a part.
-
-    Args:
-        path: File of the part.
-        columns: Columns to read; None for all.
+    """Return the metadata and the table of a part, with some of its columns or all.
 
     Raises:
         BadPartError: The file is damaged or cut off, or no part of a study.
@@ -147,15 +137,12 @@ def _part_of(metadata: Mapping[bytes, bytes]) -> Part:
 def sound_parts(
     folder: Path, damaged: list[Path], study: Study | None = None
 ) -> Iterator[tuple[Study, int, Any]]:
-    """Yield the study, the chunk and the table of each sound part in a folder.
+    """Yield the study, the chunk and the table of each sound part in a results folder.
 
     Each part is read whole, since each column has checksums of its own, and must hold the rows of
-    the chunk in its file name. Reading results and continuing a run see the same parts.
-
-    Args:
-        folder: Results folder.
-        damaged: List that damaged parts are added to; a run computes them again.
-        study: Study of all parts; that of the first one if None.
+    the chunk in its file name. Reading results and continuing a run see the same parts. Damaged
+    parts, which a run computes again, are added to a list. If no study is given, it is that of the
+    first part.
 
     Raises:
         InputError: A part is of another study.

@@ -140,9 +140,7 @@ class Summary:
 def load_results(folder: str | Path, study: Study | None = None) -> Results:
     """Return the rows of a results folder, as far as they have been computed.
 
-    Args:
-        folder: Results folder.
-        study: Study of the folder, which may then have no rows yet; that of its parts if None.
+    If the study is given, the folder may have no rows yet; else it is that of its parts.
 
     Raises:
         InputError: The folder holds no results, or those of another study or of several.

@@ -295,15 +295,7 @@ def _finite_or_none(value: Value) -> Value:
 
 
 def samples(study: Study, rows: range) -> FloatArray:
-    """Return the values of the variables of some designs.
-
-    Args:
-        study: The study.
-        rows: Indices of the designs, without gaps.
-
-    Returns:
-        Values in the order of the study's variables, shape (len(rows), d).
-    """
+    """Return the values of the variables of some designs, without gaps, shape (len(rows), d)."""
     ends = np.array(list(study.variables.values()))
     lows, highs = ends[:, 0], ends[:, 1]
     match study.sampling.method:

@@ -283,11 +283,7 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 def decode_study(data: bytes, source: str) -> Study:
-    """Return the study in a JSON text.
-
-    Args:
-        data: The text, UTF-8 or UTF-16.
-        source: Name of the text in an error message.
+    """Return the study in a JSON text, UTF-8 or UTF-16; errors name its source.
 
     Raises:
         InputError: Not JSON, of another schema, with unknown fields, fields given twice or

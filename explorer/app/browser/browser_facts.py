@@ -40,10 +40,8 @@ _DECODER = msgspec.json.Decoder(BrowserFacts)
 def ask_browser(client: viser.ClientHandle, answered: Callable[[BrowserFacts], None]) -> None:
     """Ask a browser about itself, once.
 
-    Args:
-        client: The browser.
-        answered: Function that takes its answer, on the thread that reads the browsers'
-            messages; it is not called for an answer that is not valid.
+    Its answer, if it is valid, is passed to `answered` on the thread that reads the browsers'
+    messages.
     """
     field = client.gui.add_text("Browser", "", visible=False)
 
@@ -66,13 +64,7 @@ def decode_text(text: str, decoder: msgspec.json.Decoder[Described]) -> Describe
 
 
 def listen(client: viser.ClientHandle, presses: Presses, at_release: Callable[[], None]) -> None:
-    """Record the presses of a browser that has connected.
-
-    Args:
-        client: The browser.
-        presses: Where to record them.
-        at_release: Called after each release.
-    """
+    """Record the presses of a browser that has connected; call `at_release` after each release."""
     field = client.gui.add_number("Press", 0, visible=False)
 
     # On the thread that reads the browser's messages, one after the other.

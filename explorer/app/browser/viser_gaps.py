@@ -160,9 +160,7 @@ def scene_as_html(
 ) -> str:
     """Return viser's page with a scene in it that it plays by itself.
 
-    Args:
-        server: Server of the scene.
-        select: Returns the messages for the page from all messages that make the scene.
+    `select` chooses the messages for the page from all messages that make the scene.
     """
     # Gap: a recording of viser can neither be ended nor be filtered.
     serializer: Any = server.get_scene_serializer()

@@ -14,11 +14,9 @@ FOLDER = "app/look"
 
 
 def read_script(name: str, *arguments: object) -> str:
-    """Return a script of this folder, with a call of its function if there are arguments.
+    """Return a script of this folder by its name without the suffix.
 
-    Args:
-        name: The script's name without the suffix.
-        arguments: Values of JSON for the function that the script sets.
+    Arguments, values of JSON, are for the function that the script sets, which is then called.
     """
     # Scripts come to a page in any order, so that each brings what all of them use.
     source = read_file("base.js") + read_file("clock.js") + read_file(f"{name}.js")

@@ -46,12 +46,10 @@ FIRST_ASPECT = 1.2
 def framing(
     points: FloatArray, view: ViewName | FloatArray, aspect: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the eye and the target, in scene units, that show all of some points.
+    """Return the eye and the target, in scene units, that show all of some points (n, 3).
 
-    Args:
-        points: Points to show, shape (n, 3).
-        view: Name of the view, or direction (3,) from the target to the eye, not along z.
-        aspect: Width over height of the picture.
+    The view is a name, or a direction (3,) from the target to the eye, not along z; the aspect is
+    the picture's width over its height.
     """
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     towards = np.array(DIRECTIONS[view]) if isinstance(view, str) else view
@@ -101,11 +99,7 @@ def _depth(points: FloatArray, centre: FloatArray, forward: FloatArray) -> Float
 
 
 def _axes(direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the unit vectors forward, right and up of an upright camera, shape (3,) each.
-
-    Args:
-        direction: Direction in which it looks, of any length, not along z.
-    """
+    """Return unit vectors (3,) forward, right and up of an upright camera looking not along z."""
     forward = direction / np.linalg.norm(direction)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -187,8 +181,7 @@ class Cameras:
     def follow(self, clients: Iterable[viser.ClientHandle]) -> None:
         """Move the cameras that showed all points and no longer do, keeping their directions.
 
-        Args:
-            clients: Browsers whose users hold nothing.
+        The clients are browsers whose users hold nothing.
         """
         points = self._points()
         for client in clients:

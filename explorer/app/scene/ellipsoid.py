@@ -17,12 +17,7 @@ OPACITY = 0.3
 
 
 class Ellipsoid:
-    """An ellipsoid in the scene.
-
-    Args:
-        scene: Where it is added.
-        name: Its node.
-    """
+    """An ellipsoid in a scene, at the node of a name."""
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
         self._body = add_translucent(scene, f"{name}/body", sphere(), OPACITY, side="front")

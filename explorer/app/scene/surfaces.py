@@ -244,9 +244,7 @@ CREASE = math.radians(30.0)
 def with_creases(vertices: FloatArray, faces: NDArray[np.int32]) -> Drawn:
     """Return a closed mesh whose faces on either side of a sharp edge share no vertices.
 
-    Args:
-        vertices: Positions of the vertices, shape (n, 3).
-        faces: Indices of vertices, each edge shared by two, shape (m, 3).
+    Vertices have the shape (n, 3), faces (m, 3); each edge of them is shared by two.
     """
     first, second, _ = _neighbours(faces)
     smooth = _is_smooth(vertices, faces, first, second)

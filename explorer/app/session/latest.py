@@ -35,12 +35,9 @@ class LatestWins(Generic[Item]):
         self._thread.start()
 
     def post(self, key: object, stamp: float, item: Item) -> None:
-        """Queue an item, in place of one with the same key that waits.
+        """Queue an item, in place of one with the same key that waits, as events of a slider have.
 
-        Args:
-            key: Key of the item; events of one slider share it.
-            stamp: Time of its event. An item older than the waiting one is dropped.
-            item: The item.
+        An item with the stamp of an earlier event than that of the waiting one is dropped.
         """
         with self._condition:
             waiting = self._waiting.get(key)

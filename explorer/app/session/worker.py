@@ -343,8 +343,7 @@ def do_nothing() -> None:
 def main(preload: Sequence[str]) -> None:
     """Do the tasks that the parent orders, in the child process, until it closes the pipe.
 
-    Args:
-        preload: The modules to import first, so that the first task starts at once.
+    Some modules are imported first, so that the first task starts at once.
     """
     # A terminal sends Ctrl-C to this process too; its parent ends it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -43,13 +43,9 @@ class Presses:
         self._lock = threading.Lock()
 
     def record(self, client: int, number: int, time: float) -> None:
-        """Record a press or a release.
+        """Record a press or a release of a browser, given by its id, and its time in seconds.
 
-        Args:
-            client: The browser's id.
-            number: The number of the press where it begins or goes on, its negative where it
-                ends.
-            time: When that happened, in seconds.
+        The number of the press comes where it begins or goes on, its negative where it ends.
         """
         with self._lock:
             periods = self._periods.setdefault(client, deque(maxlen=MOST_PRESSES))

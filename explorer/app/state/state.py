@@ -224,11 +224,7 @@ class State:
         return point if any(point) else None
 
     def offset(self, rotation: ArrayLike) -> FloatArray:
-        """Return the vector from b4 to that point in the base frame, shape (..., 3).
-
-        Args:
-            rotation: Platform to base, shape (..., 3, 3).
-        """
+        """Return the vector (..., 3) from b4 to that point, along base axes, of rotations."""
         return offset_of(self.design, np.asarray(rotation), self.view.at)
 
     def pose_at(self, position: Triple, orientation: Pose) -> Pose:

@@ -30,9 +30,7 @@ def data_folder() -> Path:
 def plain_words(name: str, most: int) -> str:
     """Return the ASCII letters and digits of a name, words joined by hyphens; "" without any.
 
-    Args:
-        name: Any name.
-        most: Number of characters at most.
+    They are as many characters as given at most.
     """
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     return "-".join("".join(c if c.isalnum() else " " for c in plain).split())[:most].strip("-")

@@ -53,11 +53,7 @@ class Entry:
 
 
 class Library:
-    """The user's named designs.
-
-    Args:
-        folder: The folder of designs; that in the user's data folder if None.
-    """
+    """The user's named designs in a folder; that in the user's data folder if none is given."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = data_folder() / DESIGNS if folder is None else folder

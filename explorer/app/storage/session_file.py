@@ -50,11 +50,7 @@ Index = Annotated[int, msgspec.Meta(ge=0)]
 
 
 class SessionFile:
-    """The file of this explorer's session.
-
-    Args:
-        folder: The folder of sessions; that in the user's data folder if None.
-    """
+    """The file of this explorer's session, in the user's data folder if no other is given."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = data_folder() / SESSIONS if folder is None else folder

@@ -125,10 +125,9 @@ class Preferences(msgspec.Struct, frozen=True):
 
 
 class PreferenceFile:
-    """The file of the preferences; one that cannot be read gives the defaults.
+    """The file of the preferences, whose folder is made at the first choice.
 
-    Args:
-        folder: The folder of the file, made at the first choice.
+    A file that cannot be read gives the defaults.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -46,10 +46,8 @@ class Assigner:
     def assign(self, updates: Iterable[Update], *, since: float | None = None) -> list[Update]:
         """Assign in one block, which the browsers apply together; return the updates that differed.
 
-        Args:
-            updates: Updates to assign.
-            since: Time at which their computation began: a value that a user has set since then
-                stays, since a newer frame follows.
+        A value that a user has set since the time at which their computation began stays, since a
+        newer frame follows.
         """
         new = [update for update in updates if self._is_new(update)]
         if since is not None:

@@ -22,12 +22,9 @@ PART_COLOURS = TEAL, VIOLET, BLUE
 def render(
     blocks: Iterable[kinds.Block], acts: Mapping[str, str] | None = None, *, corner: str = ""
 ) -> str:
-    """Return blocks as the box of a panel.
+    """Return blocks as the box of a panel, with a button in its upper right corner, HTML.
 
-    Args:
-        blocks: The blocks.
-        acts: Buttons by the names that blocks have for them, HTML; those missing are left out.
-        corner: Button in the upper right corner, HTML.
+    Buttons by the names that blocks have for them are HTML too; those missing are left out.
     """
     return box(corner, *(content_of(block, acts or {}) for block in blocks))
 

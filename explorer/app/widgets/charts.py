@@ -23,13 +23,10 @@ BLANK = np.zeros(2)
 
 
 def axis(label: str, *, label_size: int, size: int, space: int = 30) -> uplot.Axis:
-    """Return an axis.
+    """Return an axis, labelled with its quantity and unit.
 
-    Args:
-        label: Its quantity and unit.
-        label_size: Room for the label, in pixels.
-        size: Room for its numbers, in pixels.
-        space: Least distance of two numbers, in pixels.
+    The room for the label, that for its numbers, and the least distance of two of these are in
+    pixels.
     """
     return {
         "label": label,
@@ -61,13 +58,9 @@ def level_axis(levels: tuple[float, ...], name: str, colour: Rgb) -> uplot.Axis:
 def line(
     label: str, colour: Rgb, *, width: float = 2.0, dash: tuple[float, ...] = ()
 ) -> uplot.Series:
-    """Return a series that is drawn as a line.
+    """Return a series that is drawn as a line, with its name and colour.
 
-    Args:
-        label: Its name.
-        colour: Its colour.
-        width: Its width in pixels.
-        dash: Lengths of dashes and gaps in pixels; none for a solid line.
+    Its width, and the lengths of dashes and gaps, none for a solid line, are in pixels.
     """
     return {
         "label": label,

@@ -33,9 +33,7 @@ class Effect:
 def turn(at: str, name: str) -> Effect:
     """Return the effect of a switch: a press turns a value of the state on or off.
 
-    Args:
-        at: Path of the value, such as "view.workspace.solid".
-        name: Name of the value in the history.
+    The value is given by its path, such as "view.workspace.solid", and its name in the history.
     """
     return Effect(
         lambda state: Set(at, not value_at(state, at), name), lambda state: value_at(state, at)
@@ -43,12 +41,9 @@ def turn(at: str, name: str) -> Effect:
 
 
 def choose(at: str, value: str, name: str) -> Effect:
-    """Return the effect of an option: a press sets a value of the state.
+    """Return the effect of an option, which the history shows: a press sets a value of the state.
 
-    Args:
-        at: Path of the value, such as "paths.kind".
-        value: The option, which the history shows too.
-        name: Name of the value in the history.
+    The value is given by its path, such as "paths.kind", and its name in the history.
     """
     return Effect(lambda _: Set(at, value, name, value), lambda state: value_at(state, at) == value)
 

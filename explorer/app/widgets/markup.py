@@ -55,23 +55,15 @@ def margin_name(incidence: int, name: str = "δ{}") -> str:
 
 
 def table(rows: Iterable[str], head: Sequence[str] = ()) -> str:
-    """Return a table of a word and numbers in each row.
-
-    Args:
-        rows: Rows, made by `row`.
-        head: Names of the columns.
-    """
+    """Return a table of rows made by `row`, below the names of its columns."""
     first = row(*head, look="ex-dim") if head else ""
     return f'<table class="ex-numbers">{first}{"".join(rows)}</table>'
 
 
 def row(*cells: str, look: str = "", hint: str = "") -> str:
-    """Return a row of a table.
+    """Return a row of a table with cells of HTML, classes of the stylesheet, and its meaning.
 
-    Args:
-        cells: Content of each cell, HTML.
-        look: Classes of the stylesheet.
-        hint: Meaning of the row, shown when a pointer rests on it.
+    The meaning is shown when a pointer rests on it.
     """
     classes = f' class="{look}"' if look else ""
     content = "".join(f"<td>{cell}</td>" for cell in cells)
@@ -90,9 +82,7 @@ def ticks(*places: tuple[float, str]) -> str:
 def beside(count: Literal[2, 3], *, wide: bool = False) -> str:
     """Return a mark in a tab: so many controls after it stand side by side if there is room.
 
-    Args:
-        count: Number of controls.
-        wide: Whether each needs twice as much room as usual.
+    If they are wide, each needs twice as much room as usual.
     """
     return f'<div class="ex-beside is-{count}{" is-wide" if wide else ""}"></div>'
 
@@ -109,13 +99,9 @@ def meter(
     *,
     look: str = "ex-meter",
 ) -> str:
-    """Return a bar filled to a percentage.
+    """Return a bar filled to a percentage, with classes of the stylesheet.
 
-    Args:
-        percent: Length of the filled part, from 0 to 100.
-        colour: Colour of the filled part; None for the main one of the page.
-        rest: Colour of the other part; None for grey.
-        look: Classes of the stylesheet.
+    The colour of the filled part is the main one of the page if None, that of the rest grey.
     """
     colours = {"--colour": colour, "--ex-track": rest}
     set_colours = "".join(f";{name}:{css(rgb)}" for name, rgb in colours.items() if rgb)

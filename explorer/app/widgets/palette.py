@@ -167,9 +167,8 @@ class Palette:
     def updates(self, *, controls: bool) -> Iterator[Update]:
         """Yield the updates that enable the commands that are ready, and disable the others.
 
-        Args:
-            controls: Whether any control was enabled, disabled, shown or hidden; if not, the
-                commands of controls stay as they are.
+        Commands of controls stay as they are unless any control was enabled, disabled, shown or
+        hidden.
         """
         for command, handle in self._registered:
             if controls or command.stands_alone:
@@ -263,9 +262,7 @@ class Widget:
     def use(self, client: viser.ClientHandle, value: Any = None) -> None:
         """Use the control as a browser would: the others get its new value, callbacks are called.
 
-        Args:
-            client: The browser.
-            value: New value; None to leave the value, as with a button.
+        The value is None to leave it, as with a button.
         """
         state: Any = self.handle._impl
         state.update_timestamp = time.time()

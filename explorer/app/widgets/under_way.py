@@ -16,12 +16,9 @@ AnyFeed = Feed[Any, Any]
 
 
 class UnderWay:
-    """The buttons that cancel and repeat a computation, each visible while it has an effect.
+    """The buttons that cancel and repeat a feed's computation, each visible while it has an effect.
 
-    Args:
-        gui: Controls of the page, to which the buttons are added.
-        what: Name of the drawing, such as "workspace".
-        feed: Feed of the drawing.
+    The drawing has a name, such as "workspace".
     """
 
     def __init__(self, gui: viser.GuiApi, what: str, feed: AnyFeed) -> None:
@@ -56,12 +53,9 @@ def progress(feed: AnyFeed) -> str:
 
 
 def problem(feed: AnyFeed, title: str, button: str) -> str:
-    """Return why there is no newer drawing, as HTML.
+    """Return why there is no newer drawing of a feed, as HTML.
 
-    Args:
-        feed: Feed whose last request failed or was cancelled.
-        title: Title of a failure.
-        button: Label of the button that repeats a cancelled computation.
+    The title is that of a failure; the label is of the button that repeats what was cancelled.
     """
     if feed.is_cancelled:
         return alert("Stopped", f"Press “{button}”, or change something, to compute it.")

@@ -98,12 +98,8 @@ class Slices:
     ) -> Element:
         """Return the map of a slice, in its own coordinates: scaled, from the lows, y upwards.
 
-        Args:
-            axis: Axis that the slice is normal to.
-            level: Coordinate of the slice on that axis, in design units.
-            name: Identifier of the outline, unique in the document.
-            not_accessible: Polygons around the positions that are not accessible, each of shape
-                (n, 2), filled by the even-odd rule; () to mark none.
+        The slice is normal to an axis, at a level in design units; its outline has a name in the
+        document. Polygons (n, 2) around what is not accessible are filled by the even-odd rule.
         """
         lows, scale = self.lows[in_plane(axis)], self.own_scale
         data = self._outline_data(axis, level)

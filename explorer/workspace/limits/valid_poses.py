@@ -73,13 +73,9 @@ def poses_are_valid(
 ) -> BoolArray:
     """Return whether poses satisfy all limits and clearances, shape (...).
 
-    A clearance of zero is a collision, as for `explorer.tetrahedra_overlap`.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        rules: Rules of the design, if they have been computed before.
+    A clearance of zero is a collision, as for `explorer.tetrahedra_overlap`. Positions of b4,
+    (..., 3), are in design units, rotations (..., 3, 3) from platform to base. The rules are those
+    of the design, if they have been computed before.
 
     Raises:
         InputError: A pose that is not finite or not a rotation.
