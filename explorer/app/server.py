@@ -49,13 +49,7 @@ WAKE_SECONDS = 1.0
 
 @dataclass(frozen=True)
 class Running:
-    """A running explorer.
-
-    Attributes:
-        viser: The server that the page is drawn on.
-        page: The page.
-        access: The rule for who may connect.
-    """
+    """A running explorer: the server of its page, the page, and the rule for who may connect."""
 
     viser: viser.ViserServer
     page: Page

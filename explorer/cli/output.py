@@ -1,4 +1,4 @@
-"""The output of commands: one JSON object, or text in aligned columns.
+"""The output of commands: one JSON object, or text in aligned columns, and blocks as such text.
 
 The text has no colours, and its numbers have ASCII minus signs, so that they can be pasted back.
 """
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.cli.streams import write
+from explorer.measures.blocks import block as kinds
 from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.configuration import tool_position
 from explorer.mechanism.design import Design
@@ -172,3 +173,75 @@ def radii_line(design: Design) -> str:
 
 DISAGREES = "its volume does not agree with the exact one"
 """The remark on a mesh that `explorer.workspace.solids.solids` rejects."""
+
+
+def block_lines(blocks: Iterable[kinds.Block]) -> Iterator[str]:
+    """Yield blocks as lines, each below an empty one."""
+    for block in blocks:
+        yield ""
+        match block:
+            case kinds.Statement(title, words):
+                yield f"{text_of(title)}{': ' if title and words else ''}{text_of(words)}"
+            case kinds.Facts(title, facts, hint):
+                rows = [(fact.name, text_of(fact.words), text_of(fact.remark)) for fact in facts]
+                yield from (*_title(title, hint), table(rows, "<<<"))
+            case kinds.Table(title, _, hint, _):
+                yield from (*_title(title, hint), _table(block))
+            case kinds.Split(title, names, shares):
+                parts = (
+                    f"{name} {_share(share)}" for name, share in zip(names, shares, strict=True)
+                )
+                yield f"{title}: {', '.join(parts)}"
+
+
+def text_of(words: kinds.Words) -> str:
+    """Return words with the numbers in them as text."""
+    return "".join(map(_part, kinds.parts_of(words)))
+
+
+def _part(part: str | kinds.Number | kinds.Vector | kinds.Share) -> str:
+    match part:
+        case str():
+            return part
+        case kinds.Number():
+            return f"{_figure(part.value, part.size or part.span, '∞')}{part.unit}"
+        case kinds.Vector():
+            return f"{'  '.join(figures(part.values))}{part.unit}"
+        case kinds.Share():
+            return _share(part.value)
+
+
+def _share(share: float | None) -> str:
+    return kinds.Share(share).text(1).replace("\N{NO-BREAK SPACE}", " ").replace("∞", "infinite")
+
+
+def _figure(value: float, size: float, infinite: str) -> str:
+    return figure(value, size) if math.isfinite(value) else infinite.replace("∞", "infinite")
+
+
+def _title(title: str, hint: str) -> Iterator[str]:
+    yield title
+    if hint:
+        yield hint
+
+
+def _table(block: kinds.Table) -> str:
+    """Return a table without its bars."""
+    columns: list[list[str]] = []
+    align = ""
+    for column in block.columns:
+        match column:
+            case kinds.Names(_, words, _):
+                cells = [text_of(each) for each in words]
+            case kinds.Column():
+                cells = [_figure(value, column.size, column.infinite) for value in column.values]
+                if not column.has_one_unit:
+                    around = zip(column.around, cells, strict=True)
+                    cells = [f"{before}{text}{unit}" for (before, unit), text in around]
+            case kinds.Shares(_, values):
+                cells = [_share(value) for value in values]
+            case kinds.Bars():
+                continue
+        columns.append([kinds.head_of(column), *cells])
+        align += "<" if isinstance(column, kinds.Names) else ">"
+    return table(list(zip(*columns, strict=True)), align)

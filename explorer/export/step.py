@@ -46,9 +46,8 @@ _FAR = 4.0
 class ExactSolid:
     """The workspace as a boundary representation of OpenCASCADE, in millimetres.
 
-    Attributes:
-        shape: A `TopoDS_Shape` of solids.
-        limit_of_face: Name of the limit of each face, in the order of OpenCASCADE's explorer.
+    The shape is a `TopoDS_Shape` of solids; the names of the limits of its faces are in the order
+    of OpenCASCADE's explorer.
     """
 
     shape: Any

@@ -66,12 +66,7 @@ MANUAL_FILES = (
 
 
 class ManualPage(NamedTuple):
-    """A page of the manual.
-
-    Attributes:
-        title: Text of the page's first heading.
-        file: Name of the page's file, the argument of `read_page` and the target of links.
-    """
+    """A page of the manual: its first heading, and its file's name, the argument of `read_page`."""
 
     title: str
     file: str

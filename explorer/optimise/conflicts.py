@@ -35,9 +35,8 @@ PAPER_BOX = PRESETS["paper-optimal"].limits.box
 class Conflict(NamedTuple):
     """A demand that no design within the bounds keeps.
 
-    Attributes:
-        limit: Limit that makes it impossible, such as "box" or "l1 maximum".
-        message: Clause with the demand and the most that the limit allows.
+    The limit makes it impossible, such as "box" or "l1 maximum"; the message is a clause with the
+    demand and the most that the limit allows.
     """
 
     limit: str

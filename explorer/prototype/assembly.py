@@ -25,12 +25,7 @@ _GAP, _GAP_IN_RADII = 0.05, 6.0
 
 @dataclass(frozen=True)
 class Prototype:
-    """The parts of a design.
-
-    Attributes:
-        sizes: Sizes of the parts, in millimetres.
-        parts: Parts with unique names, the base first.
-    """
+    """The parts of a design, with unique names and the base first, and their sizes."""
 
     sizes: Sizes
     parts: tuple[Part, ...]
@@ -116,13 +111,10 @@ def exploded_offsets(prototype: Prototype, places: Places) -> FloatArray:
 
 @dataclass(frozen=True)
 class Item:
-    """One part in the bill of materials.
+    """One part in the bill of materials, such as "cylinder 2".
 
-    Attributes:
-        name: Name of the part, such as "cylinder 2".
-        size: Extents along the axes of the part's own frame, in millimetres.
-        volume: Volume in cubic millimetres.
-        mass: Mass in kilograms.
+    Its size is that along the axes of its own frame, in millimetres, its volume in mm³, its mass in
+    kilograms.
     """
 
     name: str

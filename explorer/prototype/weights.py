@@ -24,12 +24,9 @@ from explorer.statics.weights import Weights
 
 @dataclass(frozen=True)
 class Mass:
-    """The mass properties of a rigid body.
+    """The mass properties of a rigid body: a positive mass, and its centre (3,) in its frame.
 
-    Attributes:
-        mass: Mass, positive.
-        centre: Centre of mass in the body's frame, shape (3,).
-        inertia: Inertia about the centre, along the axes of the body's frame, shape (3, 3).
+    The inertia (3, 3) is about the centre, along the axes of that frame.
     """
 
     mass: float

@@ -22,12 +22,7 @@ Described = TypeVar("Described")
 
 
 class BrowserFacts(msgspec.Struct, frozen=True):
-    """What a browser reports about itself.
-
-    Attributes:
-        width, height: Size of its window, in CSS pixels.
-        dark: Whether its user prefers dark pages.
-    """
+    """What a browser reports: the size of its window in CSS pixels, and a wish for dark pages."""
 
     width: float
     height: float

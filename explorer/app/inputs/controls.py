@@ -37,12 +37,7 @@ Value = TypeVar("Value", float, bool, str, Pair, Triple)
 
 @dataclass(frozen=True)
 class Bound(Generic[Value]):
-    """The binding of a control to the state.
-
-    Attributes:
-        read: Function that returns the control's value in a frame.
-        write: Function that returns the action for a new value.
-    """
+    """The binding of a control: how its value is read in a frame, and written as an action."""
 
     read: Callable[[Frame], Value]
     write: Callable[[State, Value], Action]

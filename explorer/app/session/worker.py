@@ -51,9 +51,7 @@ class CancelledError(Exception):
 class Channel(NamedTuple):
     """The connection of a task to its parent.
 
-    Attributes:
-        send: Sends a value; it must pickle.
-        is_cancelled: Returns whether the task is cancelled; called now and then.
+    It sends values, which must pickle, and tells whether the task is cancelled.
     """
 
     send: Callable[[Any], None]

@@ -37,11 +37,9 @@ class Look:
 
 @dataclass(frozen=True)
 class Compared:
-    """The designs that the live one is compared with.
+    """The designs that the live one is compared with, and how.
 
-    Attributes:
-        pinned: Copies of designs, in the order of `SLOTS`; None where a place is free.
-        look: How they are compared.
+    Copies of designs are pinned in the order of `SLOTS`; None where a place is free.
     """
 
     pinned: Pinned = (None, None, None)

@@ -17,12 +17,7 @@ MOST_PRESSES = 16
 
 @dataclass(frozen=True)
 class Press:
-    """One press of one browser.
-
-    Attributes:
-        client: The browser's id.
-        number: Number of the press among those of this browser.
-    """
+    """One press of one browser: the browser's id, and the number of the press among its own."""
 
     client: int
     number: int

@@ -39,11 +39,8 @@ _COPY = re.compile(r" copy( \d+)?$")
 class Entry:
     """A file in the library.
 
-    Attributes:
-        name: Name of the design; of the file if it holds no usable design.
-        file: Name of the file.
-        design: The design; None if it cannot be used.
-        problem: Why it cannot be used; None if it can.
+    Its name is that of the design, or of the file if the design cannot be used; the problem then
+    says why.
     """
 
     name: str

@@ -19,12 +19,7 @@ from explorer.app.widgets.palette import Key, with_keys
 
 @dataclass(frozen=True)
 class Effect:
-    """The effect of a chip on the state.
-
-    Attributes:
-        change: Function from the state to the action of a press.
-        is_on: Function that tells whether the chip is on.
-    """
+    """The effect of a chip: the action of a press, and whether the chip is on, by the state."""
 
     change: Callable[[State], Action]
     is_on: Callable[[State], bool]

@@ -25,12 +25,7 @@ STEP = " › "
 
 @dataclass(frozen=True)
 class Key:
-    """A key with its modifiers.
-
-    Attributes:
-        key: Name of the key in viser.
-        modifier: Keys that are held down with it, such as "cmd/ctrl+shift"; None without any.
-    """
+    """A key by its name in viser, with its modifiers, such as "cmd/ctrl+shift", if it has any."""
 
     key: str
     modifier: str | None = None

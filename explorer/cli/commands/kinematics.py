@@ -229,14 +229,13 @@ def _condition_at(snapshot: Snapshot, tool: Triple) -> float:
 
 def _singularity_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
     # Only this text needs them, and they would delay every command of the module.
-    from explorer.cli.blocks import lines
     from explorer.measures.blocks import singularity as blocks
     from explorer.measures.blocks.block import Statement
     from explorer.measures.verdict import verdict
 
     design, here = snapshot.design, verdict(snapshot)
     yield from (output.heading(design), output.pose_table(design, snapshot.pose, tool))
-    yield from lines(
+    yield from output.block_lines(
         (
             Statement(here.title, here.reason(design.unit_mm)),
             *blocks.freedoms(snapshot),
@@ -248,5 +247,5 @@ def _singularity_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]
     )
     if tool is not None:
         found = ellipsoids.performance(design, snapshot.pose, tool)
-        yield from lines(blocks.ellipsoids(found, "the tool"))
-        yield from lines([blocks.tool_condition(_condition_at(snapshot, tool))])
+        yield from output.block_lines(blocks.ellipsoids(found, "the tool"))
+        yield from output.block_lines([blocks.tool_condition(_condition_at(snapshot, tool))])

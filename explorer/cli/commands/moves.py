@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from explorer.cli import blocks, options, output, values
+from explorer.cli import options, output, values
 from explorer.errors import InputError
 from explorer.export.tables import trajectory_csv
 from explorer.files.writing import check_writable
@@ -88,7 +88,7 @@ def _pose_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
     design = snapshot.design
     yield from (output.heading(design), output.pose_table(design, snapshot.pose, tool))
     yield output.radii_line(design)
-    yield from (*blocks.lines(pose_clearances(snapshot)), "")
+    yield from (*output.block_lines(pose_clearances(snapshot)), "")
     yield from output.limits_lines(snapshot, "the pose is ")
 
 
@@ -96,7 +96,7 @@ def _move_lines(move: moves.MoveClearance, start: Snapshot, end: Snapshot) -> It
     design = start.design
     yield from (output.heading(design), *_end_lines(design, move.start, move.end, move.tool))
     yield output.radii_line(design)
-    yield from (*blocks.lines(move_clearances(move, design)), "")
+    yield from (*output.block_lines(move_clearances(move, design)), "")
     yield from output.limits_lines(start, "the start is ")
     yield from output.limits_lines(end, "the end is ")
 

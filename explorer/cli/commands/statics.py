@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from explorer.cli import options, output, values
-from explorer.cli.blocks import lines
+from explorer.cli.output import block_lines
 from explorer.errors import InputError, NoAnswerError
 from explorer.files.writing import check_writable
 from explorer.measures.blocks import forces as blocks, precision
@@ -162,8 +162,8 @@ def _force_lines(
         more = blocks.worst_force(added, "the added force")
         facts = facts.add(*more)
     refused = (blocks.nearest_carrying(found, nearest, tool),) if found.share > 1.0 else ()
-    yield from lines((blocks.verdict(found), *refused, *blocks.reaction_tables(found)))
-    yield from lines((blocks.most_of_actuators(worst), facts))
+    yield from block_lines((blocks.verdict(found), *refused, *blocks.reaction_tables(found)))
+    yield from block_lines((blocks.most_of_actuators(worst), facts))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,8 +198,8 @@ class Accuracy(options.TypicalOptions, LoadOptions):
                 [output.heading(design)],
                 output.assumed_lines(assumed),
                 [output.pose_table(design, pose, tool)],
-                lines(precision.tool_errors(found, listed=None)),
-                lines(precision.deflections(found, "the load and the payload's weight")),
+                block_lines(precision.tool_errors(found, listed=None)),
+                block_lines(precision.deflections(found, "the load and the payload's weight")),
             ),
         )
 
@@ -329,7 +329,9 @@ class Budget(options.JsonOptions, options.TypicalOptions, options.PoseOptions):
             yield f"worst over {costs.count:,} {WORDS[over]}, at one orientation"
         if over == "workspace" and not design.limits.margin:
             yield "the limits demand no margin: nearer to singular poses errors are larger"
-        yield from lines(precision.tolerance_budget(costs, found, self.wanted, self.wanted_turn))
+        yield from block_lines(
+            precision.tolerance_budget(costs, found, self.wanted, self.wanted_turn)
+        )
 
 
 def _budget_json(

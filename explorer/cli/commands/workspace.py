@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from explorer.cli import blocks, options, output, values
+from explorer.cli import options, output, values
 from explorer.errors import InputError
 from explorer.measures.blocks.clearances import workspace_clearances
 from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in
@@ -253,7 +253,7 @@ class _Answer:
         self.volumes.append((title, found.accessible_volume, remark))
         design = self.case.design
         self.lines += ["", output.radii_line(design)]
-        self.lines += blocks.lines(workspace_clearances(found.pairs, design))
+        self.lines += output.block_lines(workspace_clearances(found.pairs, design))
 
     def add_curve(self, curve: radii.RadiusCurve) -> None:
         """Add a radius curve at a few radii, and the largest radius without a loss."""

@@ -2,7 +2,7 @@
 
 A function of a value yields the blocks that tell it, so that a word, a unit or a number of digits
 is written once. Each of the three has one renderer of blocks: `explorer.app.widgets.blocks`,
-`explorer.export.drawings.markup` and `explorer.cli.blocks`. The page has room for few columns: it
+`explorer.export.drawings.markup` and `explorer.cli.output`. The page has room for few columns: it
 leaves out what is `wide`, and shows a hint where a pointer rests; the others print the hints of
 tables. The command line writes six digits of each number, whatever its digits here.
 """
@@ -62,13 +62,9 @@ class Number(msgspec.Struct, frozen=True):
 
 
 class Vector(msgspec.Struct, frozen=True):
-    """Components of a vector.
+    """Components of a vector with their unit, which begins with a blank if there is one.
 
-    Attributes:
-        values: The components.
-        unit: Their unit, with the blank before it if there is one.
-        digits: Number of significant digits of the largest one.
-        span: As for a `Number`.
+    The digits are significant ones of the largest component; the span is as for a `Number`.
     """
 
     values: Sequence[float]
@@ -117,13 +113,7 @@ Words: TypeAlias = "str | tuple[Part, ...]"
 
 
 class Names(msgspec.Struct, frozen=True):
-    """A column of words.
-
-    Attributes:
-        head: Its head.
-        words: Its cells.
-        wide: Whether it needs more room than the page has.
-    """
+    """A column of words; it is wide if it needs more room than the page has."""
 
     head: str
     words: Sequence[Words]
@@ -200,12 +190,7 @@ class Shares(msgspec.Struct, frozen=True):
 
 
 class Bars(msgspec.Struct, frozen=True):
-    """A column of bars.
-
-    Attributes:
-        lengths: Their lengths, 0 to 1.
-        kinds: What each stands for.
-    """
+    """A column of bars: their lengths, 0 to 1, and what each stands for."""
 
     lengths: Sequence[float]
     kinds: Sequence[Kind]
@@ -279,14 +264,7 @@ class Statement(msgspec.Struct, frozen=True):
 
 
 class Split(msgspec.Struct, frozen=True):
-    """Parts that make a whole: their names, and the share of each.
-
-    Attributes:
-        title: The whole.
-        names: Names of the parts.
-        shares: Their shares.
-        hint: Sentence on what it shows.
-    """
+    """Parts that make a whole, which is the title: their names, and the share of each."""
 
     title: str
     names: Sequence[str]

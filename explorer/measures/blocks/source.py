@@ -20,12 +20,9 @@ LoadTopic = Literal["forces", "accuracy"]
 
 
 class Source(NamedTuple):
-    """The command line and the Python that give an answer.
+    """The command line and the lines of Python that give an answer.
 
-    Attributes:
-        command: The command.
-        python: Lines of Python that print the values behind it.
-        remark: Sentence on what the command leaves out.
+    The remark is a sentence on what the command leaves out.
     """
 
     command: str

@@ -26,12 +26,7 @@ MET = 1e-8
 
 
 class Measured(NamedTuple):
-    """The values of m demands and their derivatives by the n scaled variables.
-
-    Attributes:
-        values: Shape (m,).
-        gradients: Shape (m, n).
-    """
+    """The values (m,) of m demands and their derivatives (m, n) by the n scaled variables."""
 
     values: FloatArray
     gradients: FloatArray

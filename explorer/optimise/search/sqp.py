@@ -228,9 +228,8 @@ SAMPLES = 6
 class Optimality(NamedTuple):
     """How nearly the conditions hold.
 
-    Attributes:
-        residual: Remainder of the slope that no such sum makes up, as a share of the slope.
-        holding: The demand or bound with the largest factor, "" if none has one.
+    The residual is the remainder of the slope that no such sum makes up, as a share of the slope;
+    `holding` is the demand or bound with the largest factor, "" if none has one.
     """
 
     residual: float
