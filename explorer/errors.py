@@ -36,18 +36,6 @@ class DesignError(InputError):
         return f"{subject}{str(self).removeprefix(self.field)}"
 
 
-class TooTightError(InputError):
-    """A design without room for its parts.
-
-    Attributes:
-        fitting_unit_mm: Millimetres in one design unit with which they fit; None if no unit helps.
-    """
-
-    def __init__(self, message: str, fitting_unit_mm: float | None = None) -> None:
-        super().__init__(message)
-        self.fitting_unit_mm = fitting_unit_mm
-
-
 class StorageError(InputError):
     """A file or folder that cannot be read or written, for example on a full disk."""
 

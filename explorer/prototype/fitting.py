@@ -1,25 +1,33 @@
-"""Sizes of parts that fit a design, what to change in one without room, and limits in a pose.
+"""Whether a design can be built: sizes of parts that fit, what would fit, and limits in a pose.
 
 Joints scale with the legs; walls and clearances do not. A leg may be too thin to hold a rod in
-its cylinder, or too thick beside its neighbours. A larger unit helps in both cases.
+its cylinder, or too thick beside its neighbours. A larger unit helps in both cases: what fits a
+design with one unit fits it with every larger one. Thinner legs only give room, down to the
+thinnest that hold a rod.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError, TooTightError
-from explorer.mechanism.design import Design
-from explorer.numerics.arrays import FloatArray
+from explorer.errors import InputError
+from explorer.mechanism.configuration import Configuration
+from explorer.mechanism.design import LENGTHS, Design
+from explorer.mechanism.home import STEPS
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.numerics.checks import MOST
 from explorer.numerics.number_text import format_number
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, joints_of_leg
-from explorer.prototype.sizes import FIRST_SWING, SECOND_SWING, Sizes
+from explorer.prototype.sizes import FIRST_SWING, SECOND_SWING, THINNEST_LEG, Sizes
+from explorer.workspace.limits.valid_poses import poses_are_valid
 
 BALL_SWING = math.radians(85.0)
 """Largest angle between a leg and the normal of the platform."""
@@ -35,16 +43,8 @@ def broken_joint_limits(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) 
     poses too, since each leg is taken as thick as capsules about its parts. For the pose see
     `Chains.joints`.
     """
-    chains = sizes.chains
-    joints = chains.joints(position, rotation)
-    places = chains.places(joints, position, rotation)
-    broken = [*_strokes(sizes, joints), *_swings(joints)]
-    normal = -chains.platform_side * places.rotation[-1][:, 2]
-    for leg in LEGS:
-        along = places.rotation[BODIES.index(f"rod {leg}")][:, 2]
-        lean = math.acos(float(np.clip(along @ normal, -1.0, 1.0)))
-        if lean > BALL_SWING + _SLACK:
-            broken.append(f"the ball joint at b{leg} leans {_angle_beyond(lean, BALL_SWING)}")
+    joints = sizes.chains.joints(position, rotation)
+    broken = [*_strokes(sizes, joints), *_swings(sizes, joints, position, rotation)]
     for axes, distance, needed in sizes.leg_distances(position, rotation):
         if distance < needed * (1.0 - _SLACK):
             apart = format_number(distance, size=needed)
@@ -73,7 +73,9 @@ def _strokes(sizes: Sizes, joints: FloatArray) -> Iterator[str]:
         yield f"carriages 2 and 3 are {apart} mm apart and need {format_number(needed)} mm"
 
 
-def _swings(joints: FloatArray) -> Iterator[str]:
+def _swings(
+    sizes: Sizes, joints: FloatArray, position: ArrayLike, rotation: ArrayLike
+) -> Iterator[str]:
     for leg, point in ((1, "a1"), (4, "a3")):
         first, second, _ = np.abs(joints_of_leg(joints, leg)).tolist()
         for angle, most in ((first, FIRST_SWING), (second, SECOND_SWING)):
@@ -83,6 +85,13 @@ def _swings(joints: FloatArray) -> Iterator[str]:
         _, angle, _ = np.abs(joints_of_leg(joints, leg)).tolist()
         if angle > 0.5 * math.pi:
             yield f"leg {leg} leans {_angle_beyond(angle, 0.5 * math.pi)} about the guide"
+    places = sizes.chains.places(joints, position, rotation)
+    normal = -sizes.chains.platform_side * places.rotation[-1][:, 2]
+    for leg in LEGS:
+        along = places.rotation[BODIES.index(f"rod {leg}")][:, 2]
+        lean = math.acos(float(np.clip(along @ normal, -1.0, 1.0)))
+        if lean > BALL_SWING + _SLACK:
+            yield f"the ball joint at b{leg} leans {_angle_beyond(lean, BALL_SWING)}"
 
 
 def _angle_beyond(angle: float, most: float) -> str:
@@ -95,99 +104,187 @@ THICKEST_SHARE = 0.012
 LARGEST_FACTOR = 1e4
 """Largest factor on the unit that is tried to make a design fit."""
 
+# Number of homes that are tried, the nearest first.
+HOMES = 24
+
+
+@dataclass(frozen=True)
+class Buildability:
+    """Whether a machine can be built with its parts.
+
+    Attributes:
+        sizes: Sizes of the parts. Legs without a radius in the design have the largest that fits,
+            up to a share of the reach, or the thinnest if none fits.
+        problems: Clauses on what does not fit at home, and by how much; none if all fits.
+        mended: Design in which all fits, with the least unit and, if the joints cannot take the
+            home pose, with a near home; None if there is none, or if all fits.
+        advice: Clause on that, and on radii of the legs that would fit; "" if all fits.
+    """
+
+    sizes: Sizes
+    problems: tuple[str, ...] = ()
+    mended: Design | None = None
+    advice: str = ""
+
+    @property
+    def short_legs(self) -> tuple[int, ...]:
+        """The legs whose limits ask for more than the stroke of one rod in its cylinder."""
+        return tuple(
+            leg
+            for leg, stroke in zip(LEGS, self.sizes.strokes, strict=True)
+            if not stroke.covers(self.sizes.required_stroke(leg))
+        )
+
+    @property
+    def limited(self) -> Design:
+        """The design with the strokes of its short legs as their limits."""
+        sizes = self.sizes
+        unit = sizes.design.unit_mm
+        limits = {
+            LENGTHS[leg - 1]: (
+                _round(sizes.strokes[leg - 1].shortest / unit, up=True),
+                _round(sizes.strokes[leg - 1].longest / unit, up=False),
+            )
+            for leg in self.short_legs
+        }
+        return sizes.design.with_limits(**limits)
+
+
+def buildability(design: Design) -> Buildability:
+    """Return whether a machine can be built with its parts, and what would make it fit."""
+    design = msgspec.structs.replace(design, home=design.home_pose)
+    # The larger the radii of legs that have none, the less room; the thinnest need the least.
+    thinnest = _sizes(design)
+    thinner = THICKEST_SHARE * design.reach * design.unit_mm / THINNEST_LEG
+    sizes = thinnest
+    if thinner > 1.0 and not all(design.limits.leg_radii):
+        factor = _least(lambda f: _sizes(design, open_share=1.0 / f).worst is None, 1.0, thinner)
+        sizes = thinnest if factor is None else _sizes(design, open_share=1.0 / factor)
+    problems = tuple(_problems(sizes))
+    if not problems:
+        return Buildability(sizes)
+    mended = _mend(sizes)
+    return Buildability(sizes, problems, mended, _advice(design, mended))
+
 
 def sizes_of(design: Design) -> Sizes:
-    """Return the sizes of a design's parts.
-
-    Legs without a radius in the design get the largest that fits, up to a share of the reach.
+    """Return the sizes of a design's parts; see `Buildability.sizes`.
 
     Raises:
-        TooTightError: The design is too tight for its parts; the message names the parts, their
-            distance and what would fit.
-        InputError: The home pose breaks the limits of a leg.
+        InputError: The machine cannot be built; the message says why, and what would fit.
     """
-    design = msgspec.structs.replace(design, home=design.home_pose)
-    share = 1.0 if all(design.limits.leg_radii) else _fitting_factors(design, 1.0)[0]
-    sizes = _sizes(design, 1.0, share or 1.0)
+    built = buildability(design)
+    if built.problems:
+        raise InputError(f"too tight for the parts: {'; '.join(built.problems)}; {built.advice}")
+    return built.sizes
+
+
+def _sizes(
+    design: Design, unit: float = 1.0, factor: float = 1.0, open_share: float = 0.0
+) -> Sizes:
+    """Return sizes with factors on the unit and on the radii that the design states.
+
+    The other legs have a share of the largest radius, and at least the least one.
+    """
+    larger = msgspec.structs.replace(design, unit_mm=unit * design.unit_mm)
+    thickest = open_share * THICKEST_SHARE * design.reach * larger.unit_mm
+    radii = (factor * larger.unit_mm * radius for radius in design.limits.leg_radii)
+    return Sizes(larger, tuple(radius or max(thickest, THINNEST_LEG) for radius in radii))
+
+
+def _problems(sizes: Sizes) -> Iterator[str]:
+    """Yield what prevents parts of these sizes from being assembled in the home pose."""
     if sizes.worst is not None:
-        raise _refusal(design, sizes.worst)
+        parts, distance, needed = sizes.worst
+        if parts.startswith("the radius"):
+            yield f"{parts} is {_mm(distance)} and must be at least {_mm(needed)}"
+        else:
+            yield f"{parts} are {_mm(distance)} apart and need {_mm(needed)}"
     for leg in LEGS:
         low, high = sizes.required_stroke(leg)
         # A home pose on a limit is within it, whatever its rounding.
-        if not low * (1.0 - 1e-9) <= sizes.home_length(leg) <= high * (1.0 + 1e-9):
-            raise InputError(
+        if not low * (1.0 - _SLACK) <= sizes.home_length(leg) <= high * (1.0 + _SLACK):
+            yield (
                 f"leg {leg} is {sizes.home_length(leg):.4g} mm long at home, but its limits are "
-                f"{low:.4g} to {high:.4g} mm; choose another home"
+                f"{low:.4g} to {high:.4g} mm"
             )
-    home = design.home_pose
-    for problem in broken_joint_limits(sizes, home.position, home.rotation):
-        raise InputError(f"at home {problem}; choose another home")
-    return sizes
+    home = sizes.design.home_pose
+    for swing in _swings(sizes, sizes.home_joints, home.position, home.rotation):
+        yield f"at home {swing}"
 
 
-def _sizes(design: Design, unit: float, share: float, all_of: bool = False) -> Sizes:
-    """Return sizes with factors on the unit and on the radii that are open, or on `all_of` them."""
-    larger = msgspec.structs.replace(design, unit_mm=unit * design.unit_mm)
-    open_radius = THICKEST_SHARE * design.reach * share
-    factor = share if all_of else 1.0
-    radii = (factor * radius or open_radius for radius in design.limits.leg_radii)
-    return Sizes(larger, tuple(radius * larger.unit_mm for radius in radii))
+def _mend(sizes: Sizes) -> Design | None:
+    """Return a design whose parts do not fit with the least unit, and a near home if it must."""
+    design = sizes.design
+    most = min(LARGEST_FACTOR, 0.99 * MOST / design.unit_mm)
+    has_room = not any(_problems(_sizes(design, most)))
+    homes = [design.home_pose] if has_room else _near_homes(design)
 
-
-def _fitting_factors(
-    design: Design, unit: float, all_of: bool = False
-) -> tuple[float | None, float | None]:
-    """Return the factors on the radii that fit: the largest up to 1, the smallest from 1 on."""
-
-    def first_fitting(shares: FloatArray) -> float | None:
-        fits = (s for s in shares.tolist() if _sizes(design, unit, s, all_of).worst is None)
+    def fitting(unit: float) -> Design | None:
+        moved = (msgspec.structs.replace(design, home=home) for home in homes)
+        fits = (each for each in moved if not any(_problems(_sizes(each, unit))))
         return next(fits, None)
 
-    # Thin legs lack room for walls, thick legs room beside each other, so one interval fits.
-    return first_fitting(np.geomspace(1.0, 1e-2, 100)), first_fitting(np.geomspace(1.0, 1e2, 100))
+    factor = _least(lambda unit: fitting(unit) is not None, 1.0, most)
+    if factor is None:
+        return None
+    unit_mm = design.unit_mm if factor == 1.0 else _round(factor * design.unit_mm, up=True)
+    mended = fitting(unit_mm / design.unit_mm)
+    return mended and msgspec.structs.replace(mended, unit_mm=unit_mm)
 
 
-def _refusal(design: Design, worst: tuple[str, float, float]) -> TooTightError:
-    parts, distance, needed = worst
-    if parts.startswith("the radius"):
-        text = f"too thin: {parts} is {_mm(distance)} and must be at least {_mm(needed)}"
-    else:
-        text = f"too tight for the parts: {parts} are {_mm(distance)} apart and need {_mm(needed)}"
-    ways: list[str] = []
-    factor = _least_unit(design)
-    unit = None if factor is None else _round(factor * design.unit_mm, up=True)
-    if unit is not None:
-        ways.append(f"with a unit of at least {unit:.6g} mm")
-    largest_radius = max(design.limits.leg_radii)
-    smaller, larger = _fitting_factors(design, 1.0, all_of=True) if largest_radius else (None, None)
-    if smaller is not None:
-        ways.append(f"with legs of radius at most {_round(smaller * largest_radius, up=False):.6g}")
-    elif larger is not None:
-        ways.append(f"with legs of radius at least {_round(larger * largest_radius, up=True):.6g}")
-    if not ways:
-        text += "; no unit makes that fit: take thinner legs, another home, or points farther apart"
-        return TooTightError(text, None)
-    return TooTightError(f"{text}; it fits {' or '.join(ways)}", unit)
+def _near_homes(design: Design) -> list[Pose]:
+    """Return homes within the limits whose legs may lean as they do, the nearest first.
+
+    They have the orientation and the mode of the design's own home; positions are those of a grid.
+    """
+    home, reach = design.home_pose, design.reach
+    lows, highs = design.limits.box or ((-reach,) * 3, (reach,) * 3)
+    axes = [np.linspace(*ends, STEPS + 2)[1:-1] for ends in zip(lows, highs, strict=True)]
+    positions = np.array([*itertools.product(*axes)])
+    positions = positions[poses_are_valid(design, positions, home.rotation)]
+    legs = Configuration(design, positions, home.rotation).points.legs()
+    upright = np.abs(legs[:, [0, 3], 2]) >= math.cos(FIRST_SWING) * lengths_of(legs[:, [0, 3]])
+    positions = positions[upright.all(axis=-1)]
+    nearest = np.argsort(lengths_of(positions - home.position), kind="stable")[:HOMES]
+    return [Pose((x, y, z), home.quaternion) for x, y, z in positions[nearest].tolist()]
 
 
-def _least_unit(design: Design) -> float | None:
-    """Return the least factor on the unit with which everything fits, None if there is none."""
-    share: float | None = 1.0
-    largest = min(LARGEST_FACTOR, MOST / design.unit_mm)
-    if not all(design.limits.leg_radii):
-        # With a huge unit clearances vanish, so open radii are at their largest.
-        share = _fitting_factors(design, largest)[0]
-
-    def fits(factor: float) -> bool:
-        return share is not None and _sizes(design, factor, share).worst is None
-
-    low, high = 1.0, largest
+def _least(fits: Callable[[float], bool], low: float, high: float) -> float | None:
+    """Return the least factor of a range that fits, if all above one that fits do; None if none."""
+    if fits(low):
+        return low
     if not fits(high):
         return None
-    while high > 1.001 * low:
+    while high > (1.0 + 1e-6) * low:
         middle = math.sqrt(low * high)
         low, high = (low, middle) if fits(middle) else (middle, high)
     return high
+
+
+def _advice(design: Design, mended: Design | None) -> str:
+    """Return a clause on what would make the parts of a design fit."""
+    unit, ways = design.unit_mm, list[str]()
+    if mended is not None:
+        larger = f"a unit of at least {mended.unit_mm:.6g} mm" * (mended.unit_mm != unit)
+        x, y, z = mended.home_pose.position
+        home = f"its home at ({x:.4g}, {y:.4g}, {z:.4g})" * (mended.home != design.home)
+        ways.append(" and ".join(filter(None, (larger, home))))
+    radii = [radius * unit for radius in design.limits.leg_radii if radius]
+    if radii:
+        least = (1.0 + _SLACK) * THINNEST_LEG / min(radii)
+
+        def fits(factor: float) -> bool:
+            return not any(_problems(_sizes(design, factor=factor)))
+
+        thinner = _least(lambda f: fits(1.0 / f), 1.0, 1.0 / least) if least < 1.0 else None
+        if thinner is not None:
+            ways.append(f"legs of radius at most {_round(max(radii) / thinner, up=False):.6g} mm")
+        elif least > 1.0 and fits(least):
+            ways.append(f"legs of radius at least {_round(max(radii) * least, up=True):.6g} mm")
+    if ways:
+        return f"it fits with {' or '.join(ways)}"
+    return "no unit makes that fit: take thinner legs, another home, or points farther apart"
 
 
 def _mm(value: float) -> str:

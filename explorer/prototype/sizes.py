@@ -28,6 +28,9 @@ CLEARANCE = 0.2
 THINNEST = 0.5
 """Thinnest wall, and smallest radius of a rod."""
 
+THINNEST_LEG = 2.0 * THINNEST + CLEARANCE
+"""Smallest radius of a leg, with the thinnest wall about the thinnest rod."""
+
 FIRST_SWING, SECOND_SWING = math.radians(60.0), math.radians(50.0)
 """Largest angles of a universal joint about its two axes, from the normal of the base plane."""
 
@@ -43,6 +46,13 @@ class Stroke(NamedTuple):
 
     shortest: float
     longest: float
+
+    def covers(self, required: Stroke) -> bool:
+        """Whether it covers a required stroke, but for the last bits."""
+        slack = 1e-9 * required.longest
+        return (
+            self.shortest <= required.shortest + slack and self.longest >= required.longest - slack
+        )
 
 
 class LegSizes:
@@ -271,8 +281,7 @@ class Sizes:
     def tight_places(self) -> Iterator[tuple[str, float, float]]:
         """Yield places that may be tight: the parts, their distance, and the distance needed."""
         for leg, leg_sizes in zip(LEGS, self.legs, strict=True):
-            # A leg as thin as this has the thinnest wall and the thinnest rod.
-            yield f"the radius of leg {leg}", leg_sizes.radius, 2.0 * THINNEST + CLEARANCE
+            yield f"the radius of leg {leg}", leg_sizes.radius, THINNEST_LEG
         d1, d3 = (self.carriage_at_home(leg) for leg in ON_GUIDE)
         yield "carriages 2 and 3 at home", abs(d1 - d3), self.between_carriages
         for leg, place in ((2, d1), (3, d3)):

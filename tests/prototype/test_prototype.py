@@ -19,13 +19,12 @@ from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, Design, InputError, Pose, leg_clearances
-from explorer.errors import TooTightError
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import Prototype, bill_of_materials, make_prototype
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, Places, joints_of_leg
-from explorer.prototype.fitting import broken_joint_limits
+from explorer.prototype.fitting import THICKEST_SHARE, broken_joint_limits, buildability
 from explorer.prototype.shapes import Part
 from explorer.prototype.sizes import CLEARANCE, LegSizes, Stroke
 
@@ -365,7 +364,11 @@ def test_places_of_random_poses_lie_along_the_legs(name: str) -> None:
 
 TIGHT = (
     (limited(OPTIMAL, leg_radii=(0.4,) * 4), "carriages 2 and 3 at home are 6.69 mm apart"),
-    (msgspec.structs.replace(OPTIMAL, unit_mm=2.0), "too thin: the radius of leg 1"),
+    (
+        msgspec.structs.replace(OPTIMAL, unit_mm=2.0),
+        "carriages 2 and 3 at home are 1.34 mm apart and need 2.6 mm",
+    ),
+    (limited(OPTIMAL, leg_radii=(0.03, 0.0, 0.2, 0.0)), "the radius of leg 1 is 0.3 mm"),
     (
         msgspec.structs.replace(
             limited(UNBOXED, leg_radii=(0.15,) * 4), b1=(0.2, -0.25), b2=1.0, b3=4.9
@@ -386,32 +389,58 @@ def test_design_too_tight_for_parts_names_what_would_fit(design: Design, words: 
     message = str(refusal.value)
     assert words in message
     assert "\n" not in message
-    unit, offers = "unit of at least ", ("radius at most ", "radius at least ")
+    built, unit = buildability(design), "unit of at least "
+    offers = "radius at most ", "radius at least "
     offered = {
         phrase: float(message.partition(phrase)[2].split()[0].rstrip(";,"))
         for phrase in (unit, *offers)
         if phrase in message
     }
     assert offered or "no unit makes that fit" in message
-    assert isinstance(refusal.value, TooTightError)
-    assert refusal.value.fitting_unit_mm == offered.get(unit)
+    assert (built.mended and built.mended.unit_mm) == offered.get(unit)
     if unit in offered:
         make_prototype(msgspec.structs.replace(design, unit_mm=offered[unit]))
         with pytest.raises(InputError):
             make_prototype(msgspec.structs.replace(design, unit_mm=0.98 * offered[unit]))
     for phrase in set(offers) & set(offered):
-        factor = offered[phrase] / max(design.limits.leg_radii)
+        factor = offered[phrase] / design.unit_mm / max(design.limits.leg_radii)
         radii = tuple(factor * radius for radius in design.limits.leg_radii)
         make_prototype(limited(design, leg_radii=radii))
 
 
+def test_offer_is_the_least_unit_at_which_any_open_radius_fits() -> None:
+    # The paper's problem leads to a design like this one, with carriages close together.
+    found = msgspec.structs.replace(
+        INITIAL, a3=(19.0561, 9.5175), b1=(2.027, -4.7727), b2=5.5619, b3=4.7706
+    )
+    built = buildability(limited(found, box=OPTIMAL.limits.box))
+    assert "carriages 2 and 3 at home are 2.3 mm apart and need 2.6 mm" in built.problems
+    assert "the universal joint at a3 leans 72.1°" in " ".join(built.problems)
+    mended = built.mended
+    assert mended is not None
+    assert mended.home_pose.quaternion == found.home_pose.quaternion
+    assert mended.home_signs == found.home_signs
+    assert buildability(mended).problems == ()
+    smaller = msgspec.structs.replace(mended, unit_mm=0.99 * mended.unit_mm)
+    for share in np.geomspace(1e-3, 1.0, 60):
+        each = THICKEST_SHARE * share * smaller.reach
+        assert buildability(limited(smaller, leg_radii=(each,) * 4)).problems
+
+
+@pytest.mark.parametrize("design", [OPTIMAL, INITIAL, limited(OPTIMAL, leg_radii=(0.2,) * 4)])
+def test_limits_at_the_strokes_are_covered_by_the_rods(design: Design) -> None:
+    assert buildability(design).short_legs == (1, 2, 3, 4)
+    covered = buildability(buildability(design).limited)
+    assert covered.short_legs == covered.problems == ()
+
+
 def test_homes_beyond_joint_limits_are_refused() -> None:
-    with pytest.raises(InputError, match=r"leg 1 is 117\.4 mm long at home, but its limits"):
+    with pytest.raises(InputError, match=r"leg 1 is 117\.4 mm .* its limits.* its home at \("):
         make_prototype(limited(OPTIMAL, l1=(0.0, 11.0)))
     leaning = msgspec.structs.replace(
         OPTIMAL, home=Pose((12.0, 5.0, 4.0), OPTIMAL.home_pose.quaternion)
     )
-    leans = r"at home the universal joint at a\d leans .* choose another"
+    leans = r"at home the universal joint at a\d leans .* fits with its home at \("
     with pytest.raises(InputError, match=leans):
         make_prototype(leaning)
     parallel = msgspec.structs.replace(OPTIMAL, home=Pose.of_yaw_pitch_roll((10, 5, 9), (90, 0, 0)))
