@@ -27,8 +27,10 @@ from explorer.app.scene.camera import (
     Cameras,
     ViewName,
     are_in_picture,
+    are_out_of_sight,
     framing,
     has_perspective,
+    places_in_picture,
 )
 from explorer.app.scene.placing import Placed, around
 from explorer.app.scene.shapes import cylinder, plate, sphere, turn_z_to
@@ -339,13 +341,22 @@ def test_framed_points_are_in_the_picture_and_not_from_closer(
     flat = np.array([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)])
     points = size * np.random.default_rng(seed).uniform(-6.0, 9.0, (20, 3))
     eye, target = framing(points, flat, aspect)
-    assert are_in_picture(points, eye, target, FIELD_OF_VIEW, aspect)
+
+    def places(points: FloatArray, eye: FloatArray) -> FloatArray:
+        return places_in_picture(points, eye, target, FIELD_OF_VIEW, aspect)
+
+    assert are_in_picture(places(points, eye))
     closer = target + 0.85 * (eye - target)
-    assert not are_in_picture(points, closer, target, FIELD_OF_VIEW, aspect)
+    assert not are_in_picture(places(points, closer))
+    # Whoever comes closer to a part still sees something, unlike from far away or beside it.
+    assert not are_out_of_sight(places(points, closer))
+    assert are_out_of_sight(places(points, target + 8.0 * (eye - target)))
+    assert are_out_of_sight(places(points + 9.0 * np.cross(eye - target, (0.0, 0.0, 1.0)), eye))
     # Nothing behind a camera is in its picture, if it has perspective.
     if has_perspective(target - eye):
         behind = 2.0 * eye - target + 0.0 * points
-        assert not are_in_picture(behind, eye, target, 2.0, aspect)
+        assert not are_in_picture(places(behind, eye))
+        assert are_out_of_sight(places(behind, eye))
 
 
 @pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3)], ids=str)
@@ -387,3 +398,10 @@ def test_camera_follows_what_leaves_its_picture_and_keeps_its_direction(
     # The user comes closer to look at a part, and stays there.
     browser.tell(browser.camera.look_at + 0.3 * (eye - target))
     assert count_puts_with(1.5) == 2
+    # Whatever it looks at, it finds a mechanism that has become tiny or huge.
+    for times, factor in enumerate((1e-4, 1e4, 1e3, 1e-3), 3):
+        assert count_puts_with(factor) == times
+        camera = browser.camera
+        assert are_in_picture(
+            places_in_picture(points, camera.position, camera.look_at, FIELD_OF_VIEW, 0.7)
+        )

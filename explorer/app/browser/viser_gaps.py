@@ -17,6 +17,8 @@ SceneMessage = dict[str, Any]
 
 # Properties that place a node of the scene.
 PLACE = ("position", "wxyz")
+# Nearest and farthest distance that a camera draws, over the distance of its target.
+NEAR, FAR = 1e-3, 30.0
 
 MARKS = "_marks"
 """The property of a slider that holds its marks. Gap: only its constructor takes them."""
@@ -66,7 +68,11 @@ def put_camera(
     Gap: viser's own handle never sends the same place twice, although a browser that is still
     loading returns to its first camera after all messages.
     """
+    distance = float(np.linalg.norm(eye - target))
     messages = (
+        # What is drawn for a large design lies beyond viser's usual 1000 units.
+        protocol.SetCameraNearMessage(NEAR * distance),
+        protocol.SetCameraFarMessage(FAR * distance),
         protocol.SetCameraUpDirectionMessage((0.0, 0.0, 1.0)),
         protocol.SetCameraPositionMessage(cast("Any", tuple(eye.tolist()))),
         protocol.SetCameraLookAtMessage(cast("Any", tuple(target.tolist()))),

@@ -39,6 +39,8 @@ REMEMBERED = 4
 ALONG = 1e-3
 # Share by which points may lie beyond the edge of a picture and still count as in it.
 EDGE = 0.02
+# Share of the picture's width and height below which what is drawn is too small to see.
+SMALLEST = 0.2
 # Guess of width over height of the scene in a new browser.
 FIRST_ASPECT = 1.2
 
@@ -66,10 +68,12 @@ def framing(
     return target - 1.05 * distance * forward, target
 
 
-def are_in_picture(
+def places_in_picture(
     points: FloatArray, eye: FloatArray, target: FloatArray, field_of_view: float, aspect: float
-) -> bool:
-    """Whether an upright camera sees all of some points.
+) -> FloatArray:
+    """Return where an upright camera sees points, as shares of half the picture, shape (n, 2).
+
+    From −1 to 1 they are to the right and upwards; infinite for points behind the camera.
 
     Args:
         points: Points, shape (n, 3).
@@ -81,9 +85,22 @@ def are_in_picture(
     forward, right, up = _axes(target - eye)
     away = points - eye
     depth = float(np.linalg.norm(target - eye)) + _depth(points, target, forward)
-    half = (1.0 + EDGE) * math.tan(0.5 * field_of_view) * depth
+    half = math.tan(0.5 * field_of_view) * depth
     # Behind the camera the half height is negative.
-    return bool((np.abs(away @ up) <= half).all() and (np.abs(away @ right) <= aspect * half).all())
+    size = np.outer(np.where(half > 0.0, half, np.nan), [aspect, 1.0])
+    return np.nan_to_num(np.stack([away @ right, away @ up], axis=-1) / size, nan=np.inf)
+
+
+def are_in_picture(places: FloatArray) -> bool:
+    """Whether all of some places (n, 2) are in the picture."""
+    return bool((np.abs(places) <= 1.0 + EDGE).all())
+
+
+def are_out_of_sight(places: FloatArray) -> bool:
+    """Whether nothing between some places (n, 2) is in the picture, or all is too small to see."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    is_beside = bool((low > 1.0).any() or (high < -1.0).any())
+    return is_beside or bool((high - low).max() < 2.0 * SMALLEST)
 
 
 def has_perspective(direction: FloatArray) -> bool:
@@ -138,7 +155,8 @@ class Cameras:
     that its browser reported, since a browser may miss what was sent to it.
 
     A camera that showed all points follows them when they leave the picture, as after a change of
-    the design, and keeps its direction. A user who came closer to look at a part stays there.
+    the design, and keeps its direction. A user who came closer to look at a part stays there, as
+    long as something is in sight.
 
     Args:
         first: First camera of a new browser.
@@ -179,15 +197,18 @@ class Cameras:
             self._showing.discard(client.client_id)
 
     def follow(self, clients: Iterable[viser.ClientHandle]) -> None:
-        """Move the cameras that showed all points and no longer do, keeping their directions.
+        """Move the cameras that no longer show all points, or none, keeping their directions.
 
         The clients are browsers whose users hold nothing.
         """
         points = self._points()
         for client in clients:
             with self._lock:
-                have_left = client.client_id in self._showing and not _shows(client, points)
-            if have_left:
+                places = _places(client, points)
+                have_left = client.client_id in self._showing and not are_in_picture(places)
+                # A browser that is still loading will be where it was put.
+                is_lost = self.stands(client) and are_out_of_sight(places)
+            if have_left or is_lost:
                 self.fit(client)
         self._followed = points
 
@@ -215,7 +236,7 @@ class Cameras:
     def _on_report(self, client: viser.ClientHandle) -> None:
         """Note what a browser's camera shows, and put it again if its report calls for that."""
         with self._lock:
-            if self._followed is None or _shows(client, self._followed):
+            if self._followed is None or are_in_picture(_places(client, self._followed)):
                 self._showing.add(client.client_id)
             else:
                 self._showing.discard(client.client_id)
@@ -243,8 +264,8 @@ class Cameras:
             put_camera(client, eye, target, FIELD_OF_VIEW)
 
 
-def _shows(client: viser.ClientHandle, points: FloatArray) -> bool:
-    """Whether a browser's camera shows all of some points."""
+def _places(client: viser.ClientHandle, points: FloatArray) -> FloatArray:
+    """Return where a browser's camera shows points; see `places_in_picture`."""
     camera = client.camera
     eye, target = np.asarray(camera.position), np.asarray(camera.look_at)
-    return are_in_picture(points, eye, target, camera.fov, camera.aspect)
+    return places_in_picture(points, eye, target, camera.fov, camera.aspect)

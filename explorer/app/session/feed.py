@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,6 +15,8 @@ from explorer.numerics.search import Watch, ignore_stage
 
 # Seconds after which a drawing is cancelled as soon as a newer one waits, and its stage is shown.
 LONG_SECONDS = 1.0
+# Ratio of the sizes of two opened designs from which one's drawing is not shown with the other.
+OTHER_SIZE = 2.0
 # Seconds after which a drawing that the user cancelled ends with its process.
 CANCEL_SECONDS = 2.0
 
@@ -71,6 +74,9 @@ class Feed(Generic[Request, Drawing]):
         self.request: Request | None = None
         self.problem: str | None = None
         self._lock = threading.RLock()
+        # The reach of the opened design, which scales the scene, at the newest request, and the
+        # number of the oldest request whose drawing is shown at that scale.
+        self._reach, self._oldest = math.nan, 0
         # The newest drawing, and the request that it answers.
         self._drawing: Drawing | None = None
         self._answered: Request | None = None
@@ -115,10 +121,13 @@ class Feed(Generic[Request, Drawing]):
 
     def follow(self, frame: Frame) -> None:
         """Request the drawing of a frame, unless it is the newest request already."""
-        request = self.request_of(frame)
+        request, reach = self.request_of(frame), frame.state.base.reach
         with self._lock:
             if request == self.request:
                 return
+            if abs(math.log(reach / self._reach)) > math.log(OTHER_SIZE):
+                self._drawing, self._part, self._oldest = None, None, self._count + 1
+            self._reach = reach
             if request is None and self.has_stages:
                 self.worker.cancel(self._order)
             self.problem, self.request = None, request
@@ -162,7 +171,7 @@ class Feed(Generic[Request, Drawing]):
             self.task if self.key is None else self.key,
             self.task,
             (request,),
-            lambda drawing: self._show_drawing(request, drawing),
+            lambda drawing: self._show_drawing(count, request, drawing),
             lambda problem: self._show_problem(count, problem),
             receive if self.has_stages else None,
         )
@@ -179,8 +188,10 @@ class Feed(Generic[Request, Drawing]):
         elif is_first:
             self._stage_pause.begin()
 
-    def _show_drawing(self, request: Request, drawing: Drawing) -> None:
+    def _show_drawing(self, count: int, request: Request, drawing: Drawing) -> None:
         with self._lock:
+            if count < self._oldest:
+                return
             # An older drawing is shown until the newest has arrived.
             self._drawing, self._answered, self._part = drawing, request, None
             if self.is_current:

@@ -39,6 +39,8 @@ KEYS = {
 MOVES = {"Undo": UNDO, "Redo": REDO}
 ARROWS = {"Undo": "↶", "Redo": "↷"}
 OVER = "change.over"
+# Largest ratio of the sizes before and now at which one picture shows both.
+MOST_RATIO = 5.0
 DIGITS = 4
 
 
@@ -227,12 +229,13 @@ class ChangeScene(ScenePart):
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ghost of this frame."""
-        before = self._change.before
-        yield self._lines, "visible", before is not None
-        if before is not None:
-            ratio = before.state.design.unit_mm / placed.frame.state.design.unit_mm
-            lines = placed.scale * ratio * outline(before.snapshot)
-            yield self._lines, "points", lines.astype(np.float32)
+        before, now = self._change.before, placed.frame
+        ratio = 1.0 if before is None else _reach(before) / _reach(now)
+        visible = before is not None and 1.0 / MOST_RATIO <= ratio <= MOST_RATIO
+        yield self._lines, "visible", visible
+        if before is not None and visible:
+            scale = placed.scale * before.state.design.unit_mm / now.state.design.unit_mm
+            yield self._lines, "points", (scale * outline(before.snapshot)).astype(np.float32)
 
 
 HISTORY = Feature(

@@ -19,6 +19,7 @@ from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.state import PLACE, Optimisation, SearchRun
 from explorer.app.features.optimise.words import result_words, search_notice
 from explorer.app.features.optimise.work import complete_request, requested_box
+from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.inputs.controls import At, Bound, Controls
 from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import JOINT, add_lines
@@ -76,13 +77,13 @@ class OptimisePanel:
             with gui.add_folder("Free variables", expand_by_default=False):
                 for name, hint in FREE.items():
                     self._add_free(name, hint)
-        self._result = gui.add_html("")
+        self._result, self._verdict = gui.add_html(""), services.get(BuildVerdict)
         self._plots = OptimisePlots(gui)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
         yield from self._controls.updates(frame)
-        yield self._result, "content", result_words(frame.state)
+        yield self._result, "content", result_words(frame.state, self._verdict.html())
         yield from self._plots.updates(Optimisation.of(frame.state).run)
 
     def _add_problem(self) -> None:

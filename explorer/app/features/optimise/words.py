@@ -94,9 +94,10 @@ def _reached_text(problem: problems.Problem, iterate: Iterate) -> str:
     return f"{name} {format_number(iterate.objective, 6)} {unit}"
 
 
-def result_words(state: State) -> str:
+def result_words(state: State, built: str = "") -> str:
     """Return the column of the search as HTML: what can be done, how it goes, what it found.
 
+    Below what it found stands whether that can be built, as HTML.
     At most one of its buttons is filled: what prevents a search comes first, then the answer to
     a search that succeeded, then the search itself.
     """
@@ -148,6 +149,7 @@ def result_words(state: State) -> str:
         refused_words(refusals, limits) if refusals else "",
         f'<div class="ex-flow ex-before">{remedies}</div>' if remedies else "",
         f'<div class="ex-flow ex-before">{"".join(acts)}</div>',
+        f'<div class="ex-after">{built}</div>' if run is not None and run.best is not None else "",
         _downloads(state) if run is not None and run.best is not None else "",
         comparison_table(run) if run is not None and run.best is not None else "",
         limits_table(state.design),

@@ -7,9 +7,10 @@ from html import escape
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Export, Feature, Services, Tab, show_html
+from explorer.app.features.feature import Export, Feature, InBar, Services, Tab, show_html
 from explorer.app.features.mechanism.bodies import colliding_legs
 from explorer.app.features.prototype import work
+from explorer.app.features.prototype.building import BUILD_FEED, BuildVerdict, strokes_table
 from explorer.app.features.prototype.work import PARTS_FEED, Parts, PartsFeed, parts_to_draw
 from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.inputs.ranges import Span
@@ -17,20 +18,18 @@ from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import BALL, CARRIAGE, NO_MESH, PLATFORM_BODY, RAIL, ROD, TUBE
 from explorer.app.scene.surfaces import Drawn
 from explorer.app.session.session import Who
-from explorer.app.state.actions import Set, draw_as
+from explorer.app.state.actions import draw_as
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Updates
-from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import alert, box, caption, note, row, sentence, table
-from explorer.errors import ExplorerError, TooTightError
+from explorer.errors import ExplorerError
 from explorer.measures.box import corners_of
-from explorer.mechanism.design import LENGTHS
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
-from explorer.prototype.assembly import Actuator, exploded_offsets
+from explorer.prototype.assembly import exploded_offsets
 from explorer.prototype.chains import BODIES, LEGS, Places
-from explorer.prototype.fitting import broken_joint_limits
+from explorer.prototype.fitting import broken_joint_limits, buildability
 from explorer.singularity.colours import OUTLINE, Rgb
 
 # Format of each file by its name on the page, and end of the name of the file.
@@ -40,14 +39,15 @@ ASSEMBLIES = {
     "STL (zip)": ("stl-zip", "parts-stl.zip"),
     "STEP": ("step", "mechanism.step"),
 }
-FIT = "prototype.fit"
 
 
 class PrototypePanel:
-    """Controls that draw, explode and list the parts."""
+    """Whether the machine can be built; controls that draw, explode and list its parts."""
 
     def __init__(self, services: Services) -> None:
         gui, self._feed = services.gui, services.get(PARTS_FEED)
+        self._verdict, self._build = services.get(BuildVerdict), services.get(BUILD_FEED)
+        self._built = gui.add_html("")
         self._controls = controls = Controls(gui, services.session)
         controls.checkbox(
             "Show the parts",
@@ -60,7 +60,6 @@ class PrototypePanel:
         )
         gui.add_html(note("Sized from the design; Export has them for printers and CAD."))
         self._trouble = gui.add_html("", visible=False)
-        services.do_on_press(FIT, self._set_fitting_unit)
         self._folder = gui.add_folder("Parts", visible=False)
         with self._folder:
             controls.slider(
@@ -78,13 +77,11 @@ class PrototypePanel:
             )
             self._bill = gui.add_html("")
 
-    def _set_fitting_unit(self, _: str) -> Set | None:
-        fitting = _fitting_unit_mm(self._feed)
-        return None if fitting is None else Set("design.unit_mm", fitting, "1 unit (mm)")
-
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that show a frame."""
-        feed = self._feed
+        feed, built = self._feed, self._build.drawing
+        strokes = "" if built is None else strokes_table(built)
+        yield self._built, "content", box(self._verdict.html(), strokes)
         yield from self._controls.updates(frame)
         yield from show_html(self._trouble, trouble_of(frame, feed))
         # A failure in the worker takes the parts away at any time.
@@ -95,11 +92,6 @@ class PrototypePanel:
             yield self._bill, "content", parts_table(parts, density)
 
 
-def _fitting_unit_mm(feed: PartsFeed) -> float | None:
-    """Return the mm in a design unit with which the parts fit; None if they do, or none helps."""
-    return feed.drawing.fitting_unit_mm if isinstance(feed.drawing, TooTightError) else None
-
-
 def trouble_of(frame: Frame, feed: PartsFeed) -> str:
     """Return as HTML why there are no parts or why they cannot take the pose; "" if they can."""
     if frame.state.view.drawn_as != "prototype":
@@ -108,18 +100,7 @@ def trouble_of(frame: Frame, feed: PartsFeed) -> str:
         return alert("The parts could not be made", feed.problem)
     drawing = feed.drawing
     if isinstance(drawing, ExplorerError):
-        refusal = alert("No prototype of this design", sentence(str(drawing)))
-        unit = _fitting_unit_mm(feed)
-        if unit is None:
-            return refusal
-        fit = press_button(
-            FIT,
-            "",
-            f"Set the unit to {format_number(unit)} mm",
-            hint="The least size at which there is room for the parts.",
-            class_name="ex-button",
-        )
-        return refusal + box(fit)
+        return alert("No prototype of this design", sentence(str(drawing)))
     if drawing is None:
         return note("Making the parts …")
     broken = broken_joint_limits(
@@ -129,7 +110,7 @@ def trouble_of(frame: Frame, feed: PartsFeed) -> str:
 
 
 def parts_table(parts: Parts, density: float) -> str:
-    """Return the bill of materials as HTML: parts, then actuators; the density is in kg/m³."""
+    """Return the bill of materials as HTML; the density is in kg/m³."""
     rows = (
         row(
             escape(line.name),
@@ -140,36 +121,13 @@ def parts_table(parts: Parts, density: float) -> str:
         )
         for line in parts.lines
     )
-    actuators = (
-        row(
-            f"{LENGTHS[actuator.leg - 1]}, leg {actuator.leg}",
-            _mm(actuator.stroke.shortest),
-            _mm(actuator.stroke.longest),
-            _mm(actuator.stroke.longest - actuator.stroke.shortest),
-            hint=f"The limits allow {_mm(actuator.required.shortest)} "
-            f"to {_mm(actuator.required.longest)} mm",
-        )
-        for actuator in parts.actuators
-    )
     moving = sum(line.mass(density) for line in parts.lines if line.kind != "base")
     mass = sum(line.mass(density) for line in parts.lines)
-    remark = "The limits allow a longer stroke than one rod in its cylinder has."
     return box(
         f'<div class="ex-status">{_mass(mass)}</div>',
         caption(f"all parts; without the base {_mass(moving)}"),
         table(rows, ("part", "count", "stock, mm", "mass, g")),
-        table(actuators, ("actuator", "shortest", "longest", "stroke, mm")),
-        ""
-        if all(map(_is_enough, parts.actuators))
-        else f'<div class="ex-dim ex-after">{remark}</div>',
     )
-
-
-def _is_enough(actuator: Actuator) -> bool:
-    """Whether a stroke covers the one that the limits allow, but for the last bits."""
-    needed, stroke = actuator.required, actuator.stroke
-    slack = 1e-9 * needed.longest
-    return stroke.shortest <= needed.shortest + slack and stroke.longest >= needed.longest - slack
 
 
 def _mm(value: float) -> str:
@@ -300,6 +258,7 @@ def places_of(placed: Placed, parts: Parts) -> Places:
 PROTOTYPE = Feature(
     "prototype",
     tabs=(Tab("analyse", "Prototype", PrototypePanel, viser.Icon.ENGINE),),
+    bar=(InBar("middle", lambda services: services.get(BuildVerdict).in_bar),),
     exports=(
         Export(
             "Mechanism",
@@ -316,5 +275,7 @@ PROTOTYPE = Feature(
     ),
     scene=(PrototypeScene,),
     feeds=(PARTS_FEED,),
+    later_feeds=(BUILD_FEED,),
+    tasks=(buildability,),
     floor=_floor,
 )

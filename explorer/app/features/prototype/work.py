@@ -17,7 +17,7 @@ from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.frame import Frame
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
-from explorer.prototype.assembly import Actuator, Prototype, bill_of_materials, make_prototype
+from explorer.prototype.assembly import Prototype, bill_of_materials, make_prototype
 from explorer.prototype.shapes import Part
 
 # Axis of the round bar in the frame of the part, for the kinds cut from one.
@@ -89,13 +89,11 @@ class Parts:
         prototype: The parts.
         meshes: Meshes of the parts in their order and frames, in design units.
         lines: Lines of the list of parts.
-        actuators: The actuators.
     """
 
     prototype: Prototype
     meshes: tuple[Drawn, ...]
     lines: tuple[Line, ...]
-    actuators: tuple[Actuator, ...]
 
     @cached_property
     def floor(self) -> float:
@@ -110,8 +108,7 @@ def parts_drawing(design: Design) -> Parts | ExplorerError:
     except ExplorerError as error:
         return error
     meshes = tuple(with_creases(part.vertices, part.faces) for part in prototype.parts)
-    actuators = bill_of_materials(prototype, 1.0).actuators
-    return Parts(prototype, meshes, lines_of(prototype), actuators)
+    return Parts(prototype, meshes, lines_of(prototype))
 
 
 def _request_for(frame: Frame) -> Design | None:

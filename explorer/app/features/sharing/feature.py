@@ -12,6 +12,7 @@ import viser
 from explorer.app.browser.downloads import File
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
 from explorer.app.features.optimise.state import Optimisation
+from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.features.sharing import scene_files
 from explorer.app.features.sharing.reporting import ReportFormat, make_report
 from explorer.app.session.session import Who
@@ -79,7 +80,7 @@ def send_report(services: Services, file_format: ReportFormat, who: Who) -> None
 
 
 class ExportDialog:
-    """A row for each thing, with a button for each format; then pictures of any size."""
+    """Whether the machine can be built; a row for each thing; then pictures of any size."""
 
     def __init__(self, services: Services) -> None:
         gui, buttons = services.gui, services.buttons
@@ -90,6 +91,7 @@ class ExportDialog:
                 sends[value] = partial(each.send, services, name)
                 buttons.offer(f"Export › {each.title} › {name}", each.hint, PRESS, value)
         buttons.on(PRESS, lambda value, client: sends[value](client.client_id), values=sends)
+        self._verdict, self._built = services.get(BuildVerdict), gui.add_html("")
         gui.add_html(box("".join(_row(each) for each in services.exports)))
         with gui.add_folder("Picture of another size", expand_by_default=False):
             least, most = scene_files.LEAST, scene_files.MOST
@@ -115,8 +117,8 @@ class ExportDialog:
         )
 
     def updates(self, _: Frame) -> Iterator[Update]:
-        """Yield nothing: the dialog stays as it is."""
-        return iter(())
+        """Yield the update that shows whether the machine can be built."""
+        yield self._built, "content", box(self._verdict.html())
 
 
 def _row(export: Export) -> str:

@@ -1,0 +1,152 @@
+"""Whether the machine can be built with its parts: the verdict, and the presses that mend it.
+
+The worker finds it for each design. The tabs Prototype and Optimise and the dialog Export show it,
+and the bar while parts do not fit.
+"""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TypeAlias
+
+import msgspec
+
+from explorer.app.features.feature import Services, html_of
+from explorer.app.session.feed import Feed, feed_of
+from explorer.app.state.actions import Set
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.buttons import figure, press_button
+from explorer.app.widgets.markup import row, sentence, status, table
+from explorer.mechanism.design import LENGTHS, Design
+from explorer.numerics.number_text import format_decimals
+from explorer.prototype.chains import LEGS
+from explorer.prototype.fitting import Buildability, buildability
+from explorer.prototype.sizes import Stroke
+
+MEND = "prototype.mend"
+FITTING, STROKES = "fitting", "strokes"
+"""What a press mends: the unit and home of parts that do not fit, or limits beyond the strokes."""
+STROKES_PROBLEM = (
+    "the rods of legs {} cannot make all lengths that the limits allow: a rod in its cylinder at "
+    "most doubles the length of a leg"
+)
+STROKES_WORDS = "Limit the lengths to the strokes"
+STROKES_HINT = (
+    "Set the limits of the lengths to what a rod in its cylinder reaches; the workspace may shrink."
+)
+
+
+def _request_for(frame: Frame) -> Design | None:
+    return None if frame.state.optimisation.is_on else frame.state.design
+
+
+BuildFeed: TypeAlias = Feed[Design, Buildability]
+BUILD_FEED = feed_of(buildability, _request_for)
+
+
+class BuildVerdict:
+    """The verdict as HTML, the same wherever it stands."""
+
+    def __init__(self, services: Services) -> None:
+        self._services, self._feed = services, services.get(BUILD_FEED)
+        services.do_on_press(MEND, self._mend, values=(FITTING, STROKES))
+        for value, words, hint in (
+            (FITTING, "Make the parts fit", "Set the least unit with which the parts fit."),
+            (STROKES, STROKES_WORDS, STROKES_HINT),
+        ):
+            services.buttons.offer(
+                f"Prototype › {words}",
+                hint,
+                MEND,
+                value,
+                lambda value=value: self._mend(value) is not None,
+            )
+
+    def html(self) -> str:
+        """Return whether the machine can be built, with the press that mends it."""
+        return html_of(self._feed, verdict_words, "The parts could not be sized")
+
+    def in_bar(self, _: Frame) -> str:
+        """Return that parts do not fit as a figure of the bar; "" if they do."""
+        built = self._feed.drawing
+        if built is None or not built.problems:
+            return ""
+        hint = " ".join(map(sentence, (*built.problems, built.advice)))
+        return figure("Prototype", "Buildable", "no", hint=hint, look="ex-beyond")
+
+    def _mend(self, what: str) -> Set | None:
+        built, design = self._feed.drawing, self._services.session.latest_state().design
+        # What was found for another design would bring that one back.
+        if built is None or not self._feed.is_current or self._feed.request != design:
+            return None
+        if what == STROKES:
+            if not built.short_legs:
+                return None
+            limited, words = built.limited, "those of the strokes"
+            limits, home = limited.limits, limited.home
+            return Set(
+                "design", msgspec.structs.replace(design, limits=limits, home=home), "Limits", words
+            )
+        mended = built.mended
+        if mended is None:
+            return None
+        home = mended.home if moves_home(built) else design.home
+        fitting = msgspec.structs.replace(design, unit_mm=mended.unit_mm, home=home)
+        return Set("design", fitting, "Parts that fit", mend_words(built))
+
+
+def moves_home(built: Buildability) -> bool:
+    """Whether the parts fit with another home only."""
+    return built.mended is not None and built.mended.home != built.sizes.design.home
+
+
+def mend_words(built: Buildability) -> str:
+    """Return the words of the press that makes the parts fit."""
+    mended, words = built.mended, list[str]()
+    if mended is not None and mended.unit_mm != built.sizes.design.unit_mm:
+        words.append(f"set the unit to {mended.unit_mm:.6g} mm")
+    if moves_home(built):
+        words.append("move home")
+    return " and ".join(words).capitalize()
+
+
+def verdict_words(built: Buildability) -> str:
+    """Return whether a machine can be built, what is wrong, and the press that mends it."""
+    if not built.problems and not built.short_legs:
+        return status("Buildable", "within")
+    if built.problems:
+        head, problems, press = "Not buildable", [*built.problems], ""
+        if built.mended is None:
+            problems.append(built.advice)
+        else:
+            press = _button(FITTING, mend_words(built), sentence(built.advice))
+    else:
+        legs = ", ".join(map(str, built.short_legs))
+        head, problems = "Strokes too short", [STROKES_PROBLEM.format(legs)]
+        press = _button(STROKES, STROKES_WORDS, STROKES_HINT)
+    words = escape(" ".join(map(sentence, problems)))
+    return f"{status(head, 'beyond')}<div>{words}</div>{press}"
+
+
+def _button(value: str, words: str, hint: str) -> str:
+    button = press_button(MEND, value, words, hint=hint, class_name="ex-button")
+    return f'<div class="ex-flow ex-before">{button}</div>'
+
+
+def strokes_table(built: Buildability) -> str:
+    """Return the stroke of each actuator beside what its limits ask for, as HTML, in mm."""
+    sizes = built.sizes
+    rows = (
+        row(
+            f"{LENGTHS[leg - 1]}, leg {leg}",
+            _span(stroke),
+            _span(sizes.required_stroke(leg)),
+            look="ex-beyond" * (leg in built.short_legs),
+        )
+        for leg, stroke in zip(LEGS, sizes.strokes, strict=True)
+    )
+    return table(rows, ("actuator", "stroke, mm", "limits, mm"))
+
+
+def _span(stroke: Stroke) -> str:
+    return " to ".join(format_decimals(end, 1) for end in stroke)
