@@ -115,6 +115,11 @@ class Placed:
         bases = np.array([p["a1"], on_guide * p["b2"], on_guide * p["b3"], p["a3"]])
         return bases, np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
 
+    @cached_property
+    def leg_radii(self) -> FloatArray:
+        """Radii of the four legs in scene units, (4,); 0 for one that has none."""
+        return self.scale * np.array(self.frame.state.design.limits.leg_radii)
+
     def on_platform(self, point: Triple) -> FloatArray:
         """Return a point (3,) in scene units of one in the platform frame, in design units."""
         turned = self.frame.snapshot.rotation @ np.array(point)

@@ -128,16 +128,17 @@ class History:
             return self
         earlier = self.steps[: self.at]
         shown = replace(after, view=_with_point_of(present.state.view, after.view))
-        if event.action.continues or shown == present.state:
+        words = event.action.describe(after)
+        repeats = self.is_open and event.action.repeats and words == present.words
+        if event.action.continues or shown == present.state or repeats:
             return self.with_state(after)
         if self.is_open and event.continues(present):
             if earlier and earlier[-1].state == after:
                 # The gesture ended where it began, so that its step is dropped.
                 return History(earlier, self.at - 1)
-            words, press = event.action.describe(after), event.press or present.press
+            press = event.press or present.press
             step = Step(present.number, words, after, present.source, event.time, press)
             return History((*earlier, step), self.at, is_open=True)
-        words = event.action.describe(after)
         step = Step(present.number + 1, words, after, event.source, event.time, event.press)
         steps = (*earlier, present, step)[-MOST_STEPS:]
         return History(steps, len(steps) - 1, is_open=True)

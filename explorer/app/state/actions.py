@@ -38,10 +38,12 @@ class Action(ABC):
         template: What the action does, for the history, as a format string of `action` and of
             `design`, the name of the design after it; "" for the name of the class.
         continues: Whether the action belongs to the step before it.
+        repeats: Whether it belongs to the step before it if both have the same words.
     """
 
     template: ClassVar[str] = ""
     continues: ClassVar[bool] = False
+    repeats: ClassVar[bool] = False
 
     @abstractmethod
     def apply(self, state: State) -> State:

@@ -236,6 +236,9 @@ def clearance_figure(frame: Frame) -> str:
     words = f"{format_number(clearance, 3, size=design.unit_mm * design.reach)} mm"
     pair = pair_name(PAIRS[closest])
     hint = f"Clearance of the closest legs, {pair}: distance of their axes less their radii."
+    if not any(design.limits.leg_radii):
+        words += f" {dim('axes only')}"
+        hint = f"Distance of the axes of the closest legs, {pair}: the design states no radii."
     look = "ex-beyond" if clearance < 0.0 else ""
     return figure("Workspace", "Clearance here", words, hint=hint, look=look)
 
@@ -263,7 +266,7 @@ class ClearanceScene(ScenePart):
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the closest pair and the capsules of this frame."""
         state, snapshot = placed.frame.state, placed.frame.snapshot
-        radii = placed.scale * np.array(state.design.limits.leg_radii)
+        radii = placed.leg_radii
         has_radii = state.view.legs and not state.view.is_twin and bool(radii.any())
         yield from show(has_radii, self._rods, self._ends)
         if has_radii:

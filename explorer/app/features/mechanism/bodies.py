@@ -36,10 +36,13 @@ PLATFORM_OPACITY = 0.82
 # Sizes in scene units, at thickness one.
 PLATE_TOP = -0.6
 RAIL_HALF_WIDTH, RAIL_TOP = 0.3, -0.42
-TUBE_RADIUS, ROD_RADIUS, COLLAR_RADIUS = 0.17, 0.095, 0.215
-BALL_RADIUS, SOCKET_RADIUS = 0.24, 0.19
+BALL_RADIUS = 0.24
+# Of the line of a leg that has no radius.
+AXIS_RADIUS = 0.06
 PIN_RADIUS, PIN_HALF_LENGTH = 0.085, 0.34
 POINT_RADIUS, LINE_RADIUS = 0.36, 0.075
+# Radii of an actuator's cylinder, rod, collar and socket, over that of its leg.
+SHARES = (0.85, 0.5, 1.0, 0.9)
 # Length of an actuator's cylinder, which does not depend on its stroke, as a share of the reach.
 TUBE_SHARE = 0.34
 PLANE_OPACITY = 0.2
@@ -123,9 +126,14 @@ class Telescopes(shapes.Rods):
     def __init__(self, scene: viser.SceneApi, name: str, count: int) -> None:
         super().__init__(scene, name, _colours_of_parts([False] * count))
 
-    def along(self, placed: Placed, bases: FloatArray, tips: FloatArray) -> Updates:
-        """Yield the updates that draw the actuators from bases (n, 3) to tips (n, 3)."""
-        size, count = placed.thickness, len(bases)
+    def along(
+        self, placed: Placed, bases: FloatArray, tips: FloatArray, radii: FloatArray
+    ) -> Updates:
+        """Yield the updates that draw the actuators from bases (n, 3) to tips (n, 3).
+
+        They are as thick as their radii (n,); a line along its axis stands for one that has none.
+        """
+        size = placed.thickness
         spans = tips - bases
         lengths = np.linalg.norm(spans, axis=1, keepdims=True)
         unit = spans / np.maximum(lengths, 1e-9)
@@ -135,7 +143,7 @@ class Telescopes(shapes.Rods):
         yield from self.between(
             np.concatenate([bases, collars, collars, sockets]),
             np.concatenate([tube_ends, tips, tube_ends, tips]),
-            size * np.repeat([TUBE_RADIUS, ROD_RADIUS, COLLAR_RADIUS, SOCKET_RADIUS], count),
+            np.where(radii > 0.0, np.outer(SHARES, radii), AXIS_RADIUS * size).ravel(),
         )
 
 
@@ -166,12 +174,12 @@ class Legs(ScenePart):
         if not visible:
             return
         size, (bases, tips) = placed.thickness, placed.struts
-        yield from self._actuators.along(placed, bases, tips)
+        yield from self._actuators.along(placed, bases, tips, placed.leg_radii)
         alarms = colliding_legs(placed.frame.snapshot)
         yield from self._actuators.colour(_colours_of_parts(alarms))
         yield from self._balls.at(
             np.concatenate([tips, bases[[0, 3]]]),
-            size * np.array([BALL_RADIUS] * 4 + [1.2 * TUBE_RADIUS] * 2),
+            np.maximum(size * BALL_RADIUS, placed.leg_radii[[0, 1, 2, 3, 0, 3]]),
         )
         yield from self._joint_rods(bases, tips, size)
         low, high = guide_span(placed)
@@ -217,7 +225,7 @@ class TwinLegs(ScenePart):
         p, size = placed.points, placed.thickness
         bases = np.array([p[base] for base, _ in TWIN])
         tips = np.array([p[tip] for _, tip in TWIN])
-        yield from self._actuators.along(placed, bases, tips)
+        yield from self._actuators.along(placed, bases, tips, np.zeros(len(TWIN)))
         feet = np.array([p["a1"], p["a2"], p["a3"]])
         heads = np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
         yield from self._balls.at(np.concatenate([feet, heads]), np.full(7, BALL_RADIUS * size))

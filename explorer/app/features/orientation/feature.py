@@ -25,7 +25,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.assigning import Updates
-from explorer.app.widgets.markup import alert, box, caption, dim, row, table
+from explorer.app.widgets.markup import alert, box, caption, dim, remark, row, table
 from explorer.app.widgets.under_way import UnderWay, look_of, problem
 from explorer.measures.box import corners_of
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
@@ -127,7 +127,8 @@ class OrientationPanel:
         design, place = state.design, (state.position, here.torsion)
         tilts = tilt_map(design, *place, tool=state.tool)
         least = greatest_tilt(design, *place, tool=state.tool)
-        yield self._top, "content", box(*summary(frame, here, least, self._here))
+        why = "" if state.remark is None else remark("", state.remark)
+        yield self._top, "content", box(*summary(frame, here, least, self._here), why)
         home = tilt_torsion_of(design.home_pose.rotation)
         yield self._map, "content", box(maps.polar_map(tilts, least, here, home))
         title = caption("What ends the tilts, by share of azimuths")

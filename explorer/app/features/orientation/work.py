@@ -15,6 +15,7 @@ from explorer.app.session.worker import Channel
 from explorer.app.state.actions import Action, move_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.errors import InputError
 from explorer.mechanism.configuration import tool_offset
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
@@ -32,7 +33,12 @@ from explorer.workspace.orientations.share import (
     cone_of_directions,
     orientation_share,
 )
-from explorer.workspace.orientations.tilts import TiltByTorsion, greatest_tilts, tilt_by_torsion
+from explorer.workspace.orientations.tilts import (
+    TiltByTorsion,
+    greatest_tilts,
+    tilt_by_torsion,
+    tilt_map,
+)
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import inclusive_solid, total_solid
 
@@ -58,18 +64,37 @@ class SetTiltTorsion(Action):
 
 @dataclass(frozen=True)
 class GoToTilt(Action):
-    """Tilt the platform in an azimuth at its present torsion; angles in degrees."""
+    """Tilt the platform in an azimuth at its present torsion, as far as the limits allow it.
+
+    Angles are in degrees.
+    """
 
     azimuth: float
     tilt: float
 
     def apply(self, state: State) -> State:
-        """Return the next state."""
-        return _tilt_to(state, TiltTorsion(self.azimuth, self.tilt, state.tilt_torsion.torsion))
+        """Return the next state, with a remark if a limit ends the tilts before.
 
-    def words(self) -> str:
-        """Return what the action does."""
-        tilt, azimuth = (format_number(angle, 4) for angle in (self.tilt, self.azimuth))
+        Raises:
+            InputError: Tilt zero breaks a limit itself, so that no tilt is reached from it.
+        """
+        torsion = state.tilt_torsion.torsion
+        border = tilt_map(state.design, state.position, torsion, [self.azimuth], state.tool)
+        (most,), (limit,) = border.tilts.tolist(), border.limits
+        if math.isnan(most):
+            raise InputError(f"no tilt is possible here: tilt zero is beyond the limit {limit}")
+        if self.tilt <= most:
+            return _tilt_to(state, TiltTorsion(self.azimuth, self.tilt, torsion))
+        after = _tilt_to(state, TiltTorsion(self.azimuth, max(most - INSIDE, 0.0), torsion))
+        azimuth = format_number(self.azimuth, 4)
+        words = f"Tilts towards {azimuth}° end at {most:.1f}°, by {limit}: no farther."
+        return replace(after, taken=(after.joints, words))
+
+    def describe(self, after: State) -> str:
+        """Return what the action did."""
+        tilt, azimuth = (
+            format_number(angle, 4) for angle in (after.tilt_torsion.tilt, self.azimuth)
+        )
         return f"Tilt {tilt}° towards {azimuth}°"
 
 
@@ -79,6 +104,9 @@ def _tilt_to(state: State, angles: TiltTorsion) -> State:
     pose = state.pose_at(state.position, orientation)
     return replace(move_to(state, pose), set_tilt_torsion=angles)
 
+
+# Degrees that a tilt keeps from the limit that ends it, where the pose may be singular.
+INSIDE = 0.1
 
 NODES = 20
 """Number of nodes on each axis of the extent, at which tilts are computed."""

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from explorer.app.features.loads.load import weights_of_parts
-from explorer.app.state.actions import Action, move_to
+from explorer.app.state.actions import Action, Set, move_to
 from explorer.app.state.paths import End, Journey, Paths
 from explorer.app.state.state import Joints, State, joints_of
 from explorer.app.state.view import Weighed
@@ -66,6 +66,13 @@ class Go(Action):
         """Return which path was played or requested."""
         journey = after.journey
         return "Plan a path" if journey is None else journey.title
+
+
+@dataclass(frozen=True)
+class SetEnd(Set):
+    """Set an end of the next path; all numbers that are typed for one end are one step."""
+
+    repeats: ClassVar[bool] = True
 
 
 def goal_of(state: State) -> Pose | int:

@@ -8,11 +8,11 @@ import time
 import numpy as np
 import viser
 
-from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab
+from explorer.app.features.feature import Feature, InBar, Runner, Services, StateCommand, Tab, show
 from explorer.app.features.paths.actions import Advance, Play, TakePlan, plan
 from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.scene.placing import Placed, ScenePart
-from explorer.app.scene.shapes import Balls, add_lines
+from explorer.app.scene.shapes import Balls, add_label, add_lines
 from explorer.app.session.worker import Worker
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
@@ -35,17 +35,18 @@ DIED = "the planner's process ended; Go starts it again"
 
 
 class PathScene(ScenePart):
-    """A line, and a ball at each crossing of a singularity."""
+    """A line with its label, and a ball at each crossing of a singularity."""
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
         self._line = add_lines(scene, "/path/line", 1, FAR, 2.5)
+        self._label = add_label(scene, "/path/label", "path", visible=False)
         self._balls = Balls(scene, "/path/crossings", [SINGULAR] * MOST_CROSSINGS)
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the path of this frame."""
         state, journey = placed.frame.state, placed.frame.state.journey
-        yield self._line, "visible", journey is not None
+        yield from show(journey is not None, self._line, self._label)
         crossings = () if journey is None else journey.margins.crossings[:MOST_CROSSINGS]
         yield from self._balls.show(bool(crossings))
         if journey is None:
@@ -55,6 +56,7 @@ class PathScene(ScenePart):
         points = placed.scale * track
         segments = np.stack([points[:-1], points[1:]], axis=1)
         yield self._line, "points", segments.astype(np.float32)
+        yield self._label, "position", tuple(points[len(points) // 2].tolist())
         if crossings:
             centres, radii = np.zeros((MOST_CROSSINGS, 3)), np.full(MOST_CROSSINGS, 1e-6)
             at = [position_of(state.design, each.pose, state.view.at) for each in crossings]

@@ -56,6 +56,7 @@ KINDS: dict[PathKind, tuple[str, str]] = {
     ),
 }
 CANCEL = Set("paths.planning", None, "Planning", "stopped")
+CLEAR = Set("paths.journey", None, "Path", "cleared")
 # Decimals of typed angles and coordinates.
 DECIMALS = 9
 
@@ -121,6 +122,13 @@ class PathsPanel:
             )
         services.do_on_press("paths.play", lambda word: actions.Play(word == "on"), ("on", "off"))
         services.do_on_press("paths.cancel", lambda _: CANCEL)
+        self._clear = services.link(
+            "paths.clear",
+            "Paths › Clear",
+            "Remove the path and its line.",
+            lambda _: CLEAR,
+            is_ready=lambda state: state.journey is not None,
+        )
         buttons = services.buttons
         buttons.on("paths.export", self._export)
         buttons.offer(
@@ -146,7 +154,8 @@ class PathsPanel:
         kinds = markup.box(chips, f'<div class="ex-small">{kind_note(state)}</div>')
         yield self._kinds, "content", kinds
         yield self.go, "disabled", state.paths.is_planning
-        yield self._title, "content", plan_words(state) or path_title(state, self._shares.of(frame))
+        title = plan_words(state) or path_title(state, self._shares.of(frame), self._clear)
+        yield self._title, "content", title
         yield from show_html(self._demand, plots.demand_note(state))
         for plot in self._plots:
             yield from plot.updates(frame)
@@ -234,8 +243,11 @@ def plan_words(state: State) -> str | None:
     return None
 
 
-def path_title(state: State, loads: plots.JourneyLoads | None) -> str:
-    """Return the title of the path, its crossings and loads, and its buttons, as HTML."""
+def path_title(state: State, loads: plots.JourneyLoads | None, clear: str = "") -> str:
+    """Return the title of the path, its crossings and loads, and its buttons, as HTML.
+
+    The button `clear` removes the path.
+    """
     journey = state.journey
     if journey is None:
         return markup.box(markup.dim("No path yet. Choose a goal and press Go."))
@@ -254,7 +266,7 @@ def path_title(state: State, loads: plots.JourneyLoads | None) -> str:
     title = escape(journey.title)
     return markup.box(
         f'<div class="ex-line">{play}<span class="ex-cut ex-fill" title="{title}">{title}</span>'
-        f"{export}</div>",
+        f"{export}{clear}</div>",
         plots.crossing_words(journey),
         "" if loads is None else plots.load_words(loads),
     )
@@ -280,7 +292,7 @@ def _choose(state: State, end: EndName, option: str) -> Action:
     elif end == "goal":
         # It is of use once the platform has moved away.
         value = state.pose
-    return Set(f"paths.{end}", value, end.capitalize(), option)
+    return actions.SetEnd(f"paths.{end}", value, end.capitalize(), option)
 
 
 def _is_typed(state: State, end: EndName) -> bool:
@@ -307,7 +319,7 @@ def _set_typed(state: State, end: EndName, index: int, triple: Triple) -> Action
     if index:
         there = position_of(state.design, pose, state.view.at)
         pose = Pose.of_yaw_pitch_roll(pose.position, triple)
-    return Set(f"paths.{end}", state.pose_at(there, pose), end.capitalize(), "typed numbers")
+    return actions.SetEnd(f"paths.{end}", state.pose_at(there, pose), end.capitalize(), TYPED)
 
 
 def _is_planned(state: State) -> bool:

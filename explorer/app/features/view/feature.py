@@ -262,8 +262,12 @@ def shadow_outlines(placed: Placed, ground: float) -> list[FloatArray]:
     if view.legs and (placed.is_schematic or view.is_twin):
         twin = [(p[base], p[tip]) for base, tip in TWIN]
         legs = twin if view.is_twin else list(zip(*placed.struts, strict=True))
-        radius = 0.5 * (bodies.TUBE_RADIUS + bodies.ROD_RADIUS) * size * np.eye(3)[:, :2]
-        outlines += [_outline(np.stack(leg), radius, ground) for leg in legs]
+        radii = np.zeros(len(twin)) if view.is_twin else placed.leg_radii
+        radii = np.where(radii > 0.0, bodies.SHARES[0] * radii, bodies.AXIS_RADIUS * size)
+        outlines += [
+            _outline(np.stack(leg), radius * np.eye(3)[:, :2], ground)
+            for leg, radius in zip(legs, radii.tolist(), strict=True)
+        ]
     return outlines
 
 
