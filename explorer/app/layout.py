@@ -15,6 +15,7 @@ from explorer.app.scene.camera import Cameras
 from explorer.app.session.clock import Timer
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import MANUAL, press_button
 from explorer.app.widgets.theme import Theme
 
 # Seconds until the panels of a new page are laid out.
@@ -42,11 +43,17 @@ class Panels:
         self.build, self.analyse, self.work = (gui.add_panel() for _ in range(3))
         self._tabs: dict[tuple[Place, str], viser.GuiTabHandle] = {}
 
-    def tab(self, tab: Tab) -> viser.GuiTabHandle:
-        """Return the tab of a place with a title, made at the first call."""
+    def tab(self, tab: Tab, manual: str) -> viser.GuiTabHandle:
+        """Return the tab of a place with a title, made at the first call with its button "?"."""
         key = (tab.place, tab.title)
         if key not in self._tabs:
             self._tabs[key] = self._panel(tab.place).add_tab(tab.title, tab.icon)
+            if manual:
+                hint = f"Read about {tab.title} in the manual."
+                with self._tabs[key]:
+                    self._gui.add_html(
+                        press_button(MANUAL, manual, "?", label=hint, class_name="ex-asks")
+                    )
         return self._tabs[key]
 
     def titles(self, place: Place) -> list[str]:

@@ -216,8 +216,8 @@ class Page:
 
     def _add_panels(self) -> list[Panel]:
         panels: list[Panel] = [Bar(self.services, self._features)]
-        for tab in (tab for feature in self._features for tab in feature.tabs):
-            self.services.tab = self.panels.tab(tab)
+        for feature, tab in ((each, tab) for each in self._features for tab in each.tabs):
+            self.services.tab = self.panels.tab(tab, feature.manual)
             with self.services.tab:
                 panels.append(self.services.get(tab.panel))
         return panels

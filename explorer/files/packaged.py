@@ -58,6 +58,7 @@ MANUAL_FILES = (
     "claims.md",
     "studies.md",
     "prototype-and-export.md",
+    "cad.md",
     "command-line.md",
     "python.md",
     "files.md",

@@ -23,6 +23,7 @@ from server_clock import wait_until_drawn
 import explorer.app
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
+from explorer.app.features.help.manual import list_entries
 from explorer.app.features.loads.load import WEIGHTS_FEED, SetForce
 from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
@@ -391,6 +392,15 @@ def test_every_key_belongs_to_a_command_and_not_to_browser_camera_or_palette(
         # viser's camera looks at the letter, whatever else is held down.
         assert key.key not in "WASDQE"
         assert key != PALETTE_KEY
+
+
+def test_manual_entries_have_names_of_their_own_and_each_tab_has_one() -> None:
+    names, _, targets = zip(*list_entries(), strict=True)
+    assert len(set(names)) == len(names)
+    assert "δ2 (glossary)" in names
+    for feature in FEATURES:
+        has_tab = any(tab.place != "dialog" for tab in feature.tabs)
+        assert (feature.manual in targets) == has_tab, feature.name
 
 
 def test_manual_lists_every_key_and_no_other(palette: Palette) -> None:

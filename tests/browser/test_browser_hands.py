@@ -116,7 +116,7 @@ def test_command_is_run_by_the_palette_and_by_its_key_but_not_while_one_types(ta
     press(tab, "g")
     tab.wait_for(lambda: not tab.state.view.grid, "no grid")
     # The palette finds commands by their words.
-    tab.page.get_by_role("button", name="Commands").click()
+    tab.page.get_by_role("button", name="Search").click()
     search = tab.page.get_by_placeholder("Search commands")
     search.fill("convex hull")
     press(tab, "Enter")

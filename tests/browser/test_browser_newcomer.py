@@ -1,4 +1,4 @@
-"""Fifteen tasks of a newcomer at the page: what is found by its words, and in how many presses."""
+"""Tasks of a newcomer at the page: what is found by its words, and in how many presses."""
 
 from __future__ import annotations
 
@@ -300,22 +300,50 @@ def test_theme_palette_and_keys_are_found_in_the_bar(newcomer: Newcomer) -> None
     newcomer.wait_for_lightness(lambda now: now > 0.9 * light)
     assert newcomer.presses_for() == 2
     newcomer.type("x", "12")
-    newcomer.press(re.compile("^Commands"))
+    newcomer.press(re.compile("^Search"))
     expect(newcomer.page.get_by_placeholder("Search commands")).to_be_focused()
     newcomer.page.keyboard.type("home pose")
     newcomer.press(re.compile("^Pose › Home pose"))
     expect(dialog).to_have_count(0)
     expect(newcomer.field("x")).to_have_value("10")
     newcomer.press("Help")
-    newcomer.press("Keys")
-    card = newcomer.page.get_by_role("dialog", name="Keys")
-    expect(card).to_contain_text("Search all commands")
+    card = newcomer.page.get_by_role("dialog", name="Help")
+    expect(card).to_contain_text("Search commands and manual")
     newcomer.key("Escape")
     expect(dialog).to_have_count(0)
     newcomer.key("k")
     card.wait_for()
     newcomer.press_at(20.0, 600.0)
     expect(dialog).to_have_count(0)
+
+
+def test_term_is_found_by_the_search_and_page_by_the_question_mark(newcomer: Newcomer) -> None:
+    page = newcomer.page
+    newcomer.key("ControlOrMeta+k")
+    page.get_by_placeholder("Search commands").fill("δ2")
+    newcomer.key("Enter")
+    term = page.get_by_text("Margin δ1, δ2, δ3.", exact=True)
+    expect(term).to_be_in_viewport()
+    assert newcomer.presses_for() == 2
+    newcomer.key("Escape")
+    expect(term).to_have_count(0)
+    newcomer.key("ControlOrMeta+k")
+    for words, found in {
+        "delta2": "δ2 (glossary)",
+        "d2": "δ2 (glossary)",
+        "clearance": "Clearance (glossary)",
+        "solidworks": "SolidWorks",
+    }.items():
+        page.get_by_placeholder("Search commands").fill(words)
+        newcomer.sees(re.compile(re.escape(found)))
+    newcomer.key("Escape")
+    newcomer.presses_for()
+    newcomer.press("Read about Singularity in the manual.")
+    heading = page.get_by_role("heading", name="Verdict", exact=True)
+    expect(heading).to_be_in_viewport()
+    assert newcomer.presses_for() == 1
+    newcomer.press("Close the manual")
+    expect(heading).to_have_count(0)
 
 
 def test_mistakes_are_refused_with_a_reason_and_lose_nothing(

@@ -331,6 +331,8 @@ class Feature:
 
     Attributes:
         name: Name of its folder.
+        manual: What the button "?" of its tabs opens in the manual, the file of a page with "#" and
+            a heading of it; "" for no button. Tabs that features share have that of the first.
         tabs: Its panels, in their order.
         bar: Its parts of the bar on top of the page.
         exports: The files that it offers.
@@ -352,6 +354,7 @@ class Feature:
     """
 
     name: str
+    manual: str = ""
     tabs: tuple[Tab, ...] = ()
     bar: tuple[InBar, ...] = ()
     exports: tuple[Export, ...] = ()

@@ -2,7 +2,8 @@
 // Closes the dialog at Escape, at a click beside it, and at its button.
 window.explorer.opens ??= (() => {
   const DIALOG = "[data-floating-window][data-ex=dialog]",
-    OPEN = `${DIALOG}[data-ex-open]`;
+    OPEN = `${DIALOG}[data-ex-open]`,
+    CARD_CLOSE = "[data-ex=card] > .ex-closes";
   // viser opens its palette at this key, which nothing on the server can press.
   const PALETTE_KEY = { key: "k", code: "KeyK", ctrlKey: true, bubbles: true };
   const ENTER = { key: "Enter", code: "Enter", bubbles: true };
@@ -59,7 +60,10 @@ window.explorer.opens ??= (() => {
     ({ key, target }) => {
       // The palette may lie over a dialog, and is closed first; a list in a dialog too.
       const isOver = target.closest?.(".mantine-Spotlight-content, [aria-expanded=true]");
-      if (key === "Escape" && !isOver) closeDialogs();
+      if (key !== "Escape" || isOver) return;
+      if (document.querySelector(OPEN)) closeDialogs();
+      // In a field it discards what is typed.
+      else if (target.localName !== "input") document.querySelector(CARD_CLOSE)?.click();
     },
     true,
   );

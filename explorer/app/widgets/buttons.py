@@ -23,6 +23,9 @@ from explorer.app.widgets.markup import meter
 from explorer.app.widgets.palette import STEP, Command, Key
 from explorer.measures.blocks.source import Source
 
+MANUAL = "help.open"
+"""The name of buttons that open the manual; the value is a page, with "#" and a heading or term."""
+
 PressHandler = Callable[[str, viser.ClientHandle], None]
 """Handles a press with the value of its button, for the client that pressed."""
 

@@ -281,6 +281,7 @@ def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:
 
 COMPARE = Feature(
     "compare",
+    manual="page.md#Compare",
     tabs=(Tab("work", "Compare", ComparePanel, viser.Icon.COLUMNS_3),),
     scene=(ComparedScene,),
     feeds=FEEDS,

@@ -171,6 +171,7 @@ def load_figure(services: Services) -> BarPart:
 
 LOADS = Feature(
     "loads",
+    manual="loads.md#The tab Loads",
     tabs=(
         Tab("analyse", "Loads", ForcesPanel, viser.Icon.ARROW_DOWN_CIRCLE),
         Tab("analyse", "Loads", precision.PrecisionPanel),

@@ -364,6 +364,7 @@ def _set_lengths(state: State, value: float) -> Action:
 
 MACHINE = Feature(
     "machine",
+    manual="loads.md#The tab Machine",
     tabs=(Tab("build", "Machine", MachinePanel, viser.Icon.CRANE),),
     scene=(ToolScene, PayloadScene),
     lists=("Gravity",),

@@ -293,6 +293,7 @@ def limits_figure(frame: Frame) -> str:
 
 MECHANISM = Feature(
     "mechanism",
+    manual="mechanism.md",
     tabs=(
         Tab("build", "Pose", MovePanel, viser.Icon.ARROWS_MOVE),
         Tab("build", "Design", DesignPanel, viser.Icon.RULER_2),

@@ -350,6 +350,7 @@ def visible_box(state: State) -> Box | None:
 
 OPTIMISE = Feature(
     "optimise",
+    manual="optimise.md#On the page",
     tabs=(Tab("work", "Optimise", OptimisePanel, viser.Icon.SPARKLES),),
     bar=(InBar("right", lambda _: search_chip),),
     scene=(RequiredBox,),

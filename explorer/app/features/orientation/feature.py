@@ -290,6 +290,7 @@ def nodes_beside_cut(drawing: work.TiltsDrawing, view: WorkspaceView) -> BoolArr
 
 ORIENTATION = Feature(
     "orientation",
+    manual="orientation.md#On the page",
     tabs=(Tab("analyse", "Tilt", OrientationPanel, viser.Icon.COMPASS),),
     scene=(OrientationScene,),
     later_feeds=(work.POSITION_FEED, work.TILTS_FEED, work.RANGE_FEED),

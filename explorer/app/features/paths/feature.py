@@ -164,6 +164,7 @@ class PathRunner(Runner):
 
 PATHS = Feature(
     "paths",
+    manual="singularity.md#Paths",
     tabs=(Tab("work", "Paths", PathsPanel, viser.Icon.ROUTE),),
     bar=(InBar("right", lambda _: path_chip),),
     scene=(PathScene,),

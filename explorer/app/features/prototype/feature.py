@@ -257,6 +257,7 @@ def places_of(placed: Placed, parts: Parts) -> Places:
 
 PROTOTYPE = Feature(
     "prototype",
+    manual="prototype-and-export.md",
     tabs=(Tab("analyse", "Prototype", PrototypePanel, viser.Icon.ENGINE),),
     bar=(InBar("middle", lambda services: services.get(BuildVerdict).in_bar),),
     exports=(

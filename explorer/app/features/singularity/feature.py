@@ -374,6 +374,7 @@ def _edges(here: Stratum) -> str:
 
 SINGULARITY = Feature(
     "singularity",
+    manual="singularity.md#Verdict",
     tabs=(Tab("analyse", "Singularity", SingularityPanel, viser.Icon.ALERT_TRIANGLE),),
     bar=(InBar("middle", lambda _: distance_figure),),
     scene=(scene.NearestGhost, scene.EllipsoidScene, scene.BallScene, scene.FreeMotion),

@@ -311,6 +311,7 @@ class StudyChip:
 
 STUDIES = Feature(
     "studies",
+    manual="studies.md",
     tabs=(Tab("work", "Studies", StudiesPanel, viser.Icon.CHART_DOTS),),
     bar=(InBar("right", StudyChip),),
     is_offered=lambda services: services.has(study_folders),

@@ -284,6 +284,7 @@ def _outline(centres: FloatArray, axes: FloatArray, ground: float) -> FloatArray
 
 VIEW = Feature(
     "view",
+    manual="page.md",
     tabs=(Tab("build", "Show", ViewPanel, viser.Icon.EYE),),
     bar=(InBar("right", CameraButtons),),
     scene=(Ground,),

@@ -303,6 +303,7 @@ def volume_figure(services: Services) -> Callable[[Frame], str]:
 
 WORKSPACE = Feature(
     "workspace",
+    manual="workspace.md",
     tabs=(Tab("analyse", "Workspace", WorkspacePanel, viser.Icon.SPHERE),),
     bar=(InBar("middle", volume_figure),),
     exports=(
