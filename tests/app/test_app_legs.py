@@ -25,11 +25,12 @@ from explorer.app.features.legs.feature import (
     ClearanceScene,
     SweptTetrahedra,
     chart_columns,
+    clearance_figure,
     move_table,
     radius_words,
     volume_at,
 )
-from explorer.app.features.mechanism.bodies import Legs
+from explorer.app.features.mechanism.bodies import AXIS_RADIUS, Legs
 from explorer.app.features.workspace import work
 from explorer.app.features.workspace.feature import WorkspacePanel
 from explorer.app.features.workspace.feeds import WORKSPACE_FEED
@@ -577,20 +578,19 @@ def test_closest_pair_is_marked_wherever_the_platform_goes(services: Services) -
     assert len(marked) > 1
 
 
-def test_legs_with_radii_are_drawn_as_capsules(services: Services) -> None:
+def test_legs_are_drawn_with_the_radii_of_their_clearance_or_as_lines(services: Services) -> None:
     state = STATES[0]
-    placed = Placed(Frame(state))
-    drawn = by_name(ClearanceScene(services).updates(placed))
-    rods, ends = drawn["/clearance/rods"], drawn["/clearance/ends"]
-    axes = placed.scale * leg_axes(Configuration.at(OPTIMAL, state.pose))
-    radii = placed.scale * np.array(state.design.limits.leg_radii)
-    assert rods["visible"] is ends["visible"] is True
-    np.testing.assert_allclose(rods["batched_positions"], axes[:, 0], rtol=1e-5, atol=1e-5)
-    lengths = np.linalg.norm(axes[:, 1] - axes[:, 0], axis=1)
-    expected = np.stack([radii, radii, lengths], axis=1)
-    np.testing.assert_allclose(rods["batched_scales"], expected, rtol=1e-5)
-    np.testing.assert_allclose(ends["batched_positions"], axes.reshape(8, 3), rtol=1e-5, atol=1e-5)
-    np.testing.assert_allclose(ends["batched_scales"][:, 0], np.repeat(radii, 2), rtol=1e-5)
+    mixed = thick(state, 0.5, 0.3, 0.0, 0.2)
+    for radii, each in (((0.5, 0.3, 0.0, 0.2), mixed), ((0.0,) * 4, thick(state, 0.0))):
+        placed = Placed(Frame(each))
+        actuators = by_name(Legs(services).updates(placed))["/legs/actuators"]
+        # The cylinder, rod, collar and socket of each leg.
+        drawn = actuators["batched_scales"][:, 0].reshape(4, 4)
+        for leg, radius in enumerate(radii):
+            most = placed.scale * radius if radius else AXIS_RADIUS * placed.thickness
+            assert drawn[:, leg].max() == pytest.approx(most)
+        figure = clearance_figure(Frame(each))
+        assert ("axes only" in figure) == (not any(radii))
 
 
 def test_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
@@ -621,7 +621,7 @@ def test_tetrahedra_of_the_last_move_are_drawn(services: Services) -> None:
         viewed(thick(swept(open_state(OPTIMAL)), 0.3), swept=False, legs=False),
     ],
 )
-def test_clearances_capsules_and_tetrahedra_are_hidden_where_they_are_not_wanted(
+def test_clearances_and_tetrahedra_are_hidden_where_they_are_not_wanted(
     services: Services, state: State
 ) -> None:
     for scene in (ClearanceScene(services), SweptTetrahedra(services)):

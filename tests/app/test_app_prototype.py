@@ -16,8 +16,15 @@ from services import StubWorker
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs
 from explorer.app.features.mechanism.marks import DragHandle
+from explorer.app.features.prototype.building import (
+    BUILD_FEED,
+    FITTING,
+    MEND,
+    STROKES,
+    BuildVerdict,
+    strokes_table,
+)
 from explorer.app.features.prototype.feature import (
-    FIT,
     PrototypePanel,
     PrototypeScene,
     places_of,
@@ -31,18 +38,20 @@ from explorer.app.features.prototype.work import (
     parts_to_draw,
     stock_of,
 )
+from explorer.app.features.sharing.feature import ExportDialog
 from explorer.app.scene.placing import Placed
-from explorer.app.state.actions import Open, SetPose, SetPosition, SetVariable, draw_as
+from explorer.app.state.actions import Open, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
 from explorer.app.state.view import PrototypeView
 from explorer.app.widgets.assigning import Assigner
+from explorer.app.widgets.markup import status
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.prototype.assembly import bill_of_materials, make_prototype
 from explorer.prototype.chains import LEGS, ON_GUIDE, Places
-from explorer.prototype.fitting import broken_joint_limits
+from explorer.prototype.fitting import broken_joint_limits, buildability
 from explorer.singularity.colours import OUTLINE
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -257,37 +266,53 @@ def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed
     trouble = trouble_of(frame, feed)
     assert str(refusal.value)[1:] in trouble
     assert "carriages 2 and 3" in trouble
-    # In this home pose no unit helps, so that none is offered.
-    home = Pose.of_yaw_pitch_roll((10, 5, 9), (90, 0, 0))
-    turned = Frame(with_prototype(open_state(msgspec.structs.replace(OPTIMAL, home=home))))
-    feed.follow(turned)
-    assert parts_to_draw(feed) is None
-    assert FIT not in trouble_of(turned, feed)
     feed.follow(Frame(with_prototype()))
     assert parts_to_draw(feed) is not None
     assert trouble_of(Frame(with_prototype()), feed) == ""
 
 
-def test_press_sets_the_unit_with_which_the_parts_fit(
-    desk: Desk, services: Services, feed: PartsFeed
+# Whether the machine can be built
+
+
+@pytest.mark.parametrize("unit", [OPTIMAL.unit_mm, 3.0])
+def test_verdict_is_the_same_everywhere_and_its_presses_mend_what_it_names(
+    desk: Desk, services: Services, unit: float
 ) -> None:
-    panel = PrototypePanel(services)
-    desk.session.do(draw_as("prototype"))
-    tight = msgspec.structs.replace(OPTIMAL, unit_mm=3.0)
-    desk.session.do(Open(tight))
-    feed.follow(Frame(desk.state))
-    assert parts_to_draw(feed) is None
-    words = " ".join(str(value) for _, _, value in panel.updates(Frame(desk.state)))
-    desk.press(services.buttons, FIT)
-    unit = desk.state.design.unit_mm
-    assert unit > tight.unit_mm
-    assert f"Set the unit to {unit:g} mm" in words
-    feed.follow(Frame(desk.state))
-    assert parts_to_draw(feed) is not None
-    # Without a refusal a late press does nothing.
-    before = desk.state
-    desk.press(services.buttons, FIT)
-    assert desk.state == before
+    panels = PrototypePanel(services), ExportDialog(services)
+    feed, verdict = services.get(BUILD_FEED), services.get(BuildVerdict)
+
+    def show(state: State) -> str:
+        feed.follow(Frame(state))
+        words = verdict.html()
+        for panel in panels:
+            assert any(words in str(value) for *_, value in panel.updates(Frame(state)))
+        return words
+
+    desk.session.do(Open(msgspec.structs.replace(OPTIMAL, unit_mm=unit)))
+    if unit != OPTIMAL.unit_mm:
+        assert "Carriages 2 and 3 at home are 2.01 mm apart and need 2.6 mm." in show(desk.state)
+        assert ">Set the unit to 3.89 mm<" in show(desk.state)
+        assert "Buildable" in verdict.in_bar(Frame(desk.state))
+        desk.press(services.buttons, MEND, FITTING)
+        assert desk.state.design == msgspec.structs.replace(OPTIMAL, unit_mm=3.89)
+        # What was found for the design before the press does nothing to this one.
+        desk.press(services.buttons, MEND, FITTING)
+        assert desk.state.design.unit_mm == 3.89
+    assert "Strokes too short" in show(desk.state)
+    assert verdict.in_bar(Frame(desk.state)) == ""
+    assert strokes_table(buildability(desk.state.design)).count("ex-beyond") == len(LEGS)
+    desk.press(services.buttons, MEND, STROKES)
+    assert status("Buildable", "within") in show(desk.state)
+    assert "ex-beyond" not in strokes_table(buildability(desk.state.design))
+    assert desk.state.design.home_pose == OPTIMAL.home_pose
+
+
+def test_parts_that_no_unit_mends_have_no_press_but_advice(services: Services) -> None:
+    feed = services.get(BUILD_FEED)
+    feed.follow(Frame(thick(open_state(OPTIMAL), 0.4)))
+    words = services.get(BuildVerdict).html()
+    assert "It fits with legs of radius at most 3.24 mm." in words
+    assert "<button" not in words
 
 
 def test_pose_beyond_the_joint_limits_of_the_parts_is_reported(feed: PartsFeed) -> None:

@@ -183,10 +183,8 @@ class Rods(Instances):
 class Balls(Instances):
     """Spheres."""
 
-    def __init__(
-        self, scene: viser.SceneApi, name: str, colours: list[Rgb], *, opacity: float | None = None
-    ) -> None:
-        super().__init__(scene, name, sphere(), colours, opacity=opacity)
+    def __init__(self, scene: viser.SceneApi, name: str, colours: list[Rgb]) -> None:
+        super().__init__(scene, name, sphere(), colours)
 
     def at(self, centres: FloatArray, radii: FloatArray) -> Iterator[Update]:
         """Yield the updates that put the spheres at centres (n, 3)."""

@@ -14,9 +14,6 @@ from explorer.app.scene.placing import Placed, ScenePart
 from explorer.app.scene.shapes import (
     SWEPT,
     TETRAHEDRON_FACES,
-    TUBE,
-    Balls,
-    Rods,
     add_label,
     add_lines,
     add_translucent,
@@ -29,7 +26,7 @@ from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.markup import alert, box, dim, row, sentence, swatch, table
 from explorer.app.widgets.under_way import UnderWay, problem, progress
-from explorer.legs.clearance import PAIRS, leg_axes, legs_of, pair_name
+from explorer.legs.clearance import PAIRS, legs_of, pair_name
 from explorer.legs.interference import swept_tetrahedra
 from explorer.measures.blocks.block import Statement
 from explorer.measures.blocks.clearances import move_clearances, pose_clearances
@@ -254,25 +251,16 @@ EDGES = np.array([edge for edge in itertools.combinations(range(4), 2) if edge !
 
 
 class ClearanceScene(ScenePart):
-    """The shortest line between the axes of the closest legs, and a capsule for each leg."""
+    """The shortest line between the axes of the closest legs, and their clearance."""
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
         self._line = add_lines(scene, "/clearance/line", 1, OUTLINE, 4.0)
         self._label = add_label(scene, "/clearance/label", "0", visible=False)
-        self._rods = Rods(scene, "/clearance/rods", [TUBE] * 4, opacity=OPACITY)
-        self._ends = Balls(scene, "/clearance/ends", [TUBE] * 8, opacity=OPACITY)
 
     def updates(self, placed: Placed) -> Updates:
-        """Yield the updates that draw the closest pair and the capsules of this frame."""
+        """Yield the updates that draw the closest pair of this frame."""
         state, snapshot = placed.frame.state, placed.frame.snapshot
-        radii = placed.leg_radii
-        has_radii = state.view.legs and not state.view.is_twin and bool(radii.any())
-        yield from show(has_radii, self._rods, self._ends)
-        if has_radii:
-            axes = placed.scale * leg_axes(snapshot)
-            yield from self._rods.between(axes[:, 0], axes[:, 1], radii)
-            yield from self._ends.at(axes.reshape(-1, 3), np.repeat(radii, 2))
         is_visible = state.view.clearance and not state.view.is_twin
         yield from show(is_visible, self._line, self._label)
         if is_visible:

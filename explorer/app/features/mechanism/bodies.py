@@ -42,7 +42,7 @@ AXIS_RADIUS = 0.06
 PIN_RADIUS, PIN_HALF_LENGTH = 0.085, 0.34
 POINT_RADIUS, LINE_RADIUS = 0.36, 0.075
 # Radii of an actuator's cylinder, rod, collar and socket, over that of its leg.
-SHARES = (0.85, 0.5, 1.0, 0.9)
+SHARES = (0.94, 0.75, 1.0, 0.9)
 # Length of an actuator's cylinder, which does not depend on its stroke, as a share of the reach.
 TUBE_SHARE = 0.34
 PLANE_OPACITY = 0.2
