@@ -50,10 +50,9 @@ class Panels:
             self._tabs[key] = self._panel(tab.place).add_tab(tab.title, tab.icon)
             if manual:
                 hint = f"Read about {tab.title} in the manual."
+                button = press_button(MANUAL, manual, "?", label=hint, class_name="ex-asks")
                 with self._tabs[key]:
-                    self._gui.add_html(
-                        press_button(MANUAL, manual, "?", label=hint, class_name="ex-asks")
-                    )
+                    self._gui.add_html(button)
         return self._tabs[key]
 
     def titles(self, place: Place) -> list[str]:

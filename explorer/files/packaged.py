@@ -44,28 +44,6 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version(), "flagged-explorer": __version__, **numerical}
 
 
-MANUAL_FILES = (
-    "glossary.md",
-    "mechanism.md",
-    "page.md",
-    "workspace.md",
-    "orientation.md",
-    "singularity.md",
-    "legs.md",
-    "loads.md",
-    "precision.md",
-    "optimise.md",
-    "claims.md",
-    "studies.md",
-    "prototype-and-export.md",
-    "cad.md",
-    "command-line.md",
-    "python.md",
-    "files.md",
-    "network.md",
-)
-
-
 class ManualPage(NamedTuple):
     """A page of the manual: its first heading, and its file's name, the argument of `read_page`."""
 
@@ -74,9 +52,11 @@ class ManualPage(NamedTuple):
 
 
 def list_pages() -> tuple[ManualPage, ...]:
-    """Return the pages of the manual in the order to read them; the glossary is the first."""
-    titles = (read_page(file).partition("\n")[0].removeprefix("# ") for file in MANUAL_FILES)
-    return tuple(map(ManualPage, titles, MANUAL_FILES))
+    """Return the pages of the manual, the glossary first, the others by file name."""
+    files = sorted(_manual_files().values(), key=lambda file: file.name != "glossary.md")
+    return tuple(
+        ManualPage(file.read_text("utf-8").split("\n")[0][2:], file.name) for file in files
+    )
 
 
 def read_page(file: str) -> str:
@@ -85,8 +65,11 @@ def read_page(file: str) -> str:
     Raises:
         InputError: The manual has no such page.
     """
-    if file not in MANUAL_FILES:
-        raise InputError(
-            f"the manual has no page {file!r}; its pages are {', '.join(MANUAL_FILES)}"
-        )
-    return packaged_file("manual", file).read_text(encoding="utf-8")
+    files = _manual_files()
+    if file not in files:
+        raise InputError(f"the manual has no page {file!r}; its pages are {', '.join(files)}")
+    return files[file].read_text("utf-8")
+
+
+def _manual_files() -> dict[str, Traversable]:
+    return {file.name: file for file in packaged_files("manual", ".md")}

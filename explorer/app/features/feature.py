@@ -23,7 +23,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.storage.user_data import Autosaver, PreferenceFile, UserData
 from explorer.app.widgets.assigning import Updates
-from explorer.app.widgets.buttons import Buttons, CopyButton, press_button
+from explorer.app.widgets.buttons import Buttons, copy_button, press_button
 from explorer.app.widgets.markup import dim
 from explorer.app.widgets.palette import Command, Key
 from explorer.app.widgets.theme import Theme
@@ -172,7 +172,7 @@ class Services:
 
     def copy_button(self, answer: str, source_of: Callable[[State], Source]) -> str:
         """Add the button that copies how an answer in a state is computed; return it as HTML."""
-        return CopyButton(self.buttons, answer, lambda: source_of(self.session.latest_state())).html
+        return copy_button(self.buttons, answer, lambda: source_of(self.session.latest_state()))
 
 
 def show(visible: bool, *parts: Any) -> Updates:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Container
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from html import escape
 
 import msgspec
@@ -114,7 +114,8 @@ class Buttons:
             # A page that is being closed takes no more presses.
             with contextlib.suppress(RuntimeError):
                 handled = self._thread.submit(self.press, press.name, press.value, client)
-                handled.add_done_callback(_raise_failure)
+                # Raises what a press failed with, so that it is logged with its trace.
+                handled.add_done_callback(lambda done: done.cancelled() or done.result())
 
     def press(self, name: str, value: str, client: viser.ClientHandle) -> None:
         """Handle a press on the button with a name and a value; do nothing if there is none."""
@@ -125,12 +126,6 @@ class Buttons:
     def stop(self) -> None:
         """End the thread on which presses are handled."""
         self._thread.shutdown(wait=False, cancel_futures=True)
-
-
-def _raise_failure(handled: Future[None]) -> None:
-    """Raise the exception of handling a press, so that it is logged with its trace."""
-    if not handled.cancelled():
-        handled.result()
 
 
 def press_button(
@@ -227,22 +222,16 @@ ICON = (
 )
 
 
-class CopyButton:
-    """The button of a panel that copies how its answer is computed.
+def copy_button(buttons: Buttons, answer: str, source: Callable[[], Source]) -> str:
+    """Return the button of a panel that copies how its answer is computed, as HTML.
 
     Args:
         buttons: Buttons of the page.
         answer: Name of the answer, from the tab on, such as "Loads › Forces".
         source: Function that returns how the present answer is computed.
     """
-
-    def __init__(self, buttons: Buttons, answer: str, source: Callable[[], Source]) -> None:
-        self._name, self._source = f"{answer.rsplit(STEP, maxsplit=1)[-1].lower()}.copy", source
-        buttons.on(self._name, self._copy)
-        buttons.offer(f"{answer}{STEP}Copy the command line", HINT, self._name)
-        self.html = press_button(
-            self._name, "", ICON, hint=HINT, label="Copy the command line", class_name="ex-copy"
-        )
-
-    def _copy(self, _: str, client: viser.ClientHandle) -> None:
-        run_script_in(client, read_script("copies", self._source().text))
+    name = f"{answer.rsplit(STEP, maxsplit=1)[-1].lower()}.copy"
+    label = "Copy the command line"
+    buttons.on(name, lambda _, client: run_script_in(client, read_script("copies", source().text)))
+    buttons.offer(f"{answer}{STEP}{label}", HINT, name)
+    return press_button(name, "", ICON, hint=HINT, label=label, class_name="ex-copy")

@@ -48,9 +48,6 @@ def shift(key: str) -> Key:
     return Key(key, "shift")
 
 
-PAGE = "Page"
-"""First part of the names of commands of the whole page."""
-
 NAMED_WITH_FOLDER = frozenset({"Free variables", "Tetrahedra"})
 """Folders whose title is part of the names of their switches."""
 
@@ -205,12 +202,15 @@ def commands_of(widget: Widget, lists: Container[str] = ()) -> Iterator[Command]
         yield Command(name, widget.hint, use, lambda: widget.is_in_use, stands_alone=False)
 
 
-def group_of(command: Command) -> str:
-    """Return the first part of a command's name, such as its tab."""
-    return command.label.split(STEP)[0]
-
-
 Kind = Literal["button", "choice", "switch", "list", "upload", "value"]
+KINDS: Mapping[type, Kind] = {
+    viser.GuiUploadButtonHandle: "upload",
+    viser.GuiButtonGroupHandle: "choice",
+    viser.GuiButtonHandle: "button",
+    viser.GuiCheckboxHandle: "switch",
+    viser.GuiDropdownHandle: "list",
+}
+"""Kinds of controls by the class of their handles in viser; the others hold a value."""
 
 
 @dataclass(frozen=True)
@@ -277,23 +277,7 @@ def widgets(server: viser.ViserServer) -> Iterator[Widget]:
     for handle in tuple(gui._gui_input_handle_from_uuid.values()):
         containers = tuple(_containers(handle))
         titles = tuple(title for container in containers if (title := _title(container)))
-        yield Widget(handle, _kind(handle), titles[::-1], containers)
-
-
-def _kind(handle: Any) -> Kind:
-    match handle:
-        case viser.GuiUploadButtonHandle():
-            return "upload"
-        case viser.GuiButtonGroupHandle():
-            return "choice"
-        case viser.GuiButtonHandle():
-            return "button"
-        case viser.GuiCheckboxHandle():
-            return "switch"
-        case viser.GuiDropdownHandle():
-            return "list"
-        case _:
-            return "value"
+        yield Widget(handle, KINDS.get(handle.__class__, "value"), titles[::-1], containers)
 
 
 def _containers(handle: Any) -> Iterator[Any]:
@@ -313,6 +297,4 @@ def _containers(handle: Any) -> Iterator[Any]:
 def _title(container: Any) -> str | None:
     if isinstance(container, viser.GuiTabHandle):
         return str(getattr(container, "_label"))  # noqa: B009 - private
-    if isinstance(container, viser.GuiFolderHandle):
-        return container.label
-    return None
+    return container.label if isinstance(container, viser.GuiFolderHandle) else None

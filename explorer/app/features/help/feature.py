@@ -14,24 +14,18 @@ from explorer.app.features.help.tour import TourGuide
 from explorer.app.state.frame import Frame
 from explorer.app.widgets import palette
 from explorer.app.widgets.assigning import Updates
-from explorer.app.widgets.buttons import open_button, press_button
+from explorer.app.widgets.buttons import MANUAL, open_button, press_button
 from explorer.app.widgets.markup import box, caption, dim
 
 PRESS = "page"
 KEYS = {"Theme": (palette.shift("L"),), "Keys": (palette.Key("K"),)}
 HINTS = {
-    "Tour": "Do five steps, from the first move to an optimised design.",
-    "Manual": "Read the manual beside the scene.",
+    "Tour": "Five steps, from the first move to a better design.",
     "Keys": "Show all keys.",
     "Theme": "Turn the page dark, or light again.",
 }
 # Keys and pointers with which viser moves the camera.
-CAMERA = (
-    ("drag, arrows", "Turn"),
-    ("right drag", "Move"),
-    ("wheel", "Zoom"),
-    ("W A S D Q E", "Fly"),
-)
+CAMERA = {"Turn": "drag, arrows", "Move": "right drag", "Zoom": "wheel", "Fly": "W A S D Q E"}
 
 
 class HelpButtons:
@@ -41,17 +35,13 @@ class HelpButtons:
         self._services = services
         presses: dict[str, Callable[[viser.ClientHandle], None]] = {
             "Tour": services.get(TourGuide).begin,
-            "Manual": services.get(ManualReader).toggle,
             "Keys": lambda client: run_script_in(client, 'window.explorer.open("Help")'),
             "Theme": self._toggle_theme,
         }
         buttons = services.buttons
         buttons.on(PRESS, lambda name, client: presses[name](client), values=presses)
-        for name in presses:
-            keys = KEYS.get(name, ())
-            buttons.offer(
-                f"{palette.PAGE}{palette.STEP}{name}", HINTS[name], PRESS, name, keys=keys
-            )
+        for name, hint in HINTS.items():
+            buttons.offer(f"Page › {name}", hint, PRESS, name, keys=KEYS.get(name, ()))
         commands = open_button(
             "commands",
             f"Search {keycap(str(palette.PALETTE_KEY))}",
@@ -59,7 +49,12 @@ class HelpButtons:
             class_name="ex-tool ex-commands",
         )
         theme = press_button(
-            PRESS, "Theme", "◐", hint=hint_of("Theme"), label="Theme", class_name="ex-tool"
+            PRESS,
+            "Theme",
+            "◐",
+            hint=palette.with_keys(HINTS["Theme"], KEYS["Theme"]),
+            label="Theme",
+            class_name="ex-tool",
         )
         help_ = open_button("Help", "Help", hint="Tour, manual and keys.", class_name="ex-tool")
         self._markup = f"{commands}{theme}{help_}"
@@ -78,14 +73,12 @@ class HelpDialog:
     """The tour, the manual, and all keys of the page."""
 
     def __init__(self, services: Services) -> None:
-        buttons = {
-            name: press_button(PRESS, name, name, class_name="ex-button")
-            for name in ("Tour", "Manual")
-        }
-        self._rows = "".join(
-            f'<div class="ex-row" data-closes>{button}{dim(hint_of(name))}</div>'
-            for name, button in buttons.items()
+        buttons = (
+            press_button(PRESS, "Tour", "Tour", class_name="ex-button") + dim(HINTS["Tour"]),
+            press_button(MANUAL, "page.md", "Manual", class_name="ex-button")
+            + dim("All pages, beside the scene."),
         )
+        self._rows = "".join(f'<div class="ex-row" data-closes>{each}</div>' for each in buttons)
         self._html = services.gui.add_html("")
         self._services = services
         self._markup = ""
@@ -96,11 +89,6 @@ class HelpDialog:
         yield self._html, "content", self._markup
 
 
-def hint_of(name: str) -> str:
-    """Return the hint of a button, with its keys."""
-    return palette.with_keys(HINTS[name], KEYS.get(name, ()))
-
-
 def keycap(key: str) -> str:
     """Return a drawn key, as HTML."""
     return f'<kbd class="ex-keycap">{escape(key)}</kbd>'
@@ -108,13 +96,14 @@ def keycap(key: str) -> str:
 
 def keys_table(commands: Iterable[palette.Command]) -> str:
     """Return all keys as HTML, in the groups of their commands and in two columns."""
-    groups = {palette.PAGE: [_row("Search commands and manual", keycap(str(palette.PALETTE_KEY)))]}
+    groups = {"Page": [_row("Search commands and manual", keycap(str(palette.PALETTE_KEY)))]}
     for command in commands:
         if command.keys:
             caps = " ".join(keycap(str(key)) for key in command.keys)
-            words = command.label.partition(palette.STEP)[2].replace(palette.STEP, ", ")
-            groups.setdefault(palette.group_of(command), []).append(_row(words, caps))
-    groups["Camera"] = [_row(words, keycap(keys)) for keys, words in CAMERA]
+            group, _, words = command.label.partition(palette.STEP)
+            row = _row(words.replace(palette.STEP, ", "), caps)
+            groups.setdefault(group, []).append(row)
+    groups["Camera"] = [_row(words, keycap(keys)) for words, keys in CAMERA.items()]
     blocks = (f"<div>{caption(name)}{''.join(rows)}</div>" for name, rows in groups.items())
     return f'<div class="ex-keys">{"".join(blocks)}</div>'
 

@@ -22,7 +22,8 @@ CLOSE = "help.close"
 LEFT, TOP, WIDTH, HEIGHT = 300, 60, 560, 640
 PAGES = {page.title: page.file for page in list_pages()}
 TITLES = {file: title for title, file in PAGES.items()}
-LINK = re.compile(r"!?\[([^\]]+)\]\(([^)#]+)(?:#[^)]*)?\)")
+PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)")
+LINK = re.compile(r"\[([^\]]+)\]\(([^)#]+)(?:#[^)]*)?\)")
 # A heading, or a term with the first sentence on it; an initial with its point ends no sentence.
 HEADING = re.compile(r"^##+ (.+)$", re.MULTILINE)
 TERM = re.compile(r"\*\*([^*]+)\.\*\* (.+?[^A-Z]\.)(?:\s|$)", re.DOTALL)
@@ -59,21 +60,12 @@ class ManualReader:
         self._manuals: dict[int, _Manual] = {}
         self._lock = threading.Lock()
         services.buttons.on(MANUAL, self.open, values={target for _, _, target in list_entries()})
-        services.buttons.on(CLOSE, lambda _, client: self.toggle(client))
+        services.buttons.on(CLOSE, lambda _, client: self._close(client))
         services.server.on_client_disconnect(self._forget)
         self.commands = tuple(
             Command(label, does, lambda client, target=target: self.open(target, client))
             for label, does, target in list_entries()
         )
-
-    def toggle(self, client: viser.ClientHandle) -> None:
-        """Open the manual in a browser, or close it there."""
-        with self._lock:
-            manual = self._manuals.pop(client.client_id, None)
-        if manual is None:
-            self.open(next(iter(TITLES)), client)
-        else:
-            manual.panel.remove()
 
     def open(self, target: str, client: viser.ClientHandle) -> None:
         """Open a page of the manual in a browser, at its heading or term if the target has one."""
@@ -86,6 +78,11 @@ class ManualReader:
             show_value(manual.choice, title)
             manual.page.content = markdown_of(file)
         run_script_in(client, read_script("manual", title, words or title))
+
+    def _close(self, client: viser.ClientHandle) -> None:
+        manual = self._manuals.pop(client.client_id, None)
+        if manual is not None:
+            manual.panel.remove()
 
     def _forget(self, client: viser.ClientHandle) -> None:
         self._manuals.pop(client.client_id, None)
@@ -111,10 +108,7 @@ def markdown_of(file: str) -> str:
     """Return the Markdown of a page without pictures, and with its links as buttons."""
 
     def button(match: re.Match[str]) -> str:
-        words, target = match.groups()
-        if target not in TITLES:
-            return "" if match.group().startswith("!") else match.group()
-        link = press_button(MANUAL, target, words, class_name="ex-link")
+        link = press_button(MANUAL, match[2], match[1], class_name="ex-link")
         return link.replace(' class="', ' className="')
 
-    return LINK.sub(button, read_page(file))
+    return LINK.sub(button, PICTURE.sub("", read_page(file)))

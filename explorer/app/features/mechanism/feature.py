@@ -124,7 +124,7 @@ class MovePanel:
                 )
             controls.button(
                 "Home pose",
-                "Return to the pose that the design opens with.",
+                "Return to the home pose, with which the design opens.",
                 actions.GoHome,
                 icon=viser.Icon.HOME,
             )

@@ -148,6 +148,7 @@ def export_button(_: Frame) -> str:
 
 SHARING = Feature(
     "sharing",
+    manual="cad.md",
     tabs=(Tab("dialog", "Export", ExportDialog),),
     bar=(InBar("right", lambda _: export_button),),
     exports=(

@@ -13,14 +13,19 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets import markup
 from explorer.app.widgets.blocks import content_of
+from explorer.app.widgets.buttons import MANUAL, press_button
 from explorer.app.widgets.under_way import problem, progress
 from explorer.export.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
 from explorer.measures.blocks.clearances import workspace_clearances
+from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import BAND_EDGES, band_colours, css
 from explorer.statics.reactions import has_limits
 from explorer.workspace.position_bands import MEASURE_WORDS, SHARE_COLOURS, SHARES, STEP_COLOURS
+
+CLAIM = "claims.md#The designs of Table 1 have the printed extents and a volume of 7992."
+"""The place in the manual that explains the paper's volume of its optimum."""
 
 
 def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume]) -> str:
@@ -42,9 +47,16 @@ def volume_headline(frame: Frame, feed: Feed[work.Selection, work.MeasuredVolume
         return (
             f'<div class="ex-line"><span class="ex-large">{volume_text(newest)}</span>{error}</div>'
             + markup.caption(f"{cubic_cm} cm³ ({text} l) {where}{of_tool}")
+            + (_paper_words() if design == PRESETS["paper-optimal"] else "")
         )
 
     return html_of(feed, words, "The volume could not be computed")
+
+
+def _paper_words() -> str:
+    """Return what the paper says of the volume of its optimum, as HTML."""
+    why = press_button(MANUAL, CLAIM, "why", class_name="ex-link")
+    return f"<div>{markup.dim(f'The paper counts 7,992 units³ by nodes of a grid: {why}')}</div>"
 
 
 def drawing_words(frame: Frame, feed: Feed[work.WorkspaceRequest, work.WorkspaceDrawing]) -> str:
