@@ -55,11 +55,8 @@ TITLES: dict[Kind, str] = {
 class Warnings(NamedTuple):
     """The values below which a pose counts as near a singularity.
 
-    Attributes:
-        margin: Warning length of a margin, in design units.
-        distance: Warning length of the distance to a singular pose, in design units.
-        turn: Warning angle of the least turn to an incidence, in radians.
-        condition: Warning value of the inverse condition number of J.
+    They are lengths of a margin and of the distance to a singular pose, in design units, the angle
+    of the least turn to an incidence, in radians, and the inverse condition number of J.
     """
 
     margin: float

@@ -203,11 +203,9 @@ def _closing_intervals(
 
 
 class PossibleRanges(NamedTuple):
-    """Outer bounds (low, high), in design units; low exceeds high where limits contradict.
+    """Outer bounds (low, high) of the joints, as in `JOINTS`, and of x, y and z of b4 in the base.
 
-    Attributes:
-        joints: Of the joints, in the order of `JOINTS`.
-        position: Of x, y and z of b4 in the base frame.
+    They are in design units; low exceeds high where limits contradict.
     """
 
     joints: tuple[Pair, Pair, Pair, Pair, Pair, Pair]

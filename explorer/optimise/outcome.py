@@ -110,14 +110,9 @@ class RunRecord(RunSummary, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of an optimisation.
+    """The result of an optimisation: the run from each start, the chosen one of which is the best.
 
-    Attributes:
-        problem: The problem.
-        runs: Run from each start.
-        chosen: Index of the best run.
-        history: Every iterate, in order.
-        seconds: Duration in seconds.
+    The history has every iterate, in order; the duration is in seconds.
     """
 
     problem: Problem
@@ -278,13 +273,9 @@ LEAST = 1e-16
 
 @dataclass(frozen=True)
 class Curve:
-    """Values of the iterates of one start.
+    """Values of a quantity of the iterates of one start, shape (n,); NaN for an infinite one.
 
-    Attributes:
-        kind: Quantity of the values.
-        values: Value of each iterate, shape (n,); NaN for an infinite one.
-        level: Value to compare the others with, or None.
-        powers: Whether the values are exponents of ten.
+    The level is a value to compare the others with; powers are exponents of ten.
     """
 
     kind: Literal["objective", "volume", "spare"]

@@ -238,13 +238,10 @@ def _facing(shape: Shape, sizes: Sizes) -> Shape:
 
 @dataclass(frozen=True)
 class Part:
-    """A part, in design units.
+    """A part, such as "cylinder 2", of a body out of `explorer.prototype.chains.BODIES`.
 
-    Attributes:
-        name: Unique name, such as "cylinder 2".
-        body: Body that it belongs to, one of `explorer.prototype.chains.BODIES`.
-        vertices: Vertices in the frame of the body, shape (n, 3).
-        faces: Indices of vertices, counter-clockwise from outside, shape (m, 3).
+    Its vertices (n, 3) are in the frame of the body, in design units; its faces (m, 3) are
+    counter-clockwise from outside.
     """
 
     name: str

@@ -49,13 +49,10 @@ def scene_scale(state: State) -> float:
 
 @dataclass(frozen=True)
 class Placed:
-    """A frame with its points in scene units.
+    """A frame that is drawn, with its points in scene units, on a page that may be dark.
 
-    Attributes:
-        frame: The frame that is drawn.
-        dark: Whether the page is dark.
-        floor: Height, in design units, of the lowest point of what is drawn in place of the
-            schematic legs and bodies; None while these are drawn.
+    The floor is the height, in design units, of the lowest point of what is drawn in place of the
+    schematic legs and bodies; None while these are drawn.
     """
 
     frame: Frame

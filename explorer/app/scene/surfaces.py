@@ -60,15 +60,10 @@ class Shell:
 
 @dataclass(frozen=True)
 class Colouring:
-    """A colouring of positions by a measure, at one orientation.
+    """A colouring of positions by a measure, at one orientation, platform to base, shape (3, 3).
 
-    Attributes:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        measure: Measure that gives the colours.
-        warn_below: Length below which margins raise a warning, in design units.
-        load: (F; M) at the tool point besides the payload, base axes, shape (6,), in N and
-            N × unit; None for none.
+    The length below which margins raise a warning is in design units. The load (F; M), besides the
+    payload, acts at the tool point, along base axes, in N and N × unit; None for none.
     """
 
     design: Design
@@ -135,13 +130,10 @@ class Colouring:
 
 @dataclass
 class _Bands:
-    """Triangles that are split at levels of a value.
+    """Triangles (m, 3) of vertices (n, 3) that are split at levels of a value.
 
-    Attributes:
-        vertices: Positions, shape (n, 3).
-        triangles: Indices of vertices, shape (m, 3).
-        values: Values at the vertices, shape (n,).
-        value: Function from points (n, 3) to values (n,); None if it is linear on each triangle.
+    The vertices have values (n,); the function from points to values is None if it is linear on
+    each triangle.
     """
 
     vertices: FloatArray

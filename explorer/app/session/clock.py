@@ -20,15 +20,9 @@ pending: set[object] = set()
 
 
 class Pause:
-    """A call after a pause, on a thread of its own, unless the program ends before.
+    """A call of a function with arguments after a pause, on a thread of its own.
 
-    Args:
-        seconds: The pause.
-        call: Function to call.
-        arguments: Its arguments.
-
-    Attributes:
-        due: Time of this clock at which the last pause is over.
+    There is none if the program ends before. The last pause is over when this clock shows `due`.
     """
 
     def __init__(self, seconds: float, call: Callable[..., None], *arguments: object) -> None:

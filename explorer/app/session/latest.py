@@ -14,15 +14,10 @@ Item = TypeVar("Item")
 
 
 class LatestWins(Generic[Item]):
-    """A thread that handles what is posted, the newest item of each key only.
+    """A thread, with a name, that handles what is posted, the newest item of each key only.
 
-    Args:
-        handle: Called with all items that wait, in the order of their stamps. An exception
-            from it ends the thread, so it must not raise any.
-        name: Name of the thread.
-
-    Attributes:
-        is_stopped: Whether the thread has been told to end.
+    `handle` is called with all items that wait, in the order of their stamps. An exception from it
+    would end the thread, so it must not raise any.
     """
 
     def __init__(self, handle: Callable[[Sequence[Item]], None], name: str) -> None:

@@ -44,11 +44,8 @@ POINTS: dict[Point, str] = {"b4": "b4", "tool": "the tool"}
 class Unclosed:
     """Joints that were asked for and cannot close; the mechanism keeps its last pose.
 
-    Attributes:
-        joint: Index of the joint that was moved.
-        asked: The value it was moved to.
-        nearest: The nearest value that closes, the others as they are; None if none is.
-        failing: Which of the three trilaterations have no solution, 0 to 2.
+    The joint that was moved is given by its index, and the nearest value that closes is None if
+    none is. Failing are those of the three trilaterations, 0 to 2, that have no solution.
     """
 
     joint: Annotated[int, msgspec.Meta(ge=0, le=5)]
@@ -71,11 +68,9 @@ class Unclosed:
 
 @dataclass(frozen=True)
 class GivenFolds:
-    """The folds of a pose as the user set them.
+    """The folds of a pose as the user set them: r in design units, the angles in degrees.
 
-    Attributes:
-        folds: r in design units and β, ε, φ1, φ2, φ3 in degrees.
-        pose: The pose that they led to; they count while it is the present one.
+    They count while the pose that they led to is the present one.
     """
 
     folds: Folds

@@ -18,15 +18,9 @@ BRAND_ON_DARK: Rgb = (104, 162, 236)
 
 
 class Theme:
-    """The theme of the page.
+    """The theme of the page, that of the first browser unless it is given at the start.
 
-    Args:
-        gui: Controls of the page.
-        dark: Whether the page is dark; None to follow the first browser.
-        changed: Called after a change.
-
-    Attributes:
-        is_dark: Whether the page is dark.
+    `changed` is called after a change.
     """
 
     def __init__(

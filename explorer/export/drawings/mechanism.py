@@ -61,12 +61,9 @@ def _axes(name: ViewName) -> FloatArray:
 
 @dataclass(frozen=True)
 class Projection:
-    """A view, scaled and moved to its place on paper.
+    """A view, with its scale in points of paper per design unit and its place on paper, (2,).
 
-    Attributes:
-        axes: Right, up and towards the eye, in rows, shape (3, 3).
-        scale: Points of paper per design unit.
-        offset: Position of the origin of space on paper, shape (2,).
+    The rows of its axes, (3, 3), are right, up and towards the eye.
     """
 
     axes: FloatArray

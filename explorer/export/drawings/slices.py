@@ -46,13 +46,10 @@ NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY = OUTLINE, 0.38
 
 @dataclass(frozen=True)
 class Slices:
-    """Slices of the workspace of a design at one orientation.
+    """Slices of the workspace of a design at one orientation, platform to base, shape (3, 3).
 
-    Attributes:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        lows, highs: Corners of a box that holds the workspace, each of shape (3,).
-        bands: The measure that is drawn, in bands.
+    The lows and highs (3,) are corners of a box that holds the workspace; the measure that is drawn
+    is in bands.
     """
 
     design: Design

@@ -214,15 +214,10 @@ class Table(msgspec.Struct, frozen=True):
 
 
 class Fact(msgspec.Struct, frozen=True):
-    """A thing with its name.
+    """A thing with its name: what is known of it, more of it, and a sentence on what it is.
 
-    Attributes:
-        name: Its name.
-        words: What is known of it.
-        remark: More of it.
-        hint: Sentence on what it is.
-        act: Name of the button that stands beside it on the page.
-        wide: Whether it needs more room than the page has.
+    The button that stands beside it on the page has a name; it is wide if it needs more room than
+    the page has.
     """
 
     name: str
@@ -246,14 +241,10 @@ class Facts(msgspec.Struct, frozen=True):
 
 
 class Statement(msgspec.Struct, frozen=True):
-    """A result in a few words, and a sentence on it.
+    """A result in a few words, "" for none, and a sentence on it.
 
-    Attributes:
-        title: The result; "" for a sentence alone.
-        words: The sentence.
-        look: Whether something keeps its bounds.
-        hint: More of it.
-        act: Name of the button that stands beside the sentence on the page.
+    Its look says whether something keeps its bounds; the hint is more of it, and `act` the name of
+    the button that stands beside the sentence on the page.
     """
 
     title: Words

@@ -26,15 +26,10 @@ MISSED = 1e3
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A problem evaluated at one place.
+    """A problem evaluated at scaled variables u (n,), with its state there.
 
-    Attributes:
-        u: Scaled variables, shape (n,).
-        state: The problem there.
-        objective: Value to minimise, about of unit size.
-        slope: Derivatives of the objective, shape (n,).
-        values: Values of all demands, shape (m,).
-        gradients: Derivatives of the demands, shape (m, n).
+    The objective to minimise is about of unit size and has a slope (n,); the values of all demands
+    (m,) have gradients (m, n).
     """
 
     u: FloatArray

@@ -69,14 +69,10 @@ class Attempt(NamedTuple):
 
 @dataclass
 class Search:
-    """A run of the optimiser from one start.
+    """A run of the optimiser from values of the variables to start from.
 
-    Attributes:
-        problem: The problem.
-        start: Values of its variables to start from.
-        steps_left: Most steps of the solver.
-        trail: Record of every iterate.
-        to_beat: Best iterate of the runs so far that converged; None if none did.
+    It takes at most the steps left, and records every iterate in the trail. The iterate to beat is
+    the best of the runs so far that converged, if any did.
     """
 
     problem: Problem
