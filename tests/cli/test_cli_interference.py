@@ -122,25 +122,3 @@ def test_interference_verdict_separates_clear_touching_and_colliding(cli: Comman
     assert "Legs 2–3 touch: Least clearance: legs 2–3" in cli.text(
         "--quaternion", "1", "0", "0", "-1"
     )
-
-
-@pytest.mark.parametrize(
-    ("words", "reason"),
-    [
-        (["--to", "10", "5", "9"], "a move needs two poses that differ"),
-        (["--steps", "4"], "--to"),
-        (["--steps", "0", *MOVE], "--steps must lie within 1"),
-        ([*MOVE, "--to-quaternion", "1", "0", "0", "0"], "not both"),
-        (["--to-quaternion", "0", "0", "0", "0"], "quaternion"),
-        (["--to", "1", "2"], "--to needs three numbers in the order x y z; got 2"),
-        (["--to", "1e6", "2", "3"], "give their number with --steps"),
-        (["--radii", "-0.5"], "leg_radii must not be negative; got -0.5"),
-        (["--radii", "1", "2"], "--radii needs four numbers in the order r1 r2 r3 r4, or one"),
-        (["--radii", "nan"], "finite"),
-        (["--too", "1", "2", "3"], "did you mean --to?"),
-    ],
-)
-def test_interference_bad_input_is_refused_with_advice(
-    cli: CommandLine, words: list[str], reason: str
-) -> None:
-    assert reason in cli.refusal(*words)

@@ -185,25 +185,3 @@ def test_optimise_shows_infinite_loads_beside_finite_ones(
     assert few["converged"] is False
     assert few["objective"] is None or few["objective"] > 0.0
     assert not recwarn.list
-
-
-@pytest.mark.parametrize(
-    ("argv", "words"),
-    [
-        ([], "--target-volume"),
-        (["--target-volume", "9", "--bounds", "a3x=5:3"], "bounds of a3x cross"),
-        (["--target-volume", "9", "--bounds", "a3x=5:nan"], "must be a finite number; got nan"),
-        (["--target-volume", "9", "--bounds", "a3x=20:30"], "outside its bounds 20 to 30"),
-        (["--target-volume", "9", "--bounds", "a3x"], "NAME=LOW:HIGH"),
-        (["--target-volume", "9", "--bounds"], "needs at least one value"),
-        (["--target-volume", "9", "--free", "width"], "no variable 'width'"),
-        (["--target-volume", "9", "--box", "1", "2"], "--box needs six numbers"),
-        (["--target-volume", "9", "--box", "1", "2", "3", "0", "4", "5"], "box x"),
-        (["--target-volume", "9", "--out", "/nowhere/design.json"], "there is no folder"),
-        (["--repeat", "/nowhere/run.json"], "cannot read"),
-        (["--objective", "largest-margin"], "needs a required box"),
-        (["--objective", "largest"], "--objective"),
-    ],
-)
-def test_optimise_bad_input_is_one_line(cli: CommandLine, argv: list[str], words: str) -> None:
-    assert words in cli.refusal(*argv)

@@ -20,7 +20,6 @@ from explorer.statics.reactions import LIMITED
 COMMAND = ("path",)
 PRESET = explorer.PRESETS["paper-optimal"]
 HOME = PRESET.home_pose
-SIX = ("14", "45", "98", "-140", "-120", "60")
 
 
 def test_path_json_has_poses_and_trajectory(cli: CommandLine, tmp_path: Path) -> None:
@@ -83,31 +82,6 @@ def test_path_without_solution_has_status_1_and_reason(cli: CommandLine) -> None
     assert found == {"found": False, "reason": "other mode", "poses": []}
     refused = cli.refusal("--to", "12", "8", "-7", status=1)
     assert "mode 1 (− − +)" in refused
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--to", "40", "8", "7"], "the goal is outside the limits: "),
-        (["--from", "40", "8", "7", "--to", "12", "8", "7"], "the start is outside the limits"),
-        (["--to", "12", "8", "0"], "the goal is singular (a1 on the platform plane and"),
-        (["--to", "1", "2"], "--to needs a position x y z"),
-        ([], "say where the path ends with --to"),
-        (["--to", "12", "8", "7", "0", "0", "0", "--to-quaternion", "1", "0", "0", "0"], "already"),
-        (["--to", "12", "8", "7", "0", "0", "0", "--to-folds", *SIX], "leave --to-folds out"),
-        (["--to", "12", "8", "7", "--to-folds", *SIX], "whole pose; leave the position out"),
-        (["--to", "12", "8", "7", "--seconds", "0"], "--seconds must be a positive number"),
-        (["--to", "12", "8", "7", "--samples", "1"], "--samples must lie within"),
-        (["--to", "12", "8", "7", "--out", "/nowhere/path.csv"], "there is no folder"),
-        (["--to", "12", "8", "7", "--load", "1", "2"], "and may go on with a moment"),
-        (["--to", "12", "8", "7", "--load", "0", "0", "-1"], "limits neither its actuators"),
-        (["--form", "12", "8", "7"], "did you mean --from?"),
-    ],
-)
-def test_path_bad_input_is_one_line_and_status_2(
-    cli: CommandLine, words: list[str], message: str
-) -> None:
-    assert message in cli.refusal(*words)
 
 
 # Both ends hold 40 N downwards; the straight move between them, low over the base, does not.

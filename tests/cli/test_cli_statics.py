@@ -188,23 +188,6 @@ def test_statics_of_singular_pose_have_no_answer(cli: CommandLine, command: str)
     assert "the pose is singular (δ3 = 0: b4 on the base plane)" in message
 
 
-@pytest.mark.parametrize(
-    ("argv", "words"),
-    [
-        (["forces", "--load", "1", "2"], "--load needs a force fx fy fz"),
-        (["forces", "--payload", "-1"], "--payload must be a number of at least 0; got -1"),
-        (["forces", "--most", "0"], "6 positive numbers"),
-        (["forces", "--at", "b2"], "--at"),
-        (["accuracy", "--errors", "-1"], "actuators.error_mm must not be negative; got -1"),
-        (["accuracy", "--stiffness", "0"], "actuators.stiffness_n_mm must be positive; got 0"),
-    ],
-)
-def test_statics_unusable_options_are_refused(
-    cli: CommandLine, argv: list[str], words: str
-) -> None:
-    assert words in cli.refusal(*argv)
-
-
 HOME = OPTIMAL.home_pose
 BOX = (8.0, 3.0, 7.0, 12.0, 7.0, 11.0)
 OVER_BOX = ("--required-box", *BOX)
@@ -312,27 +295,6 @@ def test_accuracy_has_totals_of_dimensions_and_of_all_sources(
     text = cli.text("accuracy", "--design", stated)
     assert "all, worst" in text
     assert "all, worst" not in cli.text("accuracy", "--errors", "0.1")
-
-
-@pytest.mark.parametrize(
-    ("argv", "words"),
-    [
-        (["--wanted", "0"], "--wanted must be a positive number; got 0"),
-        (["--wanted-turn", "0.1"], "need a displacement with --wanted"),
-        (["--keep-actuators"], "need a displacement with --wanted"),
-        (["--out", "some.json"], "need a displacement with --wanted"),
-        ([*OVER_BOX, "--over", "pose"], "--required-box needs --over box; got --over pose"),
-        ([*OVER_BOX, "--position", "1", "2", "3"], "--position is one position"),
-        ([*OVER_BOX, "--folds", "1", "2", "3", "4", "5", "6"], "--folds is one position"),
-        (["--required-box", "1", "1", "1", "2", "2", "0"], "three lows, then highs above them"),
-        (["--required-box", "1", "1"], "--required-box needs six numbers"),
-        (["--over", "everywhere"], "--over"),
-    ],
-)
-def test_budget_unusable_options_are_refused(
-    cli: CommandLine, argv: list[object], words: str
-) -> None:
-    assert words in cli.refusal("budget", *argv)
 
 
 def test_budget_about_singular_positions_has_no_answer(cli: CommandLine, tmp_path: Path) -> None:

@@ -124,28 +124,6 @@ def test_workspace_capability_is_over_the_given_orientations(cli: CommandLine) -
     assert near["orientation_capability"] == 1.0
 
 
-@pytest.mark.parametrize(
-    ("argv", "words"),
-    [
-        (["--yaw-range", "5", "-5"], "yaw: the low end 5° exceeds the high end -5°"),
-        (["--pitch-range", "5"], "--pitch-range needs two numbers in the order low high; got 1"),
-        (["--step", "0.01"], "at most 50,000,000 are counted"),
-        (["--tolerance", "1e-6"], "at most 2,000,000 are made"),
-        (["--tilt", "200"], "within 0° to 180°; got 200°"),
-        (["--tilt", "5", "--yaw-range", "1", "2"], "not both"),
-        (["--samples", "0"], "--samples must lie within 1 to"),
-        (["--samples", "3"], "--samples needs"),
-        (["--interference", "--radii", "0.5"], "legs 2 and 3 overlap by 0.3306"),
-        (["--capability", "1", "2"], "--capability needs three numbers in the order x y z"),
-        (["--quaternion", "1", "0", "0", "0", "--yaw-pitch-roll", "1", "2", "3"], "not both"),
-    ],
-)
-def test_workspace_unusable_options_are_refused(
-    cli: CommandLine, argv: list[str], words: str
-) -> None:
-    assert words in cli.refusal(*argv)
-
-
 def test_workspace_interference_adds_the_accessible_volume(cli: CommandLine) -> None:
     found = cli.answer("--interference", "--radii", "0.2")
     assert set(found) == KEYS | {
