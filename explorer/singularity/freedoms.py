@@ -203,15 +203,12 @@ class FlagGaps:
         base: Ends on a1, the line a1a2 and the base plane, in the base frame, shape (3, 3).
         platform: Ends on the platform plane, the line b2b3 and b4, in the base frame, shape (3, 3).
         lengths: Lengths: |δ1|, the distance of the lines and |δ3|. That of the lines is |δ2| over
-            the sine between them.
-        are_parallel: Whether the lines are parallel. Of their common perpendiculars, the second
-            gap is then the one through b4.
+            the sine between them. Of parallel lines the gap is the common perpendicular through b4.
     """
 
     base: FloatArray
     platform: FloatArray
     lengths: tuple[float, float, float]
-    are_parallel: bool
 
 
 def flag_gaps(position: FloatArray, rotation: FloatArray) -> FlagGaps:
@@ -220,8 +217,7 @@ def flag_gaps(position: FloatArray, rotation: FloatArray) -> FlagGaps:
     height = float(rotation[:, 2] @ position)
     along, uy, uz = rotation[:, 0].tolist()
     sine = math.hypot(uy, uz)
-    are_parallel = sine <= ROUNDING
-    if are_parallel:
+    if sine <= ROUNDING:
         on_line = (x, y, z)
         on_guide, distance = (x, 0.0, 0.0), math.hypot(y, z)
     else:
@@ -234,7 +230,7 @@ def flag_gaps(position: FloatArray, rotation: FloatArray) -> FlagGaps:
         distance = abs(apart)
     base = np.array([(0.0, 0.0, 0.0), on_guide, (x, y, 0.0)])
     platform = np.array([height * rotation[:, 2], on_line, (x, y, z)])
-    return FlagGaps(base, platform, (abs(height), distance, abs(z)), are_parallel)
+    return FlagGaps(base, platform, (abs(height), distance, abs(z)))
 
 
 def least_turns(position: ArrayLike, rotation: ArrayLike) -> FloatArray:

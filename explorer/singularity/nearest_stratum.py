@@ -31,7 +31,6 @@ from explorer.singularity.strata import (
     Stratum,
     codimension,
     is_below,
-    stratum,
     stratum_of,
 )
 
@@ -45,12 +44,11 @@ _ON_PLATFORM, _PLANES = ("platform", "u"), ("platform", "base")
 class NearestInStratum:
     """The nearest pose in the closure of a stratum.
 
-    The stratum `seen` of that pose is the requested one or lies in its closure. The distance is the
-    root-mean-square displacement of b1 to b4, in design units.
+    The distance is the root-mean-square displacement of b1 to b4, in design units. At the tolerance
+    of incidences the pose may lack one that its other incidences imply.
     """
 
     stratum: Stratum
-    seen: Stratum
     distance: float
     pose: Pose
 
@@ -119,7 +117,7 @@ def nearest_in_strata(
 ) -> Mapping[Stratum, NearestInStratum]:
     """Return the nearest pose in the closure of each stratum, by stratum."""
     here = stratum_of(Configuration.at(design, pose))
-    found = {w: NearestInStratum(w, here, 0.0, pose) for w in strata if is_below(here, w)}
+    found = {w: NearestInStratum(w, 0.0, pose) for w in strata if is_below(here, w)}
     apart = [w for w in strata if w not in found]
     if not apart:
         return found
@@ -135,11 +133,8 @@ def nearest_in_strata(
     ways: list[float] = displacement(
         design, pose.position, pose.rotation, positions, rotations
     ).tolist()
-    seen = map(tuple, stratum(positions, rotations, design.reach).tolist())
-    for (w, goal), way, at in zip(nearest.items(), ways, seen, strict=True):
-        # Within the tolerance of incidences a pose may lack one that its other incidences imply.
-        actual = at if is_below(at, w) else w
-        found[w] = NearestInStratum(w, actual, exact.get(w, way), goal)
+    for (w, goal), way in zip(nearest.items(), ways, strict=True):
+        found[w] = NearestInStratum(w, exact.get(w, way), goal)
     return {w: found[w] for w in strata}
 
 

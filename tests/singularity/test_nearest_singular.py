@@ -233,13 +233,10 @@ def test_nearest_pose_in_a_closure_lies_in_it_and_no_nearer_than_in_the_closures
         assert found.stratum == w
         seen = stratum_of(Configuration.at(case.design, found.pose))
         place = Case(case.design, np.array(found.pose.position), found.pose.rotation)
-        if is_below(seen, w) or is_clear_cut(place, reach):
-            assert found.seen == seen
-        else:
+        if not is_below(seen, w):
             # At the tolerance other incidences hold as well, which need not agree.
-            assert found.seen == w
+            assert not is_clear_cut(place, reach)
             assert_allclose(vanishing(w, place.position / reach, place.rotation), 0.0, atol=1e-9)
-        assert is_below(found.seen, w)
         assert found.distance == pytest.approx(way(case, case.pose, found.pose), abs=1e-12)
         for lower in COVERED[w]:
             assert nearest[lower].distance >= found.distance - 1e-9 * case.size
@@ -277,7 +274,6 @@ def test_nearest_pose_at_the_tolerance_of_incidences_lies_in_the_requested_closu
     design = Design(a3=(10.0, 10.0), b1=(0.0, 10.0), b2=0.0, b3=2.5)
     pose = Pose.of([0.0, 0.15625, 0.0], QUARTER_TURNS[4])
     found = nearest_in_stratum(design, pose, (3, 1, 4, 2))
-    assert is_below(found.seen, (3, 1, 4, 2))
     p, n = np.array(found.pose.position), found.pose.rotation[:, 2]
     assert_allclose([p[1], p[2], n[0], n @ p], 0.0, atol=1e-14)
 
@@ -288,7 +284,7 @@ def test_nearest_pose_of_a_pose_in_the_closure_is_itself_and_of_one_outside_is_n
         for upper in (v for v in STRATA if is_below(w, v)):
             found = nearest_in_stratum(OPTIMAL, pose, upper)
             assert found.pose is pose
-            assert (found.distance, found.seen) == (0.0, w)
+            assert found.distance == 0.0
         for lower in COVERED[w]:
             assert nearest_in_stratum(OPTIMAL, pose, lower).distance > 1e-3
 
@@ -298,7 +294,6 @@ def test_nearest_poses_of_home_are_the_nearest_singular_ones_or_have_closed_form
     for w, nearest in zip(OF_INCIDENCES, nearest_singularities(OPTIMAL, home), strict=True):
         found = nearest_in_stratum(OPTIMAL, home, w)
         assert (found.pose, found.distance) == (nearest.pose, nearest.distance)
-        assert found.seen == w
     found = nearest_in_strata(OPTIMAL, home)
     assert found[GENERIC].pose is home
     # A level platform comes down to the base.

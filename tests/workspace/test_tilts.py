@@ -204,9 +204,7 @@ def test_orientation_is_connected_to_tilt_zero_up_to_the_tilt_of_the_map(seed: i
             assert not is_connected(design, position, start, tool=tool)
             continue
         inside, outside = tilted(azimuth, np.array([0.99 * tilt, tilt + 0.01]), torsion)
-        level = tilted(0.0, np.zeros(1), torsion)[0]
         assert is_connected(design, position, inside, tool=tool)
-        assert is_connected(design, position, inside, level, tool)
         if tilt < 179.9:
             assert not is_connected(design, position, outside, tool=tool)
 
@@ -291,27 +289,3 @@ def test_greatest_tilt_finds_a_dip_between_azimuths(index: int) -> None:
         found = float(greatest_tilts(design, position, -40.0, azimuths, tool))
         assert least - 0.05 <= found <= least + 1e-6
     assert greatest_tilt(design, position, -40.0, tool).tilt == pytest.approx(least, abs=0.05)
-
-
-def test_orientations_of_two_torsions_are_connected_within_the_range_of_torsions() -> None:
-    design = PRESETS["paper-optimal"]
-    p = design.home_pose.position
-    span = torsion_range(design, p)
-    assert span.high - span.low < 359.0
-
-    def turned_to(torsion: float) -> FloatArray:
-        return tilted(0.0, np.zeros(1), torsion)[0]
-
-    middle = turned_to(0.5 * (span.low + span.high))
-    for torsion in (span.low, span.high):
-        for beside in (-1e-14, -1e-9, 0.0, 1e-9, 1e-14):
-            other = torsion + beside
-            # The torsion itself may be a rounding error beyond its limit.
-            if math.isnan(greatest_tilt(design, p, other).tilt):
-                continue
-            assert is_connected(design, p, middle, turned_to(other))
-            assert is_connected(design, p, turned_to(other), middle)
-    for torsion in np.linspace(span.low + 0.01, span.high - 0.01, 9).tolist():
-        assert is_connected(design, p, middle, turned_to(torsion))
-    for torsion in np.linspace(span.high + 0.01, span.low + 359.99, 9).tolist():
-        assert not is_connected(design, p, middle, turned_to(torsion))

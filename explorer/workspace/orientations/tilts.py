@@ -322,29 +322,14 @@ ANGLE_TOLERANCE = 1e-7
 
 
 def is_connected(
-    design: Design,
-    position: ArrayLike,
-    rotation: ArrayLike,
-    other: ArrayLike | None = None,
-    tool: ArrayLike | None = None,
+    design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
 ) -> bool:
     """Return whether an orientation is connected to tilt zero by a tilt without a gap.
 
     The tilt keeps azimuth and torsion. At tilt 180°, where many torsions give one orientation, it
-    is that of torsion 0. With a second orientation the question is whether a tilt from the first
-    one to tilt zero, a change of the torsion there and a tilt to the second one connect the two.
-    Position, tool and errors are those of `greatest_tilt`; orientations are rotations (3, 3).
+    is that of torsion 0. Position, tool and errors are those of `greatest_tilt`; the orientation is
+    a rotation (3, 3).
     """
-    p = one_position(position)
-    given = [each for each in (rotation, other) if each is not None]
-    ends = [tilt_torsion_of(rotation_array(each)) for each in given]
-    for azimuth, tilt, torsion in ends:
-        reached = tilt_map(design, p, torsion, [azimuth], tool).tilts[0]
-        if not reached >= tilt - ANGLE_TOLERANCE:
-            return False
-    if other is None:
-        return True
-    # Without any torsion the range is NaN, which no turn is within.
-    span = torsion_range(design, p, ends[0].torsion, tool=tool)
-    turn = (ends[1].torsion - span.low + ANGLE_TOLERANCE) % 360.0 - ANGLE_TOLERANCE
-    return turn <= span.high - span.low + ANGLE_TOLERANCE
+    azimuth, tilt, torsion = tilt_torsion_of(rotation_array(rotation))
+    reached = tilt_map(design, one_position(position), torsion, [azimuth], tool).tilts[0]
+    return bool(reached >= tilt - ANGLE_TOLERANCE)
