@@ -25,11 +25,11 @@ OpenWindow = Callable[[tuple[int, int]], Tab]
 SIZES = ((1280, 720), (1024, 768), (768, 1024))
 LEAST_SHARE = 0.4
 TABS = {
-    *("Pose", "Design", "Machine", "Show"),
+    *("Pose", "Design", "Machine"),
     *("Singularity", "Workspace", "Tilt", "Loads", "Prototype"),
     *("Optimise", "Compare", "Paths"),
 }
-DIALOGS = ("History", "Export", "Help")
+DIALOGS = ("History", "Export", "Help", "Overlays")
 
 # Controls that stick out of what holds them, or of the page, to the left or to the right.
 CUT_OFF = """() => {

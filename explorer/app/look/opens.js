@@ -10,7 +10,11 @@ window.explorer.opens ??= (() => {
   const shade = document.createElement("div");
   shade.className = "ex-shade";
   const closeDialogs = () => {
-    for (const each of document.querySelectorAll(OPEN)) delete each.dataset.exOpen;
+    for (const each of document.querySelectorAll(OPEN)) {
+      const opener = document.querySelector(`[data-opens="${each.ariaLabel}"]`);
+      if (each.contains(document.activeElement)) opener?.focus({ preventScroll: true });
+      delete each.dataset.exOpen;
+    }
     shade.remove();
   };
   const closeButton = () => {
@@ -37,7 +41,11 @@ window.explorer.opens ??= (() => {
   const open = (title) => {
     const tabs = [...document.querySelectorAll("[data-dock-tab]")];
     const tab = tabs.find((each) => each.title === title);
-    if (!tab) return;
+    if (!tab) {
+      // On a phone viser lists all panels, one below another.
+      document.querySelector(`[role=button][aria-label$=" panel ${title}"]`)?.click();
+      return;
+    }
     const dialog = tab.closest(DIALOG);
     if (dialog) openDialog(dialog, title);
     else {

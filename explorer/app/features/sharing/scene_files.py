@@ -3,7 +3,7 @@
 The page opens without the explorer. It holds viser's page and the visible scene, without the panels
 and the drag handle; its content security policy keeps it from fetching anything. A picture is drawn
 by the browser that downloads it: the scene alone, with its labels, its camera and the settings of
-the tab Show; lines and labels grow with the picture.
+the menu Overlays; lines and labels grow with the picture.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""The form and the visible parts of the mechanism, the ground, and the views of the camera."""
+"""The views of the camera, the overlays of the scene, and the ground."""

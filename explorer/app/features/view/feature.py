@@ -1,4 +1,4 @@
-"""The form and the visible parts of the mechanism, the ground, and the views of the camera."""
+"""The views of the camera, a menu of what the scene shows beside them, and the ground."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from explorer.app.scene.shapes import add_label
 from explorer.app.state.actions import Action, Set, draw_as
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.state.view import DrawnAs
+from explorer.app.state.view import FORM_NAMES, DrawnAs
 from explorer.app.widgets.assigning import Updates
-from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect
 from explorer.app.widgets.markup import box
 from explorer.app.widgets.palette import Key, shift, with_keys
@@ -36,6 +36,9 @@ FORMS: Mapping[DrawnAs, tuple[str, tuple[Key, ...]]] = {
     ),
 }
 """Hint and keys of each form of the mechanism."""
+
+OVERLAYS = "Overlays"
+"""Title of the menu."""
 
 LAYERS: dict[str, tuple[str, tuple[Key, ...]]] = {
     "Flags": ("flags", (shift("F"),)),
@@ -73,7 +76,7 @@ CAMERA_HINTS = {
 VIEW_KEYS = {"Isometric": "0", "Front": "1", "Side": "3", "Top": "7", FIT: "F"}
 
 
-class ViewPanel:
+class OverlaysMenu:
     """The form of the mechanism, and a switch for each layer of the scene."""
 
     def __init__(self, services: Services) -> None:
@@ -107,14 +110,16 @@ def _form_chips(services: Services) -> Chips:
             return state.view.drawn_as == form
 
         effect = Effect(lambda state: draw_as("schematic" if is_on(state) else form), is_on)
-        return Chip(form.capitalize(), f"Show › Drawn as › {form}", hint, effect, keys=keys)
+        name = FORM_NAMES[form]
+        command = f"{OVERLAYS} › Drawn as › {name}"
+        return Chip(name.capitalize(), command, hint, effect, keys=keys)
 
     chips = {form: chip(form, *words) for form, words in FORMS.items()}
     return Chips(services.buttons, services.session, "view.form", "Drawn as", chips)
 
 
-class CameraButtons:
-    """A button for each of the views that CAD programs offer, and one that fits all."""
+class ViewButtons:
+    """A button for each of the views that CAD programs offer, one that fits all, and the menu."""
 
     def __init__(self, services: Services) -> None:
         self._cameras = services.cameras
@@ -125,6 +130,8 @@ class CameraButtons:
             services.buttons.offer(f"View › {label}", hint, PRESS, label, keys=keys)
             words = with_keys(hint, keys)
             self._markup += press_button(PRESS, label, label, hint=words, class_name="ex-tool")
+        hint = "Choose what the scene shows: the form of the mechanism, layers and tetrahedra."
+        self._markup += open_button(OVERLAYS, OVERLAYS, hint=hint, class_name="ex-tool is-menu")
 
     def __call__(self, _: Frame) -> str:
         """Return the buttons as HTML."""
@@ -285,17 +292,17 @@ def _outline(centres: FloatArray, axes: FloatArray, ground: float) -> FloatArray
 VIEW = Feature(
     "view",
     manual="page.md",
-    tabs=(Tab("build", "Show", ViewPanel, viser.Icon.EYE),),
-    bar=(InBar("right", CameraButtons),),
+    tabs=(Tab("dialog", OVERLAYS, OverlaysMenu),),
+    bar=(InBar("right", ViewButtons),),
     scene=(Ground,),
     commands=(
         StateCommand(
-            "Show › All tetrahedra",
+            f"{OVERLAYS} › All tetrahedra",
             "Show or hide the three tetrahedra that are flat where the mechanism is singular, and "
             "the gaps that are left to such poses.",
             _toggle_tetrahedra,
             keys=(Key("T"),),
         ),
     ),
-    keys={f"Show › {label}": keys for label, (_, keys) in LAYERS.items() if keys},
+    keys={f"{OVERLAYS} › {label}": keys for label, (_, keys) in LAYERS.items() if keys},
 )
