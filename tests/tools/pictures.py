@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import datetime as dt
+import io
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -20,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 import msgspec
 import numpy as np
 from machines import PRESS
+from PIL import Image
 from playwright.sync_api import Browser, FloatRect, Page
 from server_clock import wait_until_drawn
 
@@ -35,7 +37,15 @@ from explorer.app.features.studies.state import Brush, within
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import draw_page, open_page, settle, stable_picture
 from explorer.app.server import Running, start
-from explorer.app.state.actions import Action, Open, Set, SetJoint, SetPosition, SetVariable
+from explorer.app.state.actions import (
+    Action,
+    Open,
+    Set,
+    SetJoint,
+    SetPose,
+    SetPosition,
+    SetVariable,
+)
 from explorer.app.state.compared import Look
 from explorer.app.state.view import (
     ForcesView,
@@ -66,6 +76,13 @@ REPORT_STYLE = (
     "body{margin:0;padding:20px;display:flex;gap:20px;background:#dfe3e8}"
     "img{width:400px;box-shadow:0 1px 6px rgb(28 37 48/.25)}"
 )
+
+# The moving picture: the folds at its start, the last φ2, which is flat at -180°, the frames from
+# one to the other, their times in milliseconds, at its ends and between, and what it shows of the
+# window: scene and verdict, without the panel on the left, the bar and the drawer.
+FOLDS, LAST_FOLD, FRAMES = (14.4, 46.0, 98.0, -141.0, -122.5, 61.0), -205.0, 18
+REST_TIME, FRAME_TIME = 900, 90
+MOVING_SIZE, SHOWN = (1280, 720), (300, 46, 1280, 676)
 
 LOAD = ForcesView(force=(0.0, 0.0, -40.0))
 
@@ -336,10 +353,44 @@ def draw_studies(browser: Browser) -> bytes:
             running.stop()
 
 
+def draw_motion(browser: Browser) -> bytes:
+    """Return a moving picture: the platform goes through a flat fold and back."""
+    r, beta, epsilon, first, second, third = FOLDS
+    turn = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, FRAMES))
+    frames: list[Image.Image] = []
+    running = start(DESIGN, pose_of_folds(FOLDS), view=View(handle=False), port=0)
+    try:
+        page, client = open_page(browser, running, MOVING_SIZE, hold=True)
+        settle(page, client)
+        running.page.point_cameras("isometric")
+        for fold in second + (LAST_FOLD - second) * turn:
+            pose = pose_of_folds([r, beta, epsilon, first, fold, third])
+            running.page.session.do(SetPose(pose))
+            assert wait_until_drawn(running.page, 60.0)
+            settle(page, client)
+            page.evaluate("window.explorer.drawFrame()")
+            frames.append(Image.open(io.BytesIO(stable_picture(page))).crop(SHOWN))
+    finally:
+        running.stop()
+    rests = [REST_TIME, *[FRAME_TIME] * (FRAMES - 2)]
+    data = io.BytesIO()
+    frames[0].save(
+        data,
+        "WEBP",
+        save_all=True,
+        append_images=[*frames[1:], *frames[-2:0:-1]],
+        duration=[*rests, *rests],
+        loop=0,
+        quality=70,
+    )
+    return data.getvalue()
+
+
 PICTURES: dict[str, Callable[[Browser], bytes]] = {
     **{name: partial(draw, scene=scene) for name, scene in SCENES.items()},
     "report": draw_report,
     "studies": draw_studies,
+    "fold.webp": draw_motion,
 }
 
 
@@ -351,7 +402,7 @@ def main(names: list[str]) -> None:
     FOLDER.mkdir(exist_ok=True)
     with headless_browser() as browser:
         for name in names or PICTURES:
-            out = FOLDER / f"{name}.png"
+            out = FOLDER / (name if "." in name else f"{name}.png")
             out.write_bytes(PICTURES[name](browser))
             print(out)
 

@@ -47,6 +47,9 @@ window.explorer.names ??= (() => {
     isDue = false;
     document.querySelectorAll(CONTROLS).forEach(nameControl);
     document.querySelectorAll("button").forEach(nameButton);
+    // viser's palette speaks of commands alone.
+    const search = document.querySelector(".mantine-Spotlight-search");
+    if (search) search.placeholder = "Search commands, pages and terms";
   };
   // Width of the widest panel at a side of the window, and room beside a hint, in pixels.
   const WIDEST = 420,
