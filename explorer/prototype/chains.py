@@ -116,12 +116,9 @@ class Chains:
     def joints(self, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
         """Return the joint values of all chains in a pose, shape (..., 12), as `CHAIN_JOINTS`.
 
-        Angles are zero where a leg is normal to the base plane. Where a leg lies along the
-        first axis of its universal joint, the first angle is undefined and is set to zero.
-
-        Args:
-            position: Position of b4 in the base frame, shape (..., 3), in design units.
-            rotation: Rotation from platform to base, shape (..., 3, 3).
+        Angles are zero where a leg is normal to the base plane. Where a leg lies along the first
+        axis of its universal joint, the first angle is undefined and is set to zero. The position
+        of b4, (..., 3), is in design units, the rotation (..., 3, 3) from platform to base.
 
         Raises:
             InputError: A pose that is not finite or not a rotation.

@@ -125,12 +125,9 @@ class ImperfectMachine:
         return Places(origin, turn)
 
     def pose(self, joints: ArrayLike, near: Pose) -> Pose:
-        """Return the true pose in which the encoders read the joints.
+        """Return the true pose in which the encoders read the joints, shape (6,), in design units.
 
-        Args:
-            joints: Values (l1, d1, d2, d3, d4, l4) that the encoders read, shape (6,), in design
-                units.
-            near: A pose close to it, such as the one in which the design has these joints.
+        A pose close to it, such as the one in which the design has these joints, is known.
 
         Raises:
             InputError: The joints are not usable.

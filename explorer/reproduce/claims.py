@@ -40,11 +40,9 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
 def measure_claims(
     names: Iterable[str] | None = None, report: Callable[[str], None] | None = None
 ) -> Iterator[Result]:
-    """Yield claims of the paper with their measurements.
+    """Yield claims of the paper, all or those with some names, with their measurements.
 
-    Args:
-        names: Names of claims, out of `CLAIMS`; None for all.
-        report: Called with the title of each claim before it is measured.
+    The title of each claim is reported before it is measured.
 
     Raises:
         InputError: No such claim.

@@ -71,16 +71,11 @@ def framing(
 def places_in_picture(
     points: FloatArray, eye: FloatArray, target: FloatArray, field_of_view: float, aspect: float
 ) -> FloatArray:
-    """Return where an upright camera sees points, as shares of half the picture, shape (n, 2).
+    """Return where an upright camera sees points (n, 3), as shares of half the picture, (n, 2).
 
-    From −1 to 1 they are to the right and upwards; infinite for points behind the camera.
-
-    Args:
-        points: Points, shape (n, 3).
-        eye: Position of the camera, shape (3,).
-        target: Point that it looks at, shape (3,).
-        field_of_view: Vertical angle of view, in radians.
-        aspect: Width over height of the picture.
+    From −1 to 1 they are to the right and upwards; infinite for points behind the camera. It is at
+    an eye (3,) and looks at a target (3,). The field of view is the vertical angle in radians, the
+    aspect the picture's width over its height.
     """
     forward, right, up = _axes(target - eye)
     away = points - eye
@@ -147,20 +142,16 @@ class _Placement:
 
 
 class Cameras:
-    """The cameras of all open browsers.
+    """The cameras of all open browsers; those of new ones begin with the first camera.
 
     A browser reports its size before its panels are laid out, and users resize windows. A camera
     that its user has not moved is therefore put again when the size changes, or when its browser
     moved it back to the first position while loading. The position of a camera is always the one
     that its browser reported, since a browser may miss what was sent to it.
 
-    A camera that showed all points follows them when they leave the picture, as after a change of
-    the design, and keeps its direction. A user who came closer to look at a part stays there, as
-    long as something is in sight.
-
-    Args:
-        first: First camera of a new browser.
-        points: Function that returns the points to frame, shape (n, 3).
+    A camera that showed all points to frame, shape (n, 3), follows them when they leave the
+    picture, as after a change of the design, and keeps its direction. A user who came closer to
+    look at a part stays there, as long as something is in sight.
     """
 
     def __init__(self, first: viser.InitialCameraConfig, points: Callable[[], FloatArray]) -> None:

@@ -32,14 +32,10 @@ class Ellipsoid:
     def draw(
         self, centre: FloatArray, axes: FloatArray, lengths: FloatArray, colour: Rgb, words: str
     ) -> Iterator[Update]:
-        """Yield the updates that draw it.
+        """Yield the updates that draw it about a centre (3,) in scene units, with a label's text.
 
-        Args:
-            centre: Its centre in scene units, shape (3,).
-            axes: Rotation whose columns are the directions of the semi-axes, shape (3, 3).
-            lengths: Lengths of the semi-axes in scene units, shape (3,).
-            colour: Its colour.
-            words: Text of the label.
+        The columns of the axes, a rotation (3, 3), are the directions of the semi-axes, whose
+        lengths (3,) are in scene units.
         """
         yield self._body, "position", tuple(centre.tolist())
         yield self._body, "wxyz", tuple(quaternion_from_rotation(axes).tolist())

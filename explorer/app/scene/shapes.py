@@ -63,15 +63,9 @@ def add_lines(
     *,
     visible: bool = False,
 ) -> viser.LineSegmentsHandle:
-    """Add line segments.
+    """Add line segments, a number of them, as a node with a name.
 
-    Args:
-        scene: Where they are added.
-        name: Their node.
-        count: Number of segments.
-        colour: Colour of all; None where each has its own.
-        thickness: Thickness in pixels.
-        visible: Whether they are visible before the first frame.
+    Without a colour each has its own. The thickness is in pixels.
     """
     # One colour for all could not become many: the browser would draw white.
     colours = np.zeros((count, 2, 3), dtype=np.uint8) if colour is None else colour
@@ -96,17 +90,9 @@ def add_translucent(
     is_flat: bool = False,
     visible: bool = False,
 ) -> viser.MeshHandle:
-    """Add a translucent mesh.
+    """Add a translucent mesh, of an opacity from 0 to 1, as a node with a name.
 
-    Args:
-        scene: Where it is added.
-        name: Its node.
-        mesh: Its shape.
-        opacity: Its opacity, 0 to 1.
-        colour: Its colour.
-        side: Which sides of its faces are drawn.
-        is_flat: Whether each face is shaded by itself.
-        visible: Whether it is visible before the first frame.
+    It is flat if each face is shaded by itself; a side of its faces, or both, are drawn.
     """
     return scene.add_mesh_simple(
         name,
@@ -244,14 +230,10 @@ def of_one_colour(colour: Rgb, count: int) -> NDArray[np.uint8]:
 
 
 def dashes(lines: FloatArray, most: int, period: float, drawn: float) -> FloatArray:
-    """Return lines (n, 2, 3) cut into dashes, shape (n * most, 2, 3).
+    """Return lines, given by their ends (n, 2, 3), cut into dashes, shape (n * most, 2, 3).
 
-    Args:
-        lines: Ends of the lines.
-        most: Number of dashes of each line; those beyond its end have no length. One dash is the
-            whole line.
-        period: Length of a dash with the space after it; longer where the dashes would not do.
-        drawn: Share of the dash in its period.
+    Dashes beyond the end of a line have no length; one dash is the whole line. The period is that
+    of a dash and the space after it, longer where the dashes would not do; a share of it is drawn.
     """
     if most == 1:
         return lines
@@ -379,13 +361,8 @@ def add_label(
 ) -> viser.LabelHandle:
     """Add a label; its `text`, `position` and `visible` are assigned like those of other nodes.
 
-    Args:
-        scene: Scene of the label.
-        name: Name of the node; its parent is the frame of the label's position.
-        text: Text of the label.
-        colour: Colour of the text; None for that of the page's text.
-        fades: Whether the label is pale where a body hides its point.
-        visible: Whether the label is drawn.
+    The parent of its node is the frame of its position. Without a colour it has that of the page's
+    text; it may be pale where a body hides its point.
     """
     # viser's labels have no colour; they use the scene height only if their size is that of
     # things in the scene, so that the script finds the colour there.

@@ -180,15 +180,10 @@ def _shell(colour: Rgb, vertices: FloatArray, triangles: IntArray) -> Shell:
 def cut_to_size(
     vertices: FloatArray, triangles: IntArray, edge: float
 ) -> tuple[FloatArray, IntArray]:
-    """Return the vertices and triangles of a surface, cut until their edges are short.
+    """Return vertices (n, 3) and triangles (m, 3) of a surface, cut until their edges are short.
 
-    A surface that is large beside the edge keeps longer ones: halving goes on only as long as
-    it makes at most `MOST_COLOURED` triangles.
-
-    Args:
-        vertices: Positions, shape (n, 3).
-        triangles: Indices of vertices, shape (m, 3).
-        edge: Longest edge to aim at, in design units.
+    The longest edge to aim at is in design units. A surface that is large beside it keeps longer
+    ones: halving goes on only as long as it makes at most `MOST_COLOURED` triangles.
     """
     while True:
         lengths = edge_lengths(vertices, triangles)

@@ -28,12 +28,7 @@ TRIALS, HALVINGS = 24, 14
 def clear_length(state: State) -> tuple[float, str] | None:
     """Return the nearest clear length of the joint that does not close, and why it is taken.
 
-    Args:
-        state: A state whose joints do not close.
-
-    Returns:
-        The length with a sentence for people; None if no length closes, or if every one that
-        was tried is singular.
+    It is None if no length closes, or if every one that was tried is singular.
     """
     unclosed = state.unclosed
     if unclosed is None or unclosed.nearest is None:

@@ -89,14 +89,10 @@ def add_chart(
     height: int,
     padding: tuple[int, int, int, int],
 ) -> viser.GuiUplotHandle:
-    """Add a chart, hidden until it has data.
+    """Add a chart of series, without the column of the horizontal axis, hidden until it has data.
 
-    Args:
-        gui: Where it is added.
-        series: Its columns but that of the horizontal axis.
-        axes: The horizontal axis and the vertical ones.
-        height: Its height in pixels.
-        padding: Room above, at the right, below and at the left, in pixels.
+    The horizontal axis comes before the vertical ones. The height, and the room above, at the
+    right, below and at the left, are in pixels.
     """
     return gui.add_uplot(
         (BLANK,) * (1 + len(series)),
