@@ -10,7 +10,6 @@ from typing import Literal
 import numpy as np
 import pytest
 from hypothesis import given
-from scipy.spatial.transform import Rotation
 from services import StubWorker, services_for
 from strategies import Case, all_cases
 
@@ -126,31 +125,6 @@ def random_pose(design: Design, rng: np.random.Generator) -> Pose:
     reach = design.reach
     place = rng.uniform([-reach, -reach, 0.0], [reach, reach, reach])
     return Pose.of_yaw_pitch_roll(place.tolist(), rng.uniform(-90.0, 90.0, 3).tolist())
-
-
-@pytest.mark.parametrize("design", PRESETS.values(), ids=lambda design: design.name)
-@pytest.mark.parametrize("incidence", [1, 2, 3])
-def test_verdict_within_the_warning_distance_or_angle_of_an_incidence_is_never_clear(
-    design: Design, incidence: int
-) -> None:
-    rng, warn = np.random.default_rng(incidence), warnings(design.reach)
-    for _ in range(8):
-        singular = (
-            GoToSingularity(incidence).apply(open_state(design, random_pose(design, rng))).pose
-        )
-        share = float(rng.uniform(0.0, 0.999))
-        # It is moved, and turned about b4 or a1.
-        way, axis = (each / np.linalg.norm(each) for each in rng.normal(size=(2, 3)))
-        place = np.array(singular.position)
-        turn = Rotation.from_rotvec(share * warn.turn * axis).as_matrix()
-        for pose in (
-            Pose.of(place + share * warn.distance * way, singular.rotation),
-            Pose.of(place, turn @ singular.rotation),
-            Pose.of(turn @ place, turn @ singular.rotation),
-        ):
-            found = verdict(evaluate(design, pose))
-            assert found.kind != "clear"
-            assert found.levels[incidence - 1] < 1.0
 
 
 def test_verdict_on_a_nearly_degenerate_design_names_the_conditioning_and_its_margin() -> None:

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 
@@ -23,7 +23,7 @@ from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.machine import Six
 from explorer.optimise import conflicts, outcome as outcomes, solver
 from explorer.optimise.defaults import make_problem
-from explorer.optimise.problem import Box, Problem, Variable, with_box
+from explorer.optimise.problem import Box, ObjectiveName, Problem, Variable, with_box
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,15 +35,7 @@ class Optimise(options.JsonOptions, options.DesignOptions):
     status is 1, and the output is the best iterate.
     """
 
-    objective: Literal[
-        "match-volume",
-        "smallest-reach",
-        "largest-volume",
-        "largest-margin",
-        "smallest-load",
-        "smallest-error",
-        "smallest-deflection",
-    ] = "match-volume"
+    objective: ObjectiveName = "match-volume"
     """Objective: F = |1 − V/V′| of the exact volume, the longest leg, the volume, or over the
     required box the worst margin, the largest share of a limit of forces, the worst error, or the
     largest deflection under the load."""
