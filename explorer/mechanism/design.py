@@ -66,15 +66,6 @@ DEGENERATE_RATIO = 1e-12
 DOWN: Triple = (0.0, 0.0, -1.0)
 """The default direction of gravity."""
 
-_PARTS: dict[str, type] = {
-    "tool": Tool,
-    "payload": Payload,
-    "actuators": Actuators,
-    "struts": Struts,
-    "guide": Guide,
-    "tolerances": Tolerances,
-}
-
 
 class Swing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Swing limits of the universal and ball joints; None for no limit.
@@ -219,12 +210,12 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             raise DesignError(f"schema must be 2; got {self.schema!r}")
         _set(self, "schema", 2)
         checks.instance("name", self.name, str)
-        checks.instance("limits", self.limits, Limits)
         _set(self, "name", str(self.name))
         if len(self.name) > 100 or not self.name.isprintable():
             raise DesignError("name must be one printable line of at most 100 characters")
         checks.instance("home", self.home, Pose, type(None))
-        for name, kind in _PARTS.items():
+        for kind in (Limits, Tool, Payload, Actuators, Struts, Guide, Tolerances):
+            name = kind.__name__.lower()
             checks.instance(name, getattr(self, name), kind)
         _set(self, "a3", tuple(checks.numbers("a3", self.a3, 2)))
         _set(self, "b1", tuple(checks.numbers("b1", self.b1, 2)))
