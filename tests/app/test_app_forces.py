@@ -57,7 +57,7 @@ from explorer.measures.blocks.forces import largest_loads, reaction_tables, verd
 from explorer.measures.blocks.precision import tolerance_budget
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS, typical_machine
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 from explorer.singularity.colours import SINGULAR
 from explorer.statics.accuracy import SOURCES, stated_tolerances
 from explorer.statics.budget import with_tolerances
@@ -75,10 +75,13 @@ LIMITED = msgspec.structs.replace(
 )
 
 
-def loaded_state(design: Design = LIMITED, **forces: Any) -> State:
-    """Return a design at home, with forces shown."""
+def loaded_state(
+    design: Design = LIMITED, force: Triple = (0.0, 0.0, -10.0), **forces: Any
+) -> State:
+    """Return a design at home under a force, with forces shown."""
     state = open_state(design)
-    return Set("view", replace(state.view, forces=ForcesView(shown=True, **forces))).apply(state)
+    view = ForcesView(shown=True, force=force, **forces)
+    return Set("view", replace(state.view, forces=view)).apply(state)
 
 
 def move_to(state: State, *position: float) -> State:
@@ -349,6 +352,19 @@ def test_panel_has_the_numbers_of_the_pose(services: Services) -> None:
     percents = [int(each) for each in re.findall(r"(?:guide|struts|actuators) (\d+)&nbsp;%", text)]
     assert len(percents) == 3
     assert sum(percents) == pytest.approx(100, abs=1)
+
+
+def test_design_without_load_and_limits_is_told_what_to_enter(
+    services: Services, desk: Desk
+) -> None:
+    panel = ForcesPanel(services)
+    assert "No load acts" in markup(panel, desk.state)
+    desk.press(services.buttons, "forces.typical")
+    assert limited_parts(desk.state.design).all()
+    assert "Assume" not in markup(panel, desk.state)
+    assert services.get(load_figure)(Frame(desk.state)) == ""
+    desk.session.do(SetForce((0.0, 0.0, -10.0)))
+    assert "Holds the load" in markup(panel, desk.state)
 
 
 def test_ideal_design_is_offered_typical_values(services: Services, desk: Desk) -> None:

@@ -119,7 +119,7 @@ class ForcesView:
     """
 
     shown: bool = False
-    force: Triple = (0.0, 0.0, -10.0)
+    force: Triple = (0.0, 0.0, 0.0)
     moment: Triple = (0.0, 0.0, 0.0)
     weighed: Weighed = "payload"
     scale: float = 20.0

@@ -38,7 +38,8 @@ def content_of(block: kinds.Block, acts: Mapping[str, str]) -> str:
             rows = [
                 row(
                     dim(escape(fact.name)),
-                    f"{words_html(fact.words)} {dim(words_html(fact.remark))} "
+                    f"{words_html(fact.words)} "
+                    f'<span class="ex-dim ex-whole">{words_html(fact.remark)}</span> '
                     f"{acts.get(fact.act, '')}",
                     hint=fact.hint,
                 )

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import get_args
 
+import msgspec
 import numpy as np
 import viser
 
@@ -14,6 +15,8 @@ from explorer.app.features.feature import BarPart, Feature, InBar, Services, Tab
 from explorer.app.features.loads import budget, load, precision
 from explorer.app.features.loads.precision_scene import DeflectedScene, ErrorEllipsoidScene
 from explorer.app.features.loads.scene import ForcesScene, LoadHandle
+from explorer.app.features.machine.actuators import FORCE, FORCES
+from explorer.app.features.machine.feature import MOMENT
 from explorer.app.inputs.controls import Bound, Controls
 from explorer.app.state.actions import Action, Set, SetPose
 from explorer.app.state.frame import Frame
@@ -26,8 +29,15 @@ from explorer.app.widgets.markup import note
 from explorer.app.widgets.under_way import problem
 from explorer.measures.blocks import forces
 from explorer.measures.blocks.block import Share, Statement
+from explorer.mechanism.machine import Guide
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import PART_NAMES, has_limits
+
+NO_LOAD = Statement(
+    "No load acts", "Enter a force or a moment below, or a payload in the tab Machine."
+)
+LIMITS = (f"actuators {FORCE:g} N", f"struts {MOMENT:g} N m", f"guide {FORCE:g} N, {MOMENT:g} N m")
+"""Words for the typical limits."""
 
 
 class ForcesPanel:
@@ -71,6 +81,13 @@ class ForcesPanel:
                 "guide, and the bending of the struts, in colours of their shares.",
                 "view.forces.shown",
             )
+        self._assume = services.link(
+            "forces.typical",
+            "Loads › Assume typical limits",
+            "Give actuators, struts and guide typical limits; the tab Machine shows and changes "
+            "them.",
+            assume_limits,
+        )
         self._tables = gui.add_html("")
         self._most = gui.add_html("")
         self._copy = services.copy_button(
@@ -95,7 +112,9 @@ class ForcesPanel:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         loaded = self._loads.of(frame)
-        summary = (forces.verdict(loaded), *self._nearest_position(frame, loaded))
+        is_bare = load.is_bare(loaded) and loaded.is_regular
+        verdict = NO_LOAD if is_bare else forces.verdict(loaded)
+        summary = (verdict, *self._nearest_position(frame, loaded))
         top = render(summary, {"go": self._go}, corner=self._copy) + self._notes(frame)
         yield self._top, "content", top
         yield self._tables, "content", render(forces.reaction_tables(loaded))
@@ -110,9 +129,7 @@ class ForcesPanel:
         return render((most,), {"turn": self._turn})
 
     def _notes(self, frame: Frame) -> str:
-        words = ""
-        if not has_limits(frame.state.design):
-            words += note("Give limits in the tab Machine to see shares of them.")
+        words = "" if has_limits(frame.state.design) else precision.offer(LIMITS, self._assume)
         if frame.state.view.is_twin:
             words += note("These are the forces of the 4-4, not of the 6-4 twin that is drawn.")
         weights = self._loads.weights
@@ -149,6 +166,20 @@ class ForcesPanel:
         return Set("view.forces.force", force, "Force", "in its worst direction")
 
 
+def assume_limits(state: State) -> Action | None:
+    """Return the action that gives a design without limits typical ones; None if it has any."""
+    design = state.design
+    if has_limits(design):
+        return None
+    limited = msgspec.structs.replace(
+        design,
+        actuators=msgspec.structs.replace(design.actuators, push_n=FORCES),
+        struts=msgspec.structs.replace(design.struts, moment_nm=MOMENT),
+        guide=Guide(FORCE, MOMENT),
+    )
+    return Set("design", limited, "Machine", "typical limits")
+
+
 def without_force(loaded: LoadedPose) -> LoadedPose:
     """Return the pose under its moment and weights, without the force at the tool."""
     return replace(loaded, load=(0.0, 0.0, 0.0, *loaded.load[3:]))
@@ -160,7 +191,7 @@ def load_figure(services: Services) -> BarPart:
 
     def figure_of(frame: Frame) -> str:
         loaded = of(frame)
-        if not has_limits(loaded.design):
+        if load.is_bare(loaded) or not has_limits(loaded.design):
             return ""
         hint = f"Largest share of a limit under the load of this tab: {PART_NAMES[loaded.worst]}."
         share = Share(loaded.share)

@@ -87,6 +87,13 @@ def fitting_scale(force: float, scale: float) -> float:
     return round_step(force / FITTING)
 
 
+def is_bare(loaded: LoadedPose) -> bool:
+    """Whether nothing acts: neither a load nor a weight nor a force of the process."""
+    payload = loaded.design.payload
+    weight = loaded.weighs_payload and payload.mass_kg
+    return not any((*loaded.load, weight, payload.force_n, loaded.own is not None))
+
+
 def weights_of_parts(request: tuple[Design, float]) -> Weights:
     """Return the weights of a prototype's parts, without the payload, at a density in kg/m³.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 
 from explorer.app.features.feature import Export, Services, html_of, show_html
@@ -166,11 +167,10 @@ class PrecisionPanel:
         )
         self._assume = services.link(
             "precision.typical",
-            "Loads › Assume typical values",
+            "Loads › Assume typical errors and stiffness",
             "Give the design typical errors, stiffness, struts and tolerances where it states "
             "none; the tab Machine shows and changes them.",
             assume_typical,
-            words="Assume these",
         )
 
     def updates(self, frame: Frame) -> Updates:
@@ -188,8 +188,13 @@ class PrecisionPanel:
         _, assumed = _typical(design)
         if not assumed or (precision.has_errors and is_elastic(design)):
             return ""
-        words = f"State them in the tab Machine, or assume typical values: {'; '.join(assumed)}."
-        return box(f"{dim(words)} {self._assume}")
+        return offer(assumed, self._assume)
+
+
+def offer(values: Iterable[str], button: str) -> str:
+    """Return typical values that a design can be given, and the button that does it, as HTML."""
+    words = f"State them in the tab Machine, or assume typical ones: {'; '.join(values)}."
+    return box(f"{dim(words)} {button}")
 
 
 # A design stays while the mechanism moves.
@@ -199,7 +204,7 @@ _typical = lru_cache(maxsize=1)(typical_machine)
 def assume_typical(state: State) -> Action | None:
     """Return the action that gives the design typical values where it states none; None if all."""
     design, assumed = _typical(state.design)
-    return Set("design", design, "Machine", "typical values") if assumed else None
+    return Set("design", design, "Machine", "typical errors and stiffness") if assumed else None
 
 
 def _send_tolerances(services: Services, _: str, who: Who) -> None:

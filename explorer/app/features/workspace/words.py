@@ -109,14 +109,14 @@ def load_words(state: State, *, any_direction: bool = True) -> str:
     def vector(numbers: Triple, unit: str) -> str:
         return f"({', '.join(format_number(number, 4) for number in numbers)}) {unit}"
 
-    parts = [f"{vector(forces.force, 'N')} at the tool"]
+    parts = [f"{vector(forces.force, 'N')} at the tool"] if any(forces.force) else []
     if any(forces.moment):
         parts.append(vector(forces.moment, "N m"))
     if forces.weighed != "none" and payload.mass_kg:
         parts.append(f"{format_number(payload.mass_kg, 4)} kg of payload")
     if any_direction and payload.force_n:
         parts.append(f"{format_number(payload.force_n, 4)} N in any direction")
-    words = f"Load: {', '.join(parts)}"
+    words = f"Load: {', '.join(parts) or 'none; the tab Loads sets it'}"
     if forces.weighed == "payload and legs":
         words += "; platform and legs count as weightless"
     return words
