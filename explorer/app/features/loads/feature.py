@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 import viser
 
-from explorer.app.features.feature import BarPart, Feature, InBar, Services, Tab
+from explorer.app.features.feature import BarPart, Feature, InBar, Services, Tab, show_html
 from explorer.app.features.loads import budget, load, precision
 from explorer.app.features.loads.precision_scene import DeflectedScene, ErrorEllipsoidScene
 from explorer.app.features.loads.scene import ForcesScene, LoadHandle
@@ -117,7 +117,8 @@ class ForcesPanel:
         summary = (verdict, *self._nearest_position(frame, loaded))
         top = render(summary, {"go": self._go}, corner=self._copy) + self._notes(frame)
         yield self._top, "content", top
-        yield self._tables, "content", render(forces.reaction_tables(loaded))
+        tables = "" if is_bare else render(forces.reaction_tables(loaded))
+        yield from show_html(self._tables, tables)
         yield self._most, "content", self._largest_loads(frame, loaded)
         yield from self._controls.updates(frame)
 
@@ -129,7 +130,11 @@ class ForcesPanel:
         return render((most,), {"turn": self._turn})
 
     def _notes(self, frame: Frame) -> str:
-        words = "" if has_limits(frame.state.design) else precision.offer(LIMITS, self._assume)
+        words = (
+            ""
+            if has_limits(frame.state.design)
+            else precision.offer("limits", LIMITS, self._assume)
+        )
         if frame.state.view.is_twin:
             words += note("These are the forces of the 4-4, not of the 6-4 twin that is drawn.")
         weights = self._loads.weights

@@ -188,12 +188,12 @@ class PrecisionPanel:
         _, assumed = _typical(design)
         if not assumed or (precision.has_errors and is_elastic(design)):
             return ""
-        return offer(assumed, self._assume)
+        return offer("errors and stiffness", assumed, self._assume)
 
 
-def offer(values: Iterable[str], button: str) -> str:
-    """Return typical values that a design can be given, and the button that does it, as HTML."""
-    words = f"State them in the tab Machine, or assume typical ones: {'; '.join(values)}."
+def offer(what: str, typical: Iterable[str], button: str) -> str:
+    """Return what a design can be given, and the button that gives it typical values, as HTML."""
+    words = f"State {what} in the tab Machine, or assume typical ones: {'; '.join(typical)}."
     return box(f"{dim(words)} {button}")
 
 
