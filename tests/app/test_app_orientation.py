@@ -93,7 +93,29 @@ def test_angles_that_are_set_are_those_of_the_pose() -> None:
     there = work.GoToTilt(30.0, 20.0).apply(state)
     assert tilt_torsion_of(there.pose.rotation) == pytest.approx((30.0, 20.0, -50.0), abs=1e-9)
     assert work.SetTiltTorsion(1, 25.0).words() == "tilt = 25°"
-    assert work.GoToTilt(30.0, 20.0).words() == "Tilt 20° towards 30°"
+    assert work.GoToTilt(30.0, 20.0).describe(there) == "Tilt 20° towards 30°"
+
+
+@pytest.mark.parametrize("azimuth", [-150.0, 20.0, 100.0])
+def test_tilt_beyond_the_map_goes_to_its_border_in_the_same_mode_and_says_why(
+    azimuth: float,
+) -> None:
+    state = open_state(OPTIMAL)
+    border = tilt_map(OPTIMAL, state.position, state.tilt_torsion.torsion, [azimuth])
+    most, limit = float(border.tilts[0]), border.limits[0]
+    beyond = work.GoToTilt(azimuth, 170.0)
+    after = beyond.apply(state)
+    assert after.tilt_torsion.tilt == pytest.approx(most - work.INSIDE)
+    assert after.mode == state.mode
+    assert not Frame(after).snapshot.violations
+    assert after.remark is not None
+    assert limit is not None
+    assert f"{most:.1f}°, by {limit}" in after.remark
+    assert f"Tilt {most - work.INSIDE:.4g}°" in beyond.describe(after)
+    # No tilt is reached from one that is beyond a limit itself.
+    outside = SetPosition(0, 30.0).apply(state)
+    with pytest.raises(InputError, match="no tilt is possible here"):
+        work.GoToTilt(azimuth, 5.0).apply(outside)
 
 
 def test_map_draws_each_tilt_at_its_place_in_the_colour_of_its_limit() -> None:

@@ -291,7 +291,9 @@ def test_path_and_its_crossings_are_drawn(services: Services) -> None:
     expected = scale * np.array([c.pose.position for c in crossings])
     np.testing.assert_allclose(balls[: len(crossings)], expected, atol=1e-4)
     hidden = [v for _, n, v in scene.updates(Placed(Frame(open_state(OPTIMAL)))) if n == "visible"]
-    assert hidden == [False, False]
+    assert hidden == [False, False, False]
+    label: Any = drawn["/path/label", "position"]
+    assert np.abs(line - np.float32(label)).max(axis=-1).min() < 1e-5
 
 
 # Planning
@@ -385,6 +387,8 @@ def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) ->
     desk.press(buttons, "paths.export")
     assert isinstance(services.downloads, StubDownloads)
     assert services.downloads.sent == [(1, "paper-optimal-path.csv")]
+    desk.press(buttons, "paths.clear")
+    assert desk.state.journey is None
     desk.press(buttons, "paths.kind", "planned")
     desk.session.do(Set("paths.goal", GOAL))
     desk.click(paths.go)
@@ -420,10 +424,12 @@ def test_end_is_the_present_pose_a_mode_or_six_numbers(
     # Typed numbers begin as those that were shown, and each of the six can be set.
     before = numbers()
     desk.use(controls()[title], TYPED)
+    steps = len(desk.session.history.steps)
     assert value_at(desk.state, at) == before
     assert {*typed} <= {*controls()}
     desk.use(controls()[typed[0]], (9.0, 4.0, 8.0))
     desk.use(controls()[typed[1]], (-70.0, 10.0, 5.0))
+    assert len(desk.session.history.steps) == steps
     assert numbers().position == (9.0, 4.0, 8.0)
     assert angles_of(numbers()) == pytest.approx((-70.0, 10.0, 5.0))
     assert controls()[typed[1]].value == (-70.0, 10.0, 5.0)

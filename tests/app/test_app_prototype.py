@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from desk import Desk, by_name, thick, viewed
 from part_gaps import least_gap
-from services import StubWorker
+from services import StubWorker, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs
@@ -269,6 +269,26 @@ def test_design_too_tight_is_refused_in_the_words_of_the_library(feed: PartsFeed
     feed.follow(Frame(with_prototype()))
     assert parts_to_draw(feed) is not None
     assert trouble_of(Frame(with_prototype()), feed) == ""
+
+
+def test_drawing_of_a_design_of_another_size_is_not_shown() -> None:
+    services = services_for()
+    feed, worker = services.get(BUILD_FEED), services.worker
+    assert isinstance(worker, StubWorker)
+    larger = msgspec.structs.replace(
+        OPTIMAL.with_variables([1e4 * each for each in OPTIMAL.variables]).with_limits(box=None),
+        unit_mm=1e-3,
+        home=None,
+    )
+    similar = OPTIMAL.with_variable("a3x", 20.0)
+    for first, then, stays in ((OPTIMAL, similar, True), (similar, larger, False)):
+        feed.follow(Frame(open_state(first)))
+        worker.work()
+        assert feed.drawing is not None
+        feed.follow(Frame(open_state(then)))
+        assert (feed.drawing is not None) == stays
+        worker.work()
+        assert feed.is_current
 
 
 # Whether the machine can be built
