@@ -169,11 +169,11 @@ def without_leg(leg: int) -> Alteration:
     along = Telescopes.along
 
     def all_but_one(
-        self: Telescopes, placed: Placed, bases: FloatArray, tips: FloatArray
+        self: Telescopes, placed: Placed, bases: FloatArray, tips: FloatArray, radii: FloatArray
     ) -> Iterator[Update]:
         tips = tips.copy()
         tips[leg - 1] = bases[leg - 1] + [0.0, 0.0, 1e-6]
-        yield from along(self, placed, bases, tips)
+        yield from along(self, placed, bases, tips, radii)
 
     def alter(running: Running, patch: pytest.MonkeyPatch) -> None:
         patch.setattr(Telescopes, "along", all_but_one)

@@ -6,6 +6,7 @@ and the bar while parts do not fit.
 
 from __future__ import annotations
 
+from functools import partial
 from html import escape
 from typing import TypeAlias
 
@@ -15,6 +16,7 @@ from explorer.app.features.feature import Services, html_of
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.app.widgets.buttons import figure, press_button
 from explorer.app.widgets.markup import row, sentence, status, table
 from explorer.mechanism.design import LENGTHS, Design
@@ -48,19 +50,19 @@ class BuildVerdict:
     """The verdict as HTML, the same wherever it stands."""
 
     def __init__(self, services: Services) -> None:
-        self._services, self._feed = services, services.get(BUILD_FEED)
-        services.do_on_press(MEND, self._mend, values=(FITTING, STROKES))
-        for value, words, hint in (
+        self._feed, session = services.get(BUILD_FEED), services.session
+        services.do_on_press(
+            MEND, lambda what: partial(self._mend, what), values=(FITTING, STROKES)
+        )
+        for what, words, hint in (
             (FITTING, "Make the parts fit", "Set the least unit with which the parts fit."),
             (STROKES, STROKES_WORDS, STROKES_HINT),
         ):
-            services.buttons.offer(
-                f"Prototype › {words}",
-                hint,
-                MEND,
-                value,
-                lambda value=value: self._mend(value) is not None,
-            )
+
+            def is_ready(what: str = what) -> bool:
+                return self._mend(what, session.state) is not None
+
+            services.buttons.offer(f"Prototype › {words}", hint, MEND, what, is_ready)
 
     def html(self) -> str:
         """Return whether the machine can be built, with the press that mends it."""
@@ -74,25 +76,20 @@ class BuildVerdict:
         hint = " ".join(map(sentence, (*built.problems, built.advice)))
         return figure("Prototype", "Buildable", "no", hint=hint, look="ex-beyond")
 
-    def _mend(self, what: str) -> Set | None:
-        built, design = self._feed.drawing, self._services.session.latest_state().design
+    def _mend(self, what: str, state: State) -> Set | None:
+        built, design = self._feed.drawing, state.design
         # What was found for another design would bring that one back.
         if built is None or not self._feed.is_current or self._feed.request != design:
             return None
-        if what == STROKES:
-            if not built.short_legs:
-                return None
-            limited, words = built.limited, "those of the strokes"
-            limits, home = limited.limits, limited.home
-            return Set(
-                "design", msgspec.structs.replace(design, limits=limits, home=home), "Limits", words
-            )
-        mended = built.mended
-        if mended is None:
-            return None
-        home = mended.home if moves_home(built) else design.home
-        fitting = msgspec.structs.replace(design, unit_mm=mended.unit_mm, home=home)
-        return Set("design", fitting, "Parts that fit", mend_words(built))
+        if what == FITTING and built.mended is not None:
+            home = built.mended.home if moves_home(built) else design.home
+            fitting = msgspec.structs.replace(design, unit_mm=built.mended.unit_mm, home=home)
+            return Set("design", fitting, "Parts that fit", mend_words(built))
+        if what == STROKES and built.short_legs:
+            limits, home = built.limited.limits, built.limited.home
+            within = msgspec.structs.replace(design, limits=limits, home=home)
+            return Set("design", within, "Limits", "those of the strokes")
+        return None
 
 
 def moves_home(built: Buildability) -> bool:
