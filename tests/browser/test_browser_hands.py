@@ -29,7 +29,7 @@ TABS = {
     *("Singularity", "Workspace", "Tilt", "Loads", "Prototype"),
     *("Optimise", "Compare", "Paths"),
 }
-DIALOGS = ("History", "Export", "Help", "Overlays")
+DIALOGS = ("Overlays", "History", "Export", "Help")
 
 # Controls that stick out of what holds them, or of the page, to the left or to the right.
 CUT_OFF = """() => {

@@ -130,11 +130,9 @@ class ForcesPanel:
         return render((most,), {"turn": self._turn})
 
     def _notes(self, frame: Frame) -> str:
-        words = (
-            ""
-            if has_limits(frame.state.design)
-            else precision.offer("limits", LIMITS, self._assume)
-        )
+        words = ""
+        if not has_limits(frame.state.design):
+            words += precision.offer("limits", LIMITS, self._assume)
         if frame.state.view.is_twin:
             words += note("These are the forces of the 4-4, not of the 6-4 twin that is drawn.")
         weights = self._loads.weights
