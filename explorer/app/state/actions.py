@@ -17,7 +17,7 @@ from explorer.app.state import state as states
 from explorer.app.state.clear_length import clear_length
 from explorer.app.state.parts import parts_kept_on_open, with_value
 from explorer.app.state.state import State, angles_of, joints_of, open_state
-from explorer.app.state.view import FORM_NAMES, DrawnAs
+from explorer.app.state.view import DrawnAs
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, VARIABLES, Design
 from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
@@ -361,7 +361,7 @@ class Set(Action):
 
 def draw_as(form: DrawnAs) -> Set:
     """Return the action that draws another form of the mechanism."""
-    return Set("view.drawn_as", form, "Drawn as", FORM_NAMES[form])
+    return Set("view.drawn_as", form, "Drawn as", "parts" if form == "prototype" else form)
 
 
 def move_to(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> State:

@@ -170,12 +170,6 @@ class PrecisionView:
 
 Coordinates = Literal["position", "folds"]
 DrawnAs = Literal["schematic", "prototype", "6-4 twin"]
-FORM_NAMES: dict[DrawnAs, str] = {
-    "schematic": "schematic",
-    "prototype": "parts",
-    "6-4 twin": "6-4 twin",
-}
-"""Names of the forms on the page."""
 Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
 Gain = Literal["none", "speed", "force"]
 

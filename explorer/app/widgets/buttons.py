@@ -223,15 +223,14 @@ ICON = (
 
 
 def copy_button(buttons: Buttons, answer: str, source: Callable[[], Source]) -> str:
-    """Return the button of a panel that copies how its answer is computed, as HTML.
+    """Add the button that copies how an answer is computed; return it as HTML.
 
     Args:
         buttons: Buttons of the page.
         answer: Name of the answer, from the tab on, such as "Loads › Forces".
         source: Function that returns how the present answer is computed.
     """
-    name = f"{answer.rsplit(STEP, maxsplit=1)[-1].lower()}.copy"
-    label = "Copy the command line"
-    buttons.on(name, lambda _, client: run_script_in(client, read_script("copies", source().text)))
-    buttons.offer(f"{answer}{STEP}{label}", HINT, name)
-    return press_button(name, "", ICON, hint=HINT, label=label, class_name="ex-copy")
+    words, name = "Copy the command line", f"{answer.rsplit(STEP, maxsplit=1)[-1].lower()}.copy"
+    buttons.on(name, lambda _, who: run_script_in(who, read_script("copies", source().text)))
+    buttons.offer(f"{answer}{STEP}{words}", HINT, name)
+    return press_button(name, "", ICON, hint=HINT, label=words, class_name="ex-copy")

@@ -112,7 +112,7 @@ class ForcesPanel:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         loaded = self._loads.of(frame)
-        is_bare = load.is_bare(loaded) and loaded.is_regular
+        is_bare = load.is_bare(loaded)
         verdict = NO_LOAD if is_bare else forces.verdict(loaded)
         summary = (verdict, *self._nearest_position(frame, loaded))
         top = render(summary, {"go": self._go}, corner=self._copy) + self._notes(frame)
@@ -160,10 +160,8 @@ class ForcesPanel:
 
     def _turn_force(self, state: State) -> Action | None:
         size = math.hypot(*state.view.forces.force)
-        if size == 0.0:
-            return None
         direction = without_force(self._loads.of(Frame(state))).worst_force(size).direction
-        if not np.isfinite(direction).all():
+        if size == 0.0 or not np.isfinite(direction).all():
             return None
         force = load.round_force(size * direction, size)
         return Set("view.forces.force", force, "Force", "in its worst direction")

@@ -89,9 +89,8 @@ def fitting_scale(force: float, scale: float) -> float:
 
 def is_bare(loaded: LoadedPose) -> bool:
     """Whether nothing acts: neither a load nor a weight nor a force of the process."""
-    payload = loaded.design.payload
-    weight = loaded.weighs_payload and payload.mass_kg
-    return not any((*loaded.load, weight, payload.force_n, loaded.own is not None))
+    needed = loaded.reactions
+    return not (needed.actuators.any() or needed.spread.any())
 
 
 def weights_of_parts(request: tuple[Design, float]) -> Weights:

@@ -23,7 +23,6 @@ from explorer.measures.box import PositionSet
 from explorer.mechanism.design_file import typical_machine
 from explorer.statics.budget import with_tolerances
 from explorer.statics.compliance import is_elastic
-from explorer.statics.loaded import ToolPrecision
 
 LOAD = "the load and the weights above"
 OVER: dict[str, PositionSet] = {
@@ -176,19 +175,14 @@ class PrecisionPanel:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         precision = self._loads.precision(frame)
+        design = precision.loaded.design
         errors = render(answers.tool_errors(precision), corner=self._copy)
-        yield self._top, "content", errors + self._offer(precision)
+        if not (precision.has_errors and is_elastic(design)):
+            errors += offer("errors and stiffness", _typical(design)[1], self._assume)
+        yield self._top, "content", errors
         yield self._deflection, "content", render(answers.deflections(precision, LOAD))
         yield from self._controls.updates(frame)
         yield from self._budget.updates(frame)
-
-    def _offer(self, precision: ToolPrecision) -> str:
-        """Return what typical values can be assumed, with the button that does, as HTML."""
-        design = precision.loaded.design
-        _, assumed = _typical(design)
-        if not assumed or (precision.has_errors and is_elastic(design)):
-            return ""
-        return offer("errors and stiffness", assumed, self._assume)
 
 
 def offer(what: str, typical: Iterable[str], button: str) -> str:

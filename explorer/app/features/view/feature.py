@@ -16,7 +16,7 @@ from explorer.app.scene.shapes import add_label
 from explorer.app.state.actions import Action, Set, draw_as
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.state.view import FORM_NAMES, DrawnAs
+from explorer.app.state.view import DrawnAs
 from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect
@@ -110,7 +110,7 @@ def _form_chips(services: Services) -> Chips:
             return state.view.drawn_as == form
 
         effect = Effect(lambda state: draw_as("schematic" if is_on(state) else form), is_on)
-        name = FORM_NAMES[form]
+        name = draw_as(form).text
         command = f"{OVERLAYS} › Drawn as › {name}"
         return Chip(name.capitalize(), command, hint, effect, keys=keys)
 
