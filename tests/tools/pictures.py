@@ -194,7 +194,8 @@ SCENES = {
         ),
         panels=True,
         tab="Loads",
-        size=(1280, 900),
+        # Tall, so that the precision below the forces is in it.
+        size=(1280, 1200),
     ),
     # Shares grow beyond all bounds towards the base plane.
     "load-share": Scene(
