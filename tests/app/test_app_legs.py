@@ -587,7 +587,7 @@ def test_legs_are_drawn_with_the_radii_of_their_clearance_or_as_lines(services: 
         # The cylinder, rod, collar and socket of each leg.
         drawn = actuators["batched_scales"][:, 0].reshape(4, 4)
         for leg, radius in enumerate(radii):
-            most = placed.scale * radius if radius else AXIS_RADIUS * placed.thickness
+            most = placed.scale * radius if radius else AXIS_RADIUS
             assert drawn[:, leg].max() == pytest.approx(most)
         figure = clearance_figure(Frame(each))
         assert ("axes only" in figure) == (not any(radii))

@@ -164,6 +164,13 @@ def test_problem_of_the_paper_is_solved_in_two_presses(newcomer: Newcomer) -> No
     newcomer.sees("accepted")
     expect(newcomer.button("Accept")).to_have_count(0)
     assert newcomer.presses_for() == 1
+    # What was found cannot be built yet: its carriages are too close together.
+    newcomer.sees("Not buildable")
+    newcomer.presses_for()
+    newcomer.press(re.compile("^Set the unit to "))
+    newcomer.sees("Strokes too short")
+    expect(newcomer.figure("Buildable")).to_have_count(0)
+    assert newcomer.presses_for() == 1
 
 
 def test_three_designs_are_compared_by_volume_and_overlay(newcomer: Newcomer) -> None:

@@ -37,12 +37,12 @@ PLATFORM_OPACITY = 0.82
 PLATE_TOP = -0.6
 RAIL_HALF_WIDTH, RAIL_TOP = 0.3, -0.42
 BALL_RADIUS = 0.24
-# Of the line of a leg that has no radius.
-AXIS_RADIUS = 0.06
+# Of the line of a leg that has no radius, whatever the thickness.
+AXIS_RADIUS = 0.05
 PIN_RADIUS, PIN_HALF_LENGTH = 0.085, 0.34
 POINT_RADIUS, LINE_RADIUS = 0.36, 0.075
-# Radii of an actuator's cylinder, rod, collar and socket, over that of its leg.
-SHARES = (0.94, 0.75, 1.0, 0.9)
+# Radii of an actuator's cylinder, rod, collar and socket, over that of its leg, or of its line.
+SHARES, LINE_SHARES = (0.94, 0.75, 1.0, 0.9), (1.0, 1.0, 0.5, 0.5)
 # Length of an actuator's cylinder, which does not depend on its stroke, as a share of the reach.
 TUBE_SHARE = 0.34
 PLANE_OPACITY = 0.2
@@ -143,7 +143,12 @@ class Telescopes(shapes.Rods):
         yield from self.between(
             np.concatenate([bases, collars, collars, sockets]),
             np.concatenate([tube_ends, tips, tube_ends, tips]),
-            np.where(radii > 0.0, np.outer(SHARES, radii), AXIS_RADIUS * size).ravel(),
+            np.concatenate(
+                [
+                    np.where(radii > 0.0, share * radii, of_line * AXIS_RADIUS)
+                    for share, of_line in zip(SHARES, LINE_SHARES, strict=True)
+                ]
+            ),
         )
 
 

@@ -127,7 +127,7 @@ def verdict_words(built: Buildability) -> str:
 
 def _button(value: str, words: str, hint: str) -> str:
     button = press_button(MEND, value, words, hint=hint, class_name="ex-button")
-    return f'<div class="ex-flow ex-before">{button}</div>'
+    return f'<div class="ex-flow ex-after ex-before">{button}</div>'
 
 
 def strokes_table(built: Buildability) -> str:

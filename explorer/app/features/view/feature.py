@@ -270,7 +270,7 @@ def shadow_outlines(placed: Placed, ground: float) -> list[FloatArray]:
         twin = [(p[base], p[tip]) for base, tip in TWIN]
         legs = twin if view.is_twin else list(zip(*placed.struts, strict=True))
         radii = np.zeros(len(twin)) if view.is_twin else placed.leg_radii
-        radii = np.where(radii > 0.0, bodies.SHARES[0] * radii, bodies.AXIS_RADIUS * size)
+        radii = np.where(radii > 0.0, bodies.SHARES[0] * radii, bodies.AXIS_RADIUS)
         outlines += [
             _outline(np.stack(leg), radius * np.eye(3)[:, :2], ground)
             for leg, radius in zip(legs, radii.tolist(), strict=True)
