@@ -26,7 +26,7 @@ from explorer.numerics.arrays import FloatArray, lengths_of
 from explorer.numerics.checks import MOST
 from explorer.numerics.number_text import format_number
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, joints_of_leg
-from explorer.prototype.sizes import FIRST_SWING, SECOND_SWING, THINNEST_LEG, Sizes
+from explorer.prototype.sizes import FIRST_SWING, SECOND_SWING, THINNEST_LEG, Sizes, Stroke
 from explorer.workspace.limits.valid_poses import poses_are_valid
 
 BALL_SWING = math.radians(85.0)
@@ -136,30 +136,22 @@ class Buildability:
         )
 
     @property
-    def limited(self) -> Design:
-        """The design with the strokes of its short legs as their limits."""
-        sizes = self.sizes
-        unit = sizes.design.unit_mm
-        limits = {
-            LENGTHS[leg - 1]: (
-                _round(sizes.strokes[leg - 1].shortest / unit, up=True),
-                _round(sizes.strokes[leg - 1].longest / unit, up=False),
-            )
-            for leg in self.short_legs
-        }
-        return sizes.design.with_limits(**limits)
+    def limited(self) -> Design | None:
+        """The design with the strokes of its short legs as their limits; None if none is short."""
+        design, limits = self.sizes.design, dict[str, Stroke]()
+        for leg in self.short_legs:
+            low, high = (end / design.unit_mm for end in self.sizes.strokes[leg - 1])
+            limits[LENGTHS[leg - 1]] = Stroke(_round(low, up=True), _round(high, up=False))
+        return design.with_limits(**limits) if limits else None
 
 
 def buildability(design: Design) -> Buildability:
     """Return whether a machine can be built with its parts, and what would make it fit."""
     design = msgspec.structs.replace(design, home=design.home_pose)
     # The larger the radii of legs that have none, the less room; the thinnest need the least.
-    thinnest = _sizes(design)
-    thinner = THICKEST_SHARE * design.reach * design.unit_mm / THINNEST_LEG
-    sizes = thinnest
-    if thinner > 1.0 and not all(design.limits.leg_radii):
-        factor = _least(lambda f: _sizes(design, open_share=1.0 / f).worst is None, 1.0, thinner)
-        sizes = thinnest if factor is None else _sizes(design, open_share=1.0 / factor)
+    thinner = max(1.0, THICKEST_SHARE * design.reach * design.unit_mm / THINNEST_LEG)
+    factor = _least(lambda f: _sizes(design, open_share=1.0 / f).worst is None, 1.0, thinner)
+    sizes = _sizes(design, open_share=0.0 if factor is None else 1.0 / factor)
     problems = tuple(_problems(sizes))
     if not problems:
         return Buildability(sizes)

@@ -139,16 +139,12 @@ class Telescopes(shapes.Rods):
         unit = spans / np.maximum(lengths, 1e-9)
         tube_ends = bases + unit * np.minimum(TUBE_SHARE * placed.reach, 0.8 * lengths)
         collars = tube_ends - unit * np.minimum(0.3 * size, 0.2 * lengths)
+        lines = AXIS_RADIUS * np.array(LINE_SHARES)[:, None]
         sockets = tips - unit * np.minimum(0.5 * size, 0.3 * lengths)
         yield from self.between(
             np.concatenate([bases, collars, collars, sockets]),
             np.concatenate([tube_ends, tips, tube_ends, tips]),
-            np.concatenate(
-                [
-                    np.where(radii > 0.0, share * radii, of_line * AXIS_RADIUS)
-                    for share, of_line in zip(SHARES, LINE_SHARES, strict=True)
-                ]
-            ),
+            np.where(radii > 0.0, np.outer(SHARES, radii), lines).ravel(),
         )
 
 

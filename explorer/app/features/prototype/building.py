@@ -10,8 +10,6 @@ from functools import partial
 from html import escape
 from typing import TypeAlias
 
-import msgspec
-
 from explorer.app.features.feature import Services, html_of
 from explorer.app.session.feed import Feed, feed_of
 from explorer.app.state.actions import Set
@@ -77,32 +75,21 @@ class BuildVerdict:
         return figure("Prototype", "Buildable", "no", hint=hint, look="ex-beyond")
 
     def _mend(self, what: str, state: State) -> Set | None:
-        built, design = self._feed.drawing, state.design
+        built = self._feed.drawing
         # What was found for another design would bring that one back.
-        if built is None or not self._feed.is_current or self._feed.request != design:
+        if built is None or not self._feed.is_current or self._feed.request != state.design:
             return None
-        if what == FITTING and built.mended is not None:
-            home = built.mended.home if moves_home(built) else design.home
-            fitting = msgspec.structs.replace(design, unit_mm=built.mended.unit_mm, home=home)
-            return Set("design", fitting, "Parts that fit", mend_words(built))
-        if what == STROKES and built.short_legs:
-            limits, home = built.limited.limits, built.limited.home
-            within = msgspec.structs.replace(design, limits=limits, home=home)
-            return Set("design", within, "Limits", "those of the strokes")
-        return None
-
-
-def moves_home(built: Buildability) -> bool:
-    """Whether the parts fit with another home only."""
-    return built.mended is not None and built.mended.home != built.sizes.design.home
+        mended = built.mended if what == FITTING else built.limited
+        words = mend_words(built) if what == FITTING else STROKES_WORDS
+        return None if mended is None else Set("design", mended, "Design", words)
 
 
 def mend_words(built: Buildability) -> str:
     """Return the words of the press that makes the parts fit."""
-    mended, words = built.mended, list[str]()
-    if mended is not None and mended.unit_mm != built.sizes.design.unit_mm:
+    mended, design, words = built.mended, built.sizes.design, list[str]()
+    if mended is not None and mended.unit_mm != design.unit_mm:
         words.append(f"set the unit to {mended.unit_mm:.6g} mm")
-    if moves_home(built):
+    if mended is not None and mended.home != design.home:
         words.append("move home")
     return " and ".join(words).capitalize()
 

@@ -80,7 +80,7 @@ class PrototypePanel:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that show a frame."""
         feed, built = self._feed, self._build.drawing
-        strokes = "" if built is None else strokes_table(built)
+        strokes = "" if built is None else f'<div class="ex-after">{strokes_table(built)}</div>'
         yield self._built, "content", box(self._verdict.html(), strokes)
         yield from self._controls.updates(frame)
         yield from show_html(self._trouble, trouble_of(frame, feed))
