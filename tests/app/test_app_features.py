@@ -28,7 +28,7 @@ from explorer.app.features.loads.load import WEIGHTS_FEED, SetForce
 from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
 from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
-from explorer.app.features.paths.actions import Advance as PlayOn, SetPathTime, TakePlan
+from explorer.app.features.paths.actions import Advance as PlayOn, SetEnd, SetPathTime, TakePlan
 from explorer.app.features.studies.actions import PickDesign
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.view.feature import CAMERA_HINTS
@@ -260,7 +260,7 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
 
 OF_VALUES = (
     SetJoint, SetPosition, SetAngle, SetPose, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
-    SetFold, SetVariable, SetName, SetPathTime, PickDesign,
+    SetFold, SetVariable, SetName, SetPathTime, SetEnd, PickDesign,
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map or a handle gives."""
 
