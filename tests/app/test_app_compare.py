@@ -18,7 +18,7 @@ from limited_designs import scaled_design
 from services import StubWorker, services_for
 
 from explorer.app.features.compare.feature import ComparePanel, Pin, Unpin
-from explorer.app.features.compare.scene import APART, ComparedScene
+from explorer.app.features.compare.scene import APART, SCENES
 from explorer.app.features.compare.table import (
     DRAWN,
     Column,
@@ -335,15 +335,15 @@ def test_workspaces_are_drawn_to_true_size_in_their_colours(
     large = msgspec.structs.replace(INITIAL, unit_mm=25.0)
     state = compared(large, look=Look(overlay=True, outlines=True))
     follow(feeds, state)
-    scene = ComparedScene(services)
+    scenes = [services.get(part) for part in SCENES]
     assigner = Assigner(services.server)
     worker.work()
     follow(feeds, state)
     placed = Placed(Frame(state))
-    updates = scene.updates(placed)
-    assigner.assign(updates)
+    assigner.assign(update for scene in scenes for update in scene.updates(placed))
     shown = {
         handle.name: handle
+        for scene in scenes
         for handle, name, value in scene.updates(placed)
         if name == "visible" and value
     }
@@ -362,7 +362,7 @@ def test_workspaces_are_drawn_to_true_size_in_their_colours(
     assert 0.5 * close < off <= 1.001 * close
     hidden = Frame(compared(large, look=Look()))
     follow(feeds, hidden.state)
-    assigner.assign(scene.updates(Placed(hidden)))
+    assigner.assign(update for scene in scenes for update in scene.updates(Placed(hidden)))
     assert not mesh.visible
 
 

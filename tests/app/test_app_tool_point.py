@@ -22,7 +22,7 @@ from strategies import Case, all_cases
 from workspace_feeds import draw
 
 from explorer.app.features.compare.feature import Pin
-from explorer.app.features.compare.scene import ComparedScene
+from explorer.app.features.compare.scene import SCENES
 from explorer.app.features.compare.work import FEEDS
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.feature import MovePanel
@@ -569,9 +569,9 @@ def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) 
         assert isinstance(services.worker, StubWorker)
         services.worker.work()
         placed = Placed(Frame(state))
-        scene = ComparedScene(services)
-        nodes = by_name(scene.updates(placed))
-        boxes = scene.corners(placed).reshape(-1, 8, 3)
+        scenes = [services.get(part) for part in SCENES]
+        nodes = by_name(update for scene in scenes for update in scene.updates(placed))
+        boxes = [scene.corners(placed) for scene in scenes[:2]]
         for design, name, box in zip((state.design, other), ("live", "A"), boxes, strict=True):
             home = design.home_pose
             unit = scene_scale(state) * design.unit_mm / state.design.unit_mm

@@ -5,24 +5,24 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from html import escape
 from typing import ClassVar
 
 import viser
 
-from explorer.app.features.compare.scene import ComparedScene
+from explorer.app.features.compare.scene import SCENES
 from explorer.app.features.compare.table import Column, bars, columns_of, notes, table
 from explorer.app.features.compare.work import FEEDS, draw_compared
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, Tab
+from explorer.app.session.session import Change
 from explorer.app.state.actions import Action, Open
 from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import with_value
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Buttons, press_button
+from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect, choose, turn
 from explorer.app.widgets.markup import box, swatch
 from explorer.errors import InputError
@@ -139,7 +139,7 @@ class ComparePanel:
         self._feeds = [services.get(feed) for feed in FEEDS]
         self._library = None if services.user_data is None else services.get(SavedDesigns)
         self.html = services.gui.add_html("")
-        self._add_buttons(services.buttons)
+        self._add_buttons(services)
         looks = {chip.command.removeprefix("Compare › "): chip for chip in LOOKS}
         self._looks = Chips(services.buttons, services.session, "compare.turn", "", looks)
         self._key: tuple[object, ...] = ()
@@ -155,9 +155,9 @@ class ComparePanel:
             self._key, self._content = key, self._page(frame.state, columns, choices)
         yield self.html, "content", self._content
 
-    def _add_buttons(self, buttons: Buttons) -> None:
-        buttons.on("compare.pin", self._pin)
-        buttons.offer(
+    def _add_buttons(self, services: Services) -> None:
+        services.do_on_press("compare.pin", self._pin)
+        services.buttons.offer(
             "Compare › Pin this design",
             "Keep a copy of the live design as it is now, to compare it with what it becomes.",
             "compare.pin",
@@ -179,20 +179,19 @@ class ComparePanel:
         )
         for verb, change, words, hint in places:
             name = f"compare.{verb}"
-            buttons.on(name, partial(self._change_place, change), values=SLOTS)
+            services.do_on_press(
+                name,
+                lambda place, change=change: lambda state: change(state, SLOTS.index(place)),
+                SLOTS,
+            )
             for slot, place in enumerate(SLOTS):
-                buttons.offer(
+                services.buttons.offer(
                     f"Compare › {words} design {place}",
                     hint,
                     name,
                     place,
                     lambda slot=slot: self._session.state.compared.pinned[slot] is not None,
                 )
-
-    def _change_place(
-        self, change: Callable[[State, int], Action], place: str, client: viser.ClientHandle
-    ) -> None:
-        self._session.do(lambda state: change(state, SLOTS.index(place)), who=client.client_id)
 
     def _page(
         self, state: State, columns: tuple[Column, ...], choices: Mapping[str, Design]
@@ -235,11 +234,10 @@ class ComparePanel:
         named = {**PRESETS, **{design.name: design for design in own}}
         return dict(itertools.islice(named.items(), MOST_BUTTONS))
 
-    def _pin(self, name: str, client: viser.ClientHandle) -> None:
-        """Pin the live design for "", or the one with a name."""
+    def _pin(self, name: str) -> Change | None:
+        """Return what pins the live design for "", or the one with a name."""
         chosen = self._choices().get(name)
-        if chosen is not None or not name:
-            self._session.do(lambda state: Pin(chosen or state.design), who=client.client_id)
+        return None if name and chosen is None else lambda state: Pin(chosen or state.design)
 
 
 def _open(state: State, slot: int) -> Open:
@@ -283,7 +281,7 @@ COMPARE = Feature(
     "compare",
     manual="page.md#Compare",
     tabs=(Tab("work", "Compare", ComparePanel, viser.Icon.COLUMNS_3),),
-    scene=(ComparedScene,),
+    scene=SCENES,
     feeds=FEEDS,
     tasks=(draw_compared,),
 )

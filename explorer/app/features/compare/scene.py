@@ -6,19 +6,18 @@ They are of b4, or of the tool point of each design.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
-import viser
 from numpy.typing import NDArray
 
 from explorer.app.features.compare import work
+from explorer.app.features.compare.work import LIVE, NAMES
 from explorer.app.features.feature import Services
 from explorer.app.scene.placing import NO_POINTS, Placed, ScenePart
 from explorer.app.scene.shapes import COMPARED, NO_MESH, add_label, add_lines, add_translucent
 from explorer.app.scene.surfaces import Drawn
-from explorer.app.state.compared import SLOTS
 from explorer.app.widgets.assigning import Update
 from explorer.measures.box import corners_of
 from explorer.numerics.arrays import FloatArray
@@ -27,36 +26,6 @@ OPACITY = 0.3
 # Each workspace is drawn larger by this share than the one before: designs share limits, and
 # of two faces in one plane no renderer knows which is in front.
 APART = 3e-4
-NAMES = ("live", *SLOTS)
-
-
-class ComparedScene(ScenePart):
-    """The workspaces and outlines of all columns."""
-
-    def __init__(self, services: Services) -> None:
-        self._columns = [
-            _Column(services.scene, column, services.get(feed))
-            for column, feed in enumerate(work.FEEDS)
-        ]
-
-    def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield the updates that draw the workspaces of this frame."""
-        for column in self._columns:
-            yield from column.updates(placed)
-
-    def corners(self, placed: Placed) -> FloatArray:
-        """Return the corners of the boxes about the workspaces that are drawn."""
-        placements = [column.place(placed) for column in self._columns]
-        boxes = [
-            corners_of(each[0].extent + each[1])
-            for each in placements
-            if each is not None and each[0].extent is not None
-        ]
-        return np.concatenate(boxes) if boxes and _overlays(placed) else NO_POINTS
-
-
-def _overlays(placed: Placed) -> bool:
-    return placed.frame.state.compared.look.overlay
 
 
 class _Scaled(NamedTuple):
@@ -86,34 +55,26 @@ def _scale(drawing: work.ComparedDrawing, column: int, scale: float) -> _Scaled:
     return _Scaled(lines, workspace, extent, enlarged[int(enlarged[:, 2].argmax())])
 
 
-class _Column:
-    """The workspace of one design, its letter, and its outline."""
+class ComparedScene(ScenePart):
+    """The workspace of the design in a column, its letter, and its outline."""
 
-    def __init__(self, scene: viser.SceneApi, column: int, feed: work.CompareFeed) -> None:
-        self._column, self._feed = column, feed
-        name, colour = f"/compared/{NAMES[column]}", COMPARED[column]
+    def __init__(self, column: int, services: Services) -> None:
+        self._column, self._feed = column, services.get(work.FEEDS[column])
+        scene, name, colour = services.scene, f"/compared/{NAMES[column]}", COMPARED[column]
         self._mesh = add_translucent(
             scene, f"{name}/workspace", NO_MESH, OPACITY, colour=colour, is_flat=True
         )
         self._lines = add_lines(scene, f"{name}/outline", 1, colour, 2.5)
         self._label = add_label(scene, f"{name}/label", NAMES[column], colour=colour, visible=False)
 
-    def place(self, placed: Placed) -> tuple[_Scaled, FloatArray] | None:
-        """Return the drawing of the design, and its offset in the scene; None without one."""
-        state, drawing = placed.frame.state, work.drawing_in(self._column, self._feed)
-        if drawing is None:
-            return None
-        scale = placed.scale * work.unit_ratio(drawing.request.design, state.design)
-        return _scale(drawing, self._column, scale), scale * drawing.offset(state.view.at)
-
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the design in this frame."""
-        compared, column, placement = placed.frame.state.compared, self._column, self.place(placed)
-        workspace = placement[0].workspace if placement and _overlays(placed) else None
+        compared, placement = placed.frame.state.compared, self._place(placed)
+        workspace = placement[0].workspace if placement and compared.look.overlay else None
         for handle in (self._mesh, self._label):
             yield handle, "visible", workspace is not None
         # The live design has no outline, since its mechanism is drawn.
-        outlined = compared.look.outlines and column != work.LIVE and placement is not None
+        outlined = compared.look.outlines and self._column != LIVE and placement is not None
         yield self._lines, "visible", outlined
         if placement is None:
             return
@@ -122,9 +83,29 @@ class _Column:
             yield self._mesh, "position", tuple(offset.tolist())
             yield self._mesh, "vertices", workspace[0]
             yield self._mesh, "faces", workspace[1]
-            design = None if column == work.LIVE else compared.pinned[column - 1]
-            title = f"{NAMES[column]} {design.name}" if design else NAMES[column]
-            yield self._label, "text", title
+            pinned = work.design_in(self._column, placed.frame.state)
+            name = f" {pinned.name}" if pinned is not None and self._column != LIVE else ""
+            yield self._label, "text", NAMES[self._column] + name
             yield self._label, "position", tuple((scaled.top + offset).tolist())
         if outlined:
             yield self._lines, "points", scaled.outline
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the corners of the box about the workspace, if it is drawn."""
+        placement = self._place(placed)
+        if placement is None or not placed.frame.state.compared.look.overlay:
+            return NO_POINTS
+        extent, offset = placement[0].extent, placement[1]
+        return NO_POINTS if extent is None else corners_of(extent + offset)
+
+    def _place(self, placed: Placed) -> tuple[_Scaled, FloatArray] | None:
+        """Return the drawing of the design, and its offset in the scene; None without one."""
+        state, drawing = placed.frame.state, work.drawing_in(self._column, self._feed)
+        if drawing is None:
+            return None
+        scale = placed.scale * work.unit_ratio(drawing.request.design, state.design)
+        return _scale(drawing, self._column, scale), scale * drawing.offset(state.view.at)
+
+
+SCENES = tuple(partial(ComparedScene, column) for column in range(len(NAMES)))
+"""The parts of the scene by column: the live design, then the pinned ones."""

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from explorer.app.features.compare.work import LIVE, CompareFeed, drawing_in
+from explorer.app.features.compare.work import LIVE, NAMES, CompareFeed, drawing_in
 from explorer.app.scene.shapes import COMPARED
-from explorer.app.state.compared import SLOTS
 from explorer.app.state.state import State
 from explorer.app.widgets import markup
 from explorer.app.widgets.buttons import press_button
@@ -77,7 +76,7 @@ class Column:
     @property
     def letter(self) -> str:
         """The short name: "live", or the letter of the place."""
-        return "live" if self.number == LIVE else SLOTS[self.number - 1]
+        return NAMES[self.number]
 
     @property
     def colour(self) -> Rgb:

@@ -19,6 +19,7 @@ from explorer.app.scene.surfaces import Shell
 from explorer.app.session.feed import Feed
 from explorer.app.state.compared import SLOTS, without_name
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import Measurements, measure_design, measures_in
 from explorer.measures.measure import Case
@@ -34,8 +35,8 @@ if TYPE_CHECKING:
     # The process of the worker needs no viser.
     from explorer.app.features.feature import Services
 
-LIVE = 0
-"""The column of the live design; those of the pinned ones follow."""
+LIVE, NAMES = 0, ("live", *SLOTS)
+"""The column of the live design, and the short names of all columns."""
 
 # Number of cached measurements and solids: of the compared designs, and of the last changes.
 CACHED = 8
@@ -122,14 +123,14 @@ def _feed_of(column: int, services: Services) -> CompareFeed:
 
 
 FEEDS: tuple[Callable[[Services], CompareFeed], ...] = tuple(
-    partial(_feed_of, column) for column in range(1 + len(SLOTS))
+    partial(_feed_of, column) for column in range(len(NAMES))
 )
 """The feeds by column: the live design, then the pinned ones."""
 
 
 def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
     state, compared = frame.state, frame.state.compared
-    design = state.design if column == LIVE else compared.pinned[column - 1]
+    design = design_in(column, state)
     if compared.is_empty or design is None:
         return None
     if not compared.look.overlay:
@@ -141,6 +142,11 @@ def _compared_request(column: int, frame: Frame) -> ComparedRequest | None:
     is_turned = column == LIVE and compared.look.at_pose
     rotation = rows_of(frame.snapshot.rotation) if is_turned else None
     return ComparedRequest(without_name(design), drawn=True, rotation=rotation, tolerance=tolerance)
+
+
+def design_in(column: int, state: State) -> Design | None:
+    """Return the design of a column; None if nothing is pinned there."""
+    return (state.design, *state.compared.pinned)[column]
 
 
 def drawing_in(column: int, feed: CompareFeed) -> ComparedDrawing | None:
