@@ -147,7 +147,9 @@ def is_narrow(facts: BrowserFacts) -> bool:
     return facts.width < NARROW and facts.height >= HIGH_ENOUGH
 
 
+TITLE = "Flagged 4-4 explorer"
 SIDES: tuple[Side, ...] = get_args(Side)
+PRODUCT = f'<div class="ex-product"><b>{TITLE}</b><small>six actuators, four legs</small></div>'
 
 
 class Bar:
@@ -167,5 +169,7 @@ class Bar:
         """Yield the updates that make the bar show the frame."""
         parts = [(side, part(frame)) for side, part in self._parts]
         sides = ("".join(html for each, html in parts if each == side) for side in SIDES)
-        bar = "".join(f"<div>{side}</div>" for side in sides)
-        yield self._html, "content", f'<div class="ex-bar">{bar}</div>'
+        bar = '<div>{}</div><div role="toolbar" aria-label="Figures">{}</div><div>{}</div>'.format(
+            *sides
+        )
+        yield self._html, "content", f'<div class="ex-bar">{PRODUCT}{bar}</div>'

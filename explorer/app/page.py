@@ -32,7 +32,7 @@ from explorer.app.features.studies.feature import STUDIES
 from explorer.app.features.studies.folders import StudyFolders, study_folders
 from explorer.app.features.view.feature import VIEW
 from explorer.app.features.workspace.feature import WORKSPACE
-from explorer.app.layout import Bar, Layout, Panels
+from explorer.app.layout import TITLE, Bar, Layout, Panels
 from explorer.app.look import read_script, read_stylesheet
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
@@ -50,7 +50,6 @@ from explorer.app.widgets.palette import Command, Palette
 from explorer.app.widgets.theme import Theme
 from explorer.numerics.arrays import FloatArray
 
-TITLE = "Flagged 4-4 explorer"
 # The features, in the order of their tabs and of their parts of the bar.
 FEATURES: tuple[Feature, ...] = (
     DESIGNS, MECHANISM, MACHINE, HISTORY, VIEW, SINGULARITY, WORKSPACE, LEGS, ORIENTATION, LOADS,
@@ -66,6 +65,7 @@ SCRIPTS = (
     "fields",
     "names",
     "opens",
+    "stops",
     "projection",
     "labels",
     "layers",

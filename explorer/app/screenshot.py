@@ -104,7 +104,7 @@ def draw_page(
     panels: bool,
     tab: str | None = None,
 ) -> bytes:
-    """Return a picture of an explorer as `take` writes it, with a tab in front by its title.
+    """Return a picture of an explorer as `take` writes it, with a tab or a folder opened by title.
 
     Raises:
         PictureError: The browser did not draw in time.
@@ -114,7 +114,8 @@ def draw_page(
         if not panels:
             page.add_style_tag(content=SCENE_ALONE)
         if tab is not None:
-            page.get_by_role("tab", name=tab, exact=True).first.click()
+            title = page.get_by_role("tab", name=tab, exact=True)
+            title.or_(page.get_by_role("button", name=tab, exact=True)).first.click()
         # The size of the canvas, and with it the framing, is known only then.
         settle(page, client)
         running.page.point_cameras(view)

@@ -15,13 +15,8 @@ from explorer.legs.clearance import LegClearances, leg_clearances
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.mechanism.feasible_intervals import Interval, feasible_intervals
-from explorer.mechanism.kinematics import (
-    ForwardKinematics,
-    determinant,
-    forward,
-    jacobian_factors,
-    tetrahedron_volumes,
-)
+from explorer.mechanism.folds import assembly_modes
+from explorer.mechanism.kinematics import determinant, jacobian_factors, tetrahedron_volumes
 from explorer.mechanism.margins import describe_modes, mode_name, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, lengths_of, triple
@@ -189,8 +184,7 @@ class Snapshot(PoseIndices):
     @cached_property
     def mode_violations(self) -> tuple[tuple[Violation, ...], ...]:
         """The limits that each of the eight assembly modes breaks."""
-        modes = Configuration(self.design, self.modes.position, self.modes.rotation)
-        return tuple(violations(modes))
+        return tuple(violations(self.modes))
 
     @cached_property
     def clearances(self) -> LegClearances:
@@ -212,9 +206,9 @@ class Snapshot(PoseIndices):
         return nearest_singular_poses(self)
 
     @cached_property
-    def modes(self) -> ForwardKinematics:
-        """The eight assembly modes of the joint values."""
-        return forward(self.design, self.joints)
+    def modes(self) -> Configuration:
+        """The design in the eight assembly modes of the joint values."""
+        return Configuration(self.design, *assembly_modes(self.position, self.rotation))
 
     @cached_property
     def intervals(self) -> tuple[tuple[Interval, ...], ...]:

@@ -98,17 +98,18 @@ class Verdict(NamedTuple):
         return TITLES[self.kind]
 
     def reason(self, unit_mm: float) -> str:
-        """Return the reason, such as "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting"."""
+        """Return the reason, such as "2.5 mm of motion to the nearest singular pose, …"."""
         if self.kind == "singular":
             return "; ".join(f"δ{index} = 0: {INCIDENCES[index - 1]}" for index in self.incidences)
         first = self.incidences[0]
         if self.cause == "condition":
             return (
                 f"1/cond J is {format_number(self.condition, 2)}, most by δ{first}; δ{first} = 0 "
-                f"is {self._length(unit_mm)} away"
+                f"is {self._length(unit_mm)} of motion away"
             )
-        away = self._length(unit_mm) if self.cause == "distance" else f"{self._turn()} of turning"
-        return f"{away} from δ{first} = 0, {INCIDENCES[first - 1]}"
+        is_motion = self.cause == "distance"
+        away = f"{self._length(unit_mm)} of motion" if is_motion else f"{self._turn()} of turning"
+        return f"{away} to the nearest singular pose, {INCIDENCES[first - 1]} (δ{first} = 0)"
 
     def brief(self, unit_mm: float) -> str:
         """Return the verdict in a few words, such as "10.3 mm to δ1 = 0", "7° to δ2 = 0"."""

@@ -34,6 +34,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.mechanism.margins import signs_of
 from explorer.mechanism.pose import Pose, pose_rows
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
 from explorer.numerics.compiled import helper, kernel
@@ -43,6 +44,9 @@ FOLDS = ("r", "β", "ε", "φ1", "φ2", "φ3")
 
 FOLD_LINES = ("line b2b3", "line a1b4", "guide")
 """The line at which the mechanism folds, in the order φ1, φ2, φ3."""
+
+# Signs of φ1, φ2 and φ3 in the eight assembly modes.
+MODE_SIGNS = np.array([signs_of(mode) for mode in range(8)])
 
 # The cosine and the sine of an angle.
 Direction = tuple[float, float]
@@ -89,6 +93,24 @@ def from_folds(coordinates: ArrayLike) -> tuple[FloatArray, FloatArray]:
     write_poses(len(rows), rows, positions, rotations)
     batch = array.shape[:-1]
     return positions.reshape(*batch, 3), rotations.reshape(*batch, 3, 3)
+
+
+def assembly_modes(position: ArrayLike, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the eight poses with the joints of a pose, by mode, shapes (8, 3) and (8, 3, 3).
+
+    They have its folds with the signs of each mode, so that those which meet in a singular pose
+    are that pose, to rounding. From joints they follow to the square root of it only.
+
+    Args:
+        position: b4 in the base frame, shape (3,), in design units.
+        rotation: Platform to base, shape (3, 3).
+
+    Raises:
+        InputError: The position is not finite, or the rotation is not one.
+    """
+    folds = np.tile(to_folds(position, rotation), (len(MODE_SIGNS), 1))
+    folds[:, 3:] = MODE_SIGNS * np.abs(folds[:, 3:])
+    return from_folds(folds)
 
 
 def pose_of_folds(folds: Sequence[float]) -> Pose:

@@ -34,7 +34,7 @@ from explorer.app.features.singularity.feature import SingularityPanel, distance
 from explorer.app.features.singularity.work import GoToSingularity, GoToStratum
 from explorer.app.features.view.feature import TO_SUN, shadow_outlines
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import linear_colour, plate
+from explorer.app.scene.shapes import linear_colour, of_one_colour, plate
 from explorer.app.state.actions import GoHome, Open, SetJoint, SetPose
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
@@ -42,7 +42,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.colours import SINGULAR, proximity_colour
+from explorer.singularity.colours import MARGIN_COLOURS, SINGULAR, proximity_colour
 from explorer.singularity.strata import GENERIC, STRATA, incidences
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -216,7 +216,7 @@ def test_designs_of_any_size_are_drawn_alike(factor: float) -> None:
         ratio = other.reach / one.reach
         for a, b in zip(approaches(one, None), approaches(other, None), strict=True):
             assert b.level == pytest.approx(a.level, rel=1e-6, abs=1e-9)
-            assert (a.is_filled, a.is_touching) == (b.is_filled, b.is_touching)
+            assert (a.is_nearest, a.is_touching) == (b.is_nearest, b.is_touching)
             assert (a.ends is None) is (b.ends is None)
             if a.ends is not None and b.ends is not None:
                 assert_allclose(b.ends, ratio * a.ends, rtol=1e-6, atol=1e-6)
@@ -243,16 +243,21 @@ def test_one_tetrahedron_is_filled_near_a_singularity_and_none_far_from_all(
 ) -> None:
     for placed in scenes():
         levels = placed.frame.verdict.levels
-        filled = [a.is_filled for a in approaches(placed, None)]
-        faces = draw(tetrahedra, placed)["/tetrahedra/faces"]
-        if min(levels) >= FADE_FROM:
-            assert filled == [False] * 3
-            assert faces["visible"] is False
+        nodes = draw(tetrahedra, placed)
+        faces, edges = (
+            nodes["/tetrahedra/faces"],
+            [nodes[f"/tetrahedra/{i}/edges"] for i in (1, 2, 3)],
+        )
+        # That of the verdict is clear, and the others are paler.
+        index = placed.frame.verdict.incidences[0] - 1
+        clear = [
+            np.array_equal(each["colors"], of_one_colour(colour, len(each["colors"])))
+            for each, colour in zip(edges, MARGIN_COLOURS, strict=True)
+        ]
+        assert clear == [each == index for each in range(3)]
+        assert faces["visible"] is (levels[index] < FADE_FROM)
+        if levels[index] >= FADE_FROM:
             continue
-        assert filled.count(True) == 1
-        index = filled.index(True)
-        assert levels[index] == min(levels)
-        assert faces["visible"] is True
         assert faces["color"] == proximity_colour(levels[index])
         corners = np.array([placed.points[name] for name in TETRAHEDRA[index]])
         off = np.linalg.norm(faces["vertices"] - corners, axis=1)

@@ -13,7 +13,7 @@ from hypothesis import given
 from services import StubWorker, services_for
 from strategies import Case, all_cases
 
-from explorer.app.features.mechanism.modes import modes_table
+from explorer.app.features.mechanism.modes import modes_table, present_mode
 from explorer.app.features.singularity.feature import (
     distance_table,
     distances_of,
@@ -46,7 +46,8 @@ def test_verdict_seven_degrees_from_an_incidence_is_near_and_so_is_its_margin() 
     assert np.abs(frame.snapshot.margins).min() > frame.state.warn_below
     text = summary(frame)
     assert "Near a singularity" in text
-    assert "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting" in text
+    words = "to the nearest singular pose, lines a1a2 and b2b3 meeting (δ2 = 0)"
+    assert f"2.52 mm of motion {words}" in text
     colours = re.findall(r'class="ex-swatch" style="--colour:(#\w+)"', distance_table(frame))
     levels = frame.verdict.levels
     assert colours == [css(proximity_colour(level)) for level in levels]
@@ -64,7 +65,7 @@ def test_nearest_singular_pose_is_the_boundary_of_two_modes(incidence: int) -> N
     assert found.brief(10.0) == f"Singular: δ{incidence} = 0"
     first, second = frame.snapshot.bordering_modes
     assert second - first == 4 >> (incidence - 1)
-    text = re.sub("<[^>]*>", " ", summary(frame))
+    text = re.sub("<[^>]*>", " ", present_mode(frame))
     assert f"Boundary of modes {first} and {second}" in text
     assert f"ode {frame.state.mode}" not in text
     marks = r'data-press="modes.go" data-value="(\d)"[^>]*aria-pressed="true"'
@@ -137,7 +138,9 @@ def test_verdict_on_a_nearly_degenerate_design_names_the_conditioning_and_its_ma
     assert found.cause == "condition"
     # The line b2b3 has hardly a length.
     assert found.incidences[0] == 2
-    assert re.match(r"1/cond J is \S+, most by δ2; δ2 = 0 is \S+ mm away", found.reason(10.0))
+    assert re.match(
+        r"1/cond J is \S+, most by δ2; δ2 = 0 is \S+ mm of motion away", found.reason(10.0)
+    )
     assert found.brief(10.0).startswith("1/cond J ")
 
 
@@ -183,8 +186,7 @@ def test_modes_that_meet_in_a_pose_differ_in_the_signs_that_vanish(case: Case) -
     assert [index for index, sign in enumerate(signs, 1) if sign == "0"] == [*vanishing]
     expected = describe_modes(modes) if len(modes) > 1 else f"mode {snapshot.mode}"
     assert snapshot.mode_words == f"{expected} ({snapshot.sign_words})"
-    for html in (summary(frame), modes_table(frame, "")):
-        assert snapshot.mode_words.capitalize() in html
+    assert snapshot.mode_words.capitalize() in present_mode(frame)
 
 
 def test_distances_of_deeper_strata_are_shown_at_a_singular_pose_without_the_diagram() -> None:

@@ -221,6 +221,7 @@ def measure() -> dict[str, list[Stopwatch]]:
             for kind in KINDS:
                 session.do(Open(typical_machine(PRESS)[0] if kind.is_loaded else DESIGN))
                 session.do(Set("view.forces.shown", kind.is_loaded))
+                session.do(Set("view.coordinates", "lengths"))
                 drawn = PrecisionView(ellipsoid=kind.is_loaded, deflected=kind.is_loaded)
                 session.do(Set("view.precision", drawn))
                 session.wait_until_idle()

@@ -63,6 +63,7 @@ def test_accessible_solid_replaces_the_other_while_the_page_stays_alive(tab: Tab
         tab.choose("Region", "accessible from home")
         tab.page.get_by_text("Computing …").wait_for()
         tab.turn_to("Pose")
+        tab.push("Leg lengths")
         before = tab.state
         goal = tab.drag(JOINT_LABELS["l4"], 0.5)
         tab.wait_for(lambda: abs(tab.state.joints[5] - goal) < 0.2, "the length dragged to")

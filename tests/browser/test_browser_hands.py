@@ -96,7 +96,8 @@ def test_command_is_run_by_the_palette_and_by_its_key_but_not_while_one_types(ta
         press(tab, "ControlOrMeta+z")
         tab.wait_for(lambda: tab.state.mode == 1, "undone again")
     before = tab.state.view
-    field = tab.field("l1 leg 1")
+    tab.unfold("More")
+    field = tab.field("x")
     field.click()
     field.press_sequentially("glb")
     # Whatever is done by the next key is done after it would have been by these.

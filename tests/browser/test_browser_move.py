@@ -23,20 +23,30 @@ from explorer.mechanism.kinematics import forward
 from explorer.numerics.arrays import FloatArray
 
 LABELS = [JOINT_LABELS[name] for name in JOINTS]
+# The sliders by the words that show them.
+SLIDERS = {"Leg lengths": LABELS, "Pose": ["x", "y", "z", "yaw (°)", "pitch (°)", "roll (°)"]}
 
 
 def assert_page_shows_state(tab: Tab) -> None:
-    """Wait until every slider of legs and pose stands where the state says."""
+    """Wait until every slider of legs and pose, which are left shown, stands as the state says."""
     # A slow browser may still be telling of a hand: what it shows in the end is meant.
-    for index, label in enumerate((*LABELS, *"xyz", "yaw (°)", "pitch (°)", "roll (°)")):
-        tab.wait_for(
-            lambda index=index, label=label: tab.stands(label, values_of(tab.state)[index]),
-            f"{label} as in the state",
-        )
+    for words, labels in SLIDERS.items():
+        tab.push(words)
+        for index, label in enumerate(labels):
+            tab.slider(label).wait_for()
+            tab.wait_for(
+                lambda words=words, index=index, label=label: tab.stands(
+                    label, values_of(tab.state)[words][index]
+                ),
+                f"{label} as in the state",
+            )
 
 
-def values_of(state: State) -> tuple[float, ...]:
-    return (*state.joints, *state.pose.position, *state.yaw_pitch_roll)
+def values_of(state: State) -> dict[str, tuple[float, ...]]:
+    return {
+        "Leg lengths": state.joints,
+        "Pose": (*state.pose.position, *state.yaw_pitch_roll),
+    }
 
 
 @pytest.mark.draws
@@ -45,6 +55,7 @@ def test_page_loaded_again_shows_and_draws_the_same_and_asks_nobody_else(tab: Ta
     drawn = decoded(tab.picture())
     tab.reload()
     assert likeness(drawn, decoded(tab.picture())).spot < 2.0
+    tab.push("Leg lengths")
     tab.type(LABELS[2], "9.9\n")
     tab.wait_for(lambda: tab.state.joints[2] == 9.9, "the length that was typed")
     before = tab.state
@@ -58,6 +69,7 @@ def test_page_loaded_again_shows_and_draws_the_same_and_asks_nobody_else(tab: Ta
 
 def test_mechanism_follows_fields_sliders_and_the_home_button(tab: Tab) -> None:
     before = tab.state
+    tab.push("Leg lengths")
     tab.type(LABELS[0], "12.5\n")
     tab.wait_for(lambda: tab.state.joints[0] == 12.5, "the length that was typed")
     assert tab.state.joints[1:] == before.joints[1:]
@@ -66,6 +78,7 @@ def test_mechanism_follows_fields_sliders_and_the_home_button(tab: Tab) -> None:
     np.testing.assert_allclose(joints, tab.state.joints, atol=1e-9)
     assert_page_shows_state(tab)
     before = tab.state
+    tab.push("Leg lengths")
     goal = tab.drag(LABELS[5], 0.5)
     tab.wait_for(lambda: abs(tab.state.joints[5] - goal) < 0.2, "the length dragged to")
     assert tab.state.unclosed is None
@@ -89,7 +102,7 @@ def test_mechanism_follows_fields_sliders_and_the_home_button(tab: Tab) -> None:
 def test_row_of_a_mode_shows_its_ghost_while_it_is_pointed_at_and_is_chosen(tab: Tab) -> None:
     session, hovered = tab.running.page.session, tab.running.page.services.get(mode_hover)
     before, number = tab.state, session.history.step.number
-    tab.settle()
+    tab.unfold("8 modes")
     row_of_mode(tab, 6).scroll_into_view_if_needed()
     for mode in (6, 2):
         row_of_mode(tab, mode).hover()
@@ -142,9 +155,11 @@ def ghosts_in_scene(tab: Tab) -> int:
 def test_length_that_cannot_close_leaves_the_pose_and_offers_the_nearest(tab: Tab) -> None:
     alert = tab.page.get_by_role("alert").filter(has_text="cannot close")
     button = tab.page.get_by_role("button", name="Use the nearest length")
+    tab.push("Leg lengths")
     expect(alert).to_be_hidden()
     expect(button).to_be_disabled()
-    places = [tab.slider(words).bounding_box() for words in (LABELS[5], "x", "roll (°)")]
+    below = tab.page.get_by_role("button", name="Home pose")
+    place = below.bounding_box()
 
     before = tab.state
     tab.type(LABELS[0], "25")
@@ -157,8 +172,7 @@ def test_length_that_cannot_close_leaves_the_pose_and_offers_the_nearest(tab: Ta
     nearest = cast("float", unclosed.nearest)
     expect(alert).to_contain_text(f"{nearest:.6g}")
     # The message has room that was kept for it.
-    after = [tab.slider(words).bounding_box() for words in (LABELS[5], "x", "roll (°)")]
-    assert after == places
+    assert below.bounding_box() == place
     # What was asked for stays in its field; all else is as it was.
     assert_page_shows_state(tab)
 
@@ -178,6 +192,7 @@ def test_length_that_cannot_close_leaves_the_pose_and_offers_the_nearest(tab: Ta
 
 def test_track_is_tinted_where_the_legs_close_and_stays_while_it_is_dragged(tab: Tab) -> None:
     # Where it is tinted is read from the places of the marks, as the stylesheet does.
+    tab.push("Leg lengths")
     tab.settle()
     for joint, words in enumerate(LABELS):
         row = tab.row(words)
@@ -196,6 +211,7 @@ def test_track_is_tinted_where_the_legs_close_and_stays_while_it_is_dragged(tab:
         # A pixel is a hundredth of the track.
         assert places == pytest.approx(expected, abs=0.01 * (high - low))
     # Beyond what is possible, so that the track is longer than it would be of itself.
+    tab.push("Pose")
     tab.type("x", "60\n")
     tab.wait_until_shown("x", 60.0)
     tab.settle()
@@ -271,13 +287,16 @@ def test_arrow_of_the_gizmo_moves_the_platform_along_it(tab: Tab) -> None:
 
 def test_two_tabs_stay_in_step_through_many_values(open_tab: OpenTab) -> None:
     one, other = open_tab(), open_tab()
+    one.push("Leg lengths")
     one.type(LABELS[3], "11.2\n")
     other.wait_until_shown(LABELS[3], 11.2)
+    other.push("Pose")
     other.type("x", "9.5\n")
     one.wait_until_shown("x", 9.5)
     other.push("Home pose")
     one.wait_until_shown("x", 10.0)
     # Many values in a row end with the last.
+    one.push("Leg lengths")
     field = one.field(LABELS[5])
     with one.slow_time():
         for hundredths in range(1281, 1301):
@@ -286,6 +305,7 @@ def test_two_tabs_stay_in_step_through_many_values(open_tab: OpenTab) -> None:
     one.wait_for(lambda: one.state.joints[5] == 13.0, "the last length")
     for tab in (one, other):
         tab.wait_until_shown(LABELS[5], 13.0)
+    for tab in (one, other):
         assert_page_shows_state(tab)
     # A slider that is thrown about ends where the mouse leaves it.
     goal = one.drag("x", 0.62, steps=20)

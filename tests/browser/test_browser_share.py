@@ -182,6 +182,7 @@ def test_page_in_a_notebook_is_live_both_ways(browser: Browser, tmp_path: Path, 
             page.goto(address.replace("127.0.0.1", host))
             frame = page.frame_locator("iframe")
             frame.locator("#webgl-software-rendering").get_by_role("button").click()
+            frame.get_by_role("button", name="Leg lengths").click()
             field = frame.locator("label", has_text="l4 leg 4").locator(
                 "xpath=ancestor::*[.//input][1]//input[@inputmode='decimal']"
             )

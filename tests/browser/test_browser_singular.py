@@ -12,7 +12,7 @@ from explorer.mechanism.margins import INCIDENCES
 
 def test_stratum_is_entered_from_the_diagram_and_shows_its_motions(tab: Tab) -> None:
     nodes = tab.page.locator("button[title^='(']")
-    # It is open from the start.
+    tab.unfold("More")
     expect(nodes).to_have_count(23)
     tab.switch("Diagram", on=False)
     expect(nodes).to_have_count(0)

@@ -326,6 +326,14 @@ class Tab:
         buttons = self.page.get_by_role("button", name=words, exact=True)
         buttons.locator("visible=true").first.click()
 
+    def unfold(self, title: str) -> None:
+        """Open a folder that is closed."""
+        self.settle()
+        head = self.page.get_by_role("button", name=title, exact=True)
+        if head.get_attribute("aria-expanded") == "false":
+            head.click()
+        expect(head).to_have_attribute("aria-expanded", "true")
+
     def turn_to(self, name: str) -> None:
         """Turn to another tab of the panels."""
         tab = self.page.get_by_role("tab", name=name, exact=True)
@@ -419,7 +427,7 @@ class Tab:
     def _arrive(self, known: set[int]) -> None:
         # It lies over the panels, so whoever wants to use them closes it first.
         self.page.locator("#webgl-software-rendering").get_by_role("button").click()
-        self.label("l1 leg 1").wait_for()
+        self.page.get_by_role("button", name="Home pose").wait_for()
         self.wait_for(lambda: bool(self._new(known)), "a connection")
         (self._client_id,) = self._new(known)
         self._echo = self.client.gui.add_number("Echo", 0, visible=False)

@@ -99,7 +99,8 @@ class Scene:
         actions: Done before the picture is taken.
         view: From where to look.
         panels: Whether the panels are in the picture.
-        tab: To which they are turned; the first one if None.
+        tab: Title of the tab to which they are turned, or of the folder that is opened; the first
+            tab if None.
         size: Width and height in pixels.
     """
 
@@ -135,7 +136,10 @@ SCENES = {
         actions=(bare(leaves=True, bodies=False, legs=False, grid=False),),
         size=(960, 600),
     ),
-    "unclosed": Scene(actions=(SetJoint(JOINTS.index("l1"), 20.0),), panels=True),
+    "unclosed": Scene(
+        actions=(Set("view.coordinates", "lengths"), SetJoint(JOINTS.index("l1"), 20.0)),
+        panels=True,
+    ),
     # Tall, so that the whole diagram is in it.
     "strata": Scene(
         pose=Pose.of_yaw_pitch_roll((10, 5, 9), (-73.1, 12, 0)),
@@ -143,6 +147,7 @@ SCENES = {
             Set("view", View(handle=False, singular=SingularView(strata=True, ghost="nearest"))),
         ),
         panels=True,
+        tab="More",
         size=(1280, 1200),
     ),
     "twin": Scene(actions=(Set("view", View(handle=False, drawn_as="6-4 twin")),)),

@@ -1,5 +1,5 @@
-// Gives each control the words beside it as its name for screen readers, and puts hints beside the
-// panel, where they cover no control.
+// Gives each control the words beside it as its name for screen readers, the browser's tab the names
+// of design and product, and puts hints beside the panel, where they cover no control.
 window.explorer.names ??= (() => {
   const CONTROLS =
     "[role=slider], input:not([type=hidden]):not([type=file]):not([type=checkbox]), textarea";
@@ -42,9 +42,15 @@ window.explorer.names ??= (() => {
       if (button.querySelector(`.tabler-icon-${icon}`)) name(button, words);
     }
   };
+  const nameTab = () => {
+    const names = [".ex-document", ".ex-product > b"].map((each) => document.querySelector(each));
+    if (names[0]) document.title = names.map((each) => each.textContent).join(" – ");
+  };
   let isDue = false;
   const nameAll = () => {
     isDue = false;
+    nameTab();
+    window.explorer.stops?.();
     document.querySelectorAll(CONTROLS).forEach(nameControl);
     document.querySelectorAll("button").forEach(nameButton);
     // viser's palette speaks of commands alone.

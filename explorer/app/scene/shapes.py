@@ -364,13 +364,15 @@ def add_label(
     The parent of its node is the frame of its position. Without a colour it has that of the page's
     text; it may be pale where a body hides its point.
     """
-    # viser's labels have no colour; they use the scene height only if their size is that of
-    # things in the scene, so that the script finds the colour there.
-    red, green, blue = (0, 0, 0) if colour is None else colour
-    return scene.add_label(
-        name,
-        text,
-        font_scene_height=float(red << 16 | green << 8 | blue),
-        depth_test=fades,
-        visible=visible,
-    )
+    height = label_height((0, 0, 0) if colour is None else colour)
+    return scene.add_label(name, text, font_scene_height=height, depth_test=fades, visible=visible)
+
+
+def label_height(colour: Rgb) -> float:
+    """Return the `font_scene_height` by which a label has a colour.
+
+    viser's labels have none; they use the scene height only if their size is that of things in the
+    scene, so that the script finds the colour there.
+    """
+    red, green, blue = colour
+    return float(red << 16 | green << 8 | blue)

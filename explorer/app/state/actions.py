@@ -21,6 +21,7 @@ from explorer.app.state.view import DrawnAs
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, VARIABLES, Design
 from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
+from explorer.mechanism.folds import assembly_modes
 from explorer.mechanism.kinematics import ForwardKinematics, discriminants, forward
 from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import Pose, Triple
@@ -240,9 +241,9 @@ class SetMode(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        joints = joints_of(state.design, state.pose)
-        solution = forward(state.design, joints)
-        return _assemble(replace(state, joints=joints), solution, self.mode)
+        positions, rotations = assembly_modes(state.pose.position, state.pose.rotation)
+        pose = Pose.of(positions[self.mode], rotations[self.mode])
+        return replace(move_to(state, pose), mode=self.mode)
 
     def words(self) -> str:
         """Return what the action does."""

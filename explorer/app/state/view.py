@@ -168,7 +168,7 @@ class PrecisionView:
                 positive(f"the {name}", value, STIFFEST)
 
 
-Coordinates = Literal["position", "folds"]
+Coordinates = Literal["position", "lengths", "folds"]
 DrawnAs = Literal["schematic", "prototype", "6-4 twin"]
 Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
 Gain = Literal["none", "speed", "force"]
@@ -198,7 +198,7 @@ class View:
     Attributes:
         at: The point whose position is shown and set, and about which the platform turns.
         coordinates: The coordinates by which the pose is shown and set: the position of that point
-            with three angles, or the six folds.
+            with three angles, the six lengths, or the six folds.
         drawn_as: What is drawn: the schematic mechanism, the parts of its prototype in place of
             legs and bodies, or its 6-4 twin, with six legs in place of the four.
         flags, bodies, legs, labels, grid, handle: Whether each is drawn.

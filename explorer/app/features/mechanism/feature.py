@@ -8,7 +8,14 @@ from functools import partial
 import viser
 
 from explorer.app.features.designs.feature import DesignName
-from explorer.app.features.feature import Feature, InBar, Services, StateCommand, Tab
+from explorer.app.features.feature import (
+    Feature,
+    InBar,
+    Services,
+    StateCommand,
+    Tab,
+    show_html,
+)
 from explorer.app.features.mechanism.bodies import Bodies, Flags, Legs, TwinLegs
 from explorer.app.features.mechanism.folds import Leaves, add_fold_sliders
 from explorer.app.features.mechanism.incidences import Gaps, Tetrahedra
@@ -50,7 +57,8 @@ ANGLES = (
     ("roll", "about the platform's x, the third of three", 180.0),
 )
 COORDINATES = {
-    "position": ("Position and angles", "Set the position of a point, and yaw, pitch and roll."),
+    "position": ("Pose", "Set the position of a point, and yaw, pitch and roll."),
+    "lengths": ("Leg lengths", "Set the six lengths of the actuators."),
     "folds": (
         "Folds",
         "Set a distance, two angles and the folds, each of which changes one margin.",
@@ -72,40 +80,20 @@ HOLDS: dict[str, Hold] = {"hold the pose": "pose", "hold the legs": "legs"}
 
 
 class MovePanel:
-    """Sliders for joints and pose, the table of modes, and messages on lengths."""
+    """Six sliders for the pose, the lengths or the folds, messages on lengths, and the modes."""
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
         self._controls = controls = Controls(gui, services.session)
-        with gui.add_folder("Legs (design units)"):
-            for joint, (label, hint) in enumerate(JOINT_HINTS.items()):
-                controls.slider(
-                    label,
-                    hint,
-                    item(lambda frame: frame.state.joints, joint, actions.SetJoint),
-                    partial(ranges.joint_span, joint=joint),
-                    tinted=lambda frame, joint=joint: frame.snapshot.intervals[joint],
-                    closes_up=True,
-                )
-            self._message = gui.add_html("")
-            self._nearest = controls.button(
-                "Use the nearest length",
-                "Move this leg to the nearest length that closes and stays clear of "
-                "singularities; the other legs stay as they are.",
-                actions.UseNearest,
-                icon=viser.Icon.MAGNET,
-                main=True,
-            )
 
         def is_point(state: State, at: str) -> bool:
             return at == "b4" or any(state.design.tool.position)
 
-        self._coordinates = _choice(services, "Set as", "view.coordinates", COORDINATES)
+        self._coordinates = _choice(services, "Set by", "view.coordinates", COORDINATES)
         self._points = _choice(services, "Position of", "view.at", POINTS, is_point)
-        self._pose = gui.add_folder("")
-        with self._pose:
-            self._choices = gui.add_html("")
-            add_fold_sliders(controls)
+        self._switch = gui.add_html("")
+        self._sliders = gui.add_folder("")
+        with self._sliders:
             for axis, name in enumerate("xyz"):
                 controls.slider(
                     name,
@@ -122,26 +110,47 @@ class MovePanel:
                     Span(-edge, edge, 0.1),
                     visible=_is_by_position,
                 )
+            for joint, (label, hint) in enumerate(JOINT_HINTS.items()):
+                controls.slider(
+                    label,
+                    hint,
+                    item(lambda frame: frame.state.joints, joint, actions.SetJoint),
+                    partial(ranges.joint_span, joint=joint),
+                    tinted=lambda frame, joint=joint: frame.snapshot.intervals[joint],
+                    closes_up=True,
+                    visible=_is_by_lengths,
+                )
+            add_fold_sliders(controls)
+            self._message = gui.add_html("")
+            self._nearest = controls.button(
+                "Use the nearest length",
+                "Move this leg to the nearest length that closes and stays clear of "
+                "singularities; the other legs stay as they are.",
+                actions.UseNearest,
+                icon=viser.Icon.MAGNET,
+                main=True,
+            )
             controls.button(
                 "Home pose",
                 "Return to the home pose, with which the design opens.",
                 actions.GoHome,
                 icon=viser.Icon.HOME,
             )
-        self._mode_folder = gui.add_folder("")
-        with self._mode_folder:
-            self._modes = ModesPanel(services)
+        self._modes = ModesPanel(services)
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
         state, unclosed = frame.state, frame.state.unclosed
-        is_by_position = _is_by_position(state)
-        pose = f"Pose of {state.point}" if is_by_position else "Pose by its folds"
-        choices = self._coordinates.html(state) + (self._points.html(state) * is_by_position)
-        yield self._pose, "label", f"{pose} (design units, degrees)"
-        yield self._mode_folder, "label", f"Assembly modes: {state.point} (design units)"
-        yield self._choices, "content", box(choices)
-        yield self._message, "content", message(state)
+        sliders = COORDINATES[state.view.coordinates][0]
+        units = "design units" if _is_by_lengths(state) else "design units, degrees"
+        buttons, points = self._coordinates.buttons(state), box(self._points.html(state))
+        switch = f'<div class="ex-segments" role="toolbar" aria-label="Set by">{buttons}</div>'
+        yield self._switch, "content", switch + points * _is_by_position(state)
+        yield self._sliders, "label", f"{sliders} ({units})"
+        # What is wrong with a length is told whatever the sliders are.
+        is_told = _is_by_lengths(state) or unclosed is not None or state.remark is not None
+        yield from show_html(self._message, message(state) if is_told else "")
+        yield self._nearest, "visible", is_told
         yield self._nearest, "disabled", unclosed is None or unclosed.nearest is None
         yield from self._controls.updates(frame)
         yield from self._modes.updates(frame)
@@ -149,6 +158,10 @@ class MovePanel:
 
 def _is_by_position(state: State) -> bool:
     return state.view.coordinates == "position"
+
+
+def _is_by_lengths(state: State) -> bool:
+    return state.view.coordinates == "lengths"
 
 
 def _choice(

@@ -5,7 +5,8 @@ first the lines and planes of the flags reach out, and once they have arrived th
 is drawn, with δ and its length. The row of its margin shows it too, while a pointer rests there.
 
 A pose is singular where one of the tetrahedra is flat. The edges of each have the colour of its
-margin; its faces are filled if it is near. A ring with a ball marks where an incidence holds.
+margin. That of the verdict is clear, and its faces are filled if it is near; the other two are
+quiet: thinner and paler. A ring with a ball marks where an incidence holds.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from explorer.mechanism.margins import TETRAHEDRA
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_fitted
 from explorer.singularity import colours
+from explorer.singularity.colours import Rgb
 from explorer.singularity.ellipsoids import planes_of_singularity
 
 HOVER = "margins.hover"
@@ -45,6 +47,10 @@ OPACITY = 0.26
 INSET = 0.04
 # Pixels by which the edges of the filled tetrahedron are thicker, and thickness of one that fails.
 FILLED_EDGE, FAILING_EDGE = 1.0, 5.0
+# Share of the thickness that is left to quiet edges, and of the background in the colour of these
+# and of the name; the background by whether the page is dark.
+QUIET, PALE = 0.6, 0.35
+GROUND: dict[bool, Rgb] = {False: (255, 255, 255), True: (26, 28, 32)}
 
 # Most dashes of one gap, their period in scene units, and the share that is drawn.
 DASHES, PERIOD, DRAWN = 32, 0.32, 0.6
@@ -111,8 +117,8 @@ class Approach:
         level: Its level, see `explorer.measures.verdict`.
         presence: How much of it is shown: 0 where it is far, 1 at the warning value and below.
         is_shown: Whether its tetrahedron and its gap are shown at all.
-        is_filled: Whether its tetrahedron is filled: that of the row that is pointed at, otherwise
-            the nearest one, once it fades in.
+        is_nearest: Whether its tetrahedron is the clear one, which is filled once it fades in: that
+            of the row that is pointed at, otherwise that of the verdict.
         is_touching: Whether the incidence holds and its gap is closed; parallel lines leave one.
         ends: Ends of its gap on the base flag and on the platform flag, in the scene, shape (2, 3);
             None if they are too far away to be drawn.
@@ -121,7 +127,7 @@ class Approach:
     level: float
     presence: float
     is_shown: bool
-    is_filled: bool
+    is_nearest: bool
     is_touching: bool
     ends: FloatArray | None
 
@@ -138,20 +144,20 @@ class Approach:
     @property
     def has_label(self) -> bool:
         """Whether the gap has a label, in place of the name of the tetrahedron."""
-        return self.has_gap and (self.is_filled or self.level < 1.0)
+        return self.has_gap and (self.is_nearest or self.level < 1.0)
 
 
 def approaches(placed: Placed, hovered: int | None) -> tuple[Approach, Approach, Approach]:
     """Return how near the three incidences are; the margin that is hovered is 1 to 3, or None."""
-    levels, snapshot = placed.frame.verdict.levels, placed.frame.snapshot
-    filled = min(range(3), key=levels.__getitem__) if hovered is None else hovered - 1
+    verdict, snapshot = placed.frame.verdict, placed.frame.snapshot
+    nearest = hovered or verdict.incidences[0]
     gaps, reach = snapshot.gaps, snapshot.design.reach
     ends = placed.scale * np.stack([gaps.base, gaps.platform], axis=1)
     ways = np.stack([gaps.base, gaps.platform - snapshot.points.b4, gaps.platform - gaps.base])
     farthest = np.abs(ways).max(axis=(0, 2)).tolist()
 
     def approach(index: int) -> Approach:
-        level, is_hovered = levels[index], index + 1 == hovered
+        level, is_hovered = verdict.levels[index], index + 1 == hovered
         is_on = placed.frame.state.view.tetrahedra[index] or is_hovered
         presence = min(1.0, max(0.0, (FADE_FROM - level) / (FADE_FROM - 1.0)))
         return Approach(
@@ -159,7 +165,7 @@ def approaches(placed: Placed, hovered: int | None) -> tuple[Approach, Approach,
             1.0 if is_hovered else presence,
             # Like the flags, it would stand among parts that are drawn apart.
             is_on and not placed.is_apart,
-            index == filled and (is_hovered or level < FADE_FROM),
+            index + 1 == nearest,
             level == 0.0 and gaps.lengths[index] <= CLOSED * reach,
             ends[index] if farthest[index] <= FARTHEST * reach else None,
         )
@@ -201,11 +207,14 @@ class Tetrahedra(ScenePart):
             corners = np.array([placed.points[name] for name in TETRAHEDRA[index]])
             centre = corners.mean(axis=0)
             inner = corners + INSET * (centre - corners)
-            yield from self._draw_edges(index, inner, approach, fails=index in failing)
+            colour, ground = colours.MARGIN_COLOURS[index], GROUND[placed.dark]
+            tone = colours.mix(colour, ground, 0.0 if approach.is_nearest else PALE)
+            yield from self._draw_edges(index, inner, approach, tone, fails=index in failing)
             is_named = approach.is_shown and not approach.has_label and state.view.labels
             yield self._names[index], "visible", is_named
+            yield self._names[index], "font_scene_height", shapes.label_height(tone)
             yield self._names[index], "position", tuple(centre.tolist())
-            if approach.is_shown and approach.is_filled:
+            if approach.is_shown and approach.is_nearest and approach.presence > 0.0:
                 filled = True
                 yield self._faces, "vertices", inner.astype(np.float32)
                 yield self._faces, "color", colours.proximity_colour(approach.level)
@@ -213,15 +222,16 @@ class Tetrahedra(ScenePart):
         yield self._faces, "visible", filled
 
     def _draw_edges(
-        self, index: int, corners: FloatArray, approach: Approach, *, fails: bool
+        self, index: int, corners: FloatArray, approach: Approach, colour: Rgb, *, fails: bool
     ) -> Updates:
         edges, stroke = self._edges[index], STROKES[index]
         segments = shapes.dashes(corners[EDGES], stroke.most, stroke.period, stroke.drawn)
         yield edges, "visible", approach.is_shown or fails
         yield edges, "points", segments.astype(np.float32)
-        colour = colours.OUTLINE if fails else colours.MARGIN_COLOURS[index]
-        yield edges, "colors", shapes.of_one_colour(colour, len(segments))
-        thickness = stroke.thickness + FILLED_EDGE * approach.presence * approach.is_filled
+        drawn = colours.OUTLINE if fails else colour
+        yield edges, "colors", shapes.of_one_colour(drawn, len(segments))
+        thickness = stroke.thickness * (1.0 if approach.is_nearest else QUIET)
+        thickness += FILLED_EDGE * approach.presence * approach.is_nearest
         yield edges, "thickness", FAILING_EDGE if fails else thickness
 
 

@@ -39,15 +39,15 @@ def mode_hover(services: Services) -> HoveredRow:
 
 
 class ModesPanel:
-    """The table of the modes, with the switch for the ghosts of all in its head."""
+    """The present mode; the table of all, with the switch for their ghosts in its head."""
 
     def __init__(self, services: Services) -> None:
-        buttons = services.buttons
+        gui, buttons = services.gui, services.buttons
         services.get(mode_hover)
-        self._table = services.gui.add_html("")
-        services.do_on_press(
-            GO, lambda mode: SetMode(int(mode)), {str(mode) for mode in range(len(MODES))}
-        )
+        self._present = gui.add_html("")
+        with gui.add_folder("8 modes", expand_by_default=False):
+            self._table = gui.add_html("")
+        services.do_on_press(GO, lambda mode: SetMode(int(mode)), set("01234567"))
         ghosts = Chip(
             "Ghosts",
             f"Pose › {GHOSTS_LABEL}",
@@ -57,25 +57,31 @@ class ModesPanel:
             label=GHOSTS_LABEL,
         )
         self._ghosts = Chips(buttons, services.session, "modes.ghosts", "", {"": ghosts})
-        for mode, name in enumerate(MODES):
+        for mode in range(len(MODES)):
             hint = f"Assemble the same leg lengths with the signs {mode_name(mode)} of δ1, δ2, δ3."
-            words = " ".join(name.split())
-            buttons.offer(f"Pose › Assembly mode › {words}", hint, GO, str(mode))
+            label = f"Pose › Assembly mode › {mode}: {mode_name(mode)}"
+            buttons.offer(label, hint, GO, str(mode))
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
+        yield self._present, "content", present_mode(frame)
         yield self._table, "content", modes_table(frame, self._ghosts.buttons(frame.state))
+
+
+def present_mode(frame: Frame) -> str:
+    """Return the present mode, and the limits that the pose breaks, as HTML."""
+    broken = (f'<div class="ex-beyond">{escape(str(e))}</div>' for e in frame.snapshot.violations)
+    return box(f"<b>{frame.snapshot.mode_words.capitalize()}</b>", *broken)
 
 
 def modes_table(frame: Frame, switch: str) -> str:
     """Return the table of a frame, with the switch for the ghosts in its head, as HTML."""
-    snapshot = frame.snapshot
     names = "".join(f"<span>{name}</span>" for name in ("", "δ1 δ2 δ3", "x", "y", "z", "limits"))
-    below = "the modes below are those of the last lengths that did."
-    of_last = f'<div class="ex-close">These lengths close in no mode; {below}</div>'
+    head = f"{frame.state.point} in design units"
+    if frame.state.unclosed is not None:
+        head = "These lengths close in no mode; below are those of the last lengths that did."
     return box(
-        f'<div class="ex-line"><b>{snapshot.mode_words.capitalize()}</b>{switch}</div>',
-        of_last if frame.state.unclosed is not None else "",
+        f'<div class="ex-line"><span class="ex-dim">{head}</span>{switch}</div>',
         f'<div class="ex-modes"><div class="ex-mode ex-dim">{names}</div>',
         *(_row(frame, mode) for mode in range(len(MODES))),
         "</div>",
@@ -83,15 +89,12 @@ def modes_table(frame: Frame, switch: str) -> str:
 
 
 def _row(frame: Frame, mode: int) -> str:
-    solution, reach = frame.snapshot.modes, frame.state.design.reach
-    place, limits, hint = '<span class="ex-dim is-wide">does not close</span>', "", ""
-    if solution.feasible:
-        there = solution.position[mode] + frame.state.offset(solution.rotation[mode])
-        texts = (format_fitted(value, reach, 3) for value in there.tolist())
-        place = "".join(f"<span>{text}</span>" for text in texts)
-        # The modes of a singular pose are all singular, so that none of them looks safe.
-        look = "" if frame.snapshot.is_singular else "ex-within"
-        limits, hint = _limits(frame.snapshot.mode_violations[mode], look)
+    modes, reach = frame.snapshot.modes, frame.state.design.reach
+    there = modes.position[mode] + frame.state.offset(modes.rotation[mode])
+    place = "".join(f"<span>{format_fitted(x, reach, 3)}</span>" for x in there.tolist())
+    # The modes of a singular pose are all singular, so that none of them looks safe.
+    look = "" if frame.snapshot.is_singular else "ex-within"
+    limits, hint = _limits(frame.snapshot.mode_violations[mode], look)
     name = f"Mode {mode}, {mode_name(mode)}"
     return press_button(
         GO,
@@ -102,7 +105,6 @@ def _row(frame: Frame, mode: int) -> str:
         class_name="ex-mode",
         hover=HOVER,
         is_on=mode in frame.snapshot.bordering_modes,
-        is_disabled=not solution.feasible,
     )
 
 
@@ -113,6 +115,7 @@ def _limits(broken: tuple[Violation, ...], look: str) -> tuple[str, str]:
     first = broken[0].limit
     words = SHORT.get(first, first.removeprefix("margin ").removeprefix("swing "))
     more = f" +{len(broken) - 1}" if len(broken) > 1 else ""
+
     sentences = "; ".join(map(str, broken))
     return f'<span class="ex-beyond">{escape(words)}{more}</span>', f"{sentences}."
 
@@ -152,10 +155,10 @@ class Ghosts(ScenePart):
         yield self._legs, "visible", bool(modes)
         if not modes:
             return
-        solution = placed.frame.snapshot.modes
+        each = placed.frame.snapshot.modes
         plate_mesh = bodies.platform_plate(placed)
-        positions = placed.scale * solution.position[modes]
-        wxyzs = quaternion_from_rotation(solution.rotation[modes])
+        positions = placed.scale * each.position[modes]
+        wxyzs = quaternion_from_rotation(each.rotation[modes])
         for plate, position, wxyz in zip(self._plates, positions, wxyzs, strict=False):
             yield from bodies.draw_mesh(plate, plate_mesh)
             yield plate, "position", tuple(position.tolist())
@@ -178,5 +181,5 @@ class Ghosts(ScenePart):
 
 def ghost_points(placed: Placed, modes: list[int]) -> FloatArray:
     """Return b1 … b4 of n assembly modes in the scene, shape (n, 4, 3)."""
-    solution = placed.frame.snapshot.modes
-    return bodies.platform_joints(placed, solution.position[modes], solution.rotation[modes])
+    each = placed.frame.snapshot.modes
+    return bodies.platform_joints(placed, each.position[modes], each.rotation[modes])

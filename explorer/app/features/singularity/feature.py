@@ -21,10 +21,10 @@ from explorer.app.state.view import Gain, Ghost
 from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.blocks import render
 from explorer.app.widgets.buttons import figure, press_button
-from explorer.app.widgets.markup import box, dim, margin_name, meter, status, swatch, ticks
+from explorer.app.widgets.markup import box, caption, dim, margin_name, meter, swatch, ticks
 from explorer.app.widgets.palette import shift
 from explorer.measures.blocks import singularity as blocks
-from explorer.measures.blocks.block import Column, Facts, head_of
+from explorer.measures.blocks.block import Column, Facts, Statement, head_of
 from explorer.measures.blocks.source import pose_source
 from explorer.measures.verdict import DISTANCE_SHARE, warnings
 from explorer.mechanism.folds import FOLD_LINES, FOLDS
@@ -41,7 +41,7 @@ FOLD_HINT = "The fold on a dial: a red end is flat, and a flat fold is a singula
 
 
 class SingularityPanel:
-    """The verdict and the margins; then folders for strata and performance."""
+    """The verdict, its reason and the margins; below "More" the strata and the performance."""
 
     def __init__(self, services: Services) -> None:
         gui, buttons = services.gui, services.buttons
@@ -52,19 +52,17 @@ class SingularityPanel:
             "Singularity", lambda state: pose_source("singularity", state.design, state.pose)
         )
         self._table = gui.add_html("")
-        controls.dropdown(
-            "Ghost",
-            "Draw the nearest pose with an incidence, and the displacements of b1 to b4 to it.",
-            get_args(Ghost),
-            "view.singular.ghost",
-        )
         services.do_on_press(GO, lambda value: work.GoToSingularity(int(value)), {"1", "2", "3"})
         for incidence in (1, 2, 3):
             buttons.offer(f"Singularity › Go to δ{incidence} = 0", GO_HINT, GO, str(incidence))
-        with gui.add_folder("Stratum of the two flags"):
+        with gui.add_folder("More", expand_by_default=False):
+            controls.dropdown(
+                "Ghost",
+                "Draw the nearest pose with an incidence, and the displacements of b1 to b4 to it.",
+                get_args(Ghost),
+                "view.singular.ghost",
+            )
             self._strata = StrataPanel(services)
-        with gui.add_folder("Performance"):
-            self._measures = gui.add_html("")
             self._performance = gui.add_html("")
             controls.dropdown(
                 "Ellipsoid",
@@ -79,46 +77,31 @@ class SingularityPanel:
                 "and the point where it touches the singular plane.",
                 "view.singular.ball",
             )
-        controls.number(
-            "Warn below",
-            "Warning length of all margins in design units, to which those of distances, turns and "
-            "1/cond J are proportional: what is below is orange.",
-            At("view.warn_below", default=lambda state: state.warn_below),
-            least=0.0,
-            step=lambda state: length_span(state).step,
-        )
+            controls.number(
+                "Warn below",
+                "Warning length of all margins in design units, to which those of distances, turns "
+                "and 1/cond J are proportional: what is below is orange.",
+                At("view.warn_below", default=lambda state: state.warn_below),
+                least=0.0,
+                step=lambda state: length_span(state).step,
+            )
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
-        shows = {f"show {number}": scene.show_button(number) for number in (1, 2, 3)}
-        free = render(blocks.freedoms(frame.snapshot), shows) if frame.snapshot.is_singular else ""
-        yield self._summary, "content", summary(frame, self._copy) + free
+        yield self._summary, "content", summary(frame, self._copy)
         yield self._table, "content", distance_table(frame)
         yield from self._strata.updates(frame)
-        yield self._measures, "content", measures_table(frame)
-        yield self._performance, "content", performance_table(frame)
+        yield self._performance, "content", measures_table(frame) + performance_table(frame)
         yield from self._controls.updates(frame)
 
 
 def summary(frame: Frame, corner: str = "") -> str:
-    """Return the verdict, the mode and the limits as HTML, with a button in the corner."""
-    verdict, snapshot = frame.verdict, frame.snapshot
-    look = blocks.LOOKS[verdict.kind]
-    reason = escape(verdict.reason(frame.state.design.unit_mm))
-    limits_look, limits = "ex-within", "Within all limits"
-    if snapshot.violations:
-        limits_look, limits = "ex-beyond", "Outside the limits"
-    elif snapshot.is_singular:
-        limits_look, limits = "", "Limits kept"
-    return box(
-        corner,
-        status(verdict.title, look),
-        f'<div class="{"ex-dim" if look == "within" else f"ex-{look}"} ex-two-lines" '
-        f'title="{blocks.VERDICT_HINT}">{reason}</div>',
-        f'<div class="ex-line"><span>{snapshot.mode_words.capitalize()}</span>'
-        f'<span class="ex-strong {limits_look}">{limits}</span></div>',
-        *(f'<div class="ex-beyond">{escape(str(limit))}</div>' for limit in snapshot.violations),
-    )
+    """Return the verdict, its reason and the freedoms as HTML, with a button in the corner."""
+    verdict, unit_mm = frame.verdict, frame.state.design.unit_mm
+    look, hint = blocks.LOOKS[verdict.kind], blocks.VERDICT_HINT
+    answer = Statement(verdict.title, verdict.reason(unit_mm), look, hint=hint)
+    shows = {f"show {number}": scene.show_button(number) for number in (1, 2, 3)}
+    return render([answer, *blocks.freedoms(frame.snapshot)], shows, corner=corner)
 
 
 def measures_table(frame: Frame) -> str:
@@ -157,7 +140,7 @@ def distance_table(frame: Frame) -> str:
 
 def _margin(frame: Frame, index: int, texts: tuple[str, ...]) -> str:
     snapshot, level = frame.snapshot, frame.verdict.levels[index]
-    distances, colour = snapshot.nearest_distances, colours.proximity_colour(level)
+    colour = colours.proximity_colour(level)
     hint = f"{INCIDENCES[index]}, where the tetrahedron {' '.join(TETRAHEDRA[index])} is flat"
     go = press_button(
         GO,
@@ -169,12 +152,12 @@ def _margin(frame: Frame, index: int, texts: tuple[str, ...]) -> str:
         hover=HOVER,
         is_disabled=snapshot.nearest[index].distance == 0.0,
     )
-    is_least = distances[index] == min(distances)
+    is_nearest = index + 1 == frame.verdict.incidences[0]
     share = min(100.0, 100.0 * level / colours.FAR_WARNINGS)
     numbers = "".join(f"<span>{text}</span>" for text in texts)
     return (
         f'<div class="ex-margin-row" data-hover="{HOVER}" data-value="{index + 1}">'
-        f"{fold_dial(frame, index)}<div{' class=ex-strong' if is_least else ''}>"
+        f"{fold_dial(frame, index)}<div{' class=ex-strong' if is_nearest else ''}>"
         f"{margin_name(index + 1)}{numbers}{go}</div>"
         f'<div class="ex-danger" title="{escape(hint)}">{swatch(colour)}'
         f'<span class="ex-dim ex-small ex-fill">{INCIDENCES[index]}</span>'
@@ -281,8 +264,8 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
         '<div class="ex-dim ex-small">Press one to go to its nearest pose. Dimensions on the left, '
         "distances in mm.</div>"
         f'<div class="ex-strata" style="--height:{6 * ROW + NODE_HEIGHT + 4}px">'
-        f'{_edges(here)}<div class="ex-ranks">{ranks}</div><div class="ex-nodes">{nodes}</div>'
-        "</div>"
+        f'{_edges(here)}<div class="ex-ranks">{ranks}</div>'
+        f'<div class="ex-nodes" role="toolbar" aria-label="Strata">{nodes}</div></div>'
     )
 
 
@@ -306,6 +289,7 @@ def neighbours(frame: Frame, distances: Mapping[Stratum, float]) -> str:
         rest = '<div class="ex-dim ex-after">Both flags coincide: nothing is more singular.</div>'
     dimension = dim(f"dimension {strata.inversions(here)}")
     return box(
+        caption("Stratum of the two flags"),
         f"<div><b>{work.stratum_name(here)}</b> {dimension}</div>",
         f"<div>{escape(_sentence(here))}</div>{rest}",
     )

@@ -135,7 +135,7 @@ class ViewButtons:
 
     def __call__(self, _: Frame) -> str:
         """Return the buttons as HTML."""
-        return f'<span class="ex-views">{self._markup}</span>'
+        return f'<span class="ex-views" role="toolbar" aria-label="Views">{self._markup}</span>'
 
     def _point(self, label: str, client: viser.ClientHandle) -> None:
         if label == FIT:

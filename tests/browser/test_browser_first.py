@@ -1,0 +1,70 @@
+"""The first screen in a real page: stops of the keyboard, folders that stay open, and the bar."""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+from playwright.sync_api import Browser, expect
+from tab import Tab
+
+from explorer.app.server import Running
+
+STOPS = """() => [...document.querySelectorAll("a[href], button, input, [tabindex]")]
+    .filter((each) => each.tabIndex >= 0 && !each.disabled && each.getClientRects().length)
+    .map((each) => each.ariaLabel || each.innerText)"""
+# Most controls that the Tab key reaches before anything is done.
+MOST = 40
+# Figures of the bar that are drawn whole, with their names, and those that are drawn in part.
+FIGURES = """() => {
+    const room = document.querySelector(".ex-bar > [role=toolbar]").getBoundingClientRect();
+    const within = (it) => {
+        const { left, right, top, bottom } = it.getBoundingClientRect();
+        if (top >= room.bottom) return "hidden";
+        return left > room.left - 1 && right < room.right + 1 && bottom < room.bottom + 2;
+    };
+    return [...document.querySelectorAll(".ex-figure")].map((each) =>
+        [each.innerText, [each, ...each.children].map(within)]);
+}"""
+# Windows of a small laptop, half a screen, and a phone, with the figures that they show at least.
+WINDOWS = {(1000, 700): 3, (820, 600): 2, (390, 844): 1}
+
+
+def test_first_screen_is_short_for_the_keyboard_and_stays_as_it_was_opened(
+    browser: Browser, running: Running
+) -> None:
+    with closing(Tab(browser, running, size=(1280, 720))) as tab:
+        tab.settle()
+        page, keyboard = tab.page, tab.page.keyboard
+        stops = page.evaluate(STOPS)
+        assert 20 < len(stops) <= MOST, stops
+        expect(page).to_have_title("paper-optimal – Flagged 4-4 explorer")
+        # A folder is opened by its head.
+        strata = page.locator(".ex-nodes button")
+        more = page.get_by_role("button", name="More", exact=True)
+        expect(strata.first).to_be_hidden()
+        more.focus()
+        keyboard.press("Enter")
+        expect(more).to_have_attribute("aria-expanded", "true")
+        tab.settle()
+        # The diagram is one stop, and arrows lead from a stratum to the one beside it.
+        expect(strata.and_(page.locator(":not([tabindex='-1'])"))).to_have_count(1)
+        page.get_by_role("button", name="Go to (3, 4, 2, 1)").focus()
+        for key, stratum in {"Right": "(4, 2, 3, 1)", "Down": "(3, 4, 1, 2)"}.items():
+            keyboard.press(f"Arrow{key}")
+            expect(page.get_by_role("button", name=f"Go to {stratum}")).to_be_focused()
+        tab.reload()
+        expect(strata.first).to_be_visible()
+
+
+def test_bar_of_any_window_shows_the_verdict_and_cuts_no_figure(
+    browser: Browser, running: Running
+) -> None:
+    with closing(Tab(browser, running)) as tab:
+        for size, least in WINDOWS.items():
+            tab.resize(size)
+            figures = tab.page.evaluate(FIGURES)
+            shown = [words for words, parts in figures if parts[0] != "hidden"]
+            assert all(parts in ([True] * 3, ["hidden"] * 3) for _, parts in figures), figures
+            assert "Nearest singular pose\n10.3 mm to δ1 = 0" in shown
+            assert len(shown) >= least
+            expect(tab.page.locator(".ex-document")).to_be_in_viewport(ratio=1.0)
