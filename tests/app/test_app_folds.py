@@ -159,11 +159,11 @@ def _margins(folds: tuple[float, ...]) -> list[float]:
 
 
 def shown(panel: MovePanel, desk: Desk) -> dict[str, Any]:
-    """Return the visible sliders of the pose by their labels, after a panel has shown the state."""
+    """Return the visible sliders by their labels, after a panel has shown the state."""
     found: dict[str, Any] = {}
     for handle, name, value in panel.updates(Frame(desk.state)):
         setattr(handle, name, value)
-        if isinstance(handle, viser.GuiSliderHandle) and handle.label not in JOINT_LABELS.values():
+        if isinstance(handle, viser.GuiSliderHandle):
             found[handle.label] = handle
     return {label: handle for label, handle in found.items() if handle.visible}
 
@@ -182,6 +182,8 @@ def test_choice_shows_six_sliders_in_place_of_six_and_is_kept(
     # Like all that is shown it is no step of its own.
     assert desk.session.history.at == 0
     assert list(shown(panel, desk)) == ["r", "β (°)", "ε (°)", "φ1 (°)", "φ2 (°)", "φ3 (°)"]
+    desk.press(services.buttons, "view.coordinates", "lengths")
+    assert list(shown(panel, desk)) == list(JOINT_LABELS.values())
     # It stays with the next design, and in the file of the session.
     assert Open(PRESETS["paper-initial"]).apply(after).view.coordinates == "folds"
     saved = decode_session(encode_session(start_history(after)), "test")
