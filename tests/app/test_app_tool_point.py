@@ -29,7 +29,7 @@ from explorer.app.features.mechanism.feature import MovePanel
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.orientation.feature import OrientationPanel, OrientationScene
-from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, GoToTilt, SetTiltTorsion
+from explorer.app.features.orientation.work import RANGE_FEED, TILTS_FEED, SetTiltTorsion
 from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.feature import PathScene
 from explorer.app.features.paths.panel import TYPED, PathsPanel, end_numbers
@@ -543,8 +543,8 @@ def test_tab_of_tilts_has_the_largest_tilt_about_the_tool(services: Services) ->
     assert largest_tilt(Set("view.at", "b4").apply(state)) != text
     inside, beyond = (
         [
-            Frame(GoToTilt(azimuth, float(text) + change).apply(state)).snapshot.violations
-            for azimuth in range(-180, 180, 4)
+            Frame(SetTiltTorsion(1, float(text) + change).apply(towards)).snapshot.violations
+            for towards in (SetTiltTorsion(0, each).apply(state) for each in range(-180, 180, 4))
         ]
         for change in (-0.1, 0.1)
     )
