@@ -1,14 +1,21 @@
-"""The panels and the bar on top, and what each new browser needs: its room, theme and camera."""
+"""The panels and the bar on top, and what each new browser needs: its room and camera."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import get_args
 
 import viser
 
 from explorer.app.browser.browser_facts import BrowserFacts, ask_browser
-from explorer.app.browser.viser_gaps import dock_above_in, panel_in, run_script
+from explorer.app.browser.viser_gaps import (
+    dock_above_in,
+    keep_arrangement,
+    make_with_id,
+    panel_in,
+    run_script,
+)
 from explorer.app.features.feature import Feature, Place, Services, Side, Tab
 from explorer.app.look import read_script
 from explorer.app.scene.camera import Cameras
@@ -16,7 +23,6 @@ from explorer.app.session.clock import Timer
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import MANUAL, press_button
-from explorer.app.widgets.theme import Theme
 
 # Seconds until the panels of a new page are laid out.
 SETTLE_SECONDS = 0.7
@@ -27,6 +33,9 @@ MOST_ATTEMPTS, LONGEST_PAUSE_SECONDS = 12, 5.0
 NARROW, HIGH_ENOUGH = 1100, 700
 # Widths of the panels on the left and on the right, and height of the open drawer, in pixels.
 LEFT_WIDTH, RIGHT_WIDTH, DRAWER_HEIGHT = 300, 360, 300
+# What the page says while it has no connection; a script puts the time in place of "{time}".
+LOST = "The explorer has not answered since {time}. The page asks again every few seconds"
+SAVED = "; your work is saved"
 # Width, and place from the left and from the top, of a window before the stylesheet places it.
 ANY_WIDTH, ANY_PLACE = 640, 80
 
@@ -40,14 +49,18 @@ class Panels:
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._gui = gui
-        self.build, self.analyse, self.work = (gui.add_panel() for _ in range(3))
+        keep_arrangement(gui)
+        places = "build", "analyse", "work"
+        self.build, self.analyse, self.work = (make_with_id(gui.add_panel, at) for at in places)
         self._tabs: dict[tuple[Place, str], viser.GuiTabHandle] = {}
 
     def tab(self, tab: Tab, manual: str) -> viser.GuiTabHandle:
         """Return the tab of a place with a title, made at the first call with its button "?"."""
         key = (tab.place, tab.title)
         if key not in self._tabs:
-            self._tabs[key] = self._panel(tab.place).add_tab(tab.title, tab.icon)
+            panel = self._panel(tab)
+            add_tab = partial(panel.add_tab, tab.title, tab.icon)
+            self._tabs[key] = make_with_id(add_tab, f"tab {tab.title}")
             if manual:
                 hint = f"Read about {tab.title} in the manual."
                 button = press_button(MANUAL, manual, "?", label=hint, class_name="ex-asks")
@@ -59,10 +72,10 @@ class Panels:
         """Return the titles of the tabs in a place."""
         return [title for each, title in self._tabs if each == place]
 
-    def _panel(self, place: Place) -> viser.PanelHandle:
-        if place != "dialog":
-            return getattr(self, place)
-        dialog = self._gui.add_panel()
+    def _panel(self, tab: Tab) -> viser.PanelHandle:
+        if tab.place != "dialog":
+            return getattr(self, tab.place)
+        dialog = make_with_id(self._gui.add_panel, f"dialog {tab.title}")
         dialog.float(x=ANY_PLACE, y=ANY_PLACE, width=ANY_WIDTH)
         return dialog
 
@@ -89,25 +102,26 @@ class Layout:
 
     Args:
         server: Server of the page.
-        theme: Theme of the page.
         cameras: Cameras of the browsers.
         panels: The panels, with all their tabs; None to show the scene alone.
+        is_saved: Whether the session is saved.
     """
 
     def __init__(
         self,
         server: viser.ViserServer,
-        theme: Theme,
         cameras: Cameras,
         panels: Panels | None,
+        *,
+        is_saved: bool,
     ) -> None:
-        self._theme = theme
         self._cameras = cameras
         self._panels = panels
         if panels is not None:
             panels.lay_out()
             titles = {"drawer": panels.titles("work"), "dialogs": panels.titles("dialog")}
             run_script(server, read_script("places", titles))
+            run_script(server, read_script("connection", f"{LOST}{SAVED if is_saved else ''}."))
         server.on_client_connect(
             lambda client: ask_browser(client, lambda facts: self._answered(client, facts))
         )
@@ -124,7 +138,6 @@ class Layout:
 
     def _answered(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
         self._make_room(client, facts)
-        self._theme.follow_browser(dark=facts.dark)
         Timer(SETTLE_SECONDS, self._place_camera, client, 0)
 
     def _place_camera(self, client: viser.ClientHandle, attempt: int) -> None:

@@ -42,7 +42,7 @@ from explorer.app.session.worker import Worker, log_error
 from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Presses
 from explorer.app.state.state import State
-from explorer.app.storage.user_data import Autosaver, PreferenceFile, UserData
+from explorer.app.storage.user_data import Autosaver, UserData
 from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.markup import sentence
@@ -92,7 +92,7 @@ class Page:
     Args:
         server: Server that the page is drawn on.
         state: The first state.
-        panels, user_data, preferences, studies: As for `explorer.app.server.start`.
+        panels, user_data, tour, studies: As for `explorer.app.server.start`.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Page:
         *,
         panels: bool = True,
         user_data: UserData | None = None,
-        preferences: PreferenceFile | None = None,
+        tour: bool = False,
         studies: StudyFolders | None = None,
     ) -> None:
         self._server = server
@@ -131,12 +131,7 @@ class Page:
         gui = server.gui
         gui.set_panel_label(TITLE)
         self.buttons = Buttons(server)
-        chosen = None if preferences is None else preferences.chosen
-        theme = Theme(
-            gui,
-            dark=False if chosen is None else chosen.dark,
-            changed=self.session.redraw,
-        )
+        theme = Theme(server, self.buttons, self.session.redraw)
         run_script(server, read_stylesheet())
         for script in SCRIPTS:
             run_script(server, read_script(script))
@@ -155,7 +150,7 @@ class Page:
             theme,
             Cameras(server.initial_camera, self.corners),
             user_data,
-            preferences,
+            tour,
             self.autosaver,
             lambda: self.palette.commands,
         )
@@ -176,7 +171,13 @@ class Page:
         self.runners = [self.services.get(kind) for each in self._features for kind in each.runners]
         self.services.cameras.frame_first()
         self._panels = deque(self._add_panels() if panels else ())
-        layout = Layout(server, theme, self.services.cameras, self.panels if panels else None)
+        layout = Layout(
+            server,
+            self.services.cameras,
+            self.panels if panels else None,
+            is_saved=user_data is not None,
+        )
+        theme.begin(server)
         self.palette = self._add_palette(layout)
         for message in () if user_data is None else user_data.messages:
             self._tell(sentence(message))
@@ -310,7 +311,7 @@ class Page:
     def _placed(self) -> Placed:
         floors = (each.floor(self.services) for each in self._features if each.floor is not None)
         floor = next((floor for floor in floors if floor is not None), None)
-        return Placed(self._frame, self.services.theme.is_dark, floor)
+        return Placed(self._frame, floor)
 
     def corners(self) -> FloatArray:
         """Return the points of all that a picture must show, shape (n, 3)."""
@@ -320,9 +321,9 @@ class Page:
     def _complain(self, message: str, who: Who) -> None:
         self._notify(REFUSAL, message, who)
 
-    def _tell(self, message: str) -> None:
-        """Notify all browsers of what no request caused."""
-        self._notify("Please note", message, None)
+    def _tell(self, message: str, who: Who = None) -> None:
+        """Notify a browser, or all for None, of what no request caused."""
+        self._notify("Please note", message, who)
 
     def _show_saving(self, message: str) -> None:
         # The bar shows whether saving fails, also to browsers that come later.

@@ -25,7 +25,7 @@ from explorer.app.session.history import check_drawable
 from explorer.app.state.state import open_state
 from explorer.app.state.view import View
 from explorer.app.storage.folder import data_folder
-from explorer.app.storage.user_data import PreferenceFile, UserData, open_user_data
+from explorer.app.storage.user_data import UserData, open_user_data
 from explorer.errors import ExplorerError, ServerError, StorageError
 from explorer.files.writing import make_folder
 from explorer.mechanism.design import Design
@@ -77,7 +77,7 @@ def start(
     allow_hosts: Sequence[str] = (),
     panels: bool = True,
     user_data: UserData | None = None,
-    preferences: PreferenceFile | None = None,
+    tour: bool = False,
     studies: StudyFolders | None = None,
 ) -> Running:
     """Start an explorer in this process and return at once.
@@ -94,8 +94,7 @@ def start(
         panels: Whether there are panels beside the scene; else the scene is alone.
         user_data: The user's designs, where the session is saved and the history to continue;
             None to save nothing.
-        preferences: Where theme and tour are remembered; None to be light and to begin no
-            tour by itself.
+        tour: Whether the tour begins by itself in a browser that has not seen it.
         studies: Where design studies lie; None to offer none.
 
     Raises:
@@ -118,7 +117,7 @@ def start(
         state,
         panels=panels,
         user_data=user_data,
-        preferences=preferences,
+        tour=tour,
         studies=studies,
     )
     guard.let_in()
@@ -163,7 +162,7 @@ def serve(
             token=token,
             allow_hosts=allow_hosts,
             user_data=user_data,
-            preferences=PreferenceFile(data_folder()),
+            tour=True,
             studies=StudyFolders(data_folder() / STUDIES_FOLDER, studies),
         )
     except ExplorerError:

@@ -135,7 +135,7 @@ def services_for(
         theme=missing,
         cameras=missing,
         user_data=user_data,
-        preferences=None,
+        offers_tour=False,
     )
 
 

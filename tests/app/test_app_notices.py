@@ -1,8 +1,7 @@
-"""Notices, files, the tour and its preferences, and the facts that a browser sends."""
+"""Notices, files, the tour, the theme, and the facts that a browser sends."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,21 +13,21 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from client import Client, client_of, press_update, presses_in, wait_for
-from desk import Desk
 from services import StubWorker
 
 from explorer.app.browser.browser_facts import BrowserFacts
 from explorer.app.browser.downloads import Downloads
 from explorer.app.features.designs.feature import UNSAVED
-from explorer.app.features.help.tour import STEPS, Tour
+from explorer.app.features.help.tour import STEPS, EndTour, Tour
+from explorer.app.features.optimise.actions import EndRun
+from explorer.app.features.optimise.state import SearchResult
 from explorer.app.layout import is_narrow
 from explorer.app.server import Running, start
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
-from explorer.app.storage.user_data import PREFERENCES, PreferenceFile, Preferences, UserData
-from explorer.app.widgets.theme import BRAND, BRAND_ON_DARK, Theme
+from explorer.app.storage.user_data import UserData
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 
@@ -145,10 +144,18 @@ def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(design: Design
     assert tour.step_by(-1, Frame(state)).at == 0
     for index, step in enumerate(STEPS):
         assert tour.at == index
+        if step.before is not None:
+            state = step.before.apply(state)
         assert not tour.after_frame(Frame(state)).is_done
         state = tour.step.show(Frame(state)).apply(state)
+        if state.optimisation.is_on:
+            assert not tour.after_frame(Frame(state)).is_done
+            state = EndRun(1, SearchResult("failed", "no answer")).apply(state)
         tour = tour.after_frame(Frame(state))
         assert tour.is_done
+        # Wherever the tour ends, all is as it was before.
+        end = EndTour(start).apply(state)
+        assert (end.design, end.pose, end.view) == (start.design, start.pose, start.view)
         # It comes close to a singularity without reaching it.
         assert np.abs(Frame(state).snapshot.margins).min() > 0.0
         # Once done it stays so, whatever is done next.
@@ -158,35 +165,6 @@ def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(design: Design
         assert tour.is_last == (index == len(STEPS) - 1)
         tour = tour.step_by(1, Frame(state))
     assert tour.at == len(STEPS) - 1
-    assert state.optimisation.is_on
-
-
-def test_preferences_are_remembered_each_by_itself_and_of_two_explorers(tmp_path: Path) -> None:
-    assert PreferenceFile(tmp_path).chosen == Preferences(dark=None, tour_seen=False)
-    # Reading them makes no file.
-    assert list(tmp_path.iterdir()) == []
-    folder = tmp_path / "new" / "folder"
-    one, other = PreferenceFile(folder), PreferenceFile(folder)
-    one.choose(tour_seen=True)
-    other.choose(dark=True)
-    assert PreferenceFile(folder).chosen == Preferences(dark=True, tour_seen=True)
-    # A later explorer may remember more.
-    (tmp_path / PREFERENCES).write_bytes(b'{"dark": true, "language": "fr"}')
-    assert PreferenceFile(tmp_path).chosen == Preferences(dark=True)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [b"{", b"null", b'{"dark": 7}', b"\xff\xfe", b'{"dark":' + b"[" * 9000, b" " * 20_000 + b"{}"],
-)
-def test_preferences_in_a_broken_file_count_as_none_and_are_replaced(
-    tmp_path: Path, text: bytes
-) -> None:
-    (tmp_path / PREFERENCES).write_bytes(text)
-    file = PreferenceFile(tmp_path)
-    assert file.chosen == Preferences()
-    file.choose(dark=True)
-    assert json.loads((tmp_path / PREFERENCES).read_bytes()) == {"dark": True, "tour_seen": False}
 
 
 @pytest.mark.parametrize(
@@ -203,22 +181,28 @@ def test_preferences_in_a_broken_file_count_as_none_and_are_replaced(
 def test_panels_are_stacked_where_the_window_is_narrow_and_high(
     width: int, height: int, narrow: bool
 ) -> None:
-    assert is_narrow(BrowserFacts(width, height, False)) is narrow
+    assert is_narrow(BrowserFacts(width, height)) is narrow
 
 
-def test_theme_is_set_once_for_each_change_and_is_no_step_of_the_history(desk: Desk) -> None:
-    themes: list[dict[str, Any]] = []
-
-    def keep(**theme: Any) -> None:
-        themes.append(theme)
-
-    gui: Any = SimpleNamespace(configure_theme=keep)
-    theme = Theme(gui, dark=False, changed=desk.session.redraw)
-    for dark in (False, True, True, False):
-        theme.choose(dark=dark)
-    assert [t["dark_mode"] for t in themes] == [False, True, False]
-    assert [t["brand_color"] for t in themes] == [BRAND, BRAND_ON_DARK, BRAND]
-    # No tunnel to anywhere is offered in either.
-    assert not any(t["show_share_button"] for t in themes)
-    assert desk.session.wait_until_idle()
-    assert len(desk.session.history.steps) == 1
+def test_theme_is_that_of_each_browser_and_no_step_of_the_history(tmp_path: Path) -> None:
+    with (
+        explorer_with(data_in(tmp_path)) as running,
+        client_of(running) as one,
+        client_of(running) as other,
+    ):
+        is_dark_for = running.page.services.theme.is_dark_for
+        for client in (one, other):
+            client.read_all_sent(running)
+        for dark in (True, False):
+            one.update(*press_update(running, "theme", "dark" if dark else "light"))
+            wait_for(lambda dark=dark: is_dark_for(one.client_id) is dark)
+            sent = one.read_all_sent(running)
+            (theme,) = (m for m in sent if m["type"] == "ThemeConfigurationMessage")
+            # No tunnel to anywhere is offered in either.
+            assert (theme["dark_mode"], theme["show_share_button"]) == (dark, False)
+            painted = [m["name"] for m in sent if m["type"] == "SceneNodeUpdateMessage"]
+            assert {"/grid", "/shadow"} <= {*painted}
+        assert not is_dark_for(other.client_id)
+        types = {m["type"] for m in other.read_all_sent(running)}
+        assert not types & {"ThemeConfigurationMessage", "SceneNodeUpdateMessage"}
+        assert len(running.page.session.history.steps) == 1

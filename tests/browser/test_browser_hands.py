@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing, contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from explorer.app.layout import DRAWER_HEIGHT, NARROW
 from explorer.app.scene.camera import framing
 from explorer.app.screenshot import SCENE_CANVAS
 from explorer.app.server import start
-from explorer.app.storage.user_data import PreferenceFile, Preferences
+from explorer.app.state.state import State, open_state
 from explorer.mechanism.design_file import PRESETS
 
 OpenWindow = Callable[[tuple[int, int]], Tab]
@@ -49,11 +49,9 @@ CUT_OFF = """() => {
 
 
 @contextmanager
-def page_with(
-    browser: Browser, preferences: PreferenceFile, *, dark: bool = False
-) -> Generator[Tab]:
-    """Open a page that remembers, as `explorer serve` does."""
-    running = start(PRESETS["paper-optimal"], port=0, preferences=preferences)
+def page_with(browser: Browser, *, tour: bool = False, dark: bool = False) -> Generator[Tab]:
+    """Open the page of an explorer of its own."""
+    running = start(PRESETS["paper-optimal"], port=0, tour=tour)
     try:
         with closing(Tab(browser, running, size=SIZES[0], dark=dark)) as tab:
             yield tab
@@ -287,28 +285,34 @@ def left_of(tab: Tab, name: str) -> float:
     return box["x"]
 
 
-def test_page_is_as_dark_as_its_user_prefers_until_a_theme_is_chosen(
-    browser: Browser, tmp_path: Path
-) -> None:
-    preferences = PreferenceFile(tmp_path)
-    preferences.choose(tour_seen=True)
-    with page_with(browser, preferences, dark=True) as tab:
+def test_page_is_as_dark_as_the_system_until_a_theme_is_chosen(browser: Browser) -> None:
+    with page_with(browser, dark=True) as tab:
         tab.wait_for(lambda: scheme_of(tab) == "dark", "a dark page")
-        # Nobody chose, so nothing is remembered.
-        assert PreferenceFile(tmp_path).chosen.dark is None
+        tab.page.emulate_media(color_scheme="light")
+        tab.wait_for(lambda: scheme_of(tab) == "light", "a light page, as the system is now")
         tab.push("Theme")
-        tab.wait_for(lambda: scheme_of(tab) == "light", "a light page")
-        tab.wait_for(lambda: PreferenceFile(tmp_path).chosen.dark is False, "what was chosen")
+        tab.wait_for(lambda: scheme_of(tab) == "dark", "what was chosen")
         tab.reload()
-        assert scheme_of(tab) == "light"
+        tab.wait_for(lambda: scheme_of(tab) == "dark", "what was chosen in this browser")
+        # Its own theme, then again that of the system.
+        for dark in (False, True):
+            tab.push("Theme")
+            tab.wait_for(lambda: scheme_of(tab) == "light", "a light page")
+            tab.page.emulate_media(color_scheme="dark")
+            tab.wait_for(lambda dark=dark: is_dark(tab) is dark, "the theme that counts")
+            tab.page.emulate_media(color_scheme="light")
+
+
+def is_dark(tab: Tab) -> bool:
+    return tab.running.page.services.theme.is_dark_for(tab.client.client_id)
 
 
 def scheme_of(tab: Tab) -> str:
     return str(tab.page.evaluate("document.documentElement.dataset.mantineColorScheme"))
 
 
-def test_tour_leads_through_five_steps_once(browser: Browser, tmp_path: Path) -> None:
-    with page_with(browser, PreferenceFile(tmp_path)) as tab:
+def test_tour_leads_through_five_steps_once(browser: Browser) -> None:
+    with page_with(browser, tour=True) as tab:
         card = tab.page.get_by_text("step 1 of 5")
         card.wait_for()
         # What the user does by hand counts as well.
@@ -316,24 +320,53 @@ def test_tour_leads_through_five_steps_once(browser: Browser, tmp_path: Path) ->
         tab.type("y", "6")
         tab.page.get_by_text("Done", exact=True).wait_for()
         for number, step in enumerate(STEPS, 1):
-            tab.page.get_by_text(step.title, exact=True).wait_for()
+            tab.page.get_by_text(step.title, exact=True).last.wait_for()
             tab.page.get_by_text(f"step {number} of 5").wait_for()
-            if number in (2, 4):
+            # The step has its tab in front, and its control ringed.
+            tab.page.get_by_role("tab", name=step.tab, selected=True).wait_for()
+            tab.page.locator("[data-ex-ring]:visible").wait_for()
+            if number in (2, 4, 5):
                 button_of(tab, "Show me").click()
                 tab.page.get_by_text("Done", exact=True).wait_for()
-            button_of(tab, "Finish" if number == len(STEPS) else "Next").click()
+            if number < len(STEPS):
+                button_of(tab, "Next").click()
+        tab.page.get_by_text(re.compile(r"grew from 870\.7 to 8,000 units³")).wait_for()
+        button_of(tab, "Finish").click()
         tab.page.get_by_text("step 5 of 5").wait_for(state="detached")
-        assert tab.state.view.workspace.solid
-        tab.wait_for(lambda: PreferenceFile(tmp_path).chosen.tour_seen, "what was seen")
+        wait_until_back(tab)
+        assert tab.page.locator("[data-ex-ring]").count() == 0
+        # Nothing is lost: the step before the last one has what the search found.
+        step = tab.running.page.session.history.steps[-2]
+        assert step.words.startswith("Optimise")
         tab.reload()
+        tab.settle()
         assert tab.page.get_by_text("of 5").count() == 0
         # By command it begins again, and can be skipped at once.
         tab.open_dialog("Help")
         tab.push("Tour")
         tab.page.get_by_text("step 1 of 5").wait_for()
+        for _ in STEPS[1:]:
+            button_of(tab, "Next").click()
+        # A search that has just begun is cancelled.
+        button_of(tab, "Show me").click()
+        tab.wait_for(lambda: tab.state.optimisation.is_on, "a search")
         button_of(tab, "Skip the tour").click()
-        tab.page.get_by_text("step 1 of 5").wait_for(state="detached")
-    assert PreferenceFile(tmp_path).chosen == Preferences(None, True)
+        tab.page.get_by_text("step 5 of 5").wait_for(state="detached")
+        wait_until_back(tab)
+
+
+def wait_until_back(tab: Tab) -> None:
+    """Wait until design, pose, view and tabs are as they are at first, and the drawer is closed."""
+    first = open_state(PRESETS["paper-optimal"])
+
+    def parts(state: State) -> tuple[object, ...]:
+        return state.design, state.pose, state.view
+
+    tab.wait_for(lambda: parts(tab.state) == parts(first), "what was before the tour")
+    assert not tab.state.optimisation.is_on
+    for name in ("Pose", "Singularity"):
+        tab.page.get_by_role("tab", name=name, selected=True).wait_for()
+    tab.page.locator("[data-ex=drawer] [data-dock-bar]").wait_for()
 
 
 def button_of(tab: Tab, words: str) -> Locator:

@@ -63,7 +63,7 @@ def nameless(tab: Tab) -> list[str]:
 def test_text_is_legible_and_every_control_named_in_all_tabs_and_dialogs(
     tab: Tab, *, dark: bool
 ) -> None:
-    tab.running.page.services.theme.choose(dark=dark)
+    tab.page.emulate_media(color_scheme="dark" if dark else "light")
     scheme = "document.documentElement.dataset.mantineColorScheme"
     tab.wait_for(lambda: tab.page.evaluate(scheme) == ("dark" if dark else "light"), "the theme")
     sizes: dict[float, str] = {}
@@ -93,7 +93,7 @@ def test_text_is_legible_and_every_control_named_in_all_tabs_and_dialogs(
         tab.page.keyboard.press("Escape")
         expect(tab.page.get_by_role("dialog", name=name)).to_have_count(0)
     assert set(sizes) <= SIZES, sizes
-    tab.running.page.services.theme.choose(dark=False)
+    tab.page.emulate_media(color_scheme="light")
 
 
 def test_control_has_the_words_beside_it_as_its_name_whenever_it_comes(tab: Tab) -> None:

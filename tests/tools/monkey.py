@@ -151,7 +151,6 @@ class Monkey:
             session: Any = fresh.page.session
             wait_until_drawn(fresh.page, PATIENCE_SECONDS)
             session._state, session._history = state, history
-            fresh.page.services.theme.choose(dark=page.services.theme.is_dark)
             shelves = [each.services.get(SavedDesigns) for each in (fresh.page, page)]
             for saved in shelves:
                 saved.wait_until_idle()

@@ -1,4 +1,4 @@
-"""What only a browser knows: its window's size, the theme that its user prefers, and presses.
+"""What only a browser knows: its window's size, and presses.
 
 viser reports values alone. So scripts of the page write the rest to hidden fields of their tab, by
 the same way and in the same order as the values of other controls: a value is known to come from
@@ -22,11 +22,10 @@ Described = TypeVar("Described")
 
 
 class BrowserFacts(msgspec.Struct, frozen=True):
-    """What a browser reports: the size of its window in CSS pixels, and a wish for dark pages."""
+    """What a browser reports: the size of its window in CSS pixels."""
 
     width: float
     height: float
-    dark: bool
 
 
 _DECODER = msgspec.json.Decoder(BrowserFacts)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Mapping
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import viser
+import viser._gui_api
+import viser._gui_handles
 import viser._messages as protocol
 from numpy.typing import ArrayLike
 
 from explorer.numerics.arrays import FloatArray
 
+Made = TypeVar("Made")
 SceneMessage = dict[str, Any]
 """A message that makes or changes a part of the scene: its type, its fields by name."""
 
@@ -58,6 +61,16 @@ def assign_properties(node: viser.SceneNodeHandle, values: Mapping[str, object])
             updates[name] = np.array(value, dtype=dtype)
         setattr(properties, name, updates[name])
     internals._impl.api._queue_scene_message(protocol.SceneNodeUpdateMessage(node.name, updates))
+
+
+def assign_in(
+    client: viser.ClientHandle, node: viser.SceneNodeHandle, values: Mapping[str, object]
+) -> None:
+    """Assign properties of a node, which all browsers share, in one browser alone.
+
+    Gap: viser's own assignment is for all of them.
+    """
+    _send_to(client, protocol.SceneNodeUpdateMessage(node.name, dict(values)))
 
 
 def put_camera(
@@ -163,6 +176,8 @@ def _send_to(client: Any, message: object) -> None:
 def scene_as_html(
     server: viser.ViserServer,
     select: Callable[[list[SceneMessage]], list[SceneMessage]],
+    *,
+    dark: bool,
 ) -> str:
     """Return viser's page with a scene in it that it plays by itself.
 
@@ -176,7 +191,7 @@ def scene_as_html(
     recorded[:] = [(0.0, message) for message in messages]
     used = set(_arrays_in(messages))
     arrays[:] = [data if i in used else memoryview(b"") for i, data in enumerate(arrays)]
-    return str(serializer.as_html())
+    return str(serializer.as_html(dark))
 
 
 def _refuse(_: object) -> bool:
@@ -195,6 +210,33 @@ def _arrays_in(value: object) -> Generator[int]:
     elif isinstance(value, list | tuple):
         for each in cast("list[object]", value):
             yield from _arrays_in(each)
+
+
+def make_with_id(make: Callable[[], Made], name: str) -> Made:
+    """Make a panel or a tab with an id that stays the same when the explorer starts again.
+
+    Gap: viser draws ids at random. A page that connects to an explorer that was started again would
+    take its panels for others, lay them out beside those that it has, in half of the room, and
+    forget how its user arranged them.
+    """
+    modules: tuple[Any, ...] = (viser._gui_api, viser._gui_handles)
+    draw_id = modules[0]._make_uuid
+    for module in modules:
+        module._make_uuid = lambda: name
+    try:
+        return make()
+    finally:
+        for module in modules:
+            module._make_uuid = draw_id
+
+
+def keep_arrangement(gui: viser.GuiApi) -> None:
+    """Have pages keep the arrangement of their panels when the explorer starts again.
+
+    Gap: to viser the first arrangement of each run is a new one.
+    """
+    internals: Any = gui
+    internals._layout_run_id = "explorer"
 
 
 def panel_in(client: viser.ClientHandle, panel: viser.PanelHandle) -> viser.PanelHandle:

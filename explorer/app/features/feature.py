@@ -21,19 +21,26 @@ from explorer.app.session.worker import Worker
 from explorer.app.state.actions import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.storage.user_data import Autosaver, PreferenceFile, UserData
+from explorer.app.storage.user_data import Autosaver, UserData
 from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import Buttons, copy_button, press_button
 from explorer.app.widgets.markup import dim
 from explorer.app.widgets.palette import Command, Key
 from explorer.app.widgets.theme import Theme
 from explorer.app.widgets.under_way import AnyFeed, look_of, problem, progress
-from explorer.errors import StorageError
 from explorer.measures.blocks.source import Source
 
 Place = Literal["build", "analyse", "work", "dialog"]
 Side = Literal["left", "middle", "right"]
 Shared = TypeVar("Shared")
+
+
+class Tell(Protocol):
+    """Shows a message to one client, or to all for None."""
+
+    def __call__(self, message: str, who: Who = None, /) -> None:
+        """Show the message."""
+        ...
 
 
 @dataclass
@@ -47,11 +54,11 @@ class Services:
         buttons: Buttons in the markup of the page.
         downloads: Sender of files to browsers.
         complain: Function that shows a problem to one client, or to all for None.
-        tell: Function that shows a message to all clients.
-        theme: Theme of the page, light or dark.
+        tell: Function that shows a message to one client, or to all for None.
+        theme: Theme of each browser, light or dark.
         cameras: Cameras of the browsers; they frame all that the features draw.
         user_data: The user's designs and session; None to save nothing.
-        preferences: File that remembers theme and tour; None to remember nothing.
+        offers_tour: Whether the tour begins by itself in browsers that have not seen it.
         autosaver: Saver of the session; None to save nothing.
         commands: Function that returns the commands of the palette.
         exports: The files that the features of the page offer.
@@ -64,11 +71,11 @@ class Services:
     buttons: Buttons
     downloads: Downloads
     complain: Callable[[str, Who], None]
-    tell: Callable[[str], None]
+    tell: Tell
     theme: Theme
     cameras: Cameras
     user_data: UserData | None
-    preferences: PreferenceFile | None
+    offers_tour: bool
     autosaver: Autosaver | None = None
     commands: Callable[[], tuple[Command, ...]] = tuple
     exports: tuple[Export, ...] = ()
@@ -108,15 +115,6 @@ class Services:
         """Call the functions registered with `at_end`, the last one first."""
         while self._ends:
             self._ends.pop()()
-
-    def remember(self, who: Who, **chosen: bool) -> None:
-        """Remember preferences of the user by name, if preferences are kept."""
-        if self.preferences is None:
-            return
-        try:
-            self.preferences.choose(**chosen)
-        except StorageError as error:
-            self.complain(str(error), who)
 
     def do_on_press(
         self,

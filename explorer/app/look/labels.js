@@ -27,6 +27,8 @@ window.explorer.labels ??= (() => {
   const BAR = [36, 96];
   // Half the side of the square about the middle of the drag handle that stays free.
   const HANDLE = 13;
+  // Radius of the ring that the tour draws about the handle.
+  const RING = 78;
   // A body hides a point if it is so much nearer to the eye, in scene units, as a joint is thick.
   const JOINT = 0.8;
   const PALE = 0.35;
@@ -105,6 +107,14 @@ window.explorer.labels ??= (() => {
 
   // The labels whose points are hidden.
   let hidden = new Set();
+  // Where the drag handle is; nowhere while it is hidden.
+  const handlesIn = (view) =>
+    nodes("TransformControlsMessage").flatMap(({ name }) => {
+      const place = page().nodeRefFromName[name]?.matrixWorld;
+      const at =
+        place && pixelsOf(view, page().camera.position.clone().setFromMatrixPosition(place));
+      return at ? [at] : [];
+    });
   const layOut = (pen, view) => {
     const { width, height } = view;
     const labels = nodes("LabelMessage").flatMap(({ name, props }) => {
@@ -116,12 +126,7 @@ window.explorer.labels ??= (() => {
       return [{ name, text: props.text, place, at, radius, props }];
     });
     const points = labels.map(({ at }) => about(at, 4));
-    const taken = nodes("TransformControlsMessage").flatMap(({ name }) => {
-      const place = page().nodeRefFromName[name]?.matrixWorld;
-      const at =
-        place && pixelsOf(view, page().camera.position.clone().setFromMatrixPosition(place));
-      return at ? [about(at, HANDLE)] : [];
-    });
+    const taken = handlesIn(view).map((at) => about(at, HANDLE));
     taken.push([0, height - 2 * AXES.up, 2 * AXES.left, height]);
     for (const label of labels) {
       const length = widthOf(pen, label.text);
@@ -281,8 +286,20 @@ window.explorer.labels ??= (() => {
     return labels;
   };
 
+  // As the stylesheet rings a control.
+  const ringHandle = (pen, view) => {
+    pen.lineWidth = 2;
+    pen.strokeStyle = getComputedStyle(canvas).color;
+    for (const at of handlesIn(view)) {
+      pen.beginPath();
+      pen.arc(...at, RING, 0, 2 * Math.PI);
+      pen.stroke();
+    }
+  };
+
   const canvas = document.createElement("canvas");
-  canvas.style.cssText = "position:absolute;inset:0;width:100%;height:100%;pointer-events:none";
+  canvas.style.cssText =
+    "position:absolute;inset:0;width:100%;height:100%;pointer-events:none;color:var(--ex-ring)";
   // A picture of the scene alone hides what is not its canvas.
   canvas.style.setProperty("visibility", "visible", "important");
   let drawn = [],
@@ -307,6 +324,7 @@ window.explorer.labels ??= (() => {
     pen.clearRect(0, 0, canvas.width, canvas.height);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     drawn = paint(pen, pageView());
+    if (window.explorer.ringsHandle) ringHandle(pen, pageView());
     lookSoon();
   };
   // How much larger a picture of some height shows the scene than the page does.

@@ -49,14 +49,13 @@ def scene_scale(state: State) -> float:
 
 @dataclass(frozen=True)
 class Placed:
-    """A frame that is drawn, with its points in scene units, on a page that may be dark.
+    """A frame that is drawn, with its points in scene units.
 
     The floor is the height, in design units, of the lowest point of what is drawn in place of the
     schematic legs and bodies; None while these are drawn.
     """
 
     frame: Frame
-    dark: bool = False
     floor: float | None = None
 
     @property

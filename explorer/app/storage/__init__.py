@@ -1,1 +1,1 @@
-"""Storage in the user's data folder: the saved session, the library of designs, the preferences."""
+"""Storage in the user's data folder: the saved session and the library of designs."""

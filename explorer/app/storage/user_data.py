@@ -1,6 +1,5 @@
-"""What an explorer keeps in the user's data folder: designs, session, preferences and a log.
+"""What an explorer keeps in the user's data folder: designs, session and a log.
 
-The preferences belong neither to a design nor to the history, so that no undo changes them.
 Several explorers may share the folder.
 """
 
@@ -9,22 +8,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-
-import msgspec
 
 from explorer.app.session.history import History
 from explorer.app.state.state import State
-from explorer.app.storage.folder import make_data_folder
 from explorer.app.storage.library import Library
 from explorer.app.storage.session_file import SessionFile
-from explorer.errors import ExplorerError, StorageError
+from explorer.errors import ExplorerError
 from explorer.files.json_text import one_line
-from explorer.files.writing import read_at_most, write_whole
 
-PREFERENCES = "preferences.json"
-# Size in bytes beyond which no explorer wrote the file.
-LARGEST_PREFERENCES = 10_000
 # Seconds from the first unsaved change of the session until it is saved.
 DELAY_SECONDS = 1.0
 # Seconds until a failed save is tried again.
@@ -115,42 +106,3 @@ class Autosaver:
             self._changed.clear()
             while not self.flush() and not self._stopped.wait(RETRY_SECONDS):
                 pass
-
-
-class Preferences(msgspec.Struct, frozen=True):
-    """The preferences: whether the page is dark, None until chosen; whether the tour was seen."""
-
-    dark: bool | None = None
-    tour_seen: bool = False
-
-
-class PreferenceFile:
-    """The file of the preferences, whose folder is made at the first choice.
-
-    A file that cannot be read gives the defaults.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._path = folder / PREFERENCES
-        self._lock = threading.Lock()
-        self.chosen = self._read()
-
-    def choose(self, **chosen: bool) -> None:
-        """Set the preferences that are given, by name.
-
-        Raises:
-            StorageError: The file cannot be written; the choice holds until this process ends.
-        """
-        with self._lock:
-            # Another explorer may have written the file meanwhile.
-            self.chosen = msgspec.structs.replace(self._read(), **chosen)
-            make_data_folder(self._path.parent)
-            write_whole(self._path, msgspec.json.encode(self.chosen))
-
-    def _read(self) -> Preferences:
-        try:
-            return msgspec.json.decode(
-                read_at_most(self._path, LARGEST_PREFERENCES), type=Preferences
-            )
-        except (StorageError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
-            return Preferences()

@@ -22,7 +22,7 @@ KEYS = {"Theme": (palette.shift("L"),), "Keys": (palette.Key("K"),)}
 HINTS = {
     "Tour": "Five steps, from the first move to a better design.",
     "Keys": "Show all keys.",
-    "Theme": "Turn the page dark, or light again.",
+    "Theme": "Turn the page dark or light, or have it as the system is.",
 }
 # Keys and pointers with which viser moves the camera.
 CAMERA = {"Turn": "drag, arrows", "Move": "right drag", "Zoom": "wheel", "Fly": "W A S D Q E"}
@@ -32,11 +32,10 @@ class HelpButtons:
     """The palette, the theme and the help, as buttons of the bar."""
 
     def __init__(self, services: Services) -> None:
-        self._services = services
         presses: dict[str, Callable[[viser.ClientHandle], None]] = {
             "Tour": services.get(TourGuide).begin,
             "Keys": lambda client: run_script_in(client, 'window.explorer.open("Help")'),
-            "Theme": self._toggle_theme,
+            "Theme": services.theme.turn,
         }
         buttons = services.buttons
         buttons.on(PRESS, lambda name, client: presses[name](client), values=presses)
@@ -51,10 +50,10 @@ class HelpButtons:
         theme = press_button(
             PRESS,
             "Theme",
-            "◐",
+            "",
             hint=palette.with_keys(HINTS["Theme"], KEYS["Theme"]),
             label="Theme",
-            class_name="ex-tool",
+            class_name="ex-tool ex-theme",
         )
         help_ = open_button("Help", "Help", hint="Tour, manual and keys.", class_name="ex-tool")
         self._markup = f"{commands}{theme}{help_}"
@@ -62,11 +61,6 @@ class HelpButtons:
     def __call__(self, _: Frame) -> str:
         """Return the buttons as HTML."""
         return self._markup
-
-    def _toggle_theme(self, client: viser.ClientHandle) -> None:
-        theme = self._services.theme
-        theme.choose(dark=not theme.is_dark)
-        self._services.remember(client.client_id, dark=theme.is_dark)
 
 
 class HelpDialog:

@@ -1,4 +1,8 @@
-"""The tour for first-time users: five steps, each done by the user, shown or skipped."""
+"""The tour for first-time users: five steps, each done by the user, shown or skipped.
+
+A step turns to its tab and rings its control. In the end, and wherever the tour is skipped, the
+state is again what it was before, in one step of the history, so that nothing is lost.
+"""
 
 from __future__ import annotations
 
@@ -7,24 +11,30 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from html import escape
+from typing import ClassVar
 
 import viser
 
+from explorer.app.browser.viser_gaps import run_script, run_script_in
 from explorer.app.features.feature import Runner, Services
-from explorer.app.features.optimise.actions import StartRun
+from explorer.app.features.optimise.actions import CancelRun, StartRun, TakePaperProblem
 from explorer.app.features.optimise.state import Optimisation
+from explorer.app.look import read_script
+from explorer.app.session.history import restore, start_history
 from explorer.app.state.actions import Action, GoHome, Set, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.buttons import open_button, press_button
+from explorer.app.state.state import State
+from explorer.app.widgets.buttons import press_button
+from explorer.numerics.number_text import format_number
+from explorer.optimise.defaults import PAPER_VOLUME
 
 # What "Show me" does: the stride of the platform in reaches, the height over the base plane in
 # warning lengths, and the factor on a variable.
 STRIDE, NEAR, GROWTH = 0.1, 0.5, 1.1
-# Place of the card from the upper left corner of the scene, and its width, in pixels.
-PLACE, WIDTH = (14, 14), 330
-PRESS = "tour"
+PRESS, OFFER = "tour", "offer"
+OVER = "Design, pose and view are as before the tour. Undo brings back what you did in it."
 BUTTONS = {
-    "Skip": "End the tour; the command Tour begins it again.",
+    "Skip": "End the tour, and put everything back; the command Tour begins it again.",
     "Back": "Go back to the step before.",
     "Show me": "Let the explorer do what this step asks for.",
     "Next": "Go on to the next step, or end the tour.",
@@ -36,17 +46,36 @@ class Step:
     """A step of the tour: a task of the user with instructions, at a tab of the controls.
 
     Attributes:
+        control: CSS selector of the control that the text names.
         is_done: Whether the user did it, from the frame in which it began and the present one.
         show: Action that does it for the user.
+        before: Action when the step begins; None for none.
         after: Action when the user goes on; None for none.
     """
 
     title: str
     text: str
     tab: str
+    control: str
     is_done: Callable[[Frame, Frame], bool]
     show: Callable[[Frame], Action]
+    before: Action | None = None
     after: Action | None = None
+
+
+@dataclass(frozen=True)
+class EndTour(Action):
+    """Return to the state before the tour; designs to compare and studies stay as they are."""
+
+    template: ClassVar[str] = "End the tour"
+
+    before: State
+
+    def apply(self, state: State) -> State:
+        """Return the next state; refuse while a design is being optimised."""
+        after, _ = restore(start_history(self.before), state)
+        view, compared, studies = self.before.view, state.compared, state.studies
+        return replace(after, view=view, compared=compared, studies=studies)
 
 
 def _approach(frame: Frame) -> Action:
@@ -56,11 +85,18 @@ def _approach(frame: Frame) -> Action:
     return SetPosition(2, height + float(state.offset(state.pose.rotation)[2]))
 
 
+def _has_found(before: Frame, now: Frame) -> bool:
+    """Whether a search that began after a frame has ended."""
+    of = Optimisation.of(now.state)
+    return of.count > Optimisation.of(before.state).count and not of.is_on
+
+
 STEPS = (
     Step(
         "Move the platform",
-        "Drag an arrow or an arc at b4, or a slider of Pose. The legs and the pose stay in step.",
+        "Drag the handle at b4 in the scene, or the slider y. Legs and pose stay in step.",
         "Pose",
+        "[role=slider][aria-label=y]",
         lambda before, now: before.state.pose != now.state.pose,
         lambda now: SetPosition(1, now.state.position[1] + STRIDE * now.state.design.reach),
     ),
@@ -69,43 +105,53 @@ STEPS = (
         "Lower z. The two flags turn from blue to orange as they come close: where they meet, the "
         "mechanism is singular. Singularity, on the right, tells how far it is.",
         "Pose",
+        "[role=slider][aria-label=z]",
         lambda _, now: now.verdict.kind != "clear",
         _approach,
-        GoHome(),
+        after=GoHome(),
     ),
     Step(
         "Change the design",
-        "Move a slider of Design, such as a3x. The pose is held, or the lengths of the legs.",
+        "Move the slider a3x. The pose is held, and the legs and the workspace follow.",
         "Design",
+        "[role=slider][aria-label=a3x]",
         lambda before, now: before.state.design.variables != now.state.design.variables,
         lambda now: SetVariable("a3x", GROWTH * now.state.design.variables[0]),
     ),
     Step(
         "See the workspace",
-        "Press Solid in Workspace: all positions of b4 within the limits. Cut it open, or colour "
-        "it by the smallest margin.",
+        "Press Solid: all positions of b4 within the limits. Below it, cut the solid open, or "
+        "colour it by the smallest margin.",
         "Workspace",
+        ".ex-chip[data-value=solid]",
         lambda _, now: now.state.view.workspace.solid,
         lambda _: Set("view.workspace.solid", True, "Solid"),
     ),
     Step(
-        "Optimise, and take it with you",
-        "Press Optimise, and accept what it finds, or revert to your design. Export, on top of the "
-        "page, has files for CAD, simulation and print. Ctrl-Z undoes what you changed.",
         "Optimise",
-        lambda before, now: Optimisation.of(now.state).count > Optimisation.of(before.state).count,
+        "This is the initial design of the paper. Press Optimise: the search looks for a design "
+        "whose workspace is as large as the paper asks for.",
+        "Optimise",
+        "[data-ex=drawer] [data-press='optimise.start']",
+        _has_found,
         lambda _: StartRun(),
+        TakePaperProblem(),
     ),
 )
 
 
 @dataclass(frozen=True)
 class Tour:
-    """The progress of a tour: its step, the frame in which it began, and whether it is done."""
+    """The progress of a tour: its step, the frame in which it began, and whether it is done.
+
+    Attributes:
+        result: What the search of the last step has reached; "" without one.
+    """
 
     at: int
     start: Frame
     is_done: bool = False
+    result: str = ""
 
     @property
     def step(self) -> Step:
@@ -119,24 +165,47 @@ class Tour:
 
     def after_frame(self, frame: Frame) -> Tour:
         """Return the tour after a frame, in which the step may be done."""
-        return replace(self, is_done=self.is_done or self.step.is_done(self.start, frame))
+        is_done = self.is_done or self.step.is_done(self.start, frame)
+        return replace(self, is_done=is_done, result=_result(frame) if self.is_last else "")
 
     def step_by(self, steps: int, frame: Frame) -> Tour:
         """Return the tour some steps on or back, within its first and last."""
         return Tour(min(max(self.at + steps, 0), len(STEPS) - 1), frame)
 
 
+def _result(frame: Frame) -> str:
+    """Return the volume before a search and now, as HTML."""
+    run = Optimisation.of(frame.state).run
+    if run is None or not run.iterates:
+        return ""
+    volumes = run.iterates[0].volume, run.iterates[-1].volume, PAPER_VOLUME
+    then, now, wanted = (format_number(each, 4) for each in volumes)
+    return f"The volume grew from {then} to <b>{now} units³</b>; the paper asks for {wanted}."
+
+
 @dataclass
 class _Card:
-    """The tour of one browser, in a panel over its scene."""
+    """The tour of one browser, and the state before it."""
 
+    client: viser.ClientHandle
+    before: State
     tour: Tour
-    panel: viser.PanelHandle
-    html: viser.GuiHtmlHandle
 
     def show(self, tour: Tour) -> None:
+        """Show the card of the tour at another step or with another result."""
         if tour != self.tour:
-            self.tour, self.html.content = tour, card_words(tour)
+            self.tour = tour
+            self.draw()
+
+    def draw(self) -> None:
+        """Show the card, turn to the tab of the step and ring its control."""
+        at, step = self.tour.at, self.tour.step
+        place = {"number": at, "tab": step.tab, "control": step.control}
+        run_script_in(self.client, read_script("tour", card_words(self.tour), place))
+
+    def close(self) -> None:
+        """Remove the card, turn back to the tabs before the tour, and offer it no more."""
+        run_script_in(self.client, read_script("tour", "", None))
 
 
 class TourGuide(Runner):
@@ -144,61 +213,68 @@ class TourGuide(Runner):
 
     def __init__(self, services: Services) -> None:
         self._services, self._session = services, services.session
-        preferences = services.preferences
-        self._is_seen = preferences is None or preferences.chosen.tour_seen
         # Presses, frames and browsers come on threads of their own.
         self._lock = threading.RLock()
         self._cards: dict[int, _Card] = {}
-        services.buttons.on(PRESS, self._press, values=BUTTONS)
-        services.server.on_client_connect(
-            lambda client: None if self._is_seen else self.begin(client)
-        )
-        services.server.on_client_disconnect(self._forget)
+        # Tours that have ended, with the client, until the state before them is back.
+        self._ended: list[tuple[int, State]] = []
+        services.buttons.on(PRESS, self._press, values=(OFFER, *BUTTONS))
+        if services.offers_tour:
+            run_script(services.server, f"{read_script('tour')}window.explorer.tour.offer();")
+        services.server.on_client_disconnect(lambda client: self._end(client.client_id))
 
     def begin(self, client: viser.ClientHandle) -> None:
         """Begin the tour, or begin it again."""
+        self._end(client.client_id)
+        # Not within the lock: the session waits for that while it draws.
+        state = self._session.latest_state()
         with self._lock:
-            self._end(client)
-            tour = Tour(0, Frame(self._session.state))
-            panel = client.gui.add_panel()
-            panel.float(x=PLACE[0], y=PLACE[1], width=WIDTH)
-            with panel.add_tab("Tour"):
-                html = client.gui.add_html(card_words(tour))
-            self._cards[client.client_id] = _Card(tour, panel, html)
+            card = _Card(client, state, Tour(0, Frame(state)))
+            self._cards[client.client_id] = card
+            card.draw()
 
     def follow(self, frame: Frame) -> None:
-        """Mark the steps that a frame shows as done."""
+        """Mark the steps that a frame shows as done, and put back what tours have changed."""
         with self._lock:
             for card in tuple(self._cards.values()):
                 card.show(card.tour.after_frame(frame))
+            if not frame.state.optimisation.is_on:
+                ended, self._ended = self._ended, []
+                for who, before in ended:
+                    self._session.do(EndTour(before), who=who)
+                    if (before.design, before.pose) != (frame.state.design, frame.state.pose):
+                        self._services.tell(OVER, who)
 
-    def _forget(self, client: viser.ClientHandle) -> None:
-        self._cards.pop(client.client_id, None)
-
-    def _end(self, client: viser.ClientHandle) -> None:
-        card = self._cards.pop(client.client_id, None)
-        if card is not None:
-            card.panel.remove()
+    def _end(self, who: int) -> None:
+        """End the tour of a browser; a search that it began is cancelled first."""
+        with self._lock:
+            card = self._cards.pop(who, None)
+            if card is not None:
+                card.close()
+                self._ended.append((who, card.before))
+                self._session.do(CancelRun(), who=who)
 
     def _press(self, name: str, client: viser.ClientHandle) -> None:
         card = self._cards.get(client.client_id)
+        if name == OFFER and not self._session.state.optimisation.is_on:
+            self.begin(client)
         if card is None:
             return
-        tour = card.tour
+        step = card.tour.step
         if name == "Show me":
-            show = tour.step.show
-            self._session.do(lambda state: show(Frame(state)), who=client.client_id)
-        elif name == "Skip" or (name == "Next" and tour.is_last):
-            with self._lock:
-                self._end(client)
-            self._is_seen = True
-            self._services.remember(None, tour_seen=True)
+            self._session.do(lambda state: step.show(Frame(state)), who=client.client_id)
+        elif name == "Skip" or (name == "Next" and card.tour.is_last):
+            self._end(client.client_id)
         else:
-            if name == "Next" and tour.step.after is not None:
-                self._session.do(tour.step.after, who=client.client_id)
+            if name == "Next" and step.after is not None:
+                self._session.do(step.after, who=client.client_id)
+            tour = card.tour.step_by(1 if name == "Next" else -1, Frame(self._session.state))
+            first = tour.step.before
+            self._session.do(
+                lambda state: None if state.optimisation.is_on else first, who=client.client_id
+            )
             with self._lock:
-                steps = 1 if name == "Next" else -1
-                card.show(tour.step_by(steps, Frame(self._session.state)))
+                card.show(tour)
 
 
 def card_words(tour: Tour) -> str:
@@ -206,16 +282,16 @@ def card_words(tour: Tour) -> str:
     step = tour.step
     looks = ("ex-dot" if i <= tour.at else "ex-dot is-ahead" for i in range(len(STEPS)))
     dots = "".join(f'<span class="{look}"></span>' for look in looks)
-    done = '<span class="ex-within ex-strong">Done</span>' if tour.is_done else ""
-    opens = open_button(step.tab, f"Open the tab {escape(step.tab)}", class_name="ex-link")
+    look, done = "ex-card", ""
+    if tour.is_done:
+        look, done = "ex-card is-done", '<span class="ex-within ex-strong">Done</span>'
     first = "" if tour.at == 0 else _button("Back")
     show = "" if tour.is_done else _button("Show me")
     last = _button("Next", "Finish" if tour.is_last else "Next", look="is-main")
     return (
-        '<div class="ex-card"><div class="ex-line ex-dim">'
-        f"<span>{dots}</span><span>step {tour.at + 1} of {len(STEPS)}</span></div>"
-        f"<h4>{escape(step.title)}</h4><div>{escape(step.text)}</div>"
-        f"<div>{opens} {done}</div>"
+        f'<div class="{look}"><div class="ex-line ex-dim"><span>{dots}</span>{done}'
+        f"<span>step {tour.at + 1} of {len(STEPS)}</span></div>"
+        f"<h4>{escape(step.title)}</h4><div>{tour.result or escape(step.text)}</div>"
         f'<div class="ex-ends">{_button("Skip", "Skip the tour", look="is-quiet")}'
         f"{first}{show}{last}</div></div>"
     )

@@ -47,7 +47,7 @@ def send_picture(
 
     def make(client: viser.ClientHandle) -> File:
         sides = scene_files.picture_size(client, size)
-        background = None if transparent else BACKGROUNDS[services.theme.is_dark]
+        background = None if transparent else BACKGROUNDS[services.theme.is_dark_for(who)]
         data = scene_files.view_picture(client, sides, background)
         return f"{services.session.state.design.name}-{sides[0]}x{sides[1]}.png", data
 
@@ -61,7 +61,10 @@ def send_scene(services: Services, who: Who) -> None:
         state, date = services.session.latest_state(), dt.datetime.now().astimezone().date()
         eye = client.camera
         camera = scene_files.FileCamera(eye.position, eye.look_at, float(eye.fov))
-        data = scene_files.scene_html(services.server, state, camera, date=date)
+        theme, dark = services.theme, services.theme.is_dark_for(who)
+        data = scene_files.scene_html(
+            services.server, state, camera, theme.messages(dark=dark), date=date, dark=dark
+        )
         return f"{state.design.name}-scene.html", data
 
     services.downloads.make(who, "Packing the scene", make)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import datetime as dt
 import io
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import accumulate
@@ -76,21 +76,31 @@ class FileCamera:
 
 
 def scene_html(
-    server: viser.ViserServer, state: State, camera: FileCamera, *, date: dt.date
+    server: viser.ViserServer,
+    state: State,
+    camera: FileCamera,
+    colours: Sequence[SceneMessage] = (),
+    *,
+    date: dt.date,
+    dark: bool = False,
 ) -> bytes:
-    """Return the scene of a server as one HTML file, in the theme of its page.
+    """Return the scene of a server as one HTML file.
 
     Args:
         server: Server of the scene.
         state: State of the scene.
         camera: Camera of the opened file.
+        colours: Messages that give nodes the colours of the theme.
         date: Date in the caption.
+        dark: Whether the file is dark.
     """
     scripts: list[SceneMessage] = [
         {"type": "RunJavascriptMessage", "source": read_script(name)} for name in SCRIPTS
     ]
     page = scene_as_html(
-        server, lambda all_: [*visible_messages(all_), *camera.messages(), *scripts]
+        server,
+        lambda all_: [*visible_messages([*all_, *colours]), *camera.messages(), *scripts],
+        dark=dark,
     )
     title = f"{state.design.name} – flagged 4-4 manipulator"
     head, title_of_viser, rest = page.partition("<title>Viser</title>")

@@ -158,12 +158,15 @@ FROM_BELOW: Rgb = (112, 120, 150)
 SKY_INTENSITY, SUN_INTENSITY = 2.0, 3.0
 # The shadow lies below the lines of the grid, and both below the base plate.
 GRID_BELOW, SHADOW_BELOW = 0.01, 0.03
-# Colours of the grid's cells and sections, by whether the page is dark.
-GRID: dict[bool, tuple[Rgb, Rgb]] = {
-    False: ((226, 230, 236), (203, 209, 218)),
-    True: ((38, 41, 46), (56, 61, 69)),
+# Colours of the grid and of the shadow, by whether the page is dark.
+GRID: dict[bool, dict[str, Rgb]] = {
+    False: {"cell_color": (226, 230, 236), "section_color": (203, 209, 218)},
+    True: {"cell_color": (38, 41, 46), "section_color": (56, 61, 69)},
 }
-SHADOW: dict[bool, Rgb] = {False: (188, 192, 200), True: (4, 4, 5)}
+SHADOW: dict[bool, dict[str, Rgb]] = {
+    False: {"color": (188, 192, 200)},
+    True: {"color": (4, 4, 5)},
+}
 # Directions on the ground, in each of which an outline has a corner.
 CORNERS = 32
 ANGLES = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
@@ -204,8 +207,6 @@ class Ground(ScenePart):
             "/grid",
             width=60.0,
             height=60.0,
-            cell_color=GRID[False][0],
-            section_color=GRID[False][1],
             fade_distance=46.0,
             fade_from="origin",
             shadow_opacity=0.0,
@@ -221,6 +222,8 @@ class Ground(ScenePart):
             # Flat and of one tone, so that the cheapest material does.
             material="toon3",
         )
+        services.theme.paint(self._grid, GRID)
+        services.theme.paint(self._shadow, SHADOW)
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ground of this frame."""
@@ -228,9 +231,6 @@ class Ground(ScenePart):
         yield from show(view.grid, self._grid, self._scale)
         # Of the sides of the squares, in millimetres.
         yield self._scale, "text", f"{placed.square_mm:.6g}"
-        cell, section = GRID[placed.dark]
-        yield self._grid, "cell_color", cell
-        yield self._grid, "section_color", section
         yield self._grid, "cell_size", placed.square
         yield self._grid, "section_size", 5.0 * placed.square
         yield self._grid, "position", (0.0, 0.0, lowest - GRID_BELOW)
@@ -241,7 +241,6 @@ class Ground(ScenePart):
         if outlines:
             vertices[: len(outlines), :, :2] = outlines
         yield self._shadow, "vertices", vertices.reshape(-1, 3).astype(np.float32)
-        yield self._shadow, "color", SHADOW[placed.dark]
         yield self._shadow, "position", (0.0, 0.0, lowest - SHADOW_BELOW)
 
 

@@ -32,8 +32,8 @@ BAND_OPACITY = 0.4
 COLLIDING_OPACITY = 0.6
 # Opacity where a part takes its limit, which can be most of the surface.
 AT_LIMIT_OPACITY = 0.3
-# Colour of the edges on a light page and on a dark one, and their thickness in pixels.
-EDGE_COLOURS: tuple[Rgb, Rgb] = (58, 86, 126), (138, 164, 200)
+# Colour of the edges, seen on light pages and on dark ones, and their thickness in pixels.
+EDGE_COLOUR: Rgb = (84, 116, 164)
 EDGE_THICKNESS = 1.3
 PLANE_OPACITY = 0.12
 HULL_COLOUR: Rgb = (90, 100, 116)
@@ -55,7 +55,7 @@ class WorkspaceScene(ScenePart):
             add_translucent(scene, f"/workspace/shell/{i}", NO_MESH, PLAIN_OPACITY, colour=colour)
             for i, colour in enumerate(self._colours)
         ]
-        self._edges = add_lines(scene, "/workspace/edges", 1, EDGE_COLOURS[0], EDGE_THICKNESS)
+        self._edges = add_lines(scene, "/workspace/edges", 1, EDGE_COLOUR, EDGE_THICKNESS)
         self._hull = scene.add_mesh_simple(
             "/workspace/hull",
             *NO_MESH,
@@ -95,7 +95,6 @@ class WorkspaceScene(ScenePart):
                 yield handle, "faces", shell[1]
         yield self._edges, "visible", view.solid and edges is not None
         if view.solid and edges is not None:
-            yield self._edges, "colors", np.array(EDGE_COLOURS[placed.dark], dtype=np.uint8)
             yield self._edges, "points", edges
         yield self._hull, "visible", view.hull and hull is not None
         if view.hull and hull is not None:

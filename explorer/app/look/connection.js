@@ -1,0 +1,29 @@
+// Says since when the explorer does not answer, until it does.
+window.explorer.connection ??= (() => {
+  // The head of viser's main panel has this icon while there is a connection, and another one else.
+  const HEAD = "[data-dock-unmergeable-header]",
+    ICON = ".tabler-icon-cloud-check";
+  const message = document.createElement("div");
+  message.className = "ex-lost";
+  message.setAttribute("role", "alert");
+  let words = "";
+  const look = () => {
+    if (document.querySelector(`${HEAD} ${ICON}`)) message.remove();
+    else if (!message.isConnected) {
+      const [time] = new Date().toTimeString().split(" ");
+      message.textContent = words.replace("{time}", time);
+      document.body.append(message);
+      // The tour has gone with the connection.
+      window.explorer.tour?.end();
+    }
+  };
+  const watch = () => {
+    const head = document.querySelector(HEAD);
+    if (head) new MutationObserver(look).observe(head, { childList: true, subtree: true });
+    else window.explorer.clock.atFrame(watch);
+  };
+  watch();
+  return (given) => {
+    words = given;
+  };
+})();
