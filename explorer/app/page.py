@@ -69,6 +69,7 @@ SCRIPTS = (
     "projection",
     "labels",
     "layers",
+    "notices",
 )
 # Title of a notice that a request is refused.
 REFUSAL = "That is not possible"
@@ -120,7 +121,13 @@ class Page:
         self._presses = presses = Presses()
         history = None if user_data is None else user_data.history
         self.session = Session(
-            state, self._draw, self._complain, self._report, history, press_at=presses.at
+            state,
+            self._draw,
+            self._complain,
+            self._report,
+            history,
+            press_at=presses.at,
+            tell=self._tell,
         )
         self._drag_pause = clock.Pause(DRAG_PAUSE, self.session.redraw)
         self._quiet_pause = clock.Pause(QUIET_SECONDS, self.session.redraw)

@@ -23,6 +23,8 @@ from explorer.app.features.optimise.actions import EndRun
 from explorer.app.features.optimise.state import SearchResult
 from explorer.app.layout import is_narrow
 from explorer.app.server import Running, start
+from explorer.app.session.session import move_to
+from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
 from explorer.app.storage.library import Library
@@ -206,3 +208,22 @@ def test_theme_is_that_of_each_browser_and_no_step_of_the_history(tmp_path: Path
         types = {m["type"] for m in other.read_all_sent(running)}
         assert not types & {"ThemeConfigurationMessage", "SceneNodeUpdateMessage"}
         assert len(running.page.session.history.steps) == 1
+
+
+def test_step_names_its_browser_to_others_and_who_undoes_it_is_told_to_it(tmp_path: Path) -> None:
+    with explorer_with(data_in(tmp_path)) as running, client_of(running) as one:
+        session = running.page.session
+        session.do(SetPosition(0, 11.0), who=one.client_id)
+        assert session.wait_until_idle()
+        one.read_all_sent(running)
+        assert "ex-author" not in str(one.controls)
+        with client_of(running) as other:
+            session.do(SetPosition(0, 12.0), who=other.client_id)
+            assert session.wait_until_idle()
+            other.read_all_sent(running)
+            for client in (one, other):
+                assert f'ex-author" data-who="{client.client_id}"' in str(other.controls)
+            # The first one undoes the other one's step, and its own before it.
+            session.do(move_to(0), who=one.client_id)
+            (notice,) = notices_until(other, "Another browser has undone")
+            assert "x = 12" in notice["body"]

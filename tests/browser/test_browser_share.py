@@ -181,7 +181,6 @@ def test_page_in_a_notebook_is_live_both_ways(browser: Browser, tmp_path: Path, 
             page.on("pageerror", lambda error: errors.append(str(error)))
             page.goto(address.replace("127.0.0.1", host))
             frame = page.frame_locator("iframe")
-            frame.locator("#webgl-software-rendering").get_by_role("button").click()
             frame.get_by_role("button", name="Leg lengths").click()
             field = frame.locator("label", has_text="l4 leg 4").locator(
                 "xpath=ancestor::*[.//input][1]//input[@inputmode='decimal']"

@@ -38,12 +38,14 @@ class UserAction:
         source: The control that it came from; a new object for an event that is part of no drag.
         time: Time of the event, in seconds.
         press: The press during which it happened; None for keys, and where none is known.
+        who: Id of the client that did it; None for none in particular.
     """
 
     action: Action
     source: object
     time: float
     press: Press | None = None
+    who: int | None = None
 
     def continues(self, earlier: Gesture | Step) -> bool:
         """Whether this continues an earlier gesture with the same control."""
@@ -89,6 +91,7 @@ class Step:
         source: The control that it came from.
         last: Time of its last event, in seconds.
         press: The last press of a browser that was part of it; None if none is known.
+        who: Id of the client that did it; None for none in particular, or in an earlier session.
     """
 
     number: int
@@ -97,6 +100,7 @@ class Step:
     source: object = None
     last: float = 0.0
     press: Press | None = None
+    who: int | None = None
 
 
 @dataclass(frozen=True)
@@ -137,9 +141,10 @@ class History:
                 # The gesture ended where it began, so that its step is dropped.
                 return History(earlier, self.at - 1)
             press = event.press or present.press
-            step = Step(present.number, words, after, present.source, event.time, press)
+            step = replace(present, words=words, state=after, last=event.time, press=press)
             return History((*earlier, step), self.at, is_open=True)
-        step = Step(present.number + 1, words, after, event.source, event.time, event.press)
+        number, source = present.number + 1, event.source
+        step = Step(number, words, after, source, event.time, event.press, event.who)
         steps = (*earlier, present, step)[-MOST_STEPS:]
         return History(steps, len(steps) - 1, is_open=True)
 

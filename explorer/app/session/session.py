@@ -27,6 +27,7 @@ from explorer.workspace.limits.table import LIMITS
 WAKE_SECONDS = 1.0
 # Key of requests to draw the present state again.
 REDRAW = "redraw"
+UNDONE = "Another browser has undone {}. Redo or History brings it back."
 
 # Names of the fields of a design file in the words of the page.
 FIELD_WORDS = {
@@ -98,6 +99,7 @@ class Session:
         history: History that led to the state; None to start one with it.
         press_at: Returns the press of a client at a time, if there was one; None if no client
             reports presses.
+        tell: Called with a message and the client whose step another one has undone.
     """
 
     def __init__(
@@ -109,6 +111,7 @@ class Session:
         history: History | None = None,
         *,
         press_at: Callable[[Who, float], Press | None] | None = None,
+        tell: Callable[[str, Who], None] = lambda _, __: None,
     ) -> None:
         self._state = state
         self._history = start_history(state) if history is None else history
@@ -116,6 +119,7 @@ class Session:
         self._complain = complain
         self._report = report
         self._press_at = press_at
+        self._tell = tell
         self._jobs: LatestWins[_Posted] = LatestWins(self._handle, "session")
 
     @property
@@ -198,13 +202,18 @@ class Session:
     def _apply(self, item: _Posted) -> None:
         if isinstance(item.change, HistoryMove):
             history = item.change.move(self._history)
+            undone = self._history.steps[history.at + 1 : self._history.at + 1]
             self._state, self._history = restore(history, self._state)
+            # The first step of each other client.
+            for who, words in {each.who: each.words for each in undone[::-1]}.items():
+                if item.who is not None and who not in (None, item.who):
+                    self._tell(UNDONE.format(words), who)
             return
         press = None if self._press_at is None else self._press_at(item.who, item.stamp)
         action = item.change(self._state)
         if action is None:
             return
-        event = UserAction(action, item.key, item.stamp, press)
+        event = UserAction(action, item.key, item.stamp, press, item.who)
         self._state = event.apply(self._state)
         self._history = self._history.record(event, self._state)
 

@@ -10,9 +10,11 @@ from html import escape
 import numpy as np
 import viser
 
+from explorer.app.browser.viser_gaps import run_script_in
 from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.workspace.feeds import VOLUME_FEED, volume_request
 from explorer.app.features.workspace.work import MeasuredVolume, Selection, measure_volume
+from explorer.app.look import read_script
 from explorer.app.scene.placing import Placed, ScenePart, outline
 from explorer.app.scene.shapes import GHOST, add_lines
 from explorer.app.session.feed import Feed
@@ -48,7 +50,7 @@ class HistoryPanel:
     """The list of the last steps, and a slider over all of them."""
 
     def __init__(self, services: Services) -> None:
-        gui, self._session = services.gui, services.session
+        gui, self._session, self._services = services.gui, services.session, services
         self._slider = gui.add_slider(
             "Go to step",
             min=0,
@@ -77,31 +79,45 @@ class HistoryPanel:
         # The newest step comes first.
         shown = steps[max(0, last - ROWS) : last][::-1]
         self._numbers = {str(step.number) for step in shown}
-        yield self._list, "content", box(*(_row(step, here) for step in shown))
+        yield self._list, "content", box(*(self._row(step, here) for step in shown))
 
     async def _travel(self, event: viser.GuiEvent[viser.GuiSliderHandle[int]]) -> None:
         if event.client_id is not None:
             stamp, number = self._slider.update_timestamp, int(self._slider.value)
             self._session.post(self, move_to(number), stamp=stamp, who=event.client_id)
 
+    def _row(self, step: Step, here: Step) -> str:
+        """Return a step as a button in HTML; steps that were undone stay in the list."""
+        look = "is-here" if step.number == here.number else ""
+        by = author(self._services, step)
+        return press_button(
+            GO,
+            step.number,
+            f'<span class="ex-index">{step.number}</span>{escape(step.words)}{by}',
+            hint=f"Go to step {step.number}: {step.words}",
+            class_name=f"ex-row {'is-undone' if step.number > here.number else look}".rstrip(),
+        )
 
-def _row(step: Step, here: Step) -> str:
-    """Return a step as a button in HTML; steps that were undone stay in the list."""
-    look = "is-here" if step.number == here.number else ""
-    return press_button(
-        GO,
-        step.number,
-        f'<span class="ex-index">{step.number}</span>{escape(step.words)}',
-        hint=f"Go to step {step.number}: {step.words}",
-        class_name=f"ex-row {'is-undone' if step.number > here.number else look}".rstrip(),
-    )
+
+def author(services: Services, step: Step) -> str:
+    """Return words in HTML that only browsers show which have not done a step.
+
+    They stand there while that one is connected, and another one too.
+    """
+    clients = services.server.get_clients()
+    if len(clients) < 2 or step.who not in clients:
+        return ""
+    return f'<span class="ex-author" data-who="{step.who}"> (another browser)</span>'
 
 
 class UndoButtons:
     """Undo, redo, and the button that opens the list of all steps."""
 
     def __init__(self, services: Services) -> None:
-        self._session = services.session
+        self._session, self._services = services.session, services
+        services.server.on_client_connect(
+            lambda client: run_script_in(client, read_script("authors", client.client_id))
+        )
         services.do_on_press(MOVE, MOVES.__getitem__, MOVES)
         for name in MOVES:
             # Always ready: a key that is pressed before the page knows of the last step counts.
@@ -123,12 +139,13 @@ class UndoButtons:
     def _button(self, name: str, history: History, *, is_busy: bool) -> str:
         # The step that "Undo" or "Redo" goes over.
         at = history.at if name == "Undo" else history.at + 1
-        words = history.steps[at].words if 0 < at < len(history.steps) else None
+        step = history.steps[at] if 0 < at < len(history.steps) else None
+        words = None if step is None else step.words
         hint = f"{name}: {words}." if words is not None else f"Nothing to {name.lower()}."
         return press_button(
             MOVE,
             name,
-            ARROWS[name],
+            ARROWS[name] + ("" if step is None else author(self._services, step)),
             hint=with_keys(hint, KEYS[name]),
             label=name if words is None else f"{name} {words}",
             class_name="ex-tool ex-arrow",
