@@ -8,13 +8,13 @@ from typing import get_args
 
 import viser
 
-from explorer.app.browser.browser_facts import BrowserFacts, ask_browser
 from explorer.app.browser.viser_gaps import (
     dock_above_in,
     keep_arrangement,
     make_with_id,
     panel_in,
     run_script,
+    run_script_in,
 )
 from explorer.app.features.feature import Feature, Place, Services, Side, Tab
 from explorer.app.look import read_script
@@ -22,7 +22,7 @@ from explorer.app.scene.camera import Cameras
 from explorer.app.session.clock import Timer
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import MANUAL, press_button
+from explorer.app.widgets.buttons import MANUAL, Buttons, press_button
 
 # Seconds until the panels of a new page are laid out.
 SETTLE_SECONDS = 0.7
@@ -31,11 +31,9 @@ MOST_ATTEMPTS, LONGEST_PAUSE_SECONDS = 12, 5.0
 # Width and height of a window in pixels: in a narrower one the left panel goes above the right
 # one, which leaves the scene room, if the window is high enough for both.
 NARROW, HIGH_ENOUGH = 1100, 700
+ROOM = "room"
 # Widths of the panels on the left and on the right, and height of the open drawer, in pixels.
 LEFT_WIDTH, RIGHT_WIDTH, DRAWER_HEIGHT = 300, 360, 300
-# What the page says while it has no connection; a script puts the time in place of "{time}".
-LOST = "The explorer has not answered since {time}. The page asks again every few seconds"
-SAVED = "; your work is saved"
 # Width, and place from the left and from the top, of a window before the stylesheet places it.
 ANY_WIDTH, ANY_PLACE = 640, 80
 
@@ -102,18 +100,17 @@ class Layout:
 
     Args:
         server: Server of the page.
+        buttons: Buttons of the page.
         cameras: Cameras of the browsers.
         panels: The panels, with all their tabs; None to show the scene alone.
-        is_saved: Whether the session is saved.
     """
 
     def __init__(
         self,
         server: viser.ViserServer,
+        buttons: Buttons,
         cameras: Cameras,
         panels: Panels | None,
-        *,
-        is_saved: bool,
     ) -> None:
         self._cameras = cameras
         self._panels = panels
@@ -121,23 +118,18 @@ class Layout:
             panels.lay_out()
             titles = {"drawer": panels.titles("work"), "dialogs": panels.titles("dialog")}
             run_script(server, read_script("places", titles))
-            run_script(server, read_script("connection", f"{LOST}{SAVED if is_saved else ''}."))
-        server.on_client_connect(
-            lambda client: ask_browser(client, lambda facts: self._answered(client, facts))
-        )
+        buttons.on(ROOM, self._settle, values=("narrow", "wide"))
+        server.on_client_connect(ask_for_room)
 
     def reset(self, client: viser.ClientHandle) -> None:
         """Put the panels of a browser into the places that they have at first."""
         if self._panels is not None:
             self._panels.lay_out(client)
-            ask_browser(client, lambda facts: self._make_room(client, facts))
+            ask_for_room(client)
 
-    def _make_room(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
-        if self._panels is not None and is_narrow(facts):
+    def _settle(self, room: str, client: viser.ClientHandle) -> None:
+        if self._panels is not None and room == "narrow":
             dock_above_in(client, self._panels.build, self._panels.analyse)
-
-    def _answered(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
-        self._make_room(client, facts)
         Timer(SETTLE_SECONDS, self._place_camera, client, 0)
 
     def _place_camera(self, client: viser.ClientHandle, attempt: int) -> None:
@@ -155,9 +147,9 @@ class Layout:
             Timer(pause, self._place_camera, client, attempt + 1)
 
 
-def is_narrow(facts: BrowserFacts) -> bool:
-    """Whether panels on both sides would leave the scene too little room."""
-    return facts.width < NARROW and facts.height >= HIGH_ENOUGH
+def ask_for_room(client: viser.ClientHandle) -> None:
+    """Ask a browser whether panels on both sides would leave the scene too little room."""
+    run_script_in(client, read_script("room", NARROW, HIGH_ENOUGH))
 
 
 TITLE = "Flagged 4-4 explorer"

@@ -178,12 +178,10 @@ class Page:
         self.runners = [self.services.get(kind) for each in self._features for kind in each.runners]
         self.services.cameras.frame_first()
         self._panels = deque(self._add_panels() if panels else ())
-        layout = Layout(
-            server,
-            self.services.cameras,
-            self.panels if panels else None,
-            is_saved=user_data is not None,
-        )
+        shown = self.panels if panels else None
+        layout = Layout(server, self.buttons, self.services.cameras, shown)
+        if panels:
+            run_script(server, read_script("connection", user_data is not None))
         theme.begin(server)
         self.palette = self._add_palette(layout)
         for message in () if user_data is None else user_data.messages:

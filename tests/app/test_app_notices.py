@@ -1,4 +1,4 @@
-"""Notices, files, the tour, the theme, and the facts that a browser sends."""
+"""Notices, files, the tour, and the theme."""
 
 from __future__ import annotations
 
@@ -15,13 +15,11 @@ import pytest
 from client import Client, client_of, press_update, presses_in, wait_for
 from services import StubWorker
 
-from explorer.app.browser.browser_facts import BrowserFacts
 from explorer.app.browser.downloads import Downloads
 from explorer.app.features.designs.feature import UNSAVED
 from explorer.app.features.help.tour import STEPS, EndTour, Tour
 from explorer.app.features.optimise.actions import EndRun
 from explorer.app.features.optimise.state import SearchResult
-from explorer.app.layout import is_narrow
 from explorer.app.server import Running, start
 from explorer.app.session.session import move_to
 from explorer.app.state.actions import SetPosition
@@ -167,23 +165,6 @@ def test_step_of_the_tour_is_done_by_what_it_shows_and_not_before(design: Design
         assert tour.is_last == (index == len(STEPS) - 1)
         tour = tour.step_by(1, Frame(state))
     assert tour.at == len(STEPS) - 1
-
-
-@pytest.mark.parametrize(
-    ("width", "height", "narrow"),
-    # In a low window two panels one over the other would be too low to be of use.
-    [
-        (1280, 720, False),
-        (768, 1024, True),
-        (1099, 700, True),
-        (1100, 700, False),
-        (860, 480, False),
-    ],
-)
-def test_panels_are_stacked_where_the_window_is_narrow_and_high(
-    width: int, height: int, narrow: bool
-) -> None:
-    assert is_narrow(BrowserFacts(width, height)) is narrow
 
 
 def test_theme_is_that_of_each_browser_and_no_step_of_the_history(tmp_path: Path) -> None:

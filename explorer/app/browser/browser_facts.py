@@ -1,8 +1,8 @@
-"""What only a browser knows: its window's size, and presses.
+"""What only a browser knows: when its user presses and releases.
 
-viser reports values alone. So scripts of the page write the rest to hidden fields of their tab, by
-the same way and in the same order as the values of other controls: a value is known to come from
-the press during which it arrives.
+viser reports values alone. So scripts of the page write the rest to hidden fields, by the same way
+and in the same order as the values of other controls: a value is known to come from the press
+during which it arrives.
 """
 
 from __future__ import annotations
@@ -19,34 +19,6 @@ from explorer.app.session.clock import moment_of
 from explorer.app.state.presses import Presses
 
 Described = TypeVar("Described")
-
-
-class BrowserFacts(msgspec.Struct, frozen=True):
-    """What a browser reports: the size of its window in CSS pixels."""
-
-    width: float
-    height: float
-
-
-_DECODER = msgspec.json.Decoder(BrowserFacts)
-
-
-def ask_browser(client: viser.ClientHandle, answered: Callable[[BrowserFacts], None]) -> None:
-    """Ask a browser about itself, once.
-
-    Its answer, if it is valid, is passed to `answered` on the thread that reads the browsers'
-    messages.
-    """
-    field = client.gui.add_text("Browser", "", visible=False)
-
-    @field.on_update
-    async def _(event: viser.GuiEvent[viser.GuiTextHandle]) -> None:
-        field.remove()
-        facts = decode_text(event.target.value, _DECODER)
-        if facts is not None:
-            answered(facts)
-
-    run_script_in(client, read_script("window_facts", element_id(field)))
 
 
 def decode_text(text: str, decoder: msgspec.json.Decoder[Described]) -> Described | None:

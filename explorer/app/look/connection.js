@@ -6,12 +6,13 @@ window.explorer.connection ??= (() => {
   const message = document.createElement("div");
   message.className = "ex-lost";
   message.setAttribute("role", "alert");
-  let words = "";
+  let isSaved = false;
   const look = () => {
     if (document.querySelector(`${HEAD} ${ICON}`)) message.remove();
     else if (!message.isConnected) {
       const [time] = new Date().toTimeString().split(" ");
-      message.textContent = words.replace("{time}", time);
+      const saved = isSaved ? "; your work is saved" : "";
+      message.textContent = `The explorer has not answered since ${time}. The page asks again every few seconds${saved}.`;
       document.body.append(message);
       // The tour has gone with the connection.
       window.explorer.tour?.end();
@@ -23,7 +24,7 @@ window.explorer.connection ??= (() => {
     else window.explorer.clock.atFrame(watch);
   };
   watch();
-  return (given) => {
-    words = given;
+  return (saved) => {
+    isSaved = saved;
   };
 })();

@@ -60,7 +60,9 @@ window.explorer.tour ??= (() => {
   };
   // A browser that has seen the tour to its end, or skipped it, is not offered it again.
   const offer = () => {
-    if (!recall("tour")) window.explorer.press("tour", "offer");
+    if (recall("tour")) return;
+    if (window.explorer.press) window.explorer.press("tour", "offer");
+    else window.explorer.clock.atFrame(offer);
   };
   const show = (html, step) => {
     if (!html) {

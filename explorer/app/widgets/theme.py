@@ -48,8 +48,9 @@ class Theme:
         server.on_client_disconnect(lambda client: self._dark.discard(client.client_id))
 
     def begin(self, server: viser.ViserServer) -> None:
-        """Ask each browser for its theme, once it has all nodes of the scene."""
+        """Ask each browser for its theme, once it has all nodes of the scene and is connected."""
         run_script(server, read_script("theme") + call_script("theme"))
+        server.on_client_connect(lambda client: run_script_in(client, "window.explorer.theme?.();"))
 
     def paint(self, node: viser.SceneNodeHandle, colours: Mapping[bool, Mapping[str, Rgb]]) -> None:
         """Give a node colours by name, by whether the page is dark."""

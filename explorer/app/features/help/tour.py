@@ -15,7 +15,7 @@ from typing import ClassVar
 
 import viser
 
-from explorer.app.browser.viser_gaps import run_script, run_script_in
+from explorer.app.browser.viser_gaps import run_script_in
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise.actions import CancelRun, StartRun, TakePaperProblem
 from explorer.app.features.optimise.state import Optimisation
@@ -220,7 +220,8 @@ class TourGuide(Runner):
         self._ended: list[tuple[int, State]] = []
         services.buttons.on(PRESS, self._press, values=(OFFER, *BUTTONS))
         if services.offers_tour:
-            run_script(services.server, f"{read_script('tour')}window.explorer.tour.offer();")
+            offer = f"{read_script('tour')}window.explorer.tour.offer();"
+            services.server.on_client_connect(lambda client: run_script_in(client, offer))
         services.server.on_client_disconnect(lambda client: self._end(client.client_id))
 
     def begin(self, client: viser.ClientHandle) -> None:
