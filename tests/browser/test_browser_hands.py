@@ -47,6 +47,10 @@ CUT_OFF = """() => {
   return found;
 }"""
 
+# Names and widths of the panels at the sides.
+WIDTHS = """() => [...document.querySelectorAll("[data-dock-region]")].map((each) =>
+    [each.dataset.dockRegion, Math.round(each.getBoundingClientRect().width)])"""
+
 
 @contextmanager
 def page_with(browser: Browser, *, tour: bool = False, dark: bool = False) -> Generator[Tab]:
@@ -371,3 +375,22 @@ def wait_until_back(tab: Tab) -> None:
 
 def button_of(tab: Tab, words: str) -> Locator:
     return tab.page.get_by_role("button", name=words, exact=True)
+
+
+def test_lost_connection_is_told_and_leaves_the_layout_as_it_was(browser: Browser) -> None:
+    first = start(PRESETS["paper-optimal"], port=0)
+    with closing(Tab(browser, first, size=SIZES[0])) as tab:
+        tab.turn_to("Workspace")
+        tab.settle()
+        widths = tab.page.evaluate(WIDTHS)
+        first.stop()
+        told = tab.page.get_by_text(re.compile(r"has not answered since \d\d:\d\d:\d\d"))
+        told.wait_for()
+        again = start(PRESETS["paper-optimal"], port=first.viser.get_port())
+        try:
+            told.wait_for(state="detached")
+            tab.label("l1 leg 1").wait_for()
+            tab.page.get_by_role("tab", name="Workspace", selected=True).wait_for()
+            tab.wait_for(lambda: tab.page.evaluate(WIDTHS) == widths, "panels as wide as before")
+        finally:
+            again.stop()

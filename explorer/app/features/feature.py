@@ -35,14 +35,6 @@ Side = Literal["left", "middle", "right"]
 Shared = TypeVar("Shared")
 
 
-class Tell(Protocol):
-    """Shows a message to one client, or to all for None."""
-
-    def __call__(self, message: str, who: Who = None, /) -> None:
-        """Show the message."""
-        ...
-
-
 @dataclass
 class Services:
     """The services that the page offers to its features.
@@ -54,7 +46,7 @@ class Services:
         buttons: Buttons in the markup of the page.
         downloads: Sender of files to browsers.
         complain: Function that shows a problem to one client, or to all for None.
-        tell: Function that shows a message to one client, or to all for None.
+        tell: Function that shows a message to a client, or to all if none is given.
         theme: Theme of each browser, light or dark.
         cameras: Cameras of the browsers; they frame all that the features draw.
         user_data: The user's designs and session; None to save nothing.
@@ -71,7 +63,7 @@ class Services:
     buttons: Buttons
     downloads: Downloads
     complain: Callable[[str, Who], None]
-    tell: Tell
+    tell: Callable[..., None]
     theme: Theme
     cameras: Cameras
     user_data: UserData | None

@@ -32,6 +32,7 @@ from explorer.optimise.defaults import PAPER_VOLUME
 # warning lengths, and the factor on a variable.
 STRIDE, NEAR, GROWTH = 0.1, 0.5, 1.1
 PRESS, OFFER = "tour", "offer"
+BUSY = "the tour changes the design: let the search end first, or cancel it"
 OVER = "Design, pose and view are as before the tour. Undo brings back what you did in it."
 BUTTONS = {
     "Skip": "End the tour, and put everything back; the command Tour begins it again.",
@@ -229,6 +230,9 @@ class TourGuide(Runner):
         self._end(client.client_id)
         # Not within the lock: the session waits for that while it draws.
         state = self._session.latest_state()
+        if state.optimisation.is_on:
+            self._services.complain(BUSY, client.client_id)
+            return
         with self._lock:
             card = _Card(client, state, Tour(0, Frame(state)))
             self._cards[client.client_id] = card
