@@ -119,8 +119,9 @@ class Tab:
             viewport={"width": size[0], "height": size[1]},
             color_scheme="dark" if dark else "light",
         )
-        seen = {"name": "explorer-software", "value": "seen", "url": running.url}
-        self._context.add_cookies([seen])
+        self._context.add_cookies(
+            [{"name": "explorer-software", "value": "seen", "url": running.url}]
+        )
         self._context.set_default_timeout(1000 * PATIENCE_SECONDS)
         self._context.on("console", self._said)
         self._context.on("weberror", lambda error: self._complaints.append(str(error.error)))
