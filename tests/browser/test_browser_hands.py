@@ -389,7 +389,7 @@ def test_lost_connection_is_told_and_leaves_the_layout_as_it_was(browser: Browse
         again = start(PRESETS["paper-optimal"], port=first.viser.get_port())
         try:
             told.wait_for(state="detached")
-            tab.label("l1 leg 1").wait_for()
+            tab.label("y").wait_for()
             tab.page.get_by_role("tab", name="Workspace", selected=True).wait_for()
             tab.wait_for(lambda: tab.page.evaluate(WIDTHS) == widths, "panels as wide as before")
         finally:
