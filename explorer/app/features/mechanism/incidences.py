@@ -47,10 +47,10 @@ OPACITY = 0.26
 INSET = 0.04
 # Pixels by which the edges of the filled tetrahedron are thicker, and thickness of one that fails.
 FILLED_EDGE, FAILING_EDGE = 1.0, 5.0
-# Share of the thickness that is left to quiet edges, and of the background in the colour of these
-# and of the name; the background by whether the page is dark.
+# Share of the thickness that is left to quiet edges, and of a grey in the colour of these and of
+# the name, which is between light pages and dark ones.
 QUIET, PALE = 0.6, 0.35
-GROUND: dict[bool, Rgb] = {False: (255, 255, 255), True: (26, 28, 32)}
+GREY: Rgb = (160, 164, 170)
 
 # Most dashes of one gap, their period in scene units, and the share that is drawn.
 DASHES, PERIOD, DRAWN = 32, 0.32, 0.6
@@ -207,8 +207,8 @@ class Tetrahedra(ScenePart):
             corners = np.array([placed.points[name] for name in TETRAHEDRA[index]])
             centre = corners.mean(axis=0)
             inner = corners + INSET * (centre - corners)
-            colour, ground = colours.MARGIN_COLOURS[index], GROUND[placed.dark]
-            tone = colours.mix(colour, ground, 0.0 if approach.is_nearest else PALE)
+            colour, share = colours.MARGIN_COLOURS[index], 0.0 if approach.is_nearest else PALE
+            tone = colours.mix(colour, GREY, share)
             yield from self._draw_edges(index, inner, approach, tone, fails=index in failing)
             is_named = approach.is_shown and not approach.has_label and state.view.labels
             yield self._names[index], "visible", is_named
