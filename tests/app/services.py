@@ -124,6 +124,7 @@ def services_for(
     some_server: Any = server
     some_session: Any = SimpleNamespace(redraw=redraw) if session is None else session
     missing: Any = None
+    no_theme: Any = SimpleNamespace(paint=lambda *_: None)
     return Services(
         server=some_server,
         session=some_session,
@@ -132,7 +133,7 @@ def services_for(
         downloads=StubDownloads(some_server, working),
         complain=complain,
         tell=tell,
-        theme=missing,
+        theme=no_theme,
         cameras=missing,
         user_data=user_data,
         offers_tour=False,

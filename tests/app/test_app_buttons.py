@@ -22,7 +22,6 @@ from socket_tab import SocketTab
 from explorer.app import look
 from explorer.app.browser import viser_gaps
 from explorer.app.browser.viser_gaps import PLACE
-from explorer.app.features.mechanism.feature import JOINT_LABELS
 from explorer.app.features.optimise import runner
 from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.optimise.state import OptimisationRequest, SearchResult
@@ -306,7 +305,7 @@ def test_browser_that_crossed_with_the_explorer_shows_what_its_user_set(
     # However slow the machine is, the browser's answer counts as one that crossed.
     monkeypatch.setattr(assigning, "CROSSING_SECONDS", 3600.0)
     with client_of(running) as client:
-        uuid = client.find(JOINT_LABELS["l1"])
+        uuid = client.find("x")
         values: list[float] = []
 
         def read_until(value: float) -> None:
@@ -318,11 +317,11 @@ def test_browser_that_crossed_with_the_explorer_shows_what_its_user_set(
                 )
 
         # Told of one value, it sends another before it has shown that.
-        page.session.do(SetJoint(0, 11.5))
+        page.session.do(SetPosition(0, 11.5))
         read_until(11.5)
         client.update(uuid, 12.5)
         read_until(12.5)
-        assert page.session.state.joints[0] == 12.5
+        assert page.session.state.position[0] == 12.5
 
 
 def test_panels_that_a_drag_leaves_no_time_for_are_drawn_with_the_next_frame(

@@ -123,7 +123,9 @@ def test_opened_design_is_no_change_and_new_limits_are_one(watcher: Watcher) -> 
 def test_ghost_is_drawn_only_where_one_picture_shows_both_sizes(watcher: Watcher) -> None:
     def has_ghost(action: Action) -> bool:
         placed = Placed(watcher.do(action))
-        return next(value for _, name, value in watcher.scene.updates(placed) if name == "visible")
+        return bool(
+            next(value for _, name, value in watcher.scene.updates(placed) if name == "visible")
+        )
 
     for unit, is_drawn in ((23.0, True), (2.3e5, False), (23.0, False), (10.0, True)):
         assert has_ghost(Set("design.unit_mm", unit, "1 unit (mm)")) == is_drawn

@@ -24,6 +24,7 @@ import explorer.app
 from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
 from explorer.app.features.help.manual import list_entries
+from explorer.app.features.help.tour import EndTour
 from explorer.app.features.loads.load import WEIGHTS_FEED, SetForce
 from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
@@ -264,7 +265,7 @@ OF_VALUES = (
 )  # fmt: skip
 """Actions that take a value, which a slider, a field, a map or a handle gives."""
 
-OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan)
+OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan, EndTour)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
 OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")} | {

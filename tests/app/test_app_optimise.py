@@ -66,6 +66,7 @@ from explorer.app.features.optimise.work import (
     problem_of,
     requested_box,
 )
+from explorer.app.features.prototype.building import BuildVerdict
 from explorer.app.session.session import UNDO
 from explorer.app.session.worker import Channel
 from explorer.app.state.actions import (
@@ -262,7 +263,7 @@ def test_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
     assert state.view.workspace.solid
     assert filled_buttons(state) == [ACCEPT]
     assert {buttons_of(state)[name] for name in (REVERT, START, HULL)} == {"enabled"}
-    assert result_words(state) in bench.markup
+    assert result_words(state, bench.services.get(BuildVerdict).html()) in bench.markup
     for design in (asked.design, before.design):
         bench.session.do(UNDO)
         assert bench.state.design == design

@@ -84,7 +84,7 @@ def test_stratum_is_reached_by_the_shortest_way(stratum: tuple[int, ...]) -> Non
     for state in random_states(2):
         after = work.GoToStratum(stratum).apply(state)
         expected = nearest_in_stratum(OPTIMAL, state.pose, stratum)
-        assert Frame(after).snapshot.stratum == expected.seen == stratum
+        assert Frame(after).snapshot.stratum == stratum
         way = displacement(
             OPTIMAL,
             state.pose.position,

@@ -159,7 +159,7 @@ class DesignName:
     def __call__(self, frame: Frame) -> str:
         """Return the name for a frame, as HTML."""
         live = frame.state.design
-        name = f'<b class="ex-cut ex-document">{escape(live.name)}</b>'
+        name = f'<b class="ex-cut" data-document>{escape(live.name)}</b>'
         if self._saved is None:
             return f'<span class="ex-name">{name}</span>'
         mark, words = saved_words(live, self._saved.find(live.name))
