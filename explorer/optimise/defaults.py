@@ -24,8 +24,9 @@ PAPER_VOLUME = 8000.0
 CLEARANCE = 0.2
 """Clearance demanded where interference is on, in design units; the legs have no radii."""
 
-# Default bounds, as multiples of the start's largest variable.
-A3_WITHIN, B_WITHIN = 3.0, 1.0
+# Default bounds of a3 and of the reach, as multiples of the start's largest variable or reach;
+# those of other lengths are the variable itself.
+A3_WITHIN = 3.0
 # Least distance from a degenerate design by default, as a share of that variable.
 LEAST = 0.05
 # Default change of the yaw, and least angle between the two lines, in degrees.
@@ -76,10 +77,8 @@ def make_problem(
     if reach is None and objective == "largest-volume":
         reach = longest_leg(start)
     if least is None:
-        least = min(
-            LEAST * size,
-            0.5 * min(abs(problem.distance_of(start, name)) for name in problem.DISTANCES),
-        )
+        distances = problem.distances_of(start).values()
+        least = min(LEAST * size, 0.5 * min(map(abs, distances)))
     if clearance_margin is None:
         clearance_margin = MARGIN_OF_CLEARANCE * start.reach
     return problem.Problem(
@@ -110,16 +109,12 @@ def default_variable(start: Design, name: str) -> problem.Variable:
     """
     size = max(map(abs, start.variables))
     value = problem.start_value(start, name)
-    if name in ("a3x", "a3y"):
-        within = min(A3_WITHIN * size, MOST)
+    if name in (*VARIABLES, *problem.SHIFTS):
+        within = min(size * (A3_WITHIN if name in ("a3x", "a3y") else 1.0), MOST)
         return problem.Variable(name, -within, within)
-    if name in VARIABLES:
-        return problem.Variable(name, -B_WITHIN * size, B_WITHIN * size)
     if name == problem.REACH:
         low = max(value / A3_WITHIN, problem.longest_minimum(start))
         return problem.Variable(name, low, min(A3_WITHIN * value, MOST))
-    if name in problem.SHIFTS:
-        return problem.Variable(name, -size, size)
     # The lines are parallel at multiples of 180°; stay between two of them if the start does.
     below = 180.0 * math.floor(value / 180.0)
     low = max(value - YAW_WITHIN, min(value, below + LINES_APART))

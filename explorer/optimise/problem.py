@@ -268,13 +268,9 @@ def with_strokes(design: Design, ratio: float | None) -> Design:
     return design.with_limits(**ranges)
 
 
-DISTANCES = ("a3y", "b1y", "b3 − b2")
-"""Distances at zero of which a design is degenerate."""
-
-
-def distance_of(design: Design, name: str) -> float:
-    """Return one of `DISTANCES` with its sign, in design units."""
-    return {"a3y": design.a3[1], "b1y": design.b1[1]}.get(name, design.b3 - design.b2)
+def distances_of(design: Design) -> dict[str, float]:
+    """Return the signed distances at zero of which a design is degenerate, in design units."""
+    return {"a3y": design.a3[1], "b1y": design.b1[1], "b3 − b2": design.b3 - design.b2}
 
 
 def start_value(start: Design, name: str) -> float:
@@ -338,12 +334,11 @@ def _check_demands(problem: Problem) -> None:
     ratio = demands.stroke_ratio
     if ratio is not None and not ratio > 1.0:
         raise InputError(f"a stroke ratio is longest over shortest, above 1; got {ratio:g}")
-    for name in DISTANCES:
-        distance = abs(distance_of(problem.start, name))
+    for name, distance in distances_of(problem.start).items():
         # A start made of rounded numbers may lie on the bound.
-        if distance < demands.least * (1.0 - DEGENERATE_RATIO):
+        if abs(distance) < demands.least * (1.0 - DEGENERATE_RATIO):
             raise InputError(
-                f"the start has |{name}| = {distance:g}, below the least allowed "
+                f"the start has |{name}| = {abs(distance):g}, below the least allowed "
                 f"{demands.least:g}: start elsewhere or lower it"
             )
 

@@ -11,7 +11,7 @@ import viser
 from desk import Desk
 from services import services_for
 
-from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns
+from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns, rows_of
 from explorer.app.features.feature import Services
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import MarkSaved, Open, Set, SetName, SetVariable
@@ -193,7 +193,7 @@ def test_panel_lists_opens_copies_and_deletes_designs(
     for text in ("mine &lt;b&gt;", "20.42 units", "204.2 mm"):
         assert text in content
     assert "<b>" not in content
-    assert [row.name for row in panel.rows] == ["mine <b>", *PRESETS]
+    assert [row.name for row in rows_of(saved.entries)] == ["mine <b>", *PRESETS]
     assert content.count('data-press="designs.delete"') == 1
     for name, value, expected in (
         ("open", "paper-initial", ["mine <b>"]),
@@ -213,11 +213,11 @@ def test_panel_lists_opens_copies_and_deletes_designs(
     ):
         desk.press(buttons, f"designs.{name}", value)
         markup_of_rows(desk, saved, panel)
-        assert [row.name for row in panel.rows] == [*expected, *PRESETS]
+        assert [row.name for row in rows_of(saved.entries)] == [*expected, *PRESETS]
         assert desk.state.design == PRESETS["paper-initial"]
     desk.click(panel.restore)
     markup_of_rows(desk, saved, panel)
-    assert panel.rows[0].name == "mine <b> copy"
+    assert rows_of(saved.entries)[0].name == "mine <b> copy"
     assert desk.complaints == []
 
 
@@ -229,7 +229,12 @@ def test_list_shows_what_other_explorers_save_the_last_on_top(
         Library(library.folder).save(f"design {number}", OPTIMAL)
     saved.open("design 0")
     markup_of_rows(desk, saved, panel)
-    assert [row.name for row in panel.rows] == ["design 2", "design 1", "design 0", *PRESETS]
+    assert [row.name for row in rows_of(saved.entries)] == [
+        "design 2",
+        "design 1",
+        "design 0",
+        *PRESETS,
+    ]
 
 
 def test_missing_design_is_neither_renamed_nor_opened_with_a_short_reason(

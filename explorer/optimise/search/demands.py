@@ -16,7 +16,7 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.margins import SINGULAR, margins, planes_of_singularity
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.numerics.arrays import BoolArray, FloatArray, lengths_of
-from explorer.optimise.problem import DISTANCES, SHIFTS, distance_of
+from explorer.optimise.problem import SHIFTS, distances_of
 from explorer.optimise.search.state import State
 from explorer.workspace.limits.constraints import YAW, BallOrCylinder, HalfSpace
 from explorer.workspace.limits.table import GAP
@@ -99,7 +99,7 @@ class DegenerateDemand(Demand):
 
 
 def _distances(state: State) -> FloatArray:
-    return np.array([distance_of(state.design, name) for name in DISTANCES])
+    return np.array([*distances_of(state.design).values()])
 
 
 class GapDemand(Demand):

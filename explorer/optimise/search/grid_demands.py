@@ -16,7 +16,7 @@ box's own side of all planes count; that all of the box is there is an open `Mar
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -28,7 +28,7 @@ from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.optimise.problem import SHIFTS, ObjectiveName, Problem
+from explorer.optimise.problem import SHIFTS, Problem
 from explorer.optimise.search.demands import Demand, MarginDemand, Measured
 from explorer.optimise.search.state import State
 from explorer.statics import slopes
@@ -202,12 +202,6 @@ BEYOND = 0.05
 
 Cause = Literal["error", "deflection"]
 """What displaces the tool: the actuators' errors, or the design's load."""
-
-CAUSES: Mapping[ObjectiveName, Cause] = {
-    "smallest-error": "error",
-    "smallest-deflection": "deflection",
-}
-"""The causes of the displacements that objectives are about."""
 
 
 def spare_of(share: FloatArray) -> FloatArray:

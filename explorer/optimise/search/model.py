@@ -58,10 +58,7 @@ class Model:
         self.problem = problem
         self.is_relaxed = is_relaxed
         self._before_each = before_each
-        self.scales = scales(problem)
-        self.count = len(problem.names)
-        self.raises_worst = problem.objective in OVER_BOX
-        u = np.array(start) / self.scales
+        u = np.array(start) / scales(problem)
         here = State(problem, u)
         self.demands: list[demands.Demand] = _demands(problem, here)
         clearance = problem.demands.clearance
@@ -69,11 +66,10 @@ class Model:
         if clearance is not None:
             positions = grid_demands.first_positions(problem, here.design)
             self._clearance = grid_demands.ClearanceDemand(clearance, positions)
-        self.raised: demands.Demand | None = None
-        if self.raises_worst:
-            # The last one, see `_demands`.
-            self.raised = self.demands[-1]
-            least = float(self.raised.measure(here).values.min())
+        # The last one, see `_demands`.
+        self._raised = self.demands[-1] if problem.objective in OVER_BOX else None
+        if self._raised is not None:
+            least = float(self._raised.measure(here).values.min())
             u = np.append(u, least if math.isfinite(least) else -MISSED)
         if self._clearance is not None and not is_relaxed:
             self.demands.append(self._clearance)
@@ -101,7 +97,7 @@ class Model:
     def bounds(self) -> FloatArray:
         """Lows and highs of the scaled variables, shape (n, 2)."""
         bounds = bounds_of(self.problem)
-        return np.vstack([bounds, UNBOUNDED]) if self.raises_worst else bounds
+        return bounds if self._raised is None else np.vstack([bounds, UNBOUNDED])
 
     def add_positions(self, positions: FloatArray) -> None:
         """Demand clearance at more positions, shape (k, 3)."""
@@ -123,18 +119,17 @@ class Model:
     def _evaluate(self, u: FloatArray) -> Evaluation:
         if self._before_each is not None:
             self._before_each()
-        state = State(self.problem, u[: self.count])
+        state = State(self.problem, u[: len(self.problem.names)])
         if not np.isfinite(u).all():
             raise DesignError("the solver tried a design that is not finite")
         # A problem may demand nothing.
         values, gradients = [np.zeros(0)], [np.zeros((0, len(u)))]
         for demand in self.demands:
             value, gradient = demand.measure(state)
-            if self.raises_worst:
-                is_raised = demand is self.raised
-                column = np.full((len(value), 1), -1.0 if is_raised else 0.0)
-                value = value - u[-1] if is_raised else value
-                gradient = np.hstack([gradient, column])
+            if self._raised is not None:
+                by_last = -1.0 if demand is self._raised else 0.0
+                value = value + by_last * u[-1]
+                gradient = np.hstack([gradient, np.full((len(value), 1), by_last)])
             values.append(value)
             gradients.append(gradient)
         objective, slope = self._objective(state, u)
@@ -242,8 +237,8 @@ def _demands(problem: Problem, start: State) -> list[demands.Demand]:
         listed.append(demands.MarginDemand(start))
     elif problem.objective == "smallest-load":
         listed.append(grid_demands.LoadDemand(start))
-    elif problem.objective in grid_demands.CAUSES:
-        listed.append(
-            grid_demands.DisplacementDemand(start, grid_demands.CAUSES[problem.objective])
-        )
+    elif problem.objective == "smallest-error":
+        listed.append(grid_demands.DisplacementDemand(start, "error"))
+    elif problem.objective == "smallest-deflection":
+        listed.append(grid_demands.DisplacementDemand(start, "deflection"))
     return listed

@@ -13,7 +13,7 @@ import numpy as np
 
 from explorer.errors import DesignError, InputError
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import DISTANCES, Problem, distance_of
+from explorer.optimise.problem import Problem, distances_of
 from explorer.optimise.search.demands import DegenerateDemand, GapDemand
 from explorer.optimise.search.model import MISSED, Model
 from explorer.optimise.search.sqp import Point, slsqp
@@ -50,7 +50,7 @@ def more_starts(problem: Problem, count: int, seed: int) -> Iterator[tuple[float
             design = problem.design_at(values)
         except DesignError:
             continue
-        if all(abs(distance_of(design, name)) >= problem.demands.least for name in DISTANCES):
+        if min(map(abs, distances_of(design).values())) >= problem.demands.least:
             yield values
             count -= 1
             if count == 0:

@@ -64,14 +64,11 @@ class Pin(Action):
 class Unpin(Action):
     """Remove the pinned design from a place, 0 to 2; do nothing if the place is free."""
 
-    template: ClassVar[str] = "Unpin {action.place}"
-
     slot: int
 
-    @property
-    def place(self) -> str:
-        """The letter of the place."""
-        return SLOTS[self.slot]
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"Unpin {SLOTS[self.slot]}"
 
     def apply(self, state: State) -> State:
         """Return the next state."""

@@ -31,13 +31,13 @@ APART = 3e-4
 class _Scaled(NamedTuple):
     """A drawing in scene units, without its offset.
 
-    `workspace` and its `extent`, lows and highs, shape (2, 3), are None if it is not drawn; `top`
-    is the place of its label.
+    `workspace` is None, and has no `corners` (8, 3), if it is not drawn; `top` is the place of its
+    label.
     """
 
     outline: NDArray[np.float32]
     workspace: Drawn | None
-    extent: FloatArray | None
+    corners: FloatArray
     top: FloatArray
 
 
@@ -46,13 +46,13 @@ class _Scaled(NamedTuple):
 def _scale(drawing: work.ComparedDrawing, column: int, scale: float) -> _Scaled:
     lines = np.asarray(scale * drawing.outline, dtype=np.float32)
     if drawing.shell is None:
-        return _Scaled(lines, None, None, np.zeros(3))
+        return _Scaled(lines, None, NO_POINTS, np.zeros(3))
     points = scale * drawing.shell.vertices
     extent = np.array([points.min(axis=0), points.max(axis=0)])
     middle = extent.mean(axis=0)
     enlarged = middle + (1.0 + column * APART) * (points - middle)
     workspace = enlarged.astype(np.float32), np.asarray(drawing.shell.faces, dtype=np.uint32)
-    return _Scaled(lines, workspace, extent, enlarged[int(enlarged[:, 2].argmax())])
+    return _Scaled(lines, workspace, corners_of(extent), enlarged[int(enlarged[:, 2].argmax())])
 
 
 class ComparedScene(ScenePart):
@@ -95,8 +95,7 @@ class ComparedScene(ScenePart):
         placement = self._place(placed)
         if placement is None or not placed.frame.state.compared.look.overlay:
             return NO_POINTS
-        extent, offset = placement[0].extent, placement[1]
-        return NO_POINTS if extent is None else corners_of(extent + offset)
+        return placement[0].corners + placement[1]
 
     def _place(self, placed: Placed) -> tuple[_Scaled, FloatArray] | None:
         """Return the drawing of the design, and its offset in the scene; None without one."""

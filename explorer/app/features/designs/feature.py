@@ -242,7 +242,6 @@ class DesignsPanel:
         buttons.on("designs.delete", self._for_row(lambda row, _: self._set_asked(row.name)))
         buttons.on("designs.confirm", self._for_row(self._delete))
         buttons.on("designs.keep", self._for_row(lambda _, __: self._set_asked(None)))
-        self.rows: tuple[Entry, ...] = ()
         # Name of the design that the page asks whether to delete.
         self.asked: str | None = None
         self._listed: tuple[object, ...] = ()
@@ -256,8 +255,8 @@ class DesignsPanel:
         yield self.status, "content", note(words)
         listed = self._saved.entries, base.name, self.asked
         if listed != self._listed:
-            self._listed, self.rows = listed, rows_of(self._saved.entries)
-            self._markup = list_designs(self.rows, base.name, self.asked)
+            self._listed = listed
+            self._markup = list_designs(rows_of(self._saved.entries), base.name, self.asked)
         yield self.list, "content", self._markup
         deleted = self._saved.last_deleted
         yield self.restore, "visible", deleted is not None
@@ -289,7 +288,8 @@ class DesignsPanel:
 
     def _for_row(self, action: Callable[[Entry, Who], None]) -> PressHandler:
         def press(name: str, client: viser.ClientHandle) -> None:
-            row = next((row for row in self.rows if row.name == name), None)
+            rows = rows_of(self._saved.entries)
+            row = next((row for row in rows if row.name == name), None)
             if row is not None:
                 action(row, client.client_id)
 

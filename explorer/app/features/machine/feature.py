@@ -14,7 +14,7 @@ import viser
 from explorer.app.features.feature import Feature, Services, Tab, show_html
 from explorer.app.features.machine.actuators import FINE, FORCE, MachineControls, add_actuators
 from explorer.app.features.machine.scene import PayloadScene, ToolScene
-from explorer.app.inputs.controls import At, Bound
+from explorer.app.inputs.controls import At, Bound, item
 from explorer.app.inputs.ranges import Span, platform_span
 from explorer.app.state.actions import FULL_TURN, Action, Set, check_free
 from explorer.app.state.frame import Frame
@@ -133,10 +133,7 @@ class MachinePanel:
         self._controls.slider(
             f"tool {name} (°)",
             f"Rotation of the tool on the platform {about}, in degrees.",
-            Bound(
-                lambda frame: frame.state.tool_angles[axis],
-                lambda _, value: SetToolAngle(axis, value),
-            ),
+            item(lambda frame: frame.state.tool_angles, axis, SetToolAngle),
             Span(-edge, edge, 0.1),
         )
 
@@ -255,7 +252,7 @@ DIRECTIONS: dict[str, Triple] = {
 }
 """Directions of gravity along the axes of the base, by their names."""
 
-# Difference of two coordinates of unit vectors up to which they are the same but for rounding.
+# Distance of two unit vectors up to which they are the same but for rounding.
 SAME_DIRECTION = 1e-12
 # Significant digits of the numbers in the line.
 DIGITS = 3
@@ -300,10 +297,9 @@ def _tool_words(tool: Tool) -> str:
 
 def direction_name(gravity: Triple) -> str | None:
     """Return the name of a direction of gravity; None where it is along no axis of the base."""
-    for name, direction in DIRECTIONS.items():
-        if max(abs(a - b) for a, b in zip(gravity, direction, strict=True)) <= SAME_DIRECTION:
-            return name
-    return None
+    distances = {name: math.dist(gravity, along) for name, along in DIRECTIONS.items()}
+    nearest = min(distances, key=distances.__getitem__)
+    return nearest if distances[nearest] <= SAME_DIRECTION else None
 
 
 def _actuator_words(actuators: Actuators) -> str:
@@ -327,12 +323,11 @@ def _range(values: FloatArray) -> str:
 
 def moment_words(struts: Struts) -> str:
     """Return the largest bending moment of the struts in words, and what it comes from."""
-    if struts.moment_nm is not None:
-        return f"Their largest moment is {format_number(struts.moment_nm)} N m, as given."
-    if math.isfinite(struts.largest_moment):
-        moment = format_number(struts.largest_moment)
-        return f"Their largest moment is {moment} N m, that of the tube at its largest stress."
-    return "Their moment has no limit."
+    if not math.isfinite(struts.largest_moment):
+        return "Their moment has no limit."
+    given = struts.moment_nm is not None
+    source = "as given" if given else "that of the tube at its largest stress"
+    return f"Their largest moment is {format_number(struts.largest_moment)} N m, {source}."
 
 
 def _is_tube(state: State) -> bool:

@@ -248,7 +248,5 @@ def _with_design(state: State, design: Design) -> State:
 
 def _rename(design: Design) -> Design:
     """Return a design with a name that differs from the user's own design."""
-    if design.name.endswith(SUFFIX):
-        return design
-    name = design.name[: LONGEST_NAME - len(SUFFIX)] + SUFFIX
-    return msgspec.structs.replace(design, name=name)
+    name = design.name.removesuffix(SUFFIX)[: LONGEST_NAME - len(SUFFIX)]
+    return msgspec.structs.replace(design, name=name + SUFFIX)

@@ -16,7 +16,7 @@ from explorer.app.features.feature import Feature, InBar, Services, Tab
 from explorer.app.features.optimise.actions import SetObjective, SetRequest
 from explorer.app.features.optimise.buttons import ACCEPT, BUTTONS, PAPER, add_buttons, button
 from explorer.app.features.optimise.runner import Optimiser
-from explorer.app.features.optimise.state import PLACE, Optimisation, SearchRun
+from explorer.app.features.optimise.state import PLACE, Optimisation, OptimisationRequest, SearchRun
 from explorer.app.features.optimise.words import result_words, search_notice
 from explorer.app.features.optimise.work import complete_request, requested_box
 from explorer.app.features.prototype.building import BuildVerdict
@@ -96,22 +96,20 @@ class OptimisePanel:
         )
         self._add_number(
             "volume",
-            _label("volume"),
+            "volume",
             "The exact volume of the workspace, in units³, at the orientation of home: to match, "
             "or at least.",
-            default=lambda state: complete_request(state).volume,
-            visible=lambda state: Optimisation.of(state).request.needs_volume,
+            visible=lambda state: _request(state).needs_volume,
         )
         self._add_number(
             "reach",
-            _label("longest_leg"),
+            "longest_leg",
             "The largest maximum length of l1, d2, d4 and l4 allowed, in units.",
-            default=lambda state: complete_request(state).reach,
-            visible=lambda state: Optimisation.of(state).request.needs_reach,
+            visible=lambda state: _request(state).needs_reach,
         )
         self._add_number(
             "clearance",
-            _label("demanded_clearance"),
+            "demanded_clearance",
             "The least clearance of any two legs, their radii taken off, in units, wherever in the "
             "workspace all margins are at least a 20th of the reach that the search starts with; 0 "
             "for no demand.",
@@ -127,10 +125,10 @@ class OptimisePanel:
             "Required box",
             "Demand that a box lies within the workspace; it is drawn.",
             Bound(
-                lambda frame: Optimisation.of(frame.state).request.needs_box,
+                lambda frame: _request(frame.state).needs_box,
                 lambda _, on: SetRequest("optimisation.request.with_box", on, "Required box"),
             ),
-            disabled=lambda state: Optimisation.of(state).request.objective in OVER_BOX,
+            disabled=lambda state: _request(state).objective in OVER_BOX,
         )
         controls.checkbox(
             "Hold the load",
@@ -140,26 +138,22 @@ class OptimisePanel:
         )
         self._add_number(
             "error",
-            _label("worst_error"),
+            "worst_error",
             "The worst displacement of the tool by the actuators' errors allowed in the required "
             "box, in units; 0 for no demand.",
             # A demand that another design left behind can be taken back.
-            visible=lambda state: (
-                any(state.design.actuators.error_mm) or Optimisation.of(state).request.error > 0.0
-            ),
+            visible=lambda state: any(state.design.actuators.error_mm) or _request(state).error > 0,
         )
         self._add_number(
             "deflection",
-            _label("deflection"),
+            "deflection",
             "The largest displacement of the tool under the payload's weight and force allowed in "
             "the required box, in units; 0 for no demand.",
-            visible=lambda state: (
-                is_elastic(state.design) or Optimisation.of(state).request.deflection > 0.0
-            ),
+            visible=lambda state: is_elastic(state.design) or _request(state).deflection > 0,
         )
         self._add_number(
             "tilt",
-            f"{_label('box_tilt')} (°)",
+            "box_tilt",
             "The tilt from the orientation of home that every position of the required box must "
             "allow in every azimuth, in degrees; 0 for no demand.",
             step=1.0,
@@ -170,14 +164,20 @@ class OptimisePanel:
     def _add_number(
         self,
         field: str,
-        label: str,
+        measure: str,
         hint: str,
         *,
         step: float = STEP,
-        default: Callable[[State], object] | None = None,
         visible: Callable[[State], bool] | None = None,
     ) -> None:
-        at = At(f"optimisation.request.{field}", default=default, action=SetRequest)
+        """Add a demand, with the label of the measure that it bounds."""
+        at = At(
+            f"optimisation.request.{field}",
+            default=lambda state: getattr(complete_request(state), field),
+            action=SetRequest,
+        )
+        unit = " (°)" if CATALOGUE[measure].unit == "°" else ""
+        label = f"{CATALOGUE[measure].label.capitalize()}{unit}"
         self._controls.number(label, hint, at, least=0.0, step=step, visible=visible)
 
     def _add_corner(self, end: int, label: str) -> None:
@@ -191,12 +191,12 @@ class OptimisePanel:
             "A corner of the box, in the base frame.",
             Bound(lambda frame: requested_box(frame.state)[end], write),
             step=STEP,
-            visible=lambda state: Optimisation.of(state).request.needs_box,
+            visible=lambda state: _request(state).needs_box,
         )
 
     def _add_free(self, name: str, hint: str) -> None:
         def write(state: State, on: bool) -> Action:
-            free = Optimisation.of(state).request.free
+            free = _request(state).free
             chosen = tuple(key for key in FREE if (on if key == name else key in free))
             label = f"Free variable {FREE_LABELS.get(name, name)}"
             return SetRequest("optimisation.request.free", chosen, label, "on" if on else "off")
@@ -204,29 +204,22 @@ class OptimisePanel:
         self._controls.checkbox(
             FREE_LABELS.get(name, name),
             hint,
-            Bound(lambda frame: name in Optimisation.of(frame.state).request.free, write),
-            disabled=(lambda state: not Optimisation.of(state).request.needs_box)
-            if name == PLACE
-            else None,
+            Bound(lambda frame: name in _request(frame.state).free, write),
+            disabled=lambda state: name == PLACE and not _request(state).needs_box,
         )
 
 
-def _label(measure: str) -> str:
-    """Return the label of a demand: that of the measure which it bounds."""
-    return CATALOGUE[measure].label.capitalize()
+def _request(state: State) -> OptimisationRequest:
+    return Optimisation.of(state).request
 
 
 class OptimisePlots:
     """Captions and charts in a folder; hidden until there is a run."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        values: uplot.Series = {
-            "label": "value",
-            "stroke": css(charts.BLUE),
-            "width": 2.0,
-            # uPlot shows points only where they do not touch.
-            "points": {"size": 5, "fill": css(charts.BLUE)},
-        }
+        values = charts.line("value", charts.BLUE)
+        # uPlot shows points only where they do not touch.
+        values["points"] = {"size": 5, "fill": css(charts.BLUE)}
         series = values, charts.line("level", charts.ORANGE, width=1.0, dash=(4, 4))
         plain: uplot.Axis = {"gap": 3, "ticks": {"size": 4}, "font": charts.FONT}
         axes: tuple[uplot.Axis, ...] = (
@@ -315,11 +308,8 @@ def search_chip(frame: Frame) -> str:
         buttons = "".join(button(name, state, is_main=name == ACCEPT) for name in notice.buttons)
         return activity(TAB, notice.title, notice.text, notice.share, buttons)
     if Optimisation.of(state).run is None and state.design in PRESETS.values():
-        paper = BUTTONS[PAPER]
-        words = escape(paper.label)
-        return open_button(
-            TAB, words, press=PAPER, hint=paper.hint, class_name="ex-tool ex-outlined"
-        )
+        paper, look = BUTTONS[PAPER], "ex-tool ex-outlined"
+        return open_button(TAB, paper.label, press=PAPER, hint=paper.hint, class_name=look)
     return ""
 
 
@@ -345,7 +335,7 @@ def visible_box(state: State) -> Box | None:
         if run.problem.demands.required_box is None:
             return None
         return run.problem.required_box_at((run.best or run.iterates[-1]).values)
-    return requested_box(state) if Optimisation.of(state).request.needs_box else None
+    return requested_box(state) if _request(state).needs_box else None
 
 
 OPTIMISE = Feature(

@@ -127,38 +127,34 @@ def result_words(state: State, built: str = "") -> str:
     is_success = undecided is not None and undecided.has_converged
     verdict = "" if run is None or run.verdict is None else verdict_words(state, run, run.verdict)
     why = " ".join(markup.sentence(refusal.message) for refusal in refusals)
-    acts = [
-        buttons.button(
-            buttons.START,
-            state,
-            words="Search again" if run is not None and run.best is not None else "",
-            hint=f"No search can start: {why}" if refusals else "",
-            is_main=not (remedies or refusals or is_success),
-        ),
-    ]
+    has_result = run is not None and run.best is not None
+    acts = buttons.button(
+        buttons.START,
+        state,
+        words="Search again" if has_result else "",
+        hint=f"No search can start: {why}" if refusals else "",
+        is_main=not (remedies or refusals or is_success),
+    )
     if undecided is None:
-        acts.append(buttons.button(buttons.PAPER, state))
+        acts += buttons.button(buttons.PAPER, state)
     else:
-        acts = [
-            buttons.button(buttons.ACCEPT, state, is_main=is_success and not remedies),
-            buttons.button(buttons.REVERT, state),
-            *acts,
-        ]
+        accept = buttons.button(buttons.ACCEPT, state, is_main=is_success and not remedies)
+        acts = accept + buttons.button(buttons.REVERT, state) + acts
+    found = ""
+    if run is not None and has_result:
+        found = f'<div class="ex-after">{built}</div>{_downloads(state)}{comparison_table(run)}'
     return markup.box(
         verdict,
-        refused_words(refusals, limits) if refusals else "",
+        refused_words(why, refusals, limits) if refusals else "",
         f'<div class="ex-flow ex-before">{remedies}</div>' if remedies else "",
-        f'<div class="ex-flow ex-before">{"".join(acts)}</div>',
-        f'<div class="ex-after">{built}</div>' if run is not None and run.best is not None else "",
-        _downloads(state) if run is not None and run.best is not None else "",
-        comparison_table(run) if run is not None and run.best is not None else "",
+        f'<div class="ex-flow ex-before">{acts}</div>',
+        found,
         limits_table(state.design),
     )
 
 
-def refused_words(refusals: Sequence[Conflict], limits: Sequence[str]) -> str:
+def refused_words(body: str, refusals: Sequence[Conflict], limits: Sequence[str]) -> str:
     """Return why no search can start, as HTML; buttons below offer to lift some limits."""
-    body = " ".join(markup.sentence(refusal.message) for refusal in refusals)
     if any(refusal.limit not in limits for refusal in refusals):
         lacking = next((refusal.limit for refusal in refusals if refusal.limit in LACKING), "")
         body += f" Change the demands, or {LACKING.get(lacking, 'the limits in the tab Design')}."
