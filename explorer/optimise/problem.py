@@ -179,8 +179,7 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     def __post_init__(self) -> None:
         if self.start.home is None:
-            home = self.start.home_pose
-            with_home = msgspec.structs.replace(self.start, home=home)
+            with_home = msgspec.structs.replace(self.start, home=self.start.home_pose)
             msgspec.structs.force_setattr(self, "start", with_home)
         objective = checks.one_of("the objective", self.objective, OBJECTIVES)
         msgspec.structs.force_setattr(self, "objective", objective)
@@ -378,6 +377,8 @@ def _check_objective(problem: Problem) -> None:
     objective, names, demands = problem.objective, problem.names, problem.demands
     if objective in ("match-volume", "smallest-reach") and demands.volume is None:
         raise InputError(f"{objective} needs a volume")
+    if objective == "largest-margin" and demands.required_box is None:
+        raise InputError("largest-margin needs a required box to be margins over")
     is_tied = all(getattr(problem.start.limits, name)[1] is None for name in LENGTHS)
     if objective == "smallest-reach" and not (REACH in names or is_tied):
         raise StartError(
@@ -385,8 +386,6 @@ def _check_objective(problem: Problem) -> None:
             "as a variable of its own",
             MAXIMA,
         )
-    if objective == "largest-margin" and demands.required_box is None:
-        raise InputError("largest-margin needs a required box to be margins over")
     if objective == "largest-margin" and not {YAW, *SHIFTS} & {*names}:
         raise InputError(
             "margins do not depend on the design variables: let the yaw or the place of the "

@@ -128,7 +128,7 @@ def end(state: State, iterates: tuple[Iterate, ...] = ()) -> State:
     """Return the state after its run was ended by force, by default after three iterates."""
     iterates = iterates or iterates_of(state, 3)
     run = run_of(state)
-    result = result_of(run, "", iterates, is_cancelled=True)
+    result = result_of(replace(run, phase="cancelling"), "", iterates)
     return EndRun(run.number, result, iterates).apply(state)
 
 
@@ -171,7 +171,7 @@ def found() -> State:
     state = start(replace(SMALL, clearance=0.2))
     run, iterates = run_of(state), list[Iterate]()
     outcome = optimise(run.problem, run.starts, Channel(iterates.append, lambda: False))
-    result = result_of(run, outcome, (), is_cancelled=False)
+    result = result_of(run, outcome, ())
     ended = EndRun(run.number, result, tuple(iterates)).apply(state)
     both = compare_designs(run.problem, run.own.design, outcome.design, outcome.best.values)
     return Compare(run.number, both).apply(ended)

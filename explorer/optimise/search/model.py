@@ -51,7 +51,7 @@ class Model:
         self,
         problem: Problem,
         start: Sequence[float],
-        before_each: Callable[[], None] | None = None,
+        before_each: Callable[[], None] = lambda: None,
         *,
         is_relaxed: bool = False,
     ) -> None:
@@ -117,8 +117,7 @@ class Model:
         return self._last
 
     def _evaluate(self, u: FloatArray) -> Evaluation:
-        if self._before_each is not None:
-            self._before_each()
+        self._before_each()
         state = State(self.problem, u[: len(self.problem.names)])
         if not np.isfinite(u).all():
             raise DesignError("the solver tried a design that is not finite")

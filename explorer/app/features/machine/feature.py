@@ -110,8 +110,7 @@ class MachinePanel:
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the panel show the frame."""
-        state = frame.state
-        design = state.design
+        design = frame.state.design
         yield self._summary, "content", box(_with_units(machine_words(design)))
         weight = design.payload.weight_n
         words = note(f"Its weight is {format_number(weight)} N.") if weight > 0.0 else ""

@@ -89,8 +89,7 @@ class PayloadScene(ScenePart):
         if not _has_payload(placed):
             return NO_POINTS
         payload = placed.frame.state.design.payload
-        radius = ball_radius(payload.mass_kg)
-        ends = radius * np.concatenate([np.eye(3), -np.eye(3)])
+        ends = ball_radius(payload.mass_kg) * np.concatenate([np.eye(3), -np.eye(3)])
         return placed.on_platform(payload.centre) + ends
 
 

@@ -6,7 +6,6 @@ so that a slider touched by accident does not end the run.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -73,12 +72,8 @@ class StartRun(Action):
             own=replace(own, optimisation=Optimisation()),
         )
         # The run shows its workspace.
-        workspace = replace(state.view.workspace, solid=True)
-        return replace(
-            state,
-            optimisation=Optimisation(optimisation.request, run, run.number),
-            view=replace(state.view, workspace=workspace),
-        )
+        shown = with_value(state, "view.workspace.solid", True)
+        return replace(shown, optimisation=Optimisation(optimisation.request, run, run.number))
 
 
 @dataclass(frozen=True)
@@ -138,7 +133,9 @@ class CancelRun(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        return _with_run(state, lambda run: replace(run, phase="cancelling"))
+        if not state.optimisation.is_on:
+            return state
+        return with_value(state, "optimisation.run.phase", "cancelling")
 
 
 @dataclass(frozen=True)
@@ -152,9 +149,10 @@ class Advance(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        if _number(state) != self.number or not self.iterates:
+        run = _running(state, self.number)
+        if run is None or not self.iterates:
             return state
-        after = _with_run(state, lambda run: replace(run, iterates=run.iterates + self.iterates))
+        after = with_value(state, "optimisation.run.iterates", run.iterates + self.iterates)
         return _with_design(after, self.iterates[-1].design)
 
 
@@ -171,12 +169,13 @@ class EndRun(Action):
     def apply(self, state: State) -> State:
         """Return the next state."""
         state = Advance(self.number, self.iterates).apply(state)
-        own = state.optimisation.own
-        if own is None or _number(state) != self.number:
+        run = _running(state, self.number)
+        if run is None:
             return state
-        after = _with_run(state, lambda run: replace(run, phase="ended", verdict=self.verdict))
+        ended = replace(run, phase="ended", verdict=self.verdict)
+        after = with_value(state, "optimisation.run", ended)
         if self.verdict.best is None:
-            return _restore_own(after, own)
+            return _restore_own(after, run.own)
         return _with_design(after, _rename(self.verdict.best.design))
 
 
@@ -191,9 +190,10 @@ class Compare(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        is_present = _number(state) == self.number
-        path = "optimisation.run.comparison"
-        return with_value(state, path, self.comparison) if is_present else state
+        run = Optimisation.of(state).run
+        if run is None or run.number != self.number:
+            return state
+        return with_value(state, "optimisation.run.comparison", self.comparison)
 
 
 @dataclass(frozen=True)
@@ -222,17 +222,10 @@ class Revert(Action):
         return _restore_own(with_value(state, "optimisation.run", None), run.own)
 
 
-def _number(state: State) -> int | None:
-    """Return the number of the run; None without a run."""
+def _running(state: State, number: int) -> SearchRun | None:
+    """Return the run with a number; None if it is not there, or has ended."""
     run = Optimisation.of(state).run
-    return None if run is None else run.number
-
-
-def _with_run(state: State, change: Callable[[SearchRun], SearchRun]) -> State:
-    optimisation = Optimisation.of(state)
-    if optimisation.run is None or not optimisation.is_on:
-        return state
-    return replace(state, optimisation=replace(optimisation, run=change(optimisation.run)))
+    return run if run is not None and run.number == number and run.phase != "ended" else None
 
 
 def _restore_own(state: State, own: State) -> State:

@@ -277,8 +277,7 @@ def _name(problem: Problem, last: Iterate, curve: Curve) -> str:
 def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:
     """Return the columns of a chart: iterations, values, and the level or nothing."""
     x = np.arange(len(curve.values), dtype=np.float64)
-    level = np.full(len(x), np.nan if curve.level is None else curve.level)
-    return x, curve.values, level
+    return x, curve.values, np.full(len(x), np.nan if curve.level is None else curve.level)
 
 
 def _scales(curve: Curve) -> dict[str, uplot.Scale]:

@@ -50,11 +50,11 @@ class Optimiser(Runner):
         self._lock = threading.Lock()
         self._waiting: list[Iterate] = []
         self._ending: Outcome | str | None = None
-        # Number and order of the last run, and the time of its last advance.
+        # Number and order of the last run, no order once it is cancelled, and the time of its last
+        # advance.
         self._number = 0
-        self._order = 0
+        self._order: int | None = None
         self._advanced = 0.0
-        self._is_cancelled = False
         self._compared = 0
 
     def follow(self, frame: Frame) -> None:
@@ -64,9 +64,9 @@ class Optimiser(Runner):
             return
         if run.phase == "running" and run.number != self._number:
             self._begin(run)
-        elif run.phase == "cancelling" and not self._is_cancelled:
-            self._is_cancelled = True
+        elif run.phase == "cancelling" and self._order is not None:
             self.worker.cancel(self._order, PATIENCE)
+            self._order = None
         elif run.phase == "ended" and run.number != self._compared:
             self._compared = run.number
             self._compare(run)
@@ -90,8 +90,7 @@ class Optimiser(Runner):
     def _begin(self, run: SearchRun) -> None:
         number = run.number
         with self._lock:
-            self._number, self._waiting, self._ending = number, [], None
-            self._is_cancelled, self._advanced = False, 0.0
+            self._number, self._waiting, self._ending, self._advanced = number, [], None, 0.0
         self._order = self.worker.submit(
             "optimise",
             optimise,
@@ -109,8 +108,8 @@ class Optimiser(Runner):
     def _keep_end(self, ending: Outcome | str) -> None:
         with self._lock:
             self._ending = ending
-        if self._is_cancelled:
-            self._session.post(self, self._advance)
+        # A cancelled search ends at once.
+        self._session.post(self, self._advance)
 
     def _play(self, number: int) -> None:
         """Advance the page from iterate to iterate until the run has ended."""
@@ -132,15 +131,14 @@ class Optimiser(Runner):
                 return None
             self._advanced = time.monotonic()
             count = len(self._waiting)
-            is_hasty = self._is_cancelled or isinstance(self._ending, str)
+            is_hasty = run.phase == "cancelling" or isinstance(self._ending, str)
             is_over = self._ending is not None and (count == 0 or is_hasty)
             taken = count if is_over else math.ceil((len(run.iterates) + count) / STEPS)
             iterates, self._waiting = tuple(self._waiting[:taken]), self._waiting[taken:]
             if not is_over or self._ending is None:
                 return Advance(run.number, iterates)
             self._number = 0
-            every, is_cancelled = run.iterates + iterates, self._is_cancelled
-            result = result_of(run, self._ending, every, is_cancelled=is_cancelled)
+            result = result_of(run, self._ending, run.iterates + iterates)
             return EndRun(run.number, result, iterates)
 
     def _compare(self, run: SearchRun) -> None:
@@ -155,9 +153,7 @@ class Optimiser(Runner):
             )
 
 
-def result_of(
-    run: SearchRun, ending: Outcome | str, iterates: tuple[Iterate, ...], *, is_cancelled: bool
-) -> SearchResult:
+def result_of(run: SearchRun, ending: Outcome | str, iterates: tuple[Iterate, ...]) -> SearchResult:
     """Return the result of a run by its outcome, or without one by its iterates or a problem."""
     if isinstance(ending, Outcome):
         best = ending.run
@@ -170,7 +166,7 @@ def result_of(
             seconds=ending.seconds,
             record=record_of(ending, Settings(starts=run.starts)),
         )
-    if not is_cancelled:
+    if run.phase != "cancelling":
         return SearchResult("failed", ending)
     if not iterates:
         return SearchResult("cancelled", "cancelled before the first iterate")

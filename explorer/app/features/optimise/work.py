@@ -14,7 +14,8 @@ from explorer.app.session.worker import Channel
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.measures.measure import longest_leg
-from explorer.mechanism.design import VARIABLES, Design
+from explorer.mechanism.design import Design
+from explorer.numerics import checks
 from explorer.optimise import conflicts, defaults, problem as problems, solver
 from explorer.optimise.outcome import Outcome
 from explorer.workspace.limits.constraints import constraints, slacks
@@ -75,7 +76,7 @@ def _problem(design: Design, request: OptimisationRequest) -> problems.Problem:
         error=request.error or None,
         deflection=request.deflection or None,
         tilt=request.tilt or None,
-        free=[name for name in free if name not in VARIABLES],
+        free=free,
     )
     variables = tuple(variable for variable in problem.variables if variable.name in free)
     return msgspec.structs.replace(problem, variables=variables)
@@ -130,11 +131,8 @@ def box_within(design: Design) -> problems.Box:
     edge = SHARE_OF_BOX * low or 0.1 * design.reach
     # Round numbers read better, and the box need not be exact.
     digits = max(0, 1 - math.floor(math.log10(edge)))
-    lows, highs = (
-        [round(float(value), digits) for value in middle + side * 0.5 * edge]
-        for side in (-1.0, 1.0)
-    )
-    return (lows[0], lows[1], lows[2]), (highs[0], highs[1], highs[2])
+    ends = np.round([middle - 0.5 * edge, middle + 0.5 * edge], digits)
+    return checks.box("the required box", ends)
 
 
 @lru_cache(maxsize=8)

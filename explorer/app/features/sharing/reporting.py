@@ -40,8 +40,7 @@ def make_report(
     from explorer.export.report.data import ReportData
     from explorer.export.report.document import report_html
 
-    data = ReportData(design, pose=pose, record=record)
-    html = report_html(data, date or dt.date.today())
+    html = report_html(ReportData(design, pose=pose, record=record), date or dt.date.today())
     if file_format == "html":
         return html.encode()
     # Playwright refuses calls on a thread with an event loop, such as a notebook's.
@@ -54,7 +53,6 @@ def _print(html: str) -> bytes:
 
     with headless_browser() as browser:
         # A report has no scripts and fetches nothing; the browser ensures that.
-        context = browser.new_context(java_script_enabled=False, offline=True)
-        page = context.new_page()
+        page = browser.new_context(java_script_enabled=False, offline=True).new_page()
         page.set_content(html, wait_until="load")
         return page.pdf(prefer_css_page_size=True, print_background=True, outline=True, tagged=True)
