@@ -116,12 +116,10 @@ class SimulationModel:
     ) -> None:
         if not (math.isfinite(density) and density > 0.0):
             raise InputError(f"the density must be positive; got {density:g}")
-        self.is_perfect = not isinstance(given, ImperfectMachine)
-        self.machine = machine = (
-            given
-            if isinstance(given, ImperfectMachine)
-            else ImperfectMachine(given, np.zeros(len(SOURCES)))
-        )
+        self.is_perfect = isinstance(given, Design)
+        if isinstance(given, Design):
+            given = ImperfectMachine(given, np.zeros(len(SOURCES)))
+        self.machine = machine = given
         self.design = design = machine.design
         self.metres = 1e-3 * design.unit_mm
         home = design.home_pose

@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -207,35 +206,21 @@ Place = Literal["compare", "optimise", "studies", "workspace", "report"]
 Sense = Literal["more", "less"]
 Unit = Literal["", "°", "share", "N m", "kg", "mm/N"]
 Cost = Literal["low", "high"]
-NEEDS: Mapping[str, tuple[str, Callable[[Case], bool]]] = MappingProxyType(
-    {
-        "box": ("required box", lambda case: case.box is not None),
-        "demanded_margin": (
-            "demanded clearance",
-            lambda case: case.demanded_margin is not None,
-        ),
-        "is_loaded": (
-            "payload or force at the tool",
-            lambda case: bool(case.design.payload.mass_kg or case.design.payload.force_n),
-        ),
-        "is_limited": (
-            "limit of actuators, struts or guide",
-            lambda case: has_limits(case.design),
-        ),
-        "limits_actuators": (
-            "limit of the actuators",
-            lambda case: bool(case.design.actuators.push_n or case.design.actuators.pull_n),
-        ),
-        "has_errors": (
-            "errors of the actuators",
-            lambda case: any(case.design.actuators.error_mm),
-        ),
-        "is_elastic": (
-            "stiffness of actuators or struts",
-            lambda case: is_elastic(case.design),
-        ),
-    }
-)
+NEEDS: Mapping[str, tuple[str, Callable[[Case], bool]]] = {
+    "box": ("required box", lambda case: case.box is not None),
+    "demanded_margin": ("demanded clearance", lambda case: case.demanded_margin is not None),
+    "is_loaded": (
+        "payload or force at the tool",
+        lambda case: bool(case.design.payload.mass_kg or case.design.payload.force_n),
+    ),
+    "is_limited": ("limit of actuators, struts or guide", lambda case: has_limits(case.design)),
+    "limits_actuators": (
+        "limit of the actuators",
+        lambda case: bool(case.design.actuators.push_n or case.design.actuators.pull_n),
+    ),
+    "has_errors": ("errors of the actuators", lambda case: any(case.design.actuators.error_mm)),
+    "is_elastic": ("stiffness of actuators or struts", lambda case: is_elastic(case.design)),
+}
 """Words for what measures need, without an article, and whether a case has it."""
 
 POWERS = {1: "", 2: "²", 3: "³"}

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
-from explorer.numerics import checks
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.statics import load_cases
 from explorer.statics.forces import load_array
@@ -37,9 +36,9 @@ from explorer.workspace.slices.volume import workspace_volume
 from explorer.workspace.solids.solid import Solid, Surface, carved_solid, cut_solid
 from explorer.workspace.solids.solids import workspace_solid
 
-# Numbers of nodes on each axis of the box about the part, and beyond it on either side.
-DEFAULT_NODES = 20
-FEWEST_NODES, MOST_NODES = 8, 160
+# Least number of nodes on each axis of the last grid in the box about the part, and number of
+# nodes beyond it on either side.
+NODES = 20
 BEYOND = 2
 # Nodes on each axis of the grid that finds the box of the part, and steps of that about them.
 COARSE, AROUND = 20, 2.0
@@ -93,7 +92,6 @@ def carried_region(
     rotation: ArrayLike | None = None,
     load: ArrayLike = (0.0,) * 6,
     *,
-    nodes: int = DEFAULT_NODES,
     tolerance: float | None = None,
 ) -> CarriedRegion:
     """Return the positions at which the machine carries a load within its limits.
@@ -109,17 +107,15 @@ def carried_region(
         design: The manipulator, with its payload and its limits.
         rotation: Platform to base, shape (3, 3); that of the home pose if None.
         load: (F; M) on the platform at the tool point, base axes, shape (6,), in N and N × unit.
-        nodes: Least number of nodes on each axis of the last grid within the box about the part.
         tolerance: Tolerance of the solid where other limits bound it, as in
             `explorer.workspace_solid`.
 
     Raises:
-        InputError: Not a rotation, a load that is not finite, or a number out of range.
+        InputError: Not a rotation, a load that is not finite, or no usable tolerance.
         ExplorerError: A boolean fails.
     """
     r = orientation_of(design, rotation)
     w = load_array(load)
-    checks.whole("the number of nodes on an axis", nodes, FEWEST_NODES, MOST_NODES)
     if design.limits.margin is None:
         design = design.with_limits(margin=0.0)
     exact = workspace_volume(design, r)
@@ -128,7 +124,7 @@ def carried_region(
         return CarriedRegion(exact.volume, 0.0, whole)
     case = load_cases.load_case(design, r, w)
     local = _LocalLoad(case, r, constraints(design, r), part_names(design))
-    solid = _carried_part(whole, local, nodes)
+    solid = _carried_part(whole, local)
     if solid.is_empty:
         best = local.best_within(whole)
         factor = 1.0 / max(best.share, LEAST_SHARE)
@@ -190,7 +186,7 @@ class _LocalLoad:
         return min(found, key=lambda best: best.share)
 
 
-def _carried_part(whole: Solid, load: _LocalLoad, nodes: int) -> Solid:
+def _carried_part(whole: Solid, load: _LocalLoad) -> Solid:
     """Return the part of a workspace that holds a load.
 
     It is carved out of a box about the nodes of a coarse grid that hold the load, which grows on
@@ -208,7 +204,7 @@ def _carried_part(whole: Solid, load: _LocalLoad, nodes: int) -> Solid:
         kept = best.position[None]
     around = AROUND * grid.step
     box = np.array([kept.min(axis=0) - around, kept.max(axis=0) + around])
-    count, most, volume = math.ceil(nodes / FINER), max(nodes, FINEST), -math.inf
+    count, volume = math.ceil(NODES / FINER), -math.inf
     while True:
         near, side_of_limit = _crop(whole, box)
         if near.is_empty:
@@ -222,9 +218,9 @@ def _carried_part(whole: Solid, load: _LocalLoad, nodes: int) -> Solid:
                 box[side] += growth[side]
             continue
         before, volume = volume, part.volume
-        if 0.0 < abs(volume - before) <= SETTLED * volume or count >= most:
+        if 0.0 < abs(volume - before) <= SETTLED * volume or count >= FINEST:
             return _without_limits(part, set(side_of_limit))
-        count = min(most, math.ceil(FINER * count))
+        count = min(FINEST, math.ceil(FINER * count))
         seen = np.vstack([part.vertices, kept])
         box[0] = np.maximum(box[0], seen.min(axis=0) - step)
         box[1] = np.minimum(box[1], seen.max(axis=0) + step)

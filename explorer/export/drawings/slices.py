@@ -269,7 +269,9 @@ def slices_through(slices: Slices, position: Sequence[float], name: str = "slice
         first, second = in_plane(axis)
         level = float(position[AXES.index(axis)])
         x, y = left + LEFT, TOP + scale * spans[second]
-        maps.append(_place(slices, axis, level, x, y, scale, f"{name}-{axis}"))
+        drawn = slices.map(axis, level, f"{name}-{axis}")
+        drawn.set("transform", map_transform(scale / slices.own_scale, x, y))
+        maps.append(drawn)
         for k, low, across in ((first, x, y), (second, y, x)):
             ends = float(slices.lows[k]), float(slices.highs[k])
             maps.append(ruler(AXES[k], ends, low, scale, across=across, up=k == second))
@@ -307,15 +309,6 @@ def legend(slices: Slices, unit_mm: float) -> Element:
         pieces.append(element("rect", x=x, y=4.0, width=14.0, height=14.0, fill=css(OUTLINE)))
         pieces.append(drawing_text("legs collide", x + 19.0, 15.0))
     return svg_drawing(24.0 + 14.0 * len(rows), "The colours of the maps", *pieces)
-
-
-def _place(
-    slices: Slices, axis: str, level: float, x: float, y: float, scale: float, name: str
-) -> Element:
-    """Return a map with its lows at (x, y) on paper, at a scale in points per design unit."""
-    group = slices.map(axis, level, name)
-    group.set("transform", map_transform(scale / slices.own_scale, x, y))
-    return group
 
 
 def map_transform(size: float, x: float, y: float) -> str:

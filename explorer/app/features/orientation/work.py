@@ -238,8 +238,6 @@ def _range_of(frame: Frame) -> RangeRequest | None:
 
 
 PositionFeed: TypeAlias = Feed[PositionRequest, PositionDrawing]
-TiltsFeed: TypeAlias = Feed[TiltsRequest, TiltsDrawing]
-RangeFeed: TypeAlias = Feed[RangeRequest, RangeDrawing]
 POSITION_FEED = feed_of(orientations_at, _position_of)
 TILTS_FEED = feed_of(tilts_at_nodes, _tilts_of, has_stages=True)
 RANGE_FEED = feed_of(range_solid, _range_of)
