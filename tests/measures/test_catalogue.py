@@ -16,7 +16,6 @@ from explorer.measures.measure import Case
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.outcome import GOALS
@@ -24,9 +23,7 @@ from explorer.optimise.problem import OBJECTIVES, OVER_BOX, YAW, ObjectiveName
 from explorer.optimise.search.model import Model, reported_objective
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.least_clearance import least_clearances
-from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.slices.volume import workspace_volume
-from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = PRESETS["paper-optimal"]
 EXTREMES = [*(f"exact_extent_{axis}" for axis in "xyz"), "least_margin"]
@@ -37,28 +34,6 @@ each_case = pytest.mark.parametrize("design", CASES, ids=range(len(CASES)))
 def compared(design: Design) -> Measurements:
     """Return the measures that Compare lists."""
     return measure_design(Case(design), measures_in("compare"))
-
-
-@each_case
-def test_extremes_hold_for_samples_and_are_reached(design: Design) -> None:
-    r, reach = design.home_pose.rotation, design.reach
-    fine = workspace_solid(design, r, 0.0005 * reach).vertices
-    ends, least = extent_of(design, r), least_margins(design, r)
-    assert ends is not None
-    assert least is not None
-    lows, highs = ends
-    # Samples of a box that is larger than the mesh.
-    box = lows - 0.05 * (highs - lows), highs + 0.05 * (highs - lows)
-    points = np.random.default_rng(5).uniform(*box, (4000, 3))
-    points = points[(slacks(constraints(design, r), points) >= 0.0).all(axis=-1)]
-    assert len(points) > 100
-    assert (points >= lows - 1e-9 * reach).all()
-    assert (points <= highs + 1e-9 * reach).all()
-    assert (np.abs(margins(points, r)) >= least - 1e-9 * reach).all()
-    # The mesh lies within its tolerance.
-    assert np.abs(fine.min(axis=0) - lows).max() < 0.001 * reach
-    assert np.abs(fine.max(axis=0) - highs).max() < 0.001 * reach
-    assert (np.abs(margins(fine, r)).min(axis=0) - least).max() < 0.001 * reach
 
 
 def test_measures_at_a_pose_are_of_its_orientation() -> None:

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from machines import FULL, six
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from explorer import (
     PRESETS,
@@ -17,16 +17,13 @@ from explorer import (
     Struts,
     Tolerances,
     Tool,
-    rotation_from_yaw_pitch_roll,
 )
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
-from explorer.mechanism.margins import margins, planes_of_singularity
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.load_cases import largest_shares, limit_values, load_case
 from explorer.statics.loaded import LoadedPose, ToolPrecision
-from explorer.statics.reactions import limit_shares, limited_parts, part_limits, reactions
+from explorer.statics.reactions import limit_shares, limited_parts, reactions
 from explorer.statics.weights import Weights, design_weights
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -147,53 +144,6 @@ def test_shares_are_the_largest_of_all_directions() -> None:
     sampled = shares(with_force(0.0), at, loads).max(axis=0)
     assert (sampled <= ours * (1.0 + 1e-12)).all()
     assert_allclose(sampled, ours, rtol=2e-3)
-
-
-@pytest.mark.parametrize("force", [0.0, 7.0])
-def test_kernel_of_regions_has_the_same_shares(force: float) -> None:
-    design, at = with_force(force), positions(300)
-    load = np.array([3.0, -2.0, 5.0, 10.0, -20.0, 5.0])
-    expected = shares(design, at, load).max(axis=1)
-    case = load_case(design, ROTATION, load)
-    found, parts = largest_shares(case, ROTATION, at)
-    assert_allclose(found, expected, rtol=1e-9)
-    assert set(parts.tolist()) <= set(range(part_limits(design).shape[1]))
-    least = limit_values(case, ROTATION, np.arange(20), at).min(axis=0)
-    assert (np.abs(found - 1.0) > 1e-9).all()
-    assert_array_equal(least > 0.0, found < 1.0)
-
-
-def test_functions_of_limits_cross_a_singular_plane_without_fold_or_jump() -> None:
-    """f(l4) grows towards δ3 = 0; without a moment about b4 f(l1) does not."""
-    design = msgspec.structs.replace(
-        with_force(0.0),
-        tool=Tool(),
-        payload=Payload(),
-        actuators=Actuators(push_n=(15, 15, 15, 15, 15, 15)),
-    )
-    rotation = rotation_from_yaw_pitch_roll((-73.1, 40.0, 30.0))
-    design = msgspec.structs.replace(design, home=Pose.of((10.0, 5.0, 9.0), rotation))
-    case = load_case(design, rotation, np.array([3.0, -2.0, -10.0, 0.0, 0.0, 0.0]))
-    heights = np.linspace(0.01, -0.01, 41)[:, None]
-
-    def across(plane: int) -> FloatArray:
-        """Return the functions along a line across a face of the home mode."""
-        inward = planes_of_singularity(rotation)[plane] * design.home_signs[plane]
-        at = np.random.default_rng(2).uniform(-20.0, 20.0, (500, 3))
-        at -= (at @ inward)[:, None] * inward
-        depths = margins(at, rotation) * design.home_signs
-        depths[:, plane] = np.inf
-        inner = at[depths.min(axis=1).argmax()]
-        return limit_values(case, rotation, np.arange(20), inner + heights * inward)
-
-    values = across(2)[[5, 15]]
-    grows = values[values[:, 20].argmin()]
-    assert grows[20] == pytest.approx(-1.0, abs=1e-6)
-    assert (np.diff(grows) < 1e-12).all()
-    values = across(0)
-    assert values[[0, 10]] == pytest.approx(1.0, abs=1e-6)
-    assert values.min() > -1.0
-    assert np.abs(np.diff(values, n=2)).max() < 1e-4
 
 
 @pytest.mark.parametrize("seed", range(40))
