@@ -9,8 +9,13 @@ from command_line import CommandLine
 
 
 @pytest.fixture
-def cli(request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]) -> CommandLine:
+def cli(
+    request: pytest.FixtureRequest,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> CommandLine:
     """The command of the test's module, or any command in a module without one."""
     module: Any = cast("Any", request).module
     command: tuple[str, ...] = getattr(module, "COMMAND", ())
-    return CommandLine(capsys, command, has_progress=bool({*command} & {"optimise", "sweep"}))
+    has_progress = bool({*command} & {"optimise", "sweep"})
+    return CommandLine(capsys, command, has_progress, tmp_path_factory.mktemp("designs"))

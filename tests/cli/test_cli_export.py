@@ -17,7 +17,7 @@ import explorer
 from explorer.cli import run
 from explorer.export.mesh import FORMATS
 from explorer.export.simulation import simulation_mjcf
-from explorer.mechanism.design_file import STIFFNESSES, encode_design
+from explorer.mechanism.design_file import STIFFNESSES
 from explorer.mechanism.machine import Actuators, Payload
 from explorer.prototype.imperfect import ImperfectMachine
 from explorer.statics.accuracy import SOURCES
@@ -64,22 +64,13 @@ LIMITED = msgspec.structs.replace(
 )
 
 
-@pytest.fixture
-def limited(tmp_path: Path) -> Path:
-    path = tmp_path / "limited.json"
-    path.write_bytes(encode_design(LIMITED))
-    return path
-
-
-def test_export_with_a_load_writes_the_part_that_holds_it(
-    cli: CommandLine, tmp_path: Path, limited: Path
-) -> None:
+def test_export_with_a_load_writes_the_part_that_holds_it(cli: CommandLine, tmp_path: Path) -> None:
     load = (0.0, 0.0, -20.0, 0.0, 5.0, 0.0)
     solid = carried_region(LIMITED, load=load).solid
     assert solid.is_watertight
     for what, expected in (("workspace", solid), ("hull", convex_hull(solid))):
         out = tmp_path / f"{what}.stl"
-        assert cli.answer(what, "--design", limited, "--out", out, "--load", *load) == {
+        assert cli.answer(what, "--design", LIMITED, "--out", out, "--load", *load) == {
             "file": str(out),
             "format": "stl",
             "volume": pytest.approx(expected.volume, rel=1e-12),
@@ -99,11 +90,11 @@ def test_export_with_a_load_writes_the_part_that_holds_it(
     ],
 )
 def test_export_with_a_load_that_cannot_be_written_says_why(
-    cli: CommandLine, limited: Path, words: tuple[Any, ...], status: int, reason: str
+    cli: CommandLine, tmp_path: Path, words: tuple[Any, ...], status: int, reason: str
 ) -> None:
-    argv = [limited.with_name(word) if str(word).startswith("a.") else word for word in words]
-    assert reason in cli.refusal(*argv, "--design", limited, status=status)
-    assert list(limited.parent.iterdir()) == [limited]
+    argv = [tmp_path / word if str(word).startswith("a.") else word for word in words]
+    assert reason in cli.refusal(*argv, "--design", LIMITED, status=status)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_export_refusal_keeps_an_existing_file(cli: CommandLine, tmp_path: Path) -> None:
@@ -155,9 +146,8 @@ def test_export_simulation_with_errors_tells_what_deviates_and_where_the_tool_is
         actuators=Actuators(error_mm=(0.05, 0, 0, 0, 0, 0), stiffness_n_mm=STIFFNESSES),
         tolerances=tolerances,
     )
-    file, out = tmp_path / "design.json", tmp_path / "model.xml"
-    file.write_bytes(encode_design(design))
-    words = ("simulation", "--design", file, "--out", out, "--errors", 7)
+    out = tmp_path / "model.xml"
+    words = ("simulation", "--design", design, "--out", out, "--errors", 7)
     answer = cli.answer(*words)
     machine = ImperfectMachine.draw(design, 7)
     assert out.read_text(encoding="utf-8") == simulation_mjcf(machine)
@@ -199,9 +189,7 @@ def test_export_mechanism_writes_its_parts(
 
 
 def test_export_mechanism_too_tight_writes_no_file(cli: CommandLine, tmp_path: Path) -> None:
-    design = tmp_path / "thick.json"
-    limits = explorer.Limits(leg_radii=(0.5, 0.5, 0.5, 0.5))
-    design.write_bytes(explorer.encode_design(msgspec.structs.replace(OPTIMAL, limits=limits)))
+    design = OPTIMAL.with_limits(leg_radii=(0.5, 0.5, 0.5, 0.5))
     out = tmp_path / "parts.glb"
     refused = cli.refusal("mechanism", "--out", out, "--design", design)
     assert "carriages 2 and 3 at home are 6.69 mm apart and need 10.2 mm" in refused

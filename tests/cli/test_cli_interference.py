@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,8 @@ ANGLES = (-60.0, 12.5, -7.0)
 POSE = ["--position", "8", "-2.5", "1.1e1", "--yaw-pitch-roll", "-60", "12.5", "-7"]
 END = explorer.Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-20.0, 0.0, 15.0))
 MOVE = ["--to", "14", "-2", "6", "--to-yaw-pitch-roll", "-20", "0", "15"]
+# Its legs 2 and 4 share the joint b4.
+JOINED = explorer.Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0)
 RADII = (0.1, 0.2, 0.6, 0.3)
 
 
@@ -31,16 +32,6 @@ def column(found: dict[str, Any], key: str) -> list[Any]:
 
 def with_radii(radii: tuple[float, float, float, float]) -> explorer.Design:
     return OPTIMAL.with_limits(leg_radii=radii)
-
-
-@pytest.fixture
-def joined(tmp_path: Path) -> str:
-    """A design whose legs 2 and 4 share the joint b4."""
-    file = tmp_path / "joined.json"
-    file.write_bytes(
-        explorer.encode_design(explorer.Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0))
-    )
-    return str(file)
 
 
 def test_interference_pose_has_clearances_of_pairs(cli: CommandLine) -> None:
@@ -97,18 +88,18 @@ def test_interference_default_steps_are_within_the_node_step(
         assert farthest(found["steps"] - 1) > step
 
 
-def test_interference_joined_legs_are_null_and_in_words(cli: CommandLine, joined: str) -> None:
+def test_interference_joined_legs_are_null_and_in_words(cli: CommandLine) -> None:
     index = PAIRS.index((2, 4))
-    pair = cli.answer("--design", joined)["pairs"][index]
+    pair = cli.answer("--design", JOINED)["pairs"][index]
     assert pair["distance"] is pair["clearance"] is None
     assert pair["collides"] is False
-    moved = cli.answer("--design", joined, *MOVE)["pairs"][index]
+    moved = cli.answer("--design", JOINED, *MOVE)["pairs"][index]
     assert moved["clearance"] is moved["bound"] is None
     assert moved["overlaps"] is False
     for words in ([], MOVE):
         (row,) = [
             line
-            for line in cli.text("--design", joined, *words).splitlines()
+            for line in cli.text("--design", JOINED, *words).splitlines()
             if line.startswith("2–4")
         ]
         assert "joined" in row

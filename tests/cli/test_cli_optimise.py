@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import msgspec
 import pytest
 from command_line import CommandLine
 
@@ -163,13 +162,9 @@ def test_optimise_refuses_a_box_where_no_load_is_held(
 def test_optimise_shows_infinite_loads_beside_finite_ones(
     cli: CommandLine, tmp_path: Path, recwarn: pytest.WarningsRecorder
 ) -> None:
-    limits = msgspec.structs.replace(
-        explorer.PRESETS["paper-optimal"].limits, margin=None, box=None
-    )
-    path, kept = tmp_path / "any-side.json", tmp_path / "run.json"
-    design = msgspec.structs.replace(explorer.PRESETS["paper-optimal"], limits=limits)
-    path.write_bytes(explorer.encode_design(design))
-    argv = ["--design", path, *LOADED, *ACROSS]
+    design = explorer.PRESETS["paper-optimal"].with_limits(margin=None, box=None)
+    kept = tmp_path / "run.json"
+    argv = ["--design", design, *LOADED, *ACROSS]
     margin = cli.answer(*argv, "--objective", "largest-margin", "--free", "yaw")
     assert margin["objective"] == 0.0
     load = ["--objective", "smallest-load", "--target-volume", "3000", "--free", "shift-z"]

@@ -90,32 +90,22 @@ LOW = (
     *("--to", "18.5", "9.2", "2.1", "-82", "-5", "1"),
 )
 DOWN = ("--load", "0", "0", "-40")
-
-
-@pytest.fixture
-def press(tmp_path: Path) -> tuple[str, str]:
-    """Return the option of a design whose machine has limits."""
-    file = tmp_path / "press.json"
-    file.write_bytes(explorer.encode_design(PRESS))
-    return "--design", str(file)
+DESIGN = ("--design", PRESS)
 
 
 @pytest.mark.skipif(find_spec("ompl") is None, reason="OMPL is not installed")
-def test_path_with_load_holds_it_and_tells_the_largest_share(
-    cli: CommandLine, press: tuple[str, str]
-) -> None:
-    design = explorer.load_design(press[1])
-    free = cli.answer(*press, *LOW)
+def test_path_with_load_holds_it_and_tells_the_largest_share(cli: CommandLine) -> None:
+    free = cli.answer(*DESIGN, *LOW)
     assert len(free["poses"]) == 2
     assert "largest_share" not in free
-    found = cli.answer(*press, *LOW, *DOWN, "--seconds", "20")
+    found = cli.answer(*DESIGN, *LOW, *DOWN, "--seconds", "20")
     load = [0.0, 0.0, -40.0, 0.0, 0.0, 0.0]
     for answer, holds in ((free, False), (found, True)):
         poses = [
             explorer.Pose(tuple(each["position"]), tuple(each["quaternion"]))
             for each in answer["poses"]
         ]
-        largest = path_loads(design, poses, load)
+        largest = path_loads(PRESS, poses, load)
         assert (largest.share <= 1.0 + 1e-4) == holds
     assert found["largest_share"] == pytest.approx(largest.share, abs=1e-6)
     assert found["largest_share_bound"] == pytest.approx(largest.bound, rel=0.02)
@@ -124,9 +114,9 @@ def test_path_with_load_holds_it_and_tells_the_largest_share(
     assert 0.0 <= found["largest_share_at"] <= len(found["poses"]) - 1
     # A straight path that holds it tells the same in words.
     up = ("--to", "11", "5", "9", "--load", "0", "0", "-10", "0", "0", "2")
-    straight = cli.answer(*press, *up)
+    straight = cli.answer(*DESIGN, *up)
     assert 0.0 < straight["largest_share"] < 1.0
-    text = cli.text(*press, *up)
+    text = cli.text(*DESIGN, *up)
     share = f"{100.0 * straight['largest_share']:.1f}"
     assert f"load        held, with {share} % of a limit at " in text
     bound = f"{100.0 * straight['largest_share_bound']:.1f}"

@@ -49,14 +49,6 @@ MACHINE = msgspec.structs.replace(
 )
 
 
-@pytest.fixture
-def machine(tmp_path: Path) -> Path:
-    """Return the file of a design with all parts of a machine."""
-    path = tmp_path / "machine.json"
-    path.write_bytes(explorer.encode_design(MACHINE))
-    return path
-
-
 def test_forces_json_has_those_of_the_load(cli: CommandLine) -> None:
     found = cli.answer("forces", *POSE, "--load", *LOAD)
     assert_allclose(found["actuator_forces"], explorer.actuator_forces(OPTIMAL, *AT, LOAD))
@@ -68,13 +60,13 @@ def test_forces_json_has_those_of_the_load(cli: CommandLine) -> None:
     assert_allclose(three["actuator_forces"], expected)
 
 
-def test_forces_with_limits_have_a_largest_force(cli: CommandLine, machine: Path) -> None:
+def test_forces_with_limits_have_a_largest_force(cli: CommandLine) -> None:
     tool = MACHINE.tool.position
-    found = cli.answer("forces", *POSE, "--most", "50", "--at", "tool", "--design", machine)
+    found = cli.answer("forces", *POSE, "--most", "50", "--at", "tool", "--design", MACHINE)
     b4 = np.array(AT[0]) - AT[1] @ tool
     expected = explorer.largest_force(MACHINE, b4, AT[1], [50.0] * 6, tool)
     assert found["largest_force"] == pytest.approx(float(expected))
-    own = cli.answer("forces", *POSE, "--design", machine)
+    own = cli.answer("forces", *POSE, "--design", MACHINE)
     expected = explorer.largest_force(MACHINE, *AT, MACHINE.actuators.limits[0])
     assert own["largest_force"] == pytest.approx(float(expected))
     assert own["worst_actuator"] in explorer.JOINTS
@@ -84,10 +76,8 @@ def test_forces_with_limits_have_a_largest_force(cli: CommandLine, machine: Path
     assert max(own["shares"].values()) > 0.0
 
 
-def test_an_added_force_has_the_direction_that_is_worst_with_the_load(
-    cli: CommandLine, machine: Path
-) -> None:
-    given = ["forces", *POSE, "--design", machine, "--at", "tool"]
+def test_an_added_force_has_the_direction_that_is_worst_with_the_load(cli: CommandLine) -> None:
+    given = ["forces", *POSE, "--design", MACHINE, "--at", "tool"]
     found = cli.answer(*given, "--load", *LOAD, "--force", "7")["worst_force"]
     force = 7.0 * np.array(found["direction"]) + LOAD[:3]
     there = cli.answer(*given, "--load", *force, *LOAD[3:])
@@ -97,10 +87,8 @@ def test_an_added_force_has_the_direction_that_is_worst_with_the_load(
     assert (free["direction"], free["part"], free["share"]) == (None, None, 0.0)
 
 
-def test_where_a_load_is_not_held_the_nearest_position_is_told(
-    cli: CommandLine, machine: Path
-) -> None:
-    given = ["forces", "--design", machine, "--at", "tool", "--load", "0", "0", "-30"]
+def test_where_a_load_is_not_held_the_nearest_position_is_told(cli: CommandLine) -> None:
+    given = ["forces", "--design", MACHINE, "--at", "tool", "--load", "0", "0", "-30"]
     low = ["--position", "10", "5", "4"]
     found = cli.answer(*given, *low)
     nearest = found["nearest_held"]
@@ -125,31 +113,27 @@ def test_parts_of_the_prototype_weigh_in_place_of_bars(cli: CommandLine) -> None
     assert "--density" in cli.refusal("forces", *POSE, "--parts")
 
 
-def test_forces_of_payload_are_those_of_its_weight(cli: CommandLine, machine: Path) -> None:
+def test_forces_of_payload_are_those_of_its_weight(cli: CommandLine) -> None:
     for mass in (2.0, 0.0):
-        found = cli.answer("forces", *POSE, "--payload", mass, "--design", machine)
+        found = cli.answer("forces", *POSE, "--payload", mass, "--design", MACHINE)
         payload = msgspec.structs.replace(MACHINE.payload, mass_kg=mass)
         weight = payload_wrench(msgspec.structs.replace(MACHINE, payload=payload), AT[1])
         expected = explorer.actuator_forces(MACHINE, *AT, weight, MACHINE.tool.position)
         assert_allclose(found["actuator_forces"], expected)
 
 
-def test_forces_json_has_what_the_process_may_add(cli: CommandLine, tmp_path: Path) -> None:
+def test_forces_json_has_what_the_process_may_add(cli: CommandLine) -> None:
     design = msgspec.structs.replace(MACHINE, payload=explorer.Payload(0.3, (0.0, 0.0, 1.0), 7.0))
-    path = tmp_path / "process.json"
-    path.write_bytes(explorer.encode_design(design))
-    found = cli.answer("forces", *POSE, "--design", path)
+    found = cli.answer("forces", *POSE, "--design", design)
     loaded = LoadedPose(design, explorer.Pose.of(*AT), point=(0.0, 0.0, 0.0))
     assert_allclose(list(found["process"].values())[:6], loaded.reactions.spread[:6])
     assert_allclose(list(found["shares"].values()), loaded.shares)
-    assert "payload's force, ± N" in cli.text("forces", *POSE, "--design", path)
+    assert "payload's force, ± N" in cli.text("forces", *POSE, "--design", design)
     assert not any(cli.answer("forces", *POSE)["process"].values())
 
 
-def test_accuracy_json_has_errors_compliance_and_deflection(
-    cli: CommandLine, machine: Path
-) -> None:
-    found = cli.answer("accuracy", *POSE, "--load", *LOAD, "--payload", "0", "--design", machine)
+def test_accuracy_json_has_errors_compliance_and_deflection(cli: CommandLine) -> None:
+    found = cli.answer("accuracy", *POSE, "--load", *LOAD, "--payload", "0", "--design", MACHINE)
     soft = explorer.compliance(MACHINE, *AT, *stiffness_of(MACHINE))
     worst = explorer.worst_error(MACHINE, *AT, actuator_errors(MACHINE))
     assert_allclose(found["compliance"], soft)
@@ -201,16 +185,8 @@ STATED = msgspec.structs.replace(
 )
 
 
-@pytest.fixture
-def stated(tmp_path: Path) -> Path:
-    """Return the file of a design with errors and some tolerances."""
-    path = tmp_path / "stated.json"
-    path.write_bytes(explorer.encode_design(STATED))
-    return path
-
-
-def test_budget_without_wanted_precision_ranks_the_costs(cli: CommandLine, stated: Path) -> None:
-    found = cli.answer("budget", "--design", stated, *OVER_BOX, "--at", "tool")
+def test_budget_without_wanted_precision_ranks_the_costs(cli: CommandLine) -> None:
+    found = cli.answer("budget", "--design", STATED, *OVER_BOX, "--at", "tool")
     costs = source_costs(Configuration(STATED, POSITIONS, HOME.rotation, STATED.tool.position))
     assert found["count"] == 729
     assert found["ranking"] == [SOURCES[k] for k in costs.ranking]
@@ -220,7 +196,7 @@ def test_budget_without_wanted_precision_ranks_the_costs(cli: CommandLine, state
     assert found["worst_displacement"] == pytest.approx(costs.worst_displacement)
     assert found["tolerances"] is found["effort"] is found["out"] is None
     assert found["assumed"] == []
-    text = cli.text("budget", "--design", stated, *OVER_BOX)
+    text = cli.text("budget", "--design", STATED, *OVER_BOX)
     assert "worst over 729 nodes of a grid over the box" in text
     rows = [line for line in text.splitlines() if line.split(" ")[0] in SOURCES]
     rows += [line for line in text.splitlines() if line.startswith("guide ")]
@@ -229,11 +205,11 @@ def test_budget_without_wanted_precision_ranks_the_costs(cli: CommandLine, state
 
 
 def test_budget_writes_the_design_that_keeps_what_is_wanted(
-    cli: CommandLine, stated: Path, tmp_path: Path
+    cli: CommandLine, tmp_path: Path
 ) -> None:
     out = tmp_path / "better.json"
     wanted = ["--wanted", "0.05", "--wanted-turn", "0.04"]
-    found = cli.answer("budget", "--design", stated, *OVER_BOX, *wanted, "--out", out)
+    found = cli.answer("budget", "--design", STATED, *OVER_BOX, *wanted, "--out", out)
     better = explorer.load_design(str(out))
     assert found["out"] == str(out)
     assert_allclose(stated_tolerances(better), found["tolerances"])
@@ -245,20 +221,20 @@ def test_budget_writes_the_design_that_keeps_what_is_wanted(
     again = cli.answer("budget", "--design", out, *OVER_BOX)
     assert again["ranking"] == found["ranking"]
     assert better.name == STATED.name
-    text = cli.text("budget", "--design", stated, *OVER_BOX, *wanted, "--out", out)
+    text = cli.text("budget", "--design", STATED, *OVER_BOX, *wanted, "--out", out)
     for words in ("of the wanted 0.05 mm", "of the wanted 0.04°", "above the least", str(out)):
         assert words in text
 
 
-def test_kept_errors_of_actuators_stay_or_are_refused(cli: CommandLine, stated: Path) -> None:
-    given = ["budget", "--design", stated, *OVER_BOX, "--keep-actuators"]
+def test_kept_errors_of_actuators_stay_or_are_refused(cli: CommandLine) -> None:
+    given = ["budget", "--design", STATED, *OVER_BOX, "--keep-actuators"]
     found = cli.answer(*given, "--wanted", "1")
     assert_allclose(found["tolerances"][:6], STATED.actuators.error_mm)
     message = cli.refusal(*given, "--wanted", "0.05", status=1)
     assert "the errors of the actuators alone move the tool by up to" in message
 
 
-def test_typical_values_are_told(cli: CommandLine, stated: Path) -> None:
+def test_typical_values_are_told(cli: CommandLine) -> None:
     typical, words = typical_machine(OPTIMAL)
     for command in ("budget", "accuracy"):
         found = cli.answer(command, "--typical")
@@ -267,7 +243,7 @@ def test_typical_values_are_told(cli: CommandLine, stated: Path) -> None:
         assert line == f"assumed, since the design states none: {'; '.join(words)}"
         assert "assumed" not in cli.text(command)
         # Stated values stay.
-        own = cli.answer(command, "--typical", "--design", stated)["assumed"]
+        own = cli.answer(command, "--typical", "--design", STATED)["assumed"]
         assert len(own) == 2
     costs = source_costs(Configuration(typical, [HOME.position], HOME.rotation))
     found = cli.answer("budget", "--typical")
@@ -277,10 +253,8 @@ def test_typical_values_are_told(cli: CommandLine, stated: Path) -> None:
     assert not any("errors" in words for words in given["assumed"])
 
 
-def test_accuracy_has_totals_of_dimensions_and_of_all_sources(
-    cli: CommandLine, stated: Path
-) -> None:
-    found = cli.answer("accuracy", "--design", stated)
+def test_accuracy_has_totals_of_dimensions_and_of_all_sources(cli: CommandLine) -> None:
+    found = cli.answer("accuracy", "--design", STATED)
     by_source = error_by_source(explorer.Configuration(STATED, HOME.position, HOME.rotation))
     bounds = source_errors(STATED)
     for name, sources in (("dimensions", slice(6, 29)), ("all", slice(0, 29))):
@@ -292,16 +266,14 @@ def test_accuracy_has_totals_of_dimensions_and_of_all_sources(
     # The first keys are those of the actuators.
     actuators = explorer.worst_error(STATED, HOME.position, HOME.rotation, bounds[:6])
     assert found["worst_displacement"] == pytest.approx(float(actuators.displacement))
-    text = cli.text("accuracy", "--design", stated)
+    text = cli.text("accuracy", "--design", STATED)
     assert "all, worst" in text
     assert "all, worst" not in cli.text("accuracy", "--errors", "0.1")
 
 
-def test_budget_about_singular_positions_has_no_answer(cli: CommandLine, tmp_path: Path) -> None:
+def test_budget_about_singular_positions_has_no_answer(cli: CommandLine) -> None:
     message = cli.refusal("budget", "--over", "box", status=1)
     assert "δ3 = 0: b4 on the base plane" in message
     assert "the pose is singular" in cli.refusal("budget", "--position", "3", "4", "0", status=1)
-    path = tmp_path / "no_box.json"
-    limits = msgspec.structs.replace(OPTIMAL.limits, box=None)
-    path.write_bytes(explorer.encode_design(msgspec.structs.replace(OPTIMAL, limits=limits)))
-    assert "need a box" in cli.refusal("budget", "--over", "box", "--design", path)
+    unboxed = OPTIMAL.with_limits(box=None)
+    assert "need a box" in cli.refusal("budget", "--over", "box", "--design", unboxed)

@@ -35,43 +35,37 @@ TURN = explorer.rotation_from_yaw_pitch_roll(ANGLES)
 B4 = np.array(PLACE) - TURN @ TOOL
 POSE = ["--position", *map(str, PLACE), "--yaw-pitch-roll", *map(str, ANGLES)]
 
-
-@pytest.fixture
-def tooled(tmp_path: Path) -> list[str]:
-    """Return the options that mean the tool of a design in a file."""
-    path = tmp_path / "tooled.json"
-    path.write_bytes(explorer.encode_design(TOOLED))
-    return ["--design", str(path), "--at", "tool"]
+AT_TOOL = ("--design", TOOLED, "--at", "tool")
 
 
-def test_positions_are_those_of_the_tool(cli: CommandLine, tooled: list[str]) -> None:
-    found = cli.answer("inverse", *POSE, *tooled)
+def test_positions_are_those_of_the_tool(cli: CommandLine) -> None:
+    found = cli.answer("inverse", *POSE, *AT_TOOL)
     assert_allclose(found["joints"], explorer.inverse(TOOLED, B4, TURN), rtol=1e-12)
     assert_allclose(found["tool_position"], PLACE)
     assert_allclose(found["position"], B4)
-    assert "tool position         9.00000  3.00000  12.5000" in cli.text("inverse", *POSE, *tooled)
+    assert "tool position         9.00000  3.00000  12.5000" in cli.text("inverse", *POSE, *AT_TOOL)
 
 
-def test_poses_are_completed_from_the_tool_at_home(cli: CommandLine, tooled: list[str]) -> None:
+def test_poses_are_completed_from_the_tool_at_home(cli: CommandLine) -> None:
     home = TOOLED.home_pose
     at_home = np.array(home.position) + home.rotation @ TOOL
-    assert cli.answer("inverse", *tooled)["position"] == list(home.position)
-    turned = cli.answer("inverse", "--yaw-pitch-roll", *ANGLES, *tooled)
+    assert cli.answer("inverse", *AT_TOOL)["position"] == list(home.position)
+    turned = cli.answer("inverse", "--yaw-pitch-roll", *ANGLES, *AT_TOOL)
     assert_allclose(turned["tool_position"], at_home)
     assert_allclose(turned["position"], at_home - TURN @ TOOL)
-    moved = cli.answer("inverse", "--position", *PLACE, *tooled)
+    moved = cli.answer("inverse", "--position", *PLACE, *AT_TOOL)
     assert_allclose(moved["position"], np.array(PLACE) - home.rotation @ TOOL)
     assert_allclose(moved["quaternion"], home.quaternion)
 
 
-def test_accuracy_is_that_of_the_tool(cli: CommandLine, tooled: list[str]) -> None:
-    found = cli.answer("accuracy", *POSE, "--errors", "0.2", *tooled)
+def test_accuracy_is_that_of_the_tool(cli: CommandLine) -> None:
+    found = cli.answer("accuracy", *POSE, "--errors", "0.2", *AT_TOOL)
     worst = explorer.worst_error(TOOLED, B4, TURN, [0.02] * 6, TOOL)
     assert found["worst_displacement"] == pytest.approx(float(worst.displacement))
 
 
-def test_singularity_has_the_ellipsoids_of_the_tool(cli: CommandLine, tooled: list[str]) -> None:
-    found = cli.answer("singularity", *POSE, *tooled)
+def test_singularity_has_the_ellipsoids_of_the_tool(cli: CommandLine) -> None:
+    found = cli.answer("singularity", *POSE, *AT_TOOL)
     pose = explorer.Pose.of(B4, TURN)
     expected = performance(TOOLED, pose, TOOL)
     for name in ("translation", "rotation"):
@@ -88,9 +82,9 @@ def test_singularity_has_the_ellipsoids_of_the_tool(cli: CommandLine, tooled: li
         assert_allclose(ours["tool_position"], ours["position"] + rotation @ TOOL, atol=1e-9)
 
 
-def test_forward_has_the_tool_of_each_mode(cli: CommandLine, tooled: list[str]) -> None:
+def test_forward_has_the_tool_of_each_mode(cli: CommandLine) -> None:
     joints = explorer.inverse(TOOLED, B4, TURN).tolist()
-    for options in (tooled, tooled[:2]):
+    for options in (AT_TOOL, AT_TOOL[:2]):
         modes = cli.answer("forward", "--joints", *joints, *options)["modes"]
         for mode in modes:
             rotation = Rotation.from_quat(mode["quaternion"], scalar_first=True).as_matrix()
@@ -99,18 +93,16 @@ def test_forward_has_the_tool_of_each_mode(cli: CommandLine, tooled: list[str]) 
         assert (
             min(float(np.linalg.norm(np.array(m["tool_position"]) - PLACE)) for m in modes) < 1e-9
         )
-    assert "tool z" in cli.text("forward", "--joints", *joints, *tooled)
+    assert "tool z" in cli.text("forward", "--joints", *joints, *AT_TOOL)
     plain = cli.answer("forward", "--joints", *joints)["modes"]
     assert all("tool_position" not in mode for mode in plain)
 
 
-def test_path_of_the_tool_goes_straight(
-    cli: CommandLine, tooled: list[str], tmp_path: Path
-) -> None:
+def test_path_of_the_tool_goes_straight(cli: CommandLine, tmp_path: Path) -> None:
     out = tmp_path / "path.csv"
     to = ["--to", "11", "5", "11", "--to-yaw-pitch-roll", "-85", "-10", "15"]
     where = ["--from", *POSE[1:4], "--from-yaw-pitch-roll", *POSE[5:]]
-    found = cli.answer("path", *where, *to, *tooled, "--samples", "41", "--out", out)
+    found = cli.answer("path", *where, *to, *AT_TOOL, "--samples", "41", "--out", out)
     assert_allclose(found["poses"][0]["tool_position"], PLACE, atol=1e-9)
     assert_allclose(found["poses"][-1]["tool_position"], (11.0, 5.0, 11.0), atol=1e-9)
     assert_allclose(found["poses"][0]["position"], B4, atol=1e-9)
@@ -130,13 +122,13 @@ def test_path_of_the_tool_goes_straight(
     head, *rows = csv.reader(out.read_text(encoding="utf-8").splitlines())
     assert head[-3:] == [f"tool_{axis} [10 mm]" for axis in "xyz"]
     assert_allclose([[float(word) for word in row[-3:]] for row in rows], tools)
-    assert "tool position" in cli.text("path", *where, *to, *tooled)
+    assert "tool position" in cli.text("path", *where, *to, *AT_TOOL)
     assert "tool_position" not in cli.answer("path", "--to", "11", "5", "8")["trajectory"]
 
 
-def test_workspace_of_the_tool_is_moved_as_a_whole(cli: CommandLine, tooled: list[str]) -> None:
+def test_workspace_of_the_tool_is_moved_as_a_whole(cli: CommandLine) -> None:
     options = ["--step", "4", "--hull", "--interference", "--yaw-pitch-roll", *POSE[5:]]
-    found, b4 = (cli.answer("workspace", *options, *more) for more in (tooled, tooled[:2]))
+    found, b4 = (cli.answer("workspace", *options, *more) for more in (AT_TOOL, AT_TOOL[:2]))
     for key, value in b4.items():
         if key != "extent":
             if key in ("mesh", "accessible_solid"):
@@ -146,43 +138,41 @@ def test_workspace_of_the_tool_is_moved_as_a_whole(cli: CommandLine, tooled: lis
             else:
                 assert found[key] == value, key
     assert_allclose(found["extent"], np.array(b4["extent"]) + TURN @ TOOL)
-    assert "of the tool point  1.00000  -0.500000  3.00000" in cli.text("workspace", *tooled)
+    assert "of the tool point  1.00000  -0.500000  3.00000" in cli.text("workspace", *AT_TOOL)
 
 
-def test_capability_and_orientations_are_those_of_the_tool(
-    cli: CommandLine, tooled: list[str]
-) -> None:
+def test_capability_and_orientations_are_those_of_the_tool(cli: CommandLine) -> None:
     share = cli.answer(
-        "workspace", "--capability", *PLACE, "--samples", "3000", "--step", "4", *tooled
+        "workspace", "--capability", *PLACE, "--samples", "3000", "--step", "4", *AT_TOOL
     )["orientation_capability"]
     assert share == explorer.orientation_capability(TOOLED, PLACE, 3000, TOOL)
-    found = cli.answer("orientation", "--position", *PLACE, "--samples", "3000", *tooled)
+    found = cli.answer("orientation", "--position", *PLACE, "--samples", "3000", *AT_TOOL)
     assert found["share"] == share
     assert found["tool_position"] == list(PLACE)
     assert "position" not in found
     assert found["greatest_tilt"] == explorer.greatest_tilt(TOOLED, PLACE, tool=TOOL).tilt
     assert found["tilts"] == tilt_map(TOOLED, PLACE, tool=TOOL).tilts.tolist()
     home = TOOLED.home_pose
-    default = cli.answer("orientation", "--samples", "10", *tooled)
+    default = cli.answer("orientation", "--samples", "10", *AT_TOOL)
     assert_allclose(default["tool_position"], position_of(TOOLED, home, "tool"))
     assert default["home_connected"]
 
 
 @pytest.mark.parametrize("what", ["workspace", "hull"])
 def test_export_of_the_workspace_is_moved_to_the_tool(
-    cli: CommandLine, tooled: list[str], tmp_path: Path, what: str
+    cli: CommandLine, tmp_path: Path, what: str
 ) -> None:
     files = [tmp_path / f"{name}.ply" for name in ("b4", "tool")]
     answers = [
         cli.answer("export", what, "--out", file, "--yaw-pitch-roll", *ANGLES, *options)
-        for file, options in zip(files, (tooled[:2], tooled), strict=True)
+        for file, options in zip(files, (AT_TOOL[:2], AT_TOOL), strict=True)
     ]
     assert answers[1]["volume"] == pytest.approx(answers[0]["volume"], rel=1e-9)
     untyped: Any = trimesh
     b4, tool = (np.array(untyped.load(file, process=False).vertices) for file in files)
     assert_allclose(tool, b4 + TOOLED.unit_mm * TURN @ TOOL, atol=1e-9)
     named = tmp_path / "tool.obj"
-    cli.answer("export", what, "--out", named, *tooled)
+    cli.answer("export", what, "--out", named, *AT_TOOL)
     assert f"o {what}_of_the_tool_of_tooled" in named.read_text()
 
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import msgspec
 import pytest
 from command_line import CommandLine
 
 import explorer
-from explorer import PRESETS
 from explorer.legs.clearance import PAIRS
-from explorer.mechanism.design_file import encode_design
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.orientations.share import (
     cone_of_directions,
@@ -77,16 +73,14 @@ def test_workspace_orientation_step_and_tolerance_are_used(cli: CommandLine) -> 
     assert found["hull_volume"] == pytest.approx(convex_hull(solid).volume, rel=1e-9)
 
 
-def test_workspace_empty_has_status_0(cli: CommandLine, tmp_path: Path) -> None:
-    limits = msgspec.structs.replace(OPTIMAL.limits, gap=50.0)
-    file = tmp_path / "empty.json"
-    file.write_bytes(explorer.encode_design(msgspec.structs.replace(OPTIMAL, limits=limits)))
-    found = cli.answer("--design", file, "--hull")
+def test_workspace_empty_has_status_0(cli: CommandLine) -> None:
+    empty = OPTIMAL.with_limits(gap=50.0)
+    found = cli.answer("--design", empty, "--hull")
     assert found["volume"] == found["node_count"] == found["hull_volume"] == 0
     assert found["extent"] is None
     assert found["empty_because"] == ["gap |d1 − d3|"]
     assert found["mesh"] == {"volume": 0.0, "triangles": 0, "watertight": False}
-    assert "empty because of gap |d1 − d3|" in cli.text("--design", file)
+    assert "empty because of gap |d1 − d3|" in cli.text("--design", empty)
 
 
 def test_workspace_ranges_and_tilts_add_two_volumes(cli: CommandLine) -> None:
@@ -145,22 +139,18 @@ def test_workspace_interference_adds_the_accessible_volume(cli: CommandLine) -> 
     assert "no radius is harmless" in text
 
 
-def test_workspace_with_a_load_has_the_volume_that_holds_it(
-    cli: CommandLine, tmp_path: Path
-) -> None:
-    limited = {"push_n": [60.0, 50.0, 40.0, 50.0, 45.0, 70.0]}
-    design = json.loads(encode_design(PRESETS["paper-optimal"]))
-    path = tmp_path / "limited.json"
-    path.write_text(json.dumps({**design, "schema": 2, "actuators": limited}), encoding="utf-8")
-    found = cli.answer("--design", path, "--load", 0, 0, -20)
+def test_workspace_with_a_load_has_the_volume_that_holds_it(cli: CommandLine) -> None:
+    actuators = explorer.Actuators(push_n=(60.0, 50.0, 40.0, 50.0, 45.0, 70.0))
+    limited = msgspec.structs.replace(OPTIMAL, actuators=actuators)
+    found = cli.answer("--design", limited, "--load", 0, 0, -20)
     assert 0.0 < found["held_volume"] < found["volume"]
     assert found["held_mesh"]["watertight"]
-    assert "that holds the load" in cli.text("--design", path, "--load", 0, 0, -20)
+    assert "that holds the load" in cli.text("--design", limited, "--load", 0, 0, -20)
     refusal = cli.refusal("--design", "paper-optimal", "--load", 0, 0, -20)
     assert "so that it holds any load" in refusal
     assert "held_factor" not in found
-    heavy = cli.answer("--design", path, "--load", 0, 0, -1e5)
+    heavy = cli.answer("--design", limited, "--load", 0, 0, -1e5)
     assert heavy["held_volume"] == heavy["held_mesh"]["triangles"] == 0
     assert 0.0 < heavy["held_factor"] < 1e-2
-    text = cli.text("--design", path, "--load", 0, 0, -1e5)
+    text = cli.text("--design", limited, "--load", 0, 0, -1e5)
     assert re.search(r"empty because of actuator \w+; 0\.\d+ of load and payload", text)

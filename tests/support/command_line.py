@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from explorer import Design, encode_design
 from explorer.cli import run
 
 
@@ -20,15 +22,21 @@ class CommandLine:
         capsys: Capture of both streams.
         command: Arguments that every command line begins with.
         has_progress: Whether the command writes progress to standard error.
+        folder: Where a design among the arguments is written, which its file stands for.
     """
 
     capsys: pytest.CaptureFixture[str]
     command: tuple[str, ...] = ()
     has_progress: bool = False
+    folder: Path = Path()
 
     def run(self, *argv: object, status: int = 0) -> tuple[str, str]:
         """Return standard output and standard error of a command that ends with a status."""
-        assert run([*self.command, *map(str, argv)]) == status
+        file = self.folder / "design.json"
+        for design in (word for word in argv if isinstance(word, Design)):
+            file.write_bytes(encode_design(design))
+        words = [str(file if isinstance(word, Design) else word) for word in argv]
+        assert run([*self.command, *words]) == status
         captured = self.capsys.readouterr()
         assert "\x1b" not in captured.out
         assert "Traceback" not in captured.err
