@@ -165,13 +165,6 @@ def test_accuracy_of_ideal_design_is_exact_and_rigid(cli: CommandLine) -> None:
     assert "Rigid: the design states no stiffness" in cli.text("accuracy", *POSE)
 
 
-@pytest.mark.parametrize("command", ["forces", "accuracy"])
-def test_statics_of_singular_pose_have_no_answer(cli: CommandLine, command: str) -> None:
-    pose = ["--position", "3", "4", "0", "--quaternion", "0.8", "0.3", "0.2", "0.4"]
-    message = cli.refusal(command, *pose, status=1)
-    assert "the pose is singular (δ3 = 0: b4 on the base plane)" in message
-
-
 HOME = OPTIMAL.home_pose
 BOX = (8.0, 3.0, 7.0, 12.0, 7.0, 11.0)
 OVER_BOX = ("--required-box", *BOX)

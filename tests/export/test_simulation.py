@@ -1,4 +1,4 @@
-"""The simulation model, judged by MuJoCo: loops, limits, singularities, masses."""
+"""The simulation model, judged by MuJoCo: loops, bodies, limits, masses."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import pytest
 from limited_designs import limited
 from mujoco_models import engine, joints_of, loops_of
 from scipy.spatial.transform import Rotation
-from strategies import WAYS
 
-from explorer import JOINTS, PRESETS, Design, InputError, Pose, evaluate, inverse, margins
+from explorer import JOINTS, PRESETS, Design, InputError, Pose, evaluate, inverse
 from explorer.export.simulation import (
     SIMULATION_BODIES,
     SIMULATION_JOINTS,
@@ -22,7 +21,7 @@ from explorer.export.simulation import (
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
-from explorer.prototype.chains import ACTUATED, CHAIN_JOINTS, Chains
+from explorer.prototype.chains import ACTUATED, Chains
 from explorer.prototype.weights import ball, bar, mesh_mass, total_mass
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -127,52 +126,6 @@ def test_model_bodies_lie_where_the_chains_put_them(design: Design) -> None:
         np.testing.assert_allclose(origins, metres * places.origin[index], atol=atol)
         turns = np.array([body.xmat for body in bodies]).reshape(-1, 3, 3)
         np.testing.assert_allclose(turns, places.rotation[index], atol=1e-12)
-
-
-def locked_jacobian(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Return the loops' Jacobian with the actuated joints locked, made homogeneous, (15, 15)."""
-    model = model_of(design)
-    data = engine.MjData(model)
-    set_pose(design, data, position, rotation)
-    engine.mj_forward(model, data)
-    _, loops = loops_of(model, data)
-    locks = np.eye(model.nv)[list(ACTUATED)]
-    # Rates of slides are lengths over time, the others angles.
-    is_length = np.append(np.isin(CHAIN_JOINTS, JOINTS), [False] * 3)
-    size = design.reach * design.unit_mm * 1e-3
-    columns = np.where(is_length, size, 1.0)
-    return np.vstack([loops / size, locks / size]) * columns
-
-
-def singular_pose(
-    design: Design, way: tuple[int, ...], rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """Return a random pose at which the margins of a way vanish."""
-    rotation = Rotation.random(random_state=rng).as_matrix()
-    normals = {
-        1: rotation[:, 2],
-        2: np.array([0.0, -rotation[2, 0], rotation[1, 0]]),
-        3: np.array([0.0, 0.0, 1.0]),
-    }
-    rows = np.array([normals[each] for each in way])
-    position = rng.uniform(-1.0, 1.0, 3) * design.reach
-    return position - np.linalg.pinv(rows) @ (rows @ position), rotation
-
-
-@pytest.mark.parametrize("design", DESIGNS)
-def test_locked_model_moves_at_singular_poses_alone(design: Design) -> None:
-    rng = np.random.default_rng(7)
-    for way in (way for way in WAYS if len(way) < 3):
-        for _ in range(2):
-            position, rotation = singular_pose(design, way, rng)
-            values = np.linalg.svd(locked_jacobian(design, position, rotation), compute_uv=False)
-            assert values[-1] < 1e-12 * values[0]
-    positions, rotations = random_poses(design, 10, seed=11)
-    for position, rotation in zip(positions, rotations, strict=True):
-        share = margins(position, rotation) / design.reach
-        locked = locked_jacobian(design, position, rotation)
-        values = np.linalg.svd(locked, compute_uv=False)
-        assert values[-1] > 1e-6 * np.abs(share).min() * values[0]
 
 
 def test_model_limits_become_ranges_in_metres() -> None:

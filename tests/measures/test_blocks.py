@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 
-import msgspec
 import pytest
+from machines import FULL
 
-from explorer import Guide, Payload, Pose, Struts, Tool, evaluate
+from explorer import Pose, evaluate
 from explorer.app.widgets.blocks import render
 from explorer.export.drawings.markup import elements
 from explorer.measures.blocks.block import Block, Facts
@@ -21,21 +21,11 @@ from explorer.measures.blocks.singularity import (
     gains,
     margin_table,
 )
-from explorer.mechanism.design_file import PRESETS, typical_machine
+from explorer.mechanism.design_file import typical_machine
 from explorer.singularity.ellipsoids import performance, singularity_free_ball
 from explorer.statics.loaded import LoadedPose, ToolPrecision
 
-TYPICAL = typical_machine(PRESETS["paper-optimal"])[0]
-MACHINE = msgspec.structs.replace(
-    TYPICAL,
-    tool=Tool((1.5, -1.0, 3.0)),
-    payload=Payload(0.5, (1.5, -1.0, 1.5), 4.0),
-    actuators=msgspec.structs.replace(
-        TYPICAL.actuators, push_n=(60.0, 60.0, 60.0, 60.0, 60.0, 60.0)
-    ),
-    struts=Struts(outer_mm=12.0, inner_mm=10.0, moment_nm=3.0),
-    guide=Guide(50.0, 3.0),
-)
+MACHINE = typical_machine(FULL)[0]
 SINGULAR = Pose((10.0, 5.0, 0.0), MACHINE.home_pose.quaternion)
 
 

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case, scaled_design, troubled_case
+from machines import same_for_all
 
 from explorer import Actuators, Payload, Struts
 from explorer.legs.clearance import PAIRS, leg_clearances
@@ -177,10 +178,7 @@ def test_objective_of_a_search_is_the_measure_that_it_is_named_after(
         design = msgspec.structs.replace(
             design,
             payload=Payload(force_n=3.0),
-            actuators=Actuators(
-                push_n=(9.0, 9.0, 9.0, 9.0, 9.0, 9.0),
-                error_mm=(0.01, 0.01, 0.01, 0.01, 0.01, 0.01),
-            ),
+            actuators=Actuators(push_n=same_for_all(9.0), error_mm=same_for_all(0.01)),
             struts=Struts(outer_mm=12.0),
         )
     middle = np.array(design.home_pose.position)

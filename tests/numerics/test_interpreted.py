@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import msgspec
 import numpy as np
 import pytest
+from machines import FULL
 
-from explorer import PRESETS, Actuators, Configuration, Payload, Struts, forward
+from explorer import PRESETS, Configuration, forward
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import KERNELS, warm
 from explorer.singularity.nearest import nearest_singular_poses
@@ -21,12 +21,6 @@ from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map, tors
 OPTIMAL = PRESETS["paper-optimal"]
 ROTATION = OPTIMAL.home_pose.rotation
 POSITION = (10.0, 5.0, 9.0)
-LOADED = msgspec.structs.replace(
-    OPTIMAL,
-    payload=Payload(2.0, (1.0, 2.0, 3.0), 4.0),
-    actuators=Actuators(push_n=(60.0, 50.0, 40.0, 50.0, 45.0, 70.0)),
-    struts=Struts(moment_nm=3.0),
-)
 
 
 def positions() -> FloatArray:
@@ -44,7 +38,7 @@ def tilts() -> FloatArray:
 
 
 def regions() -> FloatArray:
-    case = load_case(LOADED, ROTATION, np.zeros(6))
+    case = load_case(FULL, ROTATION, np.zeros(6))
     # The last positions are beyond a singular plane.
     at = np.vstack([positions(), positions()[:3] * [1.0, 1.0, -0.1]])
     shares, parts = largest_shares(case, ROTATION, at)
@@ -62,7 +56,7 @@ CASES: dict[str, Callable[[], FloatArray]] = {
     "forward": lambda: forward(OPTIMAL, joints()).position,
     "nearest": lambda: nearest_singular_poses(Configuration(OPTIMAL, positions(), ROTATION))[0],
     "forces": lambda: actuator_forces(OPTIMAL, positions(), ROTATION, np.arange(1.0, 7.0)),
-    "slopes": lambda: twist_slopes(LOADED, positions(), ROTATION).by,
+    "slopes": lambda: twist_slopes(FULL, positions(), ROTATION).by,
 }
 
 

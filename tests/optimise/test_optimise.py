@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from limited_designs import limited
 from long_cases import long_after
+from machines import same_for_all
 
 from explorer import (
     PRESETS,
@@ -30,7 +31,6 @@ from explorer.measures.box import BoxStatics, corners_of
 from explorer.measures.measure import Case, longest_leg
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import LENGTHS
-from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.optimise.defaults import paper_problem, paper_start, reach_problem
 from explorer.optimise.outcome import (
@@ -59,11 +59,6 @@ OPTIMAL = PRESETS["paper-optimal"]
 
 def started_at(problem: Problem, values: tuple[float, ...]) -> Problem:
     return msgspec.structs.replace(problem, start=problem.design_at(values))
-
-
-def same_for_all(value: float) -> Six:
-    """Return one value for each actuator."""
-    return value, value, value, value, value, value
 
 
 def least_clearance_by_sampling(design: Design, margin: float, count: int) -> float:

@@ -10,21 +10,19 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from machines import same_for_all
 
 from explorer import Actuators, Design, Payload, Struts
 from explorer.measures.catalogue import measure_design
 from explorer.measures.measure import Case
 from explorer.mechanism.design import Triple
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.machine import Six
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.conflicts import find_conflicts
 from explorer.optimise.defaults import make_problem
-from explorer.optimise.outcome import (
-    Outcome,
-)
+from explorer.optimise.outcome import Outcome
 from explorer.optimise.problem import (
     OF_THE_MACHINE,
     OVER_BOX,
@@ -46,11 +44,6 @@ BESIDE = (-0.5, -1e-3, -1e-9, 0.0, 1e-9, 1e-3)
 TURNS = ((-73.1, 0.0, 0.0), (-70.0, 12.0, -8.0), (35.0, -20.0, 25.0))
 
 
-def same(value: float) -> Six:
-    """Return one value for each actuator."""
-    return value, value, value, value, value, value
-
-
 def machine(turn: Triple = TURNS[0], margin: float | None = None, source: Any = None) -> Design:
     """Return a design with a load, limits, errors and stiffness, at an orientation."""
     start = OPTIMAL if source is None else source
@@ -59,7 +52,11 @@ def machine(turn: Triple = TURNS[0], margin: float | None = None, source: Any = 
         home=Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), turn),
         limits=msgspec.structs.replace(start.limits, box=None, margin=margin),
         payload=Payload(force_n=10.0),
-        actuators=Actuators(push_n=same(150.0), error_mm=same(0.02), stiffness_n_mm=same(900.0)),
+        actuators=Actuators(
+            push_n=same_for_all(150.0),
+            error_mm=same_for_all(0.02),
+            stiffness_n_mm=same_for_all(900.0),
+        ),
         struts=Struts(outer_mm=12.0),
     )
 

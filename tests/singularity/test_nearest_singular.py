@@ -28,7 +28,6 @@ from explorer.mechanism.configuration import Configuration
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 from explorer.singularity.nearest import PlatformPoints, displacement, nearest_singular_poses
-from explorer.singularity.nearest_lines import Constants, bound_over, terms_at, value_at
 from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_stratum
 from explorer.singularity.strata import (
     COVERED,
@@ -99,24 +98,6 @@ def test_bounds_of_many_poses_are_close_to_the_distances(b1y: float) -> None:
     apart = np.hypot(positions[:, 1], positions[:, 2]) > 0.2 * length
     gap = nearest.distance**2 - nearest.bound**2
     assert (gap <= 2e-8 * nearest.distance**2 + 1e-12 * length**2)[apart].all()
-
-
-def test_bound_of_a_box_is_below_its_values_and_close_to_them() -> None:
-    rng = np.random.default_rng(0)
-    for index in range(120):
-        k = Constants._make([*rng.uniform(-1.0, 1.0, 9).tolist(), 2.0])
-        phi, sigma = rng.uniform(0.0, math.pi), rng.uniform(0.0, 2.0 * math.pi)
-        if index % 2:
-            # Where the hypotenuse of f vanishes, f is curved the most.
-            terms = terms_at(phi, sigma, k)
-            k = k._replace(l_x=-terms.da / terms.cos_sigma, m_x=terms.db * terms.cos_sigma)
-        alpha, beta = 10.0 ** -rng.integers(0, 4, 2)
-        bound, steps = bound_over(phi, sigma, alpha, beta, k), np.linspace(-1.0, 1.0, 5)
-        values = [value_at(phi + i * alpha, sigma + j * beta, k) for i in steps for j in steps]
-        size = 1.0 + float(np.square(k).sum())
-        assert min(values) >= bound - 1e-12 * size
-        # To second order it is the value itself.
-        assert value_at(phi, sigma, k) - bound <= 100.0 * size * max(alpha, beta)
 
 
 @given(singular_cases())

@@ -196,17 +196,6 @@ def test_largest_error_of_a_machine_exceeds_random_errors_and_all_its_neighbours
         assert_allclose(reach, size, rtol=1e-12)
 
 
-def test_largest_error_of_actuators_alone_is_the_worst_error() -> None:
-    positions, rotations = random_poses(OPTIMAL, 300)
-    sources = error_by_source(Configuration(OPTIMAL, positions, rotations, TOOL))
-    found = largest_error(sources[..., :6], BOUNDS[:6])
-    expected = worst_error(OPTIMAL, positions, rotations, BOUNDS[:6], TOOL)
-    assert_allclose(found.displacement, expected.displacement, rtol=1e-12)
-    assert_allclose(found.turn, expected.turn, rtol=1e-12)
-    rms = rms_of_sources(sources[..., :6], BOUNDS[:6])
-    assert (rms.displacement <= found.displacement).all()
-
-
 def test_errors_of_sources_are_those_of_actuators_and_dimensions() -> None:
     design = msgspec.structs.replace(
         OPTIMAL,

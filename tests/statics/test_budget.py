@@ -19,8 +19,6 @@ from explorer import (
     Design,
     NoAnswerError,
     Tolerances,
-    decode_design,
-    encode_design,
 )
 from explorer.measures.box import positions_over
 from explorer.mechanism.configuration import Configuration
@@ -32,7 +30,6 @@ from explorer.statics.accuracy import (
     largest_error,
     rms_of_sources,
     source_errors,
-    stated_tolerances,
 )
 from explorer.statics.budget import (
     IS_TILT,
@@ -297,17 +294,6 @@ def test_unusable_wanted_precision_is_refused(wanted: float) -> None:
     assert "turn must" in message
     none = Configuration(OPTIMAL, np.empty((0, 3)), HOME.rotation)
     assert "at least one" in refusal(source_costs, none)
-
-
-def test_design_with_found_tolerances_keeps_what_is_wanted_after_its_file_is_read() -> None:
-    found = tolerance_budget(Configuration(STATED, box_positions(), HOME.rotation), 0.05, 0.05)
-    written = encode_design(with_tolerances(STATED, found.tolerances))
-    design = decode_design(written, "the file")
-    assert_allclose(stated_tolerances(design), found.tolerances, rtol=0.0)
-    costs = source_costs(Configuration(design, box_positions(), HOME.rotation))
-    assert costs.worst_displacement == found.costs.worst_displacement
-    assert costs.worst_displacement <= 0.05
-    assert costs.worst_turn <= 0.05
 
 
 def test_budget_over_the_workspace_holds_at_its_nodes() -> None:

@@ -82,24 +82,19 @@ def test_loaded_pose_that_weighs_no_payload_has_no_forces() -> None:
     assert np.abs(with_weight.reactions.actuators).max() > 1.0
 
 
-def test_loaded_pose_without_limits_uses_no_share_and_has_no_worst_direction() -> None:
-    loaded = LoadedPose(OPTIMAL, HOME, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
-    assert loaded.share == 0.0
-    assert np.isinf(loaded.largest_payload)
-    assert loaded.unit_force.share == 0.0
+@pytest.mark.parametrize(
+    ("design", "height", "share", "payload"),
+    [(OPTIMAL, 9.0, 0.0, np.inf), (FULL, 0.0, np.inf, 0.0)],
+)
+def test_loaded_pose_without_limits_holds_any_load_and_a_singular_one_holds_none(
+    design: Design, height: float, share: float, payload: float
+) -> None:
+    pose = Pose((10.0, 5.0, height), HOME.quaternion)
+    loaded = LoadedPose(design, pose, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
     worst = loaded.worst_force(10.0)
-    assert worst.share == 0.0
-    assert np.isnan(worst.direction).all()
-
-
-def test_loaded_pose_that_is_singular_holds_no_load() -> None:
-    pose = Pose((10.0, 5.0, 0.0), HOME.quaternion)
-    loaded = LoadedPose(limited(), pose, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
-    assert not loaded.is_regular
-    assert np.isinf(loaded.share)
-    assert (loaded.largest_payload, loaded.unit_force.share) == (0.0, np.inf)
-    worst = loaded.worst_force(10.0)
-    assert np.isinf(worst.share)
+    assert loaded.is_regular == (height > 0.0)
+    assert loaded.share == loaded.unit_force.share == worst.share == share
+    assert loaded.largest_payload == payload
     assert np.isnan(worst.direction).all()
 
 

@@ -16,6 +16,11 @@ def six(values: ArrayLike) -> Six:
     return a, b, c, d, e, f
 
 
+def same_for_all(value: float) -> Six:
+    """Return one value for each actuator."""
+    return value, value, value, value, value, value
+
+
 OPTIMAL = PRESETS["paper-optimal"]
 
 PRESS = msgspec.structs.replace(

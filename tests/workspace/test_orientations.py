@@ -14,9 +14,8 @@ from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, Design, InputError, Limits, Pose, evaluate, margins
-from explorer.mechanism.design import LENGTHS, Swing
+from explorer.mechanism.design import LENGTHS, Swing, Triple
 from explorer.mechanism.pose import rotation_array, yaw_pitch_roll_from_rotation
-from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.orientations.share import (
@@ -66,24 +65,22 @@ def test_cone_of_directions_is_even_and_has_no_torsion(half_angle: float) -> Non
         assert abs(complex(towards.mean())) < 2e-3
 
 
-def within_one_by_one(position: FloatArray, rotations: FloatArray, **limits: Any) -> list[bool]:
-    design = limited(OPTIMAL, **limits)
-    return [not evaluate(design, Pose.of(position, r)).violations for r in rotations]
-
-
+@pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (3.0, -2.0, 1.0)])
 @pytest.mark.parametrize("seed", range(2))
-def test_orientation_capability_agrees_with_single_poses(seed: int) -> None:
+def test_orientation_capability_at_a_tool_agrees_with_single_poses(seed: int, tool: Triple) -> None:
     rng = np.random.default_rng(seed)
-    position = np.array(HOME.position) + rng.normal(scale=2.0, size=3)
+    position = np.array(HOME.position) + HOME.rotation @ tool + rng.normal(scale=2.0, size=3)
     turns = Rotation.from_rotvec(rng.normal(scale=0.5, size=(80, 3))).as_matrix()
     rotations = turns @ HOME.rotation
     for limits in ({}, EVERY_LIMIT, {"margin": None, "box": None}):
-        expected = within_one_by_one(position, rotations, **limits)
         design = limited(OPTIMAL, **limits)
-        np.testing.assert_array_equal(orientations_within(design, position, rotations), expected)
-        share = orientation_capability(design, position, rotations)
+        poses = [Pose.of(position - r @ tool, r) for r in rotations]
+        expected = [not evaluate(design, pose).violations for pose in poses]
+        found = orientations_within(design, position, rotations, tool)
+        np.testing.assert_array_equal(found, expected)
+        share = orientation_capability(design, position, rotations, tool)
         assert share == pytest.approx(np.mean(expected), abs=1e-12)
-    assert 0 < sum(within_one_by_one(position, rotations, **EVERY_LIMIT)) < len(rotations)
+        assert limits is not EVERY_LIMIT or 0 < sum(expected) < len(rotations)
 
 
 def test_swing_of_a_leg_is_its_angle_to_the_direction_at_home() -> None:

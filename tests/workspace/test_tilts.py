@@ -17,7 +17,7 @@ from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.table import CARRIAGE_ORDER
-from explorer.workspace.orientations.share import orientation_capability, orientations_within
+from explorer.workspace.orientations.share import orientations_within
 from explorer.workspace.orientations.tilts import (
     greatest_tilt,
     greatest_tilts,
@@ -72,19 +72,6 @@ def tool_case_of(seed: int, share: float) -> tuple[Design, FloatArray, float, Fl
     direction = np.random.default_rng([4, seed]).normal(size=3)
     tool = share * design.reach * direction / np.linalg.norm(direction)
     return design, position + design.home_pose.rotation @ tool, torsion, tool
-
-
-@pytest.mark.parametrize("seed", range(0, 12, 4))
-def test_orientations_of_the_tool_are_those_of_its_poses(seed: int) -> None:
-    design, position, _, tool = tool_case_of(seed, 0.3)
-    rng = np.random.default_rng(seed)
-    turns = Rotation.from_rotvec(rng.normal(scale=0.3, size=(60, 3))).as_matrix()
-    rotations = turns @ design.home_pose.rotation
-    poses = [Pose.of(position - r @ tool, r) for r in rotations]
-    expected = [not evaluate(design, pose).violations for pose in poses]
-    assert orientations_within(design, position, rotations, tool).tolist() == expected
-    share = orientation_capability(design, position, rotations, tool)
-    assert share == pytest.approx(np.mean(expected))
 
 
 @pytest.mark.parametrize("seed", long_after(9, range(40)))
