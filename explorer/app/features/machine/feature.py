@@ -80,8 +80,13 @@ class MachinePanel:
         self._summary = gui.add_html("")
         with gui.add_folder("Tool on the platform (design units, degrees)"):
             self._add_point("tool", "the tool point", "design.tool.position")
-            for axis in range(len(ANGLES)):
-                self._add_angle(axis)
+            for axis, (name, about, edge) in enumerate(ANGLES):
+                controls.slider(
+                    f"tool {name} (°)",
+                    f"Rotation of the tool on the platform {about}, in degrees.",
+                    item(lambda frame: frame.state.tool_angles, axis, SetToolAngle),
+                    Span(-edge, edge, 0.1),
+                )
         with gui.add_folder("Payload (design units, kg, N)"):
             controls.field(
                 "Mass (kg)",
@@ -126,15 +131,6 @@ class MachinePanel:
                 f"{path}.{axis}",
                 platform_span,
             )
-
-    def _add_angle(self, axis: int) -> None:
-        name, about, edge = ANGLES[axis]
-        self._controls.slider(
-            f"tool {name} (°)",
-            f"Rotation of the tool on the platform {about}, in degrees.",
-            item(lambda frame: frame.state.tool_angles, axis, SetToolAngle),
-            Span(-edge, edge, 0.1),
-        )
 
     def _add_gravity(self) -> None:
         self._controls.dropdown(
