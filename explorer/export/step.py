@@ -22,7 +22,7 @@ from explorer.export.mesh import colour_of
 from explorer.export.opencascade import Document, ExactShape, occ, primitive
 from explorer.measures.box import corners_of
 from explorer.mechanism.design import Design
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, triple
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
     Cone,
@@ -60,8 +60,7 @@ class ExactSolid:
 
     def shift(self, offset: FloatArray) -> ExactSolid:
         """Return the solid moved by a vector in millimetres, shape (3,)."""
-        x, y, z = offset.tolist()
-        return replace(self, shape=ExactShape(self.shape).translate((x, y, z)).shape)
+        return replace(self, shape=ExactShape(self.shape).translate(triple(offset)).shape)
 
 
 def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactSolid:

@@ -15,7 +15,7 @@ import numpy as np
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, triple
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, reactions
 from explorer.workspace.accessible.nodes import descend_towards, make_grid
@@ -67,8 +67,7 @@ def nearest_carrying_pose(loaded: LoadedPose) -> Pose | None:
         if nearer is None or search.distance(nearer) >= (1.0 - NEARER) * distance:
             break
         found = nearer
-    x, y, z = found.tolist()
-    return Pose((x, y, z), pose.quaternion)
+    return Pose(triple(found), pose.quaternion)
 
 
 @dataclass(frozen=True)

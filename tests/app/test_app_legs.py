@@ -45,6 +45,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, open_state
 from explorer.app.widgets.blocks import render
 from explorer.errors import InputError
+from explorer.export.drawings.slices import in_plane
 from explorer.legs.clearance import PAIRS, leg_axes, leg_clearances
 from explorer.legs.interference import step_overlaps, swept_tetrahedra
 from explorer.legs.moves import move_clearance
@@ -181,7 +182,7 @@ def test_cut_takes_one_side_and_maps_the_accessible_part(axis: int) -> None:
     vertices = np.concatenate([shell.vertices for shell in drawing.surface.shells])
     assert float((side * (vertices[:, axis] - level)).max()) == pytest.approx(0.0, abs=1e-9)
     assert drawing.slice_map is not None
-    first, second = drawing.slice_map.plane
+    first, second = in_plane(drawing.slice_map.axis)
     lows, highs = np.array(drawing.slice_map.lows), np.array(drawing.slice_map.highs)
     points = np.full((3000, 3), level)
     flat = np.random.default_rng(axis).uniform(lows, highs, (len(points), 2))

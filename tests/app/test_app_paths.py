@@ -43,7 +43,7 @@ from explorer.app.features.paths.panel import (
 from explorer.app.features.paths.plots import (
     FOLDS,
     MARGINS,
-    PathShares,
+    LoadPlot,
     Quantity,
     crossing_time,
     crossing_words,
@@ -519,7 +519,7 @@ def test_planned_path_holds_load_and_weights_of_the_tab_forces(
 def test_shares_over_time_are_those_of_the_path(services: Services) -> None:
     state = straight(Set("view.at", "tool"))
     journey = journey_of(state)
-    found = PathShares(services).of(Frame(state))
+    found = LoadPlot(services).shares(Frame(state))
     assert found is not None
     expected = path_loads(PRESS, journey.poses, state.load, tool=journey.tool)
     np.testing.assert_array_equal(found.path.shares, expected.shares)

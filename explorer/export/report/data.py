@@ -18,6 +18,7 @@ from explorer.measures.catalogue import Measurements, measure_design, measures_i
 from explorer.measures.measure import Case
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.machine import Payload, Tool
+from explorer.numerics.arrays import triple
 from explorer.optimise.outcome import Record
 from explorer.prototype.assembly import Bill, bill_of_materials, make_prototype
 from explorer.statics.compliance import largest_deflection
@@ -120,8 +121,7 @@ class ReportData(Case):
         _, worst = largest_deflection(weighed.compliance, weighed.wrench, force)
         if not np.isfinite(worst).all():
             return weighed
-        x, y, z = worst.tolist()
-        return ToolPrecision(replace(weighed.loaded, load=(x, y, z, 0.0, 0.0, 0.0)))
+        return ToolPrecision(replace(weighed.loaded, load=(*triple(worst), 0.0, 0.0, 0.0)))
 
     @cached_property
     def bill(self) -> Bill | ExplorerError:

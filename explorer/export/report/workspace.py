@@ -136,10 +136,8 @@ def _extent(data: ReportData) -> Element | None:
 
 
 def _bounds(solid: Solid) -> Element:
-    corners = solid.vertices[solid.faces]
-    sides = corners[:, 1:] - corners[:, :1]
-    areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    shares = np.bincount(solid.limit_of_face, areas, len(solid.limits)) / areas.sum()
+    areas = np.bincount(solid.limit_of_face, solid.areas, len(solid.limits))
+    shares = areas / solid.areas.sum()
     rows = [
         (name, (number(100.0 * share, 3), " %"))
         for share, name in sorted(zip(shares.tolist(), solid.limits, strict=True), reverse=True)

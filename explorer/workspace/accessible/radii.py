@@ -73,8 +73,7 @@ class RadiusCurve:
 
     def radius_at(self, share: float) -> float:
         """Return the radius at which a share of the volume at radius 0 is left."""
-        at = np.interp(-share * float(self.volumes[0]), -self.volumes, self.radii)
-        return float(at)
+        return float(np.interp(-share * float(self.volumes[0]), -self.volumes, self.radii))
 
 
 def radius_curve(

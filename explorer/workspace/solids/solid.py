@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explorer.errors import ExplorerError
-from explorer.numerics.arrays import FloatArray, IntArray, dot
+from explorer.numerics.arrays import FloatArray, IntArray, dot, triple
 from explorer.numerics.isosurface import surface_below_zero
 from explorer.workspace.limits.constraints import HalfSpace
 from explorer.workspace.solids.facets import Facets, Frame, frame_around
@@ -77,10 +77,10 @@ class Solid:
         return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
     @cached_property
-    def area(self) -> float:
-        """The area of the faces, in squared design units."""
+    def areas(self) -> FloatArray:
+        """The areas of the faces, in squared design units, shape (m,)."""
         a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+        return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
 
     @cached_property
     def is_watertight(self) -> bool:
@@ -262,10 +262,10 @@ def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
         return solid
     body, frame, origins = _body_of(solid)
     length = float(np.linalg.norm(half_space.normal))
-    x, y, z = (-half_space.normal / length).tolist()
     offset = (half_space.offset - float(half_space.normal @ frame.middle)) / (length * frame.scale)
     names = tuple(dict.fromkeys((*solid.limits, half_space.name)))
-    part = solid_of(body.trim_by_plane((x, y, z), -offset), origins, frame, names)
+    trimmed = body.trim_by_plane(triple(-half_space.normal / length), -offset)
+    part = solid_of(trimmed, origins, frame, names)
     of_cut = names.index(half_space.name)
     limit_of_face = np.where(part.limit_of_face < 0, of_cut, part.limit_of_face)
     return replace(part, limit_of_face=limit_of_face, agrees=solid.agrees)

@@ -185,7 +185,7 @@ def _make_agreeing_solid(
                 best = solid
             finer = replace(finer, tolerance=finer.tolerance / FINER)
     agrees = _excess(best, *exact) <= 0.0
-    is_artefact = exact[0] <= 0.0 and abs(best.volume) <= best.tolerance * best.area
+    is_artefact = exact[0] <= 0.0 and abs(best.volume) <= best.tolerance * float(best.areas.sum())
     if ends is not None and (agrees or not is_artefact):
         return replace(best, agrees=agrees)
     empty = replace(best, vertices=best.vertices[:0], faces=best.faces[:0], agrees=True)
@@ -376,7 +376,7 @@ def _excess(solid: Solid, volume: float, error: float) -> float:
     """
     if (solid.limit_of_face < 0).any() or (solid.is_empty and volume > 0.0):
         return math.inf
-    allowed = min(solid.tolerance * solid.area, LARGEST_SHARE * volume)
+    allowed = min(solid.tolerance * float(solid.areas.sum()), LARGEST_SHARE * volume)
     return abs(solid.volume - volume) - allowed - error
 
 

@@ -62,80 +62,16 @@ def _zero_for_none(path: str) -> At:
     return At(path, default=lambda _: 0.0, convert=lambda value: value or None)
 
 
-class BudgetPart:
-    """The part of the panel with the budget."""
-
-    def __init__(self, services: Services) -> None:
-        gui, self._feed = services.gui, services.get(BUDGET_FEED)
-        self._controls = controls = Controls(gui, services.session)
-        controls.checkbox(
-            "What each tolerance costs",
-            "Rank the six actuators and the 23 dimensions by what their errors cost at the tool.",
-            "view.precision.budget",
-        )
-        controls.dropdown("Worst over", OVER_HINT, OVER, "view.precision.over")
-        controls.number(
-            "Wanted within ± (mm)",
-            "Largest displacement of the tool that is wanted: tolerances of the least total effort "
-            "that keep it are found. 0 ranks the tolerances as they are.",
-            _zero_for_none("view.precision.wanted"),
-            least=0.0,
-            step=0.01,
-            small=True,
-            visible=lambda state: state.view.precision.budget,
-        )
-        controls.number(
-            "and turned within ± (°)",
-            "Largest turn of the tool that is wanted besides; 0 is any.",
-            _zero_for_none("view.precision.wanted_turn"),
-            least=0.0,
-            step=0.01,
-            small=True,
-            visible=_is_wanted,
-        )
-        controls.checkbox(
-            "Keep the actuators' errors",
-            "Find tolerances of the dimensions alone, with the errors of the actuators as they "
-            "are; off, errors of the actuators are found too.",
-            "view.precision.keep_actuators",
-            visible=_is_wanted,
-        )
-        self._result = gui.add_html("", visible=False)
-        self._set = services.link(
-            "precision.set",
-            "Loads › Set these tolerances",
-            "Give the design these tolerances, and these errors of its actuators.",
-            self._set_tolerances,
-        )
-
-    def updates(self, frame: Frame) -> Updates:
-        """Yield the updates that make the part show the frame."""
-        yield from self._controls.updates(frame)
-        budget = html_of(self._feed, self._budget, "There is no budget")
-        yield from show_html(self._result, "" if self._feed.request is None else budget)
-
-    def _budget(self, drawing: tasks.BudgetDrawing) -> str:
-        request, costs, found = drawing.request, drawing.costs, drawing.found
-        budget = answers.tolerance_budget(costs, found, request.wanted, request.wanted_turn)
-        return render(budget, {"set": self._set})
-
-    def _set_tolerances(self, state: State) -> Action | None:
-        drawing = self._feed.drawing
-        if drawing is None or drawing.found is None or not self._feed.is_current:
-            return None
-        design = with_tolerances(state.design, drawing.found.costs.tolerances)
-        return Set("design", design, "Tolerances", "of the budget")
-
-
 def _is_wanted(state: State) -> bool:
     return state.view.precision.budget and state.view.precision.wanted is not None
 
 
 class PrecisionPanel:
-    """Errors of the tool, its deflection, and what is drawn of them."""
+    """Errors of the tool, its deflection, what is drawn of them, and the budget of tolerances."""
 
     def __init__(self, services: Services) -> None:
         gui, self._loads = services.gui, services.get(Loads)
+        self._feed = services.get(BUDGET_FEED)
         self._controls = controls = Controls(gui, services.session)
         with gui.add_folder("Precision"):
             self._top = gui.add_html("")
@@ -160,7 +96,46 @@ class PrecisionPanel:
                 visible=lambda state: state.view.precision.deflected,
             )
         with gui.add_folder("Budget of tolerances"):
-            self._budget = BudgetPart(services)
+            controls.checkbox(
+                "What each tolerance costs",
+                "Rank the six actuators and the 23 dimensions by what their errors cost at the "
+                "tool.",
+                "view.precision.budget",
+            )
+            controls.dropdown("Worst over", OVER_HINT, OVER, "view.precision.over")
+            controls.number(
+                "Wanted within ± (mm)",
+                "Largest displacement of the tool that is wanted: tolerances of the least total "
+                "effort that keep it are found. 0 ranks the tolerances as they are.",
+                _zero_for_none("view.precision.wanted"),
+                least=0.0,
+                step=0.01,
+                small=True,
+                visible=lambda state: state.view.precision.budget,
+            )
+            controls.number(
+                "and turned within ± (°)",
+                "Largest turn of the tool that is wanted besides; 0 is any.",
+                _zero_for_none("view.precision.wanted_turn"),
+                least=0.0,
+                step=0.01,
+                small=True,
+                visible=_is_wanted,
+            )
+            controls.checkbox(
+                "Keep the actuators' errors",
+                "Find tolerances of the dimensions alone, with the errors of the actuators as they "
+                "are; off, errors of the actuators are found too.",
+                "view.precision.keep_actuators",
+                visible=_is_wanted,
+            )
+            self._result = gui.add_html("", visible=False)
+        self._set = services.link(
+            "precision.set",
+            "Loads › Set these tolerances",
+            "Give the design these tolerances, and these errors of its actuators.",
+            self._set_tolerances,
+        )
         self._copy = services.copy_button(
             "Loads › Precision", lambda state: self._loads.source("accuracy", state)
         )
@@ -182,7 +157,20 @@ class PrecisionPanel:
         yield self._top, "content", errors
         yield self._deflection, "content", render(answers.deflections(precision, LOAD))
         yield from self._controls.updates(frame)
-        yield from self._budget.updates(frame)
+        budget = html_of(self._feed, self._budget, "There is no budget")
+        yield from show_html(self._result, "" if self._feed.request is None else budget)
+
+    def _budget(self, drawing: tasks.BudgetDrawing) -> str:
+        request, costs, found = drawing.request, drawing.costs, drawing.found
+        budget = answers.tolerance_budget(costs, found, request.wanted, request.wanted_turn)
+        return render(budget, {"set": self._set})
+
+    def _set_tolerances(self, state: State) -> Action | None:
+        drawing = self._feed.drawing
+        if drawing is None or drawing.found is None or not self._feed.is_current:
+            return None
+        design = with_tolerances(state.design, drawing.found.costs.tolerances)
+        return Set("design", design, "Tolerances", "of the budget")
 
 
 def offer(what: str, typical: Iterable[str], button: str) -> str:

@@ -218,11 +218,6 @@ def range_solid(request: RangeRequest) -> RangeDrawing:
     return RangeDrawing(request, solid)
 
 
-def _position_of(frame: Frame) -> PositionRequest:
-    state = frame.state
-    return state.design, state.position, state.tool
-
-
 def _tilts_of(frame: Frame) -> TiltsRequest | None:
     if not frame.state.view.orientation.tilts:
         return None
@@ -238,6 +233,8 @@ def _range_of(frame: Frame) -> RangeRequest | None:
 
 
 PositionFeed: TypeAlias = Feed[PositionRequest, PositionDrawing]
-POSITION_FEED = feed_of(orientations_at, _position_of)
+POSITION_FEED = feed_of(
+    orientations_at, lambda frame: (frame.state.design, frame.state.position, frame.state.tool)
+)
 TILTS_FEED = feed_of(tilts_at_nodes, _tilts_of, has_stages=True)
 RANGE_FEED = feed_of(range_solid, _range_of)

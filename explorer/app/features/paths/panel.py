@@ -66,8 +66,7 @@ class PathsPanel:
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
-        self._downloads, self._shares = services.downloads, plots.PathShares(services)
-        self._controls = Controls(gui, services.session)
+        self._downloads, self._controls = services.downloads, Controls(gui, services.session)
         kinds = {
             kind: Chip(words, f"Paths › {words}", hint, choose("paths.kind", kind, "Path"))
             for kind, (words, hint) in KINDS.items()
@@ -115,11 +114,11 @@ class PathsPanel:
                 _time_span,
                 disabled=lambda state: state.journey is None,
             )
-            self._plots = (
+            self._incidences = (
                 plots.IncidencePlot(gui, plots.MARGINS, has_times=False),
                 plots.IncidencePlot(gui, plots.FOLDS),
-                plots.LoadPlot(gui, self._shares),
             )
+            self._loads = plots.LoadPlot(services)
         services.do_on_press("paths.play", lambda word: actions.Play(word == "on"), ("on", "off"))
         services.do_on_press("paths.cancel", lambda _: CANCEL)
         self._clear = services.link(
@@ -154,10 +153,10 @@ class PathsPanel:
         kinds = markup.box(chips, f'<div class="ex-small">{kind_note(state)}</div>')
         yield self._kinds, "content", kinds
         yield self.go, "disabled", state.paths.is_planning
-        title = plan_words(state) or path_title(state, self._shares.of(frame), self._clear)
+        title = plan_words(state) or path_title(state, self._loads.shares(frame), self._clear)
         yield self._title, "content", title
         yield from show_html(self._demand, plots.demand_note(state))
-        for plot in self._plots:
+        for plot in (*self._incidences, self._loads):
             yield from plot.updates(frame)
         yield from self._controls.updates(frame)
 

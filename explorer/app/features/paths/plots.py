@@ -129,29 +129,6 @@ class JourneyLoads(NamedTuple):
         return float(np.interp(self.path.place, self.path.at, self.time))
 
 
-class PathShares:
-    """The shares along the path of the present frame, computed anew if path or load change."""
-
-    def __init__(self, services: Services) -> None:
-        self._loads = services.get(Loads)
-        self._key: tuple[object, ...] = ()
-        self._shares: JourneyLoads | None = None
-
-    def of(self, frame: Frame) -> JourneyLoads | None:
-        """Return the shares along the path of a frame; None without a path or without limits."""
-        journey, loaded = frame.state.journey, self._loads.of(frame)
-        if journey is None or not has_limits(loaded.design):
-            return None
-        path = journey.kind, journey.design, journey.poses, journey.tool
-        key = *path, loaded.load, loaded.weights
-        if key != self._key:
-            demanded = DemandedLoad.of(journey.design, loaded.load, loaded.weights)
-            along, timed = demanded.over(journey.margins, journey.tool), journey.trajectory
-            self._shares = JourneyLoads(np.interp(along.at, timed.at, timed.time), along)
-            self._key = key
-        return self._shares
-
-
 def load_words(loads: JourneyLoads) -> str:
     """Return the largest share of a limit along a path, its bound and its place, as HTML."""
     share, bound, part = loads.path.share, loads.path.bound, loads.path.part
@@ -308,13 +285,16 @@ def crossing_words(journey: Journey) -> str:
 
 
 class LoadPlot:
-    """The chart, for designs with limits."""
+    """The chart of the shares along the path, for designs with limits."""
 
-    def __init__(self, gui: viser.GuiApi, shares: PathShares) -> None:
-        self._shares = shares
+    def __init__(self, services: Services) -> None:
+        self._loads = services.get(Loads)
+        # The shares along the last path, under the last load.
+        self._key: tuple[object, ...] = ()
+        self._shares: JourneyLoads | None = None
         vertical = axis("share (%)", label_size=18, size=40, space=22)
         self._chart = TimeChart(
-            gui,
+            services.gui,
             (line("share", BLUE), line("beyond the limit", ORANGE)),
             (vertical, level_axis((100.0,), "limit", NEUTRAL)),
             LOAD_HEIGHT,
@@ -322,7 +302,7 @@ class LoadPlot:
 
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the chart show the frame."""
-        journey, loads = frame.state.journey, self._shares.of(frame)
+        journey, loads = frame.state.journey, self.shares(frame)
         if journey is None or loads is None:
             columns = blank_columns(2, (0.0, LEAST_TOP))
         else:
@@ -334,3 +314,20 @@ class LoadPlot:
             beyond = np.where(share > 100.0, share, np.nan)
             columns = time_columns(loads.time, (share, beyond), journey.at, (0.0, top))
         yield from self._chart.show(columns, is_visible=has_limits(frame.state.design))
+
+    def shares(self, frame: Frame) -> JourneyLoads | None:
+        """Return the shares along the path of a frame; None without a path or without limits.
+
+        They are computed anew if path or load change.
+        """
+        journey, loaded = frame.state.journey, self._loads.of(frame)
+        if journey is None or not has_limits(loaded.design):
+            return None
+        path = journey.kind, journey.design, journey.poses, journey.tool
+        key = *path, loaded.load, loaded.weights
+        if key != self._key:
+            demanded = DemandedLoad.of(journey.design, loaded.load, loaded.weights)
+            along, timed = demanded.over(journey.margins, journey.tool), journey.trajectory
+            self._shares = JourneyLoads(np.interp(along.at, timed.at, timed.time), along)
+            self._key = key
+        return self._shares

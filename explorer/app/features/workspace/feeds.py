@@ -19,6 +19,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import triple
 from explorer.workspace.position_bands import LOAD_MEASURES, is_unstated
 
 if TYPE_CHECKING:
@@ -168,10 +169,7 @@ def send_workspace(
     design, load = state.design, None
     if region == "held":
         design, load = loaded_design(state), state.load
-    offset: Triple | None = None
-    if state.view.at == "tool":
-        x, y, z = state.offset(rows).tolist()
-        offset = x, y, z
+    offset = triple(state.offset(rows)) if state.view.at == "tool" else None
     words = work.file_words(region, what, offset).replace(" ", "-")
     selection = work.Selection(design, rows, region, start, load)
     services.downloads.compute(

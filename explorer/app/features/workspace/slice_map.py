@@ -70,15 +70,9 @@ class SliceMap:
     colouring: Colouring
     offset: FloatArray
 
-    @property
-    def plane(self) -> tuple[int, int]:
-        """The indices of the two axes of the map."""
-        first, second = in_plane(self.axis)
-        return first, second
-
     def shift(self, offset: FloatArray) -> SliceMap:
         """Return the map of positions moved by a vector in design units, shape (3,)."""
-        across, (first, second) = AXES.index(self.axis), self.plane
+        across, (first, second) = AXES.index(self.axis), in_plane(self.axis)
         du, dv, dw = offset[[first, second, across]].tolist()
         (u0, v0), (u1, v1) = self.lows, self.highs
         lows, highs = (u0 + du, v0 + dv), (u1 + du, v1 + dv)
@@ -88,7 +82,9 @@ class SliceMap:
         """Return the coordinates of a position on the map and the measure there."""
         design, measure = self.colouring.design, self.colouring.banded
         decimals = decimals_for(design.reach, DIGITS)
-        at = ", ".join(f"{AXES[k]} {format_decimals(point[k], decimals)}" for k in self.plane)
+        at = ", ".join(
+            f"{AXES[k]} {format_decimals(point[k], decimals)}" for k in in_plane(self.axis)
+        )
         positions = (np.array(point) - self.offset)[None]
         values, found = measure_positions(
             design, self.colouring.rotation, measure, positions, self.colouring.load
@@ -183,7 +179,7 @@ def cut_loops(solid: Solid, axes: tuple[int, int]) -> list[FloatArray]:
 def map_picture(mapped: SliceMap, position: Triple, reach: float) -> str:
     """Return the map between its axes as SVG, with the present position of its point as a cross."""
     (u0, v0), (u1, v1) = mapped.lows, mapped.highs
-    first, second = mapped.plane
+    first, second = in_plane(mapped.axis)
     scale = min((WIDTH - LEFT - RIGHT) / (u1 - u0), (MOST_HEIGHT - TOP - BOTTOM) / (v1 - v0))
     height = TOP + BOTTOM + scale * (v1 - v0)
     left, bottom = LEFT, height - BOTTOM

@@ -19,7 +19,7 @@ from explorer.errors import ExplorerError, InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, triple
 from explorer.numerics.number_text import format_number
 from explorer.numerics.search import Watch, ignore_stage
 from explorer.statics.reactions import has_limits
@@ -100,8 +100,7 @@ def trouble_of(error: ExplorerError) -> Trouble:
     """Return an error of the library as a trouble."""
     if not isinstance(error, StartError) or error.nearest is None:
         return Trouble(str(error))
-    x, y, z = error.nearest.tolist()
-    return Trouble(str(error), (x, y, z))
+    return Trouble(str(error), triple(error.nearest))
 
 
 _parts: dict[tuple[Selection, float], tuple[Part, Solid] | Trouble] = {}
