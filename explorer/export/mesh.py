@@ -68,6 +68,14 @@ def material(name: str, rgb: Rgb, *, metallic: float, roughness: float) -> dict[
     return {"name": name, "pbrMetallicRoughness": factors}
 
 
+def as_trimesh(vertices: FloatArray, faces: NDArray[np.integer]) -> Any:
+    """Return a mesh of vertices (n, 3) and faces (m, 3), as they are, as one of trimesh."""
+    import trimesh
+
+    untyped: Any = trimesh
+    return untyped.Trimesh(vertices, faces, process=False)
+
+
 def glb_bytes(
     bodies: Mapping[str, tuple[FloatArray, NDArray[np.integer], int]],
     nodes: Sequence[Mapping[str, Any]],
@@ -102,7 +110,7 @@ def glb_bytes(
     untyped: Any = trimesh
     scene = untyped.Scene()
     for name, (vertices, faces, _) in bodies.items():
-        scene.add_geometry(untyped.Trimesh(vertices, faces, process=False), geom_name=name)
+        scene.add_geometry(as_trimesh(vertices, faces), geom_name=name)
     return scene.export(file_type="glb", tree_postprocessor=complete)
 
 
@@ -245,15 +253,11 @@ def _single(solid: Solid, file_format: str, decimals: int | None = None) -> Soli
 
 
 def _stl(solid: Solid, _: Design, name: str) -> bytes:
-    import trimesh
-
     points = _single(solid, "stl").vertices
     # Rounding may merge corners; the facets that it degenerates are left out.
     a, b, c = (points[solid.faces[:, k]] for k in range(3))
     is_facet = ~((a == b).all(axis=1) | (b == c).all(axis=1) | (c == a).all(axis=1))
-    untyped: Any = trimesh
-    mesh = untyped.Trimesh(points, solid.faces[is_facet], process=False)
-    data: bytes = mesh.export(file_type="stl")
+    data: bytes = as_trimesh(points, solid.faces[is_facet]).export(file_type="stl")
     # trimesh leaves the header empty. It must not start with "solid", by which readers tell text
     # from binary.
     text = f"binary STL in millimetres, {APPLICATION}: {ascii_name(name)}"

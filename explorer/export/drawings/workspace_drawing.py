@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import operator
-from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -17,6 +16,7 @@ from explorer.export.drawings import mechanism as drawings
 from explorer.export.drawings.markup import element, path_of
 from explorer.export.drawings.mechanism import ROOM, WIDTH, Projection
 from explorer.export.drawings.slices import Slices
+from explorer.export.mesh import as_trimesh
 from explorer.measures.snapshot import Snapshot
 from explorer.singularity.colours import css, mix
 from explorer.workspace.limits.constraints import HalfSpace
@@ -72,7 +72,7 @@ _SHADES = 24
 def shaded_faces(solid: Solid, view: Projection) -> Element:
     """Return the visible faces of a solid, shaded by their angle to the light."""
     corners = solid.vertices[solid.faces]
-    normals = _mesh(solid).face_normals
+    normals = as_trimesh(solid.vertices, solid.faces).face_normals
     seen = np.flatnonzero(normals @ view.axes[2] > 0.0)
     order = seen[np.argsort(view.depth(corners[seen].mean(axis=1)), kind="stable")]
     light = _LIGHT / np.linalg.norm(_LIGHT)
@@ -89,17 +89,10 @@ def shaded_faces(solid: Solid, view: Projection) -> Element:
 
 def visible_edges(solid: Solid, view: Projection) -> Element:
     """Return the visible edges: those between two limits, and the silhouette."""
-    mesh = _mesh(solid)
+    mesh = as_trimesh(solid.vertices, solid.faces)
     facing = mesh.face_normals @ view.axes[2] > 0.0
     one, other = mesh.face_adjacency.T
     differs = solid.limit_of_face[one] != solid.limit_of_face[other]
     drawn = (facing[one] & facing[other] & differs) | (facing[one] != facing[other])
     ends = view.to(solid.vertices[mesh.face_adjacency_edges[drawn]])
     return element("path", d="".join(path_of(edge, "") for edge in ends), class_="edge")
-
-
-def _mesh(solid: Solid) -> Any:
-    import trimesh
-
-    untyped: Any = trimesh
-    return untyped.Trimesh(solid.vertices, solid.faces, process=False)

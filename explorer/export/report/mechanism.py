@@ -17,7 +17,8 @@ from explorer.measures.blocks.block import Facts, Statement
 from explorer.measures.blocks.clearances import pose_clearances, workspace_clearances
 from explorer.measures.verdict import verdict
 from explorer.mechanism.design import JOINTS
-from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import Triple, yaw_pitch_roll_from_rotation
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_SHARE
 from explorer.singularity.ellipsoids import performance, singularity_free_ball
@@ -80,17 +81,22 @@ def _lengths(data: ReportData, name: Cell, value: float) -> Row:
     return name, value, value * data.design.unit_mm
 
 
+def point_rows(data: ReportData, name: str, point: Triple) -> Iterator[Row]:
+    """Yield the rows of a point's coordinates."""
+    for axis, value in zip("xyz", point, strict=True):
+        yield _lengths(data, f"{axis} of {name}", value)
+
+
+def angle_rows(rotation: FloatArray, of: str = "") -> Iterator[Row]:
+    """Yield the rows of yaw, pitch and roll of a rotation (3, 3), and the words that follow."""
+    angles = yaw_pitch_roll_from_rotation(rotation).tolist()
+    for name, angle in zip(("yaw", "pitch", "roll"), angles, strict=True):
+        yield f"{name}{of}", (number(angle), "°"), ""
+
+
 def _pose(data: ReportData) -> Element:
     pose = data.snapshot.pose
-    rows = [
-        _lengths(data, f"{axis} of b4", value)
-        for axis, value in zip("xyz", pose.position, strict=True)
-    ]
-    angles = yaw_pitch_roll_from_rotation(data.rotation).tolist()
-    rows += [
-        (name, (number(angle), "°"), "")
-        for name, angle in zip(("yaw", "pitch", "roll"), angles, strict=True)
-    ]
+    rows = [*point_rows(data, "b4", pose.position), *angle_rows(data.rotation)]
     rows += [
         (f"quaternion {name}", value, "")
         for name, value in zip("wxyz", pose.quaternion, strict=True)

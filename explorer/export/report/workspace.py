@@ -15,11 +15,12 @@ from explorer.export.drawings.markup import Cell, Piece, Row, element, number, p
 from explorer.export.drawings.slices import Slices, legend, slices_through
 from explorer.export.drawings.workspace_drawing import workspace_views
 from explorer.export.report.data import ReportData, compute
+from explorer.export.report.mechanism import angle_rows, point_rows
 from explorer.measures.blocks import forces, precision as blocks
 from explorer.measures.blocks.block import Block
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.machine import Tool
-from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_SHARE
@@ -165,26 +166,16 @@ def loads_section(data: ReportData) -> Iterator[Element]:
 
 def _payload(data: ReportData) -> Element:
     tool, payload = data.design.tool, data.design.payload
-    rows = _point(data, "tool point", tool.position)
+    rows = [*point_rows(data, "the tool point", tool.position)]
     if tool.quaternion != Tool().quaternion:
-        rotation = Pose((0.0, 0.0, 0.0), tool.quaternion).rotation
-        angles = yaw_pitch_roll_from_rotation(rotation).tolist()
-        for name, angle in zip(("yaw", "pitch", "roll"), angles, strict=True):
-            rows.append((f"{name} of the tool", (number(angle), "°"), ""))
+        rows += angle_rows(Pose((0.0, 0.0, 0.0), tool.quaternion).rotation, " of the tool")
     rows.append(("mass of the payload", _amount(payload.mass_kg, "kg"), ""))
     if payload.mass_kg:
-        rows += _point(data, "payload’s centre", payload.centre)
+        rows += point_rows(data, "the payload’s centre", payload.centre)
     rows.append(("force at the tool, any direction", _amount(payload.force_n, "N"), ""))
     rows.append(("gravity, along x, y, z of the base", markup.vector(data.design.gravity), ""))
     caption = "Tool and payload, from b4 in the platform’s axes"
     return markup.table(("", "units", "mm"), rows, "<>>", caption)
-
-
-def _point(data: ReportData, name: str, point: Triple) -> list[Row]:
-    return [
-        (f"{axis} of the {name}", value, value * data.design.unit_mm)
-        for axis, value in zip("xyz", point, strict=True)
-    ]
 
 
 def _limits(data: ReportData) -> Element:

@@ -111,10 +111,6 @@ def nearest_poses(snapshot: Snapshot) -> block.Table:
 
 def conditioning(snapshot: Snapshot) -> block.Facts:
     """Return the measures of the actuator Jacobian J, the mode and the stratum."""
-
-    def ratio(value: float | FloatArray) -> block.Words:
-        return (block.Number(float(value), digits=5, size=1.0, span=1.0),)
-
     worst = int(snapshot.transmissions.argmin())
     determinant = block.Number(snapshot.determinant, " units³", size=snapshot.design.reach**3)
     return block.Facts(
@@ -123,31 +119,31 @@ def conditioning(snapshot: Snapshot) -> block.Facts:
             block.Fact("det J", (determinant,), hint="Determinant of the actuator Jacobian"),
             block.Fact(
                 "1/cond J",
-                ratio(snapshot.inverse_condition),
+                _ratio(snapshot.inverse_condition),
                 hint="Inverse condition number of J, with lengths divided by the reach; 0 is "
                 "singular, 1 is best",
             ),
             block.Fact(
                 "least σ of J",
-                ratio(snapshot.smallest_singular_value),
+                _ratio(snapshot.smallest_singular_value),
                 hint="Smallest singular value of J, with lengths divided by the reach: errors of "
                 "actuators and loads grow at most 1/σ times to those of the platform and of the "
                 "actuators",
             ),
             block.Fact(
                 "manipulability",
-                ratio(snapshot.manipulability),
+                _ratio(snapshot.manipulability),
                 hint="|det J| with lengths divided by the reach (Yoshikawa)",
             ),
             block.Fact(
                 "transmission index",
-                (*ratio(snapshot.transmission_index), f" ({JOINTS[worst]})"),
+                (*_ratio(snapshot.transmission_index), f" ({JOINTS[worst]})"),
                 hint="Output transmission index of the worst actuator, the cosine between its "
                 "force and the motion that it causes; 0 is singular, good above 0.64 to 0.7",
             ),
             block.Fact(
                 "min |δ| / reach",
-                ratio(snapshot.proximity),
+                _ratio(snapshot.proximity),
                 hint=f"Smallest margin over the reach |a3|; {MARGIN_KINDS}",
             ),
             block.Fact("assembly mode", snapshot.mode_words, wide=True),
@@ -237,8 +233,11 @@ def finite_gain(value: float) -> float:
 
 def tool_condition(condition: float) -> block.Facts:
     """Return the inverse condition number of J at the tool."""
-    value = block.Number(condition, digits=5, size=1.0, span=1.0)
-    return block.Facts("At the tool", (block.Fact("1/cond J", (value,)),))
+    return block.Facts("At the tool", (block.Fact("1/cond J", _ratio(condition)),))
+
+
+def _ratio(value: float | FloatArray) -> tuple[block.Number]:
+    return (block.Number(float(value), digits=5, size=1.0, span=1.0),)
 
 
 def ellipsoids(performance: Performance, point: str) -> Iterator[block.Table]:

@@ -51,11 +51,10 @@ def budget_request(state: State) -> tasks.BudgetRequest:
     )
 
 
-def _shown_budget(frame: Frame) -> tasks.BudgetRequest | None:
-    return budget_request(frame.state) if frame.state.view.precision.budget else None
-
-
-BUDGET_FEED = feed_of(tasks.budget_of, _shown_budget)
+BUDGET_FEED = feed_of(
+    tasks.budget_of,
+    lambda frame: budget_request(frame.state) if frame.state.view.precision.budget else None,
+)
 
 
 def _zero_for_none(path: str) -> At:

@@ -204,9 +204,7 @@ class TakePlan(Action):
         if self.journey is not None and self.journey.design != state.design:
             problem = "the design has changed meanwhile; press Go again"
         after = _with(state, planning=None, problem=problem, journey=self.journey)
-        if after.journey is None:
-            return after
-        return move_to(after, after.journey.pose)
+        return after if after.journey is None else move_to(after, after.journey.pose)
 
 
 def _journey(state: State) -> Journey:

@@ -202,15 +202,15 @@ def legend(measure: Measure, warn_below: float, drawing: work.WorkspaceDrawing |
             levels = drawing.levels[:0:-1]
         texts = ("0", *(format_number(factor * level, 3) for level in levels), "∞")
         # The ends of bands, and the infinity of singular planes.
-        edges = [(100.0 * k / len(colours), text) for k, text in enumerate(texts)]
+        marked = dict(enumerate(texts))
     else:
         name = "1 / cond J" if measure == "condition" else "Smallest |δ| (units)"
         colours = band_colours()
         # All bands are drawn equally wide, so the values at their edges are not evenly spaced.
         marked = {k: format_number(BAND_EDGES[k] * warn_below, 2) for k in (0, 2, 4, 6, 9)}
-        edges = [(100.0 * k / len(colours), text) for k, text in marked.items()]
     width = 100.0 / len(colours)
     stops = ",".join(f"{css(band)} 0 {width * k:g}%" for k, band in enumerate(colours, 1))
+    edges = [(100.0 * k / len(colours), text) for k, text in marked.items()]
     marks = ""
     if drawing is not None and drawing.slice_map is not None:
         if any(drawing.request.design.limits.leg_radii):
