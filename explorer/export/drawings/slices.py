@@ -144,7 +144,7 @@ class Slices:
         lows, scale = self.lows[in_plane(axis)], self.own_scale
         outline = slice_outline(self.design, self.rotation, axis, level)
         if outline is not None:
-            return "".join(_loop_data(loop, lows, scale) for loop in outline.loops)
+            return "".join(_loop_data(loop, lows, scale) for loop in outline)
         columns, rows, points = self._grid(axis, level, CELLS)
         slack = slacks(constraints(self.design, self.rotation), points).min(axis=-1)
         loops = level_loops(columns, rows, slack, 0.0)

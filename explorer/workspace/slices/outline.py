@@ -3,7 +3,6 @@
 At one orientation the limits are balls, cylinders along x and half-spaces, so a plane across
 an axis cuts each in a circle, in a pair of lines or in a line. Each of these curves is split
 where it meets the others, and the parts that satisfy all other limits are joined to closed loops.
-Their areas are independent of those in `explorer.workspace.slices.arcs`.
 
 Of a field on a grid, marching squares give the outlines of the parts in which it is at least a
 level.
@@ -19,7 +18,6 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.workspace.faces.faces import find_roots
@@ -46,55 +44,27 @@ class Edge:
         start, end: Ends on the two axes of the slice, in design units.
         centre: Centre of the circle of an arc; None for a straight edge.
         turn: Angle of an arc in radians, positive counter-clockwise; 0 for a straight edge.
-        limit: Name of the limit that bounds the slice here, such as "l1 maximum".
     """
 
     start: Point
     end: Point
     centre: Point | None
     turn: float
-    limit: str
 
     @property
     def radius(self) -> float:
         """The radius of an arc, 0 for a straight edge."""
         return 0.0 if self.centre is None else math.dist(self.centre, self.start)
 
-    @property
-    def area(self) -> float:
-        """The edge's part of the area of the slice by Green's theorem, ½ ∮ (u dv − v du)."""
-        (u0, v0), (u1, v1) = self.start, self.end
-        if self.centre is None:
-            return 0.5 * (u0 * v1 - u1 * v0)
-        u, v = self.centre
-        return 0.5 * (self.radius**2 * self.turn + u * (v1 - v0) - v * (u1 - u0))
 
-
-@dataclass(frozen=True)
-class Outline:
-    """The outline of a slice.
-
-    Attributes:
-        axis: Axis across which the slice is cut: "x", "y" or "z".
-        level: Coordinate of the slice on this axis, in design units.
-        loops: Closed loops of edges; those about holes run clockwise. () for an empty slice.
-    """
-
-    axis: str
-    level: float
-    loops: tuple[tuple[Edge, ...], ...]
-
-    @property
-    def area(self) -> float:
-        """The area of the slice, in squared design units."""
-        return math.fsum(edge.area for loop in self.loops for edge in loop)
+Outline: TypeAlias = tuple[tuple[Edge, ...], ...]
+"""The closed loops of the edges of a slice; those about holes run clockwise. () if it is empty."""
 
 
 @dataclass(frozen=True)
 class _Curve:
     """A circle, or a line n·q = offset with |n| = 1, with the slice on one side of it."""
 
-    limit: str
     # A cylinder has two lines with the same index.
     limit_index: int
     side: float
@@ -115,30 +85,26 @@ def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) 
     if edges cannot be distinguished in double precision. The level is the coordinate on the axis.
 
     Raises:
-        InputError: No such axis, or not a rotation.
+        InputError: Not a rotation.
     """
-    if axis not in AXES or len(axis) != 1:
-        raise InputError(f"a slice is cut across x, y or z; got {axis!r}")
     cut = AXES.index(axis)
     axes = cut, *(other for other in range(3) if other != cut)
     limits = constraints(design, rotation)
     if any(isinstance(limit, Cone) for limit in limits):
         return None
-    empty = Outline(axis, level, ())
     region = region_of(limits)
     if region.box is None:
-        return empty
+        return ()
     size = float(np.abs(region.box).max())
     ends = [end for end in (region.low_limit, region.high_limit) if end is not None]
     curves: list[_Curve] = []
     for index, limit in enumerate([*region.circle_limits, *region.plane_limits, *ends]):
         limit_curves = _curves_of(limit, axes, level, index)
         if limit_curves is None:
-            return empty
+            return ()
         curves += limit_curves
     edges = [edge for curve in curves for edge in _edges_of(curve, curves, size)]
-    loops = _join(edges, CORNER * size)
-    return None if loops is None else replace(empty, loops=loops)
+    return _join(edges, CORNER * size)
 
 
 def _curves_of(
@@ -153,21 +119,21 @@ def _curves_of(
         if length <= SAME * float(np.linalg.norm(limit.normal)):
             return [] if offset >= 0.0 else None
         u, v = (n / length).tolist()
-        return [_Curve(limit.name, limit_index, 1.0, normal=(u, v), offset=offset / length)]
+        return [_Curve(limit_index, 1.0, normal=(u, v), offset=offset / length)]
     side = 1.0 if limit.inside else -1.0
     centre = (float(limit.centre[first]), float(limit.centre[second]))
     if not limit.is_ball and cut == 0:
-        return [_Curve(limit.name, limit_index, side, centre, limit.radius)]
+        return [_Curve(limit_index, side, centre, limit.radius)]
     off = level - float(limit.centre[cut])
     square = (limit.radius - off) * (limit.radius + off)
     if square <= 0.0:
         return None if limit.inside else []
     half = math.sqrt(square)
     if limit.is_ball:
-        return [_Curve(limit.name, limit_index, side, centre, half)]
+        return [_Curve(limit_index, side, centre, half)]
     # A cylinder along x is cut in two lines, on either side of its axis.
     return [
-        _Curve(limit.name, limit_index, side, normal=(0.0, end * side), offset=offset)
+        _Curve(limit_index, side, normal=(0.0, end * side), offset=offset)
         for end, offset in ((1.0, side * (half + centre[1])), (-1.0, side * (half - centre[1])))
     ]
 
@@ -194,7 +160,7 @@ def _edges_of(curve: _Curve, curves: list[_Curve], size: float) -> list[Edge]:
     turns = (high - low).tolist() if curve.is_circle else [0.0] * len(starts)
     centre = curve.centre if curve.is_circle else None
     edges = [
-        Edge((a[0], a[1]), (b[0], b[1]), centre, turn, curve.limit)
+        Edge((a[0], a[1]), (b[0], b[1]), centre, turn)
         for a, b, turn in zip(starts, ends, turns, strict=True)
     ]
     if curve.is_circle and curve.side < 0.0:
@@ -257,7 +223,7 @@ def _find_meetings(curve: _Curve, other: _Curve) -> list[float]:
     return [(other.offset - along * offset) / slope] if abs(slope) > SAME else []
 
 
-def _join(edges: list[Edge], corner: float) -> tuple[tuple[Edge, ...], ...] | None:
+def _join(edges: list[Edge], corner: float) -> Outline | None:
     """Return edges joined to closed loops; None if an end has no start nearby."""
     unjoined, loops = list(edges), list[tuple[Edge, ...]]()
     while unjoined:
