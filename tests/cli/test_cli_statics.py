@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 from command_line import CommandLine
+from machines import PRECISE
 from numpy.testing import assert_allclose
 
 import explorer
@@ -35,15 +36,8 @@ AT = (8.0, -2.5, 11.0), explorer.rotation_from_yaw_pitch_roll((-60.0, 12.5, -7.0
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 LOAD = [1.0, -2.0, 3.0, 4.0, 5.0, -6.0]
 MACHINE = msgspec.structs.replace(
-    OPTIMAL,
-    tool=explorer.Tool(position=(0.5, 0.25, 1.0)),
+    PRECISE,
     payload=explorer.Payload(0.3, (0.0, 0.0, 1.0)),
-    actuators=explorer.Actuators(
-        push_n=(90.0, 80.0, 70.0, 60.0, 50.0, 40.0),
-        error_mm=(0.1, 0.2, 0.1, 0.2, 0.1, 0.1),
-        stiffness_n_mm=(50.0, 60.0, 50.0, 60.0, 50.0, 40.0),
-    ),
-    struts=explorer.Struts(outer_mm=8.0, inner_mm=6.0, stress_mpa=200.0),
     guide=explorer.Guide(force_n=100.0, moment_nm=5.0),
     tolerances=explorer.Tolerances(a3=(0.1, 0.2, 0.0)),
 )

@@ -13,11 +13,7 @@ from mujoco_models import engine, joints_of, loops_of
 from scipy.spatial.transform import Rotation
 
 from explorer import JOINTS, PRESETS, Design, InputError, Pose, evaluate, inverse
-from explorer.export.simulation import (
-    SIMULATION_BODIES,
-    SIMULATION_JOINTS,
-    simulation_mjcf,
-)
+from explorer.export.simulation import SIMULATION_BODIES, SIMULATION_JOINTS, simulation_mjcf
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype

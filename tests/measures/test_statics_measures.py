@@ -7,20 +7,10 @@ import math
 import msgspec
 import numpy as np
 import pytest
+from machines import PRECISE
 from scipy.spatial.transform import Rotation
 
-from explorer import (
-    PRESETS,
-    Actuators,
-    Design,
-    Guide,
-    Payload,
-    Pose,
-    Struts,
-    Tool,
-    deflection,
-    reactions,
-)
+from explorer import PRESETS, Design, Guide, Pose, deflection, reactions
 from explorer.measures.catalogue import CATALOGUE, measure_design, measures_in, reason_for_missing
 from explorer.measures.measure import Case
 from explorer.mechanism.configuration import Configuration
@@ -37,17 +27,6 @@ NAMES = (
     *("largest_bending", "worst_error", "worst_turn", "softest_compliance", "deflection"),
 )
 WITH_GRADIENT = tuple(name for name in NAMES if name not in ("worst_actuator", "largest_payload"))
-MACHINE = msgspec.structs.replace(
-    OPTIMAL,
-    tool=Tool(position=(0.5, 0.25, 1.0)),
-    payload=Payload(0.6, (0.0, 0.5, 1.0)),
-    actuators=Actuators(
-        push_n=(90.0, 80.0, 70.0, 60.0, 50.0, 40.0),
-        error_mm=(0.1, 0.2, 0.1, 0.2, 0.1, 0.1),
-        stiffness_n_mm=(50.0, 60.0, 50.0, 60.0, 50.0, 40.0),
-    ),
-    struts=Struts(outer_mm=8.0, inner_mm=6.0, stress_mpa=200.0),
-)
 
 
 def values(
@@ -58,25 +37,25 @@ def values(
 
 
 def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
-    found = {name: value or math.nan for name, value in values(MACHINE).items()}
+    found = {name: value or math.nan for name, value in values(PRECISE).items()}
     assert tuple(found) == NAMES
     units = [CATALOGUE[name].unit_in("mm") for name in NAMES]
     assert units == ["", "", "kg", "N m", "mm", "°", "mm/N", "mm"]
-    rotation = MACHINE.home_pose.rotation
+    rotation = PRECISE.home_pose.rotation
     positions = np.random.default_rng(1).uniform(*BOX, (1000, 3))
-    given = MACHINE, positions, rotation
-    held = reactions(Configuration(*given), np.zeros(6), design_weights(MACHINE))
-    shares = limit_shares(MACHINE, held)
-    poses = Configuration(*given, MACHINE.tool.position)
-    soft = compliance_of(poses, *stiffness_of(MACHINE))
-    worst = worst_errors(poses, actuator_errors(MACHINE))
-    bent = deflection(soft, payload_wrench(MACHINE, rotation))
+    given = PRECISE, positions, rotation
+    held = reactions(Configuration(*given), np.zeros(6), design_weights(PRECISE))
+    shares = limit_shares(PRECISE, held)
+    poses = Configuration(*given, PRECISE.tool.position)
+    soft = compliance_of(poses, *stiffness_of(PRECISE))
+    worst = worst_errors(poses, actuator_errors(PRECISE))
+    bent = deflection(soft, payload_wrench(PRECISE, rotation))
     sampled = {
         "load_share": shares.max(),
-        "largest_bending": held.bending.max() * 1e-3 * MACHINE.unit_mm,
+        "largest_bending": held.bending.max() * 1e-3 * PRECISE.unit_mm,
         "worst_error": worst.displacement.max(),
         "softest_compliance": np.linalg.norm(soft[:, :3, :3], 2, axis=(1, 2)).max()
-        * MACHINE.unit_mm,
+        * PRECISE.unit_mm,
         "worst_turn": np.degrees(worst.turn.max()),
         "deflection": np.linalg.norm(bent[:, :3], axis=1).max(),
     }
@@ -90,14 +69,14 @@ def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
 
 def test_measures_of_statics_need_a_box_and_the_parts_of_a_machine() -> None:
     assert values(OPTIMAL) == {}
-    assert values(MACHINE, None) == {}
+    assert values(PRECISE, None) == {}
     parts = {
         "payload": ["largest_bending"],
         "struts": ["largest_payload", "softest_compliance"],
         "actuators": ["largest_payload", "worst_error", "worst_turn", "softest_compliance"],
     }
     for part, names in parts.items():
-        design = msgspec.structs.replace(OPTIMAL, **{part: getattr(MACHINE, part)})
+        design = msgspec.structs.replace(OPTIMAL, **{part: getattr(PRECISE, part)})
         assert list(values(design)) == names
     guided = msgspec.structs.replace(OPTIMAL, guide=Guide(force_n=10.0))
     assert list(values(guided)) == ["largest_payload"]
@@ -105,10 +84,10 @@ def test_measures_of_statics_need_a_box_and_the_parts_of_a_machine() -> None:
 
 def test_measures_of_statics_in_a_singular_box_are_none_with_a_reason() -> None:
     box = ((9.0, 4.0, -1.0), (11.0, 6.0, 10.0))
-    found = values(MACHINE, box)
+    found = values(PRECISE, box)
     assert found.pop("largest_payload") == 0.0
     assert set(found.values()) == {None}
-    case = Case(MACHINE, box=box)
+    case = Case(PRECISE, box=box)
     measured = measure_design(case, NAMES)
     assert "the required box has singular positions" in reason_for_missing(case, measured)
     for name in WITH_GRADIENT:
@@ -119,10 +98,10 @@ def test_measures_of_statics_in_a_singular_box_are_none_with_a_reason() -> None:
 
 def test_measures_of_statics_are_of_the_given_orientation() -> None:
     pose = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-60.0, 5.0, 2.0))
-    turned = msgspec.structs.replace(MACHINE, home=pose)
-    one = measure_design(Case(MACHINE, box=BOX, pose=pose), NAMES).values
+    turned = msgspec.structs.replace(PRECISE, home=pose)
+    one = measure_design(Case(PRECISE, box=BOX, pose=pose), NAMES).values
     assert one == measure_design(Case(turned, box=BOX), NAMES).values
-    assert one != measure_design(Case(MACHINE, box=BOX), NAMES).values
+    assert one != measure_design(Case(PRECISE, box=BOX), NAMES).values
 
 
 @pytest.mark.parametrize("prefix", ["home_", ""])
@@ -131,8 +110,8 @@ def test_gradients_of_statics_match_central_differences(seed: int, prefix: str) 
     rng = np.random.default_rng(seed)
     force = float(rng.uniform(0.0, 20.0)) if seed % 2 else 0.0
     design = msgspec.structs.replace(
-        MACHINE.with_variables((MACHINE.variables + rng.uniform(-0.5, 0.5, 6)).tolist()),
-        payload=msgspec.structs.replace(MACHINE.payload, force_n=force),
+        PRECISE.with_variables((PRECISE.variables + rng.uniform(-0.5, 0.5, 6)).tolist()),
+        payload=msgspec.structs.replace(PRECISE.payload, force_n=force),
         guide=Guide(moment_nm=float(rng.uniform(1.0, 30.0))),
         gravity=tuple(rng.normal(size=3).tolist()),
     )

@@ -20,11 +20,7 @@ from explorer import (
     rotation_from_yaw_pitch_roll,
     yaw_pitch_roll_from_rotation,
 )
-from explorer.mechanism.pose import (
-    ORTHONORMAL_TOLERANCE,
-    quaternion_from_rotation,
-    rotation_array,
-)
+from explorer.mechanism.pose import ORTHONORMAL_TOLERANCE, quaternion_from_rotation, rotation_array
 from explorer.mechanism.tilt_torsion import (
     rotation_from_tilt_torsion,
     tilt_torsion_from_rotation,

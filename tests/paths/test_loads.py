@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from limited_designs import limited
 from long_cases import long_after
+from machines import six
 from scipy.spatial.transform import Rotation
 from tool_moves import tool_move
 
@@ -30,6 +31,7 @@ from explorer import (
 from explorer.legs.moves import StraightMoves
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import VARIABLES
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
@@ -51,9 +53,8 @@ def random_machine(design: Design, seed: int, strength: float = 1.0) -> Design:
         x, y, z = rng.normal(size=3).tolist()
         return x, y, z
 
-    def six() -> tuple[float, float, float, float, float, float]:
-        a, b, c, d, e, f = (strength * rng.uniform(50.0, 150.0, 6)).tolist()
-        return a, b, c, d, e, f
+    def limits() -> Six:
+        return six(strength * rng.uniform(50.0, 150.0, 6))
 
     return msgspec.structs.replace(
         design,
@@ -61,7 +62,7 @@ def random_machine(design: Design, seed: int, strength: float = 1.0) -> Design:
         tool=Tool(three()),
         payload=Payload(float(rng.uniform(0.0, 5.0)), three(), float(rng.choice([0.0, 10.0]))),
         gravity=three(),
-        actuators=Actuators(six(), six()),
+        actuators=Actuators(limits(), limits()),
         struts=Struts(moment_nm=strength * float(rng.uniform(1.0, 3.0))),
         guide=Guide(
             strength * float(rng.uniform(50.0, 150.0)), strength * float(rng.uniform(1.0, 3.0))

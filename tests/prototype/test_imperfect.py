@@ -37,12 +37,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED
 from explorer.prototype.imperfect import ImperfectMachine
 from explorer.prototype.weights import bar_masses
-from explorer.statics.accuracy import (
-    SOURCES,
-    error_by_source,
-    rms_of_sources,
-    source_errors,
-)
+from explorer.statics.accuracy import SOURCES, error_by_source, rms_of_sources, source_errors
 from explorer.statics.budget import source_costs
 from explorer.statics.compliance import stiffness_of
 from explorer.statics.forces import twists_of_actuators

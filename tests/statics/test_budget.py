@@ -13,13 +13,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 from statics_cases import random_poses
 
-from explorer import (
-    PRESETS,
-    Actuators,
-    Design,
-    NoAnswerError,
-    Tolerances,
-)
+from explorer import PRESETS, Actuators, Design, NoAnswerError, Tolerances
 from explorer.measures.box import positions_over
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.pose import Triple

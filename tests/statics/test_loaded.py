@@ -8,16 +8,7 @@ import pytest
 from machines import FULL, six
 from numpy.testing import assert_allclose
 
-from explorer import (
-    PRESETS,
-    Actuators,
-    Design,
-    Guide,
-    Payload,
-    Struts,
-    Tolerances,
-    Tool,
-)
+from explorer import PRESETS, Actuators, Design, Guide, Payload, Struts, Tolerances, Tool
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Limits
 from explorer.mechanism.pose import Pose

@@ -36,6 +36,19 @@ PRESS = msgspec.structs.replace(
 )
 """That of the manual's page on loads."""
 
+PRECISE = msgspec.structs.replace(
+    OPTIMAL,
+    tool=Tool(position=(0.5, 0.25, 1.0)),
+    payload=Payload(0.6, (0.0, 0.5, 1.0)),
+    actuators=Actuators(
+        push_n=(90.0, 80.0, 70.0, 60.0, 50.0, 40.0),
+        error_mm=(0.1, 0.2, 0.1, 0.2, 0.1, 0.1),
+        stiffness_n_mm=(50.0, 60.0, 50.0, 60.0, 50.0, 40.0),
+    ),
+    struts=Struts(outer_mm=8.0, inner_mm=6.0, stress_mpa=200.0),
+)
+"""Limits, errors and stiffness of the actuators and the struts; a payload without a force."""
+
 FULL = msgspec.structs.replace(
     OPTIMAL,
     tool=Tool((1.0, -1.0, 2.0)),

@@ -2,13 +2,11 @@
 
 Valid files are mutated: bytes flipped and cut, tokens swapped, numbers, types, names, nesting
 and text changed. Each file is opened as on the page, and the only error allowed is an
-`ExplorerError` of one line. The number of a file that fails is printed; `--only NUMBER` tries
-that file alone.
+`ExplorerError` of one line. The number and the contents of a file that fails are printed.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import random
@@ -29,7 +27,6 @@ from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 from explorer.numerics.compiled import warm
 
 SEED = 4_4
-COUNT = 100_000
 
 PLAIN: dict[str, Any] = {"a3": [8, 5], "b1": [3, -2.5], "b2": 2, "b3": 5}
 """The fields that every design file has."""
@@ -212,31 +209,21 @@ MUTATIONS: tuple[Mutation, ...] = (
 )
 
 
-def main() -> int:
+def main(count: int = 100_000, seed: int = SEED) -> None:
     """Try fuzzed files; print the failures and how many files were opened and refused."""
-    parser = argparse.ArgumentParser(prog="python tests/tools/fuzz.py", description=__doc__)
-    parser.add_argument("count", nargs="?", type=int, default=COUNT)
-    parser.add_argument("seed", nargs="?", type=int, default=SEED)
-    parser.add_argument("--only", type=int, help="number of the only file to try")
-    options = parser.parse_args()
-    if options.only is not None:
-        data = fuzzed(options.only, options.seed)
-        print(data[:2000])
-        print("refused" if attempt(data) is None else "opened")
-        return 0
     warm()
     outcomes: Counter[str] = Counter()
-    for number in range(options.count):
+    for number in range(count):
+        data = fuzzed(number, seed)
         try:
-            outcome = "refused" if attempt(fuzzed(number, options.seed)) is None else "opened"
+            outcome = "refused" if attempt(data) is None else "opened"
         except Exception as error:  # noqa: BLE001 - every other error is a failure to report
-            outcome = f"failed: {type(error).__name__}: {error}"[:100]
-            print(f"{number}: {outcome}")
+            outcome = "failed"
+            print(f"{number}: {type(error).__name__}: {error}: {data[:2000]!r}")
         outcomes[outcome] += 1
-    for outcome, count in outcomes.most_common():
-        print(f"{count:8}  {outcome}")
-    return int(any(outcome.startswith("failed") for outcome in outcomes))
+    print(*(f"{count:8}  {outcome}" for outcome, count in outcomes.most_common()), sep="\n")
+    sys.exit(bool(outcomes["failed"]))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main(*map(int, sys.argv[1:]))
