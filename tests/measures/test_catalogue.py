@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case, scaled_design, troubled_case
-from machines import same_for_all
+from machines import PRECISE, same_for_all
 
 from explorer import Actuators, Payload, Struts
 from explorer.legs.clearance import PAIRS, leg_clearances
@@ -39,13 +39,17 @@ def compared(design: Design) -> Measurements:
 
 def test_measures_at_a_pose_are_of_its_orientation() -> None:
     pose = Pose.of_yaw_pitch_roll((9.0, 4.0, 8.0), (-60.0, 5.0, 2.0))
-    names = [*measures_in("compare"), "worst_margin", "accessible_volume"]
-    turned = msgspec.structs.replace(OPTIMAL, home=pose)
+    box = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
+    statics = ("load_share", "largest_payload", "worst_error", "deflection")
+    names = [*measures_in("compare"), "worst_margin", "accessible_volume", *statics]
+    turned = msgspec.structs.replace(PRECISE, home=pose)
     assert turned.home_pose == pose
-    at_pose = measure_design(Case(OPTIMAL, pose=pose), names)
-    assert at_pose["volume"] == workspace_volume(OPTIMAL, pose.rotation).volume
-    own = measure_design(Case(turned), [name for name in names if name != "accessible_volume"])
+    at_pose = measure_design(Case(PRECISE, pose=pose, box=box), names)
+    assert at_pose["volume"] == workspace_volume(PRECISE, pose.rotation).volume
+    own = measure_design(Case(turned, box=box), [n for n in names if n != "accessible_volume"])
     assert own.values == {name: at_pose[name] for name in own.values}
+    at_home = measure_design(Case(PRECISE, box=box), statics)
+    assert all(at_home[name] != at_pose[name] for name in statics)
 
 
 def test_extremes_of_separate_parts_are_those_of_each_part() -> None:

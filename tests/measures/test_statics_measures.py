@@ -96,14 +96,6 @@ def test_measures_of_statics_in_a_singular_box_are_none_with_a_reason() -> None:
         assert gradient(case) == {}
 
 
-def test_measures_of_statics_are_of_the_given_orientation() -> None:
-    pose = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-60.0, 5.0, 2.0))
-    turned = msgspec.structs.replace(PRECISE, home=pose)
-    one = measure_design(Case(PRECISE, box=BOX, pose=pose), NAMES).values
-    assert one == measure_design(Case(turned, box=BOX), NAMES).values
-    assert one != measure_design(Case(PRECISE, box=BOX), NAMES).values
-
-
 @pytest.mark.parametrize("prefix", ["home_", ""])
 @pytest.mark.parametrize("seed", range(2))
 def test_gradients_of_statics_match_central_differences(seed: int, prefix: str) -> None:
