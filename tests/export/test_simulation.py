@@ -1,4 +1,4 @@
-"""The simulation model, judged by MuJoCo: loops, bodies, limits, masses."""
+"""The simulation model, judged by MuJoCo: loops, servos, singularities."""
 
 from __future__ import annotations
 
@@ -9,15 +9,21 @@ import msgspec
 import numpy as np
 import pytest
 from limited_designs import limited
-from mujoco_models import engine, joints_of, loops_of
+from mujoco_models import at_home, engine, joints_of, loops_of
 from scipy.spatial.transform import Rotation
+from strategies import WAYS
 
-from explorer import JOINTS, PRESETS, Design, InputError, Pose, evaluate, inverse
-from explorer.export.simulation import SIMULATION_BODIES, SIMULATION_JOINTS, simulation_mjcf
+from explorer import JOINTS, PRESETS, Design, InputError, Pose, evaluate, forward, inverse, margins
+from explorer.export.simulation import (
+    SIMULATION_BODIES,
+    SIMULATION_JOINTS,
+    simulation_mjcf,
+)
 from explorer.mechanism.design import Swing
+from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
-from explorer.prototype.chains import ACTUATED, Chains
+from explorer.prototype.chains import ACTUATED, CHAIN_JOINTS, Chains
 from explorer.prototype.weights import ball, bar, mesh_mass, total_mass
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -122,6 +128,88 @@ def test_model_bodies_lie_where_the_chains_put_them(design: Design) -> None:
         np.testing.assert_allclose(origins, metres * places.origin[index], atol=atol)
         turns = np.array([body.xmat for body in bodies]).reshape(-1, 3, 3)
         np.testing.assert_allclose(turns, places.rotation[index], atol=1e-12)
+
+
+def locked_jacobian(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return the loops' Jacobian with the actuated joints locked, made homogeneous, (15, 15)."""
+    model = model_of(design)
+    data = engine.MjData(model)
+    set_pose(design, data, position, rotation)
+    engine.mj_forward(model, data)
+    _, loops = loops_of(model, data)
+    locks = np.eye(model.nv)[list(ACTUATED)]
+    # Rates of slides are lengths over time, the others angles.
+    is_length = np.append(np.isin(CHAIN_JOINTS, JOINTS), [False] * 3)
+    size = design.reach * design.unit_mm * 1e-3
+    columns = np.where(is_length, size, 1.0)
+    return np.vstack([loops / size, locks / size]) * columns
+
+
+def singular_pose(
+    design: Design, way: tuple[int, ...], rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Return a random pose at which the margins of a way vanish."""
+    rotation = Rotation.random(random_state=rng).as_matrix()
+    normals = {
+        1: rotation[:, 2],
+        2: np.array([0.0, -rotation[2, 0], rotation[1, 0]]),
+        3: np.array([0.0, 0.0, 1.0]),
+    }
+    rows = np.array([normals[each] for each in way])
+    position = rng.uniform(-1.0, 1.0, 3) * design.reach
+    return position - np.linalg.pinv(rows) @ (rows @ position), rotation
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_locked_model_moves_at_singular_poses_alone(design: Design) -> None:
+    rng = np.random.default_rng(7)
+    for way in (way for way in WAYS if len(way) < 3):
+        for _ in range(2):
+            position, rotation = singular_pose(design, way, rng)
+            values = np.linalg.svd(locked_jacobian(design, position, rotation), compute_uv=False)
+            assert values[-1] < 1e-12 * values[0]
+    positions, rotations = random_poses(design, 10, seed=11)
+    for position, rotation in zip(positions, rotations, strict=True):
+        share = margins(position, rotation) / design.reach
+        locked = locked_jacobian(design, position, rotation)
+        values = np.linalg.svd(locked, compute_uv=False)
+        assert values[-1] > 1e-6 * np.abs(share).min() * values[0]
+
+
+def test_model_servos_reach_the_pose_of_forward_kinematics() -> None:
+    design = OPTIMAL
+    model = model_of(design)
+    data = at_home(model)
+    home = design.home_pose
+    mode = int(mode_of(margins(home.position, home.rotation)))
+    metres = design.unit_mm * 1e-3
+    turn = Rotation.from_euler("ZYX", [8.0, -5.0, 6.0], degrees=True).as_matrix()
+    start = inverse(design, home.position, home.rotation)
+    shift = 0.08 * design.reach * np.array([1.0, -0.5, 0.7])
+    end = inverse(design, home.position + shift, home.rotation @ turn)
+    steps = 1000
+    for step in range(steps):
+        share = min(1.0, 1.5 * step / steps)
+        smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        command = start + smooth * (end - start)
+        data.ctrl[:] = metres * command
+        engine.mj_step(model, data)
+        if step % 100 == 99:
+            found = forward(design, command)
+            assert bool(found.feasible)
+            off = np.linalg.norm(data.body("platform").xpos / metres - found.position[mode])
+            assert off < 2e-2 * design.reach
+    # At rest nothing is left but what the weight and the soft constraints give.
+    reached = data.qpos[list(ACTUATED)] / metres
+    np.testing.assert_allclose(reached, end, atol=1e-3 * design.reach)
+    found = forward(design, reached)
+    platform = data.body("platform")
+    off = np.linalg.norm(platform.xpos / metres - found.position[mode])
+    assert off < 1e-4 * design.reach
+    relative = platform.xmat.reshape(3, 3).T @ found.rotation[mode]
+    assert Rotation.from_matrix(relative).magnitude() < 1e-4
+    moved = np.linalg.norm(platform.xpos / metres - home.position)
+    assert moved > 0.9 * np.linalg.norm(shift)
 
 
 def test_model_limits_become_ranges_in_metres() -> None:

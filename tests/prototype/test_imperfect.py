@@ -37,7 +37,12 @@ from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED
 from explorer.prototype.imperfect import ImperfectMachine
 from explorer.prototype.weights import bar_masses
-from explorer.statics.accuracy import SOURCES, error_by_source, rms_of_sources, source_errors
+from explorer.statics.accuracy import (
+    SOURCES,
+    error_by_source,
+    rms_of_sources,
+    source_errors,
+)
 from explorer.statics.budget import source_costs
 from explorer.statics.compliance import stiffness_of
 from explorer.statics.forces import twists_of_actuators
@@ -293,6 +298,21 @@ def difference(
     halves = (slice(3), slice(3, 6))
     sizes = [np.linalg.norm(off[h]) / np.linalg.norm(share * expected[h]) for h in halves]
     return float(max(sizes))
+
+
+def test_deflection_is_that_of_a_model_with_springs() -> None:
+    model, data = springs_of(SPRINGS)
+    positions, rotations = random_poses(SPRINGS, 12, seed=4)
+    rng = np.random.default_rng(1)
+    stiffness = np.array(STIFFNESS) * SPRINGS.unit_mm
+    most = 0.0
+    for position, rotation in zip(positions, rotations, strict=True):
+        softness = compliance(SPRINGS, position, rotation, stiffness, tool=TOOL)
+        load = rng.normal(size=6) * [1.0, 1.0, 1.0, 10.0, 10.0, 10.0]
+        pose = Pose.of(position, rotation)
+        most = max(most, difference(SPRINGS, model, data, pose, softness, load))
+    # The ball joints of the model give way a little.
+    assert most < 1e-3
 
 
 @pytest.mark.parametrize("actuators", [SPRINGS.actuators, Actuators()])

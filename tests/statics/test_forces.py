@@ -1,4 +1,4 @@
-"""Forces of actuators and struts: the reference, virtual work, laws of statics, limits."""
+"""Forces of actuators and struts: the reference, virtual work, laws of statics, derivatives."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from explorer import (
     InputError,
     Payload,
     Struts,
+    Tool,
     actuator_forces,
     inverse,
     jacobian,
@@ -36,6 +37,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 from explorer.statics.forces import twists_of_actuators, worst_direction
 from explorer.statics.reactions import limit_shares
+from explorer.statics.slopes import PARAMETERS, twist_slopes
 from explorer.statics.weights import Weights, carry
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -266,3 +268,44 @@ def test_forces_of_unusable_arguments_are_refused() -> None:
     assert "broadcast" in refusal(
         actuator_forces, OPTIMAL, positions, rotations, loads, kind=InputError
     )
+
+
+STEP = 1e-5
+
+
+def random_case(seed: int) -> tuple[Design, FloatArray, FloatArray]:
+    """Return a random design with a tool, positions and a rotation."""
+    random = np.random.default_rng(seed)
+    a3 = tuple(random.uniform(6.0, 14.0, 2).tolist())
+    b1 = tuple((random.choice((-1.0, 1.0), 2) * random.uniform(2.0, 5.0, 2)).tolist())
+    b2, gap = random.uniform(-2.0, 2.0), random.uniform(1.0, 4.0)
+    design = Design(a3=a3, b1=b1, b2=b2, b3=b2 + gap)
+    tool = Tool(tuple(random.normal(size=3).tolist()))
+    rotation = Rotation.from_euler("zyx", random.uniform(-1.2, 1.2, 3)).as_matrix()
+    positions = random.uniform((2.0, 2.0, 5.0), (12.0, 8.0, 12.0), (8, 3))
+    return msgspec.structs.replace(design, tool=tool), positions, rotation
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_slopes_match_central_differences(seed: int) -> None:
+    design, positions, rotation = random_case(seed)
+    slopes = twist_slopes(design, positions, rotation)
+
+    def moved(index: int, step: float) -> tuple[FloatArray, FloatArray]:
+        variables, at, r = list(design.variables), positions.copy(), rotation
+        if index < len(variables):
+            variables[index] += step
+        elif PARAMETERS[index] == "yaw":
+            r = Rotation.from_rotvec([0.0, 0.0, step]).as_matrix() @ rotation
+        else:
+            at[:, "xyz".index(PARAMETERS[index])] += step
+        changed = design.with_variables(variables)
+        twists = twists_of_actuators(Configuration(changed, at, r, design.tool.position))
+        return twists, inverse(changed, at, r)[:, [2, 4]]
+
+    for index in range(len(PARAMETERS)):
+        ahead, behind = moved(index, STEP), moved(index, -STEP)
+        twists, struts = ((a - b) / (2.0 * STEP) for a, b in zip(ahead, behind, strict=True))
+        size = np.abs(slopes.twists).max() ** 2 + 1.0
+        assert_allclose(slopes.by[:, index], twists, rtol=1e-6, atol=1e-7 * size)
+        assert_allclose(slopes.struts_by[:, index], struts, rtol=1e-6, atol=1e-8)
