@@ -243,14 +243,14 @@ def test_map_has_the_exact_outline_of_the_slice(axis: Axis) -> None:
     outline = slice_outline(OPTIMAL, rotation, axis, drawn.level)
     assert outline is not None
     (data,) = re.findall(r'<path d="([^"]*)" class="edge"', drawn.markup)
-    assert data.count("A") >= sum(e.centre is not None for loop in outline.loops for e in loop)
+    assert data.count("A") >= sum(e.centre is not None for loop in outline for e in loop)
     corners = np.array(
         [
             [float(x) for x in each.split(",")]
             for each in re.findall(r"(-?[\d.]+,-?[\d.]+)(?=[MLAZ])", data)
         ]
     )
-    expected = np.array([edge.end for loop in outline.loops for edge in loop])
+    expected = np.array([edge.end for loop in outline for edge in loop])
     places = corners / drawn.own_scale + np.array(drawn.lows)
     for point in expected:
         assert np.linalg.norm(places - point, axis=1).min() < 2e-3

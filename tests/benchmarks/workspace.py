@@ -10,6 +10,7 @@ import importlib
 import time
 from collections.abc import Iterator
 from typing import Any
+from unittest.mock import patch
 
 import msgspec
 import numpy as np
@@ -140,7 +141,8 @@ def _through_trimesh(exact: float) -> tuple[float, int, float]:
 
 
 def _held_region() -> Row:
-    true = carried_region(LOADED, nodes=FINE).held_volume
+    with patch("explorer.workspace.carried_region.NODES", FINE):
+        true = carried_region(LOADED).held_volume
     ours = best_of(5, lambda: carried_region(LOADED))
     error = abs(carried_region(LOADED).held_volume / true - 1.0)
     count, theirs, their_error = _marching_cubes(true)

@@ -32,13 +32,11 @@ class Division(NamedTuple):
             The i-th of them gets the vertex n + i, where n is the number of vertices so far.
         faces: Faces after the division, shape (m, 3).
         is_high: Whether each of these faces is above the level, shape (m,).
-        origin: Face that each of them is a part of, shape (m,).
     """
 
     ends: IntArray
     faces: IntArray
     is_high: BoolArray
-    origin: IntArray
 
 
 def divide(faces: IntArray, high: BoolArray) -> Division:
@@ -60,7 +58,6 @@ def divide(faces: IntArray, high: BoolArray) -> Division:
         np.stack(np.divmod(keys, count), axis=1),
         np.concatenate([faces[whole], *(np.stack(part, axis=1) for part in parts)]),
         np.concatenate([number[whole] == 3, lone_is_high, ~lone_is_high, ~lone_is_high]),
-        np.concatenate([whole, mixed, mixed, mixed]),
     )
 
 
