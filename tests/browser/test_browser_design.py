@@ -111,7 +111,7 @@ def test_end_that_is_typed_is_a_limit_and_is_disabled_where_nothing_is_bounded(
 ) -> None:
     type_end(limits, "l1", 1, "11")
     limits.wait_for(lambda: limits.state.design.limits.l1 == (0.0, 11.0), "the maximum")
-    expect(limits.page.get_by_text("Outside the limits")).to_be_visible()
+    expect(limits.page.get_by_text("1 broken")).to_be_visible()
     # The others are the reach still, and so is that of a leg whose minimum alone changes.
     type_end(limits, "d2", 0, "2.5")
     limits.wait_for(lambda: limits.state.design.limits.d2 == (2.5, None), "the minimum")

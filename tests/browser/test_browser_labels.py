@@ -23,6 +23,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.view import PrototypeView, View
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
+from explorer.workspace.accessible.radii import with_radius
 
 SIZE = (1280, 720)
 ON_AXES: tuple[ViewName, ...] = ("front", "side", "top")
@@ -142,9 +143,11 @@ def test_label_behind_a_body_is_pale_but_not_that_of_a_gap(wide: Tab) -> None:
     finally:
         board.remove()
     wait_for_hidden(wide, {a1}, hidden=False)
-    # Where δ3 vanishes b4, with the contact at the same place, is behind the platform.
+    # Where δ3 vanishes b4, with the contact at the same place, is behind a leg that has a radius.
     show(wide, View())
-    wide.running.page.session.do(GoToSingularity(3))
+    session = wide.running.page.session
+    session.do(Set("design", with_radius(wide.state.design, 0.4)))
+    session.do(GoToSingularity(3))
     assert not wait_for_hidden(wide, {b4}, hidden=True)[gap]["isHidden"]
 
 

@@ -43,7 +43,9 @@ window.explorer.names ??= (() => {
     }
   };
   const nameTab = () => {
-    const names = ["[data-document]", ".ex-product > b"].map((each) => document.querySelector(each));
+    const names = ["[data-document]", ".ex-product > b"].map((each) =>
+      document.querySelector(each),
+    );
     if (names[0]) document.title = names.map((each) => each.textContent).join(" – ");
   };
   let isDue = false;

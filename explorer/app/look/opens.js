@@ -67,7 +67,9 @@ window.explorer.opens ??= (() => {
     "keydown",
     ({ key, target }) => {
       // The palette may lie over a dialog, and is closed first; a list in a dialog too.
-      const isOver = target.closest?.(".mantine-Spotlight-content, [aria-expanded=true]");
+      const isOver = target.closest?.(
+        ".mantine-Spotlight-content, [aria-haspopup][aria-expanded=true]",
+      );
       if (key !== "Escape" || isOver) return;
       if (document.querySelector(OPEN)) closeDialogs();
       // In a field it discards what is typed.
