@@ -176,10 +176,18 @@ class DesignChange:
         old, words = self.before, self._session.history.step.words
         if old is None:
             return ""
+        state = frame.state
+        ratio = state.view.unit_for(old.state.design).factor / state.unit.factor
+
+        def difference(name: str, power: int, before: float | None, now: float | None) -> str:
+            unit = state.unit_of(power)
+            before = None if before is None else before * ratio**power * unit.factor
+            return _difference(name, before, None if now is None else now * unit.factor, unit.name)
+
         lines = [
-            _difference("Volume", _volume(self._then), _volume(self._now), "units³"),
-            _difference("Reach", _reach(old), _reach(frame), "mm"),
-            _difference("Clearance here", _clearance(old), _clearance(frame), "mm"),
+            difference("Volume", 3, _volume(self._then), _volume(self._now)),
+            difference("Reach", 1, old.state.design.reach, frame.state.design.reach),
+            difference("Clearance here", 1, _clearance(old), _clearance(frame)),
         ]
         body = table(lines, head=("", "before", "now", ""))
         return (
@@ -210,14 +218,9 @@ def _difference(name: str, before: float | None, now: float | None, unit: str) -
     return row(f"{name} {dim(unit)}", *texts, words)
 
 
-def _reach(frame: Frame) -> float:
-    design = frame.state.design
-    return design.reach * design.unit_mm
-
-
 def _clearance(frame: Frame) -> float:
     clearances = frame.snapshot.clearances
-    return float(clearances.clearance[int(clearances.closest)]) * frame.state.design.unit_mm
+    return float(clearances.clearance[int(clearances.closest)])
 
 
 class ChangeScene(ScenePart):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from typing import get_args
 
 import viser
 
@@ -24,6 +25,7 @@ from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
 from explorer.app.state.parts import value_at
 from explorer.app.state.state import Hold, State
+from explorer.app.state.view import LengthName
 from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import figure
 from explorer.app.widgets.chips import Chip, Chips, Effect
@@ -77,7 +79,7 @@ class MovePanel:
     def __init__(self, services: Services) -> None:
         gui = services.gui
         self._controls = controls = Controls(gui, services.session)
-        with gui.add_folder("Legs (design units)"):
+        with controls.folder("Leg lengths ({unit})"):
             for joint, (label, hint) in enumerate(JOINT_HINTS.items()):
                 controls.slider(
                     label,
@@ -86,6 +88,7 @@ class MovePanel:
                     partial(ranges.joint_span, joint=joint),
                     tinted=lambda frame, joint=joint: frame.snapshot.intervals[joint],
                     closes_up=True,
+                    power=1,
                 )
             self._message = gui.add_html("")
             self._nearest = controls.button(
@@ -112,6 +115,7 @@ class MovePanel:
                     f"The {name} coordinate of b4 or of the tool point in the base frame.",
                     item(lambda frame: frame.state.position, axis, actions.SetPosition),
                     partial(ranges.position_span, axis=axis),
+                    power=1,
                     visible=_is_by_position,
                 )
             for axis, (name, order, edge) in enumerate(ANGLES):
@@ -138,8 +142,8 @@ class MovePanel:
         is_by_position = _is_by_position(state)
         pose = f"Pose of {state.point}" if is_by_position else "Pose by its folds"
         choices = self._coordinates.html(state) + (self._points.html(state) * is_by_position)
-        yield self._pose, "label", f"{pose} (design units, degrees)"
-        yield self._mode_folder, "label", f"Assembly modes: {state.point} (design units)"
+        yield self._pose, "label", f"{pose} ({state.unit.name}, degrees)"
+        yield self._mode_folder, "label", f"Assembly modes: {state.point} ({state.unit.name})"
         yield self._choices, "content", box(choices)
         yield self._message, "content", message(state)
         yield self._nearest, "disabled", unclosed is None or unclosed.nearest is None
@@ -175,7 +179,7 @@ def _choice(
 def message(state: State) -> str:
     """Return the message on the lengths of the legs as HTML, in a box of constant height."""
     if state.unclosed is not None:
-        text = alert("", str(state.unclosed))
+        text = alert("", state.unclosed.words(state.unit))
     elif state.remark is not None:
         text = remark("", state.remark)
     else:
@@ -211,7 +215,7 @@ class DesignPanel:
                 actions.Reset,
                 icon=viser.Icon.RESTORE,
             )
-        with gui.add_folder("Design variables (design units)"):
+        with controls.folder("Design variables ({unit})"):
             self._sketch = gui.add_html("")
             for index, name in enumerate(VARIABLES):
                 controls.slider(
@@ -222,6 +226,7 @@ class DesignPanel:
                         lambda _, value, name=name: actions.SetVariable(name, value),
                     ),
                     partial(ranges.variable_span, index=index),
+                    power=1,
                 )
             controls.number(
                 "1 unit (mm)",
@@ -230,15 +235,22 @@ class DesignPanel:
                 least=1e-6,
                 step=0.001,
             )
-        with gui.add_folder("Limits (design units)", expand_by_default=False):
+            controls.dropdown(
+                "Lengths in",
+                "Unit in which lengths are shown and typed, here and everywhere on the page.",
+                get_args(LengthName),
+                "view.lengths",
+            )
+        with controls.folder("Limits ({unit})", is_open=False):
             self._add_limits(in_degrees=False)
-        with gui.add_folder("Radii of the legs (design units)", expand_by_default=False):
+        with controls.folder("Radii of the legs ({unit})", is_open=False):
             for leg in range(4):
                 controls.slider(
                     f"leg {leg + 1}",
                     f"Radius of leg {leg + 1}, a capsule about its axis.",
                     f"design.limits.leg_radii.{leg}",
                     ranges.radius_span,
+                    power=1,
                 )
         with gui.add_folder("Swing of the joints (°)", expand_by_default=False):
             self._add_limits(in_degrees=True)
@@ -268,6 +280,7 @@ class DesignPanel:
             entry.hint,
             bound_entry(limit, entry),
             lambda state: limit_span(state.base, entry),
+            power=int(not entry.is_angle),
             disabled=lambda state: limit.switch is not None and limit.value(state.design) is None,
         )
 
@@ -279,7 +292,7 @@ def _preset_name(frame: Frame) -> str:
 
 def limits_figure(frame: Frame) -> str:
     """Return how many limits the pose breaks, as HTML."""
-    broken = [str(each) for each in frame.snapshot.violations]
+    broken = [each.words(frame.state.unit) for each in frame.snapshot.violations]
     if broken:
         words, look, hint = f"{len(broken)} broken", "ex-beyond", "; ".join(broken)
         hint = f"Outside the limits: {hint}."
@@ -319,5 +332,5 @@ MECHANISM = Feature(
         "Pose › Home pose": (Key("H"),),
         "Pose › Use the nearest length": (Key("U"),),
     },
-    lists=("Preset", "On a change"),
+    lists=("Preset", "On a change", "Lengths in"),
 )

@@ -69,6 +69,7 @@ def add_fold_sliders(controls: Controls) -> None:
             HINTS[index],
             item(lambda frame: frame.folds, index, SetFold),
             partial(fold_span, index=index),
+            power=int(index == 0),
             visible=lambda state: state.view.coordinates == "folds",
             coloured=lambda frame, span, index=index: colour_stops(frame, index, span),
         )
@@ -89,7 +90,7 @@ def colour_stops(frame: Frame, index: int, span: Span) -> str:
     r, *angles = frame.folds
     factors = (r, *(abs(math.sin(math.radians(angle))) for angle in angles))
     # The largest value of a margin along the track: that where its own factor is r's end, or 1.
-    largest = span.high if index == 0 else 1.0
+    largest = frame.state.unit.read(span.high) if index == 0 else 1.0
     peak = min(
         largest * math.prod(factors[each] for each in margin if each != index)
         for margin in FACTORS

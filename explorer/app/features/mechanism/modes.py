@@ -21,7 +21,7 @@ from explorer.app.widgets.palette import Key
 from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_fitted
+from explorer.numerics.number_text import Unit, format_fitted
 from explorer.workspace.limits.valid_poses import Violation
 
 MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
@@ -87,11 +87,12 @@ def _row(frame: Frame, mode: int) -> str:
     place, limits, hint = '<span class="ex-dim is-wide">does not close</span>', "", ""
     if solution.feasible:
         there = solution.position[mode] + frame.state.offset(solution.rotation[mode])
-        texts = (format_fitted(value, reach, 3) for value in there.tolist())
+        unit = frame.state.unit.factor
+        texts = (format_fitted(unit * value, unit * reach, 3) for value in there.tolist())
         place = "".join(f"<span>{text}</span>" for text in texts)
         # The modes of a singular pose are all singular, so that none of them looks safe.
         look = "" if frame.snapshot.is_singular else "ex-within"
-        limits, hint = _limits(frame.snapshot.mode_violations[mode], look)
+        limits, hint = _limits(frame.snapshot.mode_violations[mode], look, frame.state.unit)
     name = f"Mode {mode}, {mode_name(mode)}"
     return press_button(
         GO,
@@ -106,14 +107,14 @@ def _row(frame: Frame, mode: int) -> str:
     )
 
 
-def _limits(broken: tuple[Violation, ...], look: str) -> tuple[str, str]:
+def _limits(broken: tuple[Violation, ...], look: str, unit: Unit) -> tuple[str, str]:
     """Return the cell and the sentence on limits that are broken; `look` if none is."""
     if not broken:
         return f'<span class="{look}">within</span>', "It is within all limits."
     first = broken[0].limit
     words = SHORT.get(first, first.removeprefix("margin ").removeprefix("swing "))
     more = f" +{len(broken) - 1}" if len(broken) > 1 else ""
-    sentences = "; ".join(map(str, broken))
+    sentences = "; ".join(each.words(unit) for each in broken)
     return f'<span class="ex-beyond">{escape(words)}{more}</span>', f"{sentences}."
 
 
