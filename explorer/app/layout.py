@@ -168,4 +168,6 @@ class Bar:
         parts = [(side, part(frame)) for side, part in self._parts]
         sides = ("".join(html for each, html in parts if each == side) for side in SIDES)
         bar = "".join(f"<div>{side}</div>" for side in sides)
-        yield self._html, "content", f'<div class="ex-bar">{bar}</div>'
+        # With this scripts read lengths that are typed in another unit.
+        unit = f'data-unit-mm="{frame.state.design.unit_mm!r}"'
+        yield self._html, "content", f'<div class="ex-bar" {unit}>{bar}</div>'
