@@ -43,12 +43,14 @@ window.explorer.fields ??= (() => {
   // A sentence below a field on what it takes, until another field has the focus or time is over.
   const explain = (field, unit) => {
     document.querySelector(".ex-refusal")?.remove();
-    const lengths = Number.isFinite(ofUnits(unit)) ? ", 3 mm, 0.3 cm, 1 in or 4 units" : "";
+    const allowed = Number.isFinite(ofUnits(unit))
+      ? `length: type a number in ${unit}, such as 0.3, or one with its unit: 3 mm, 2 cm, 1 in, 4 units`
+      : "number: type one such as 0.3 or 0,3";
     const note = document.createElement("div"),
       { left, bottom } = field.getBoundingClientRect();
     note.className = "ex-refusal";
     note.setAttribute("role", "alert");
-    note.textContent = `“${field.value.slice(0, 20)}” is no ${lengths ? "length" : "number"}: type one such as 0.3 or 0,3${lengths}.`;
+    note.textContent = `“${field.value.slice(0, 20)}” is no ${allowed}.`;
     note.style.setProperty("--left", `${Math.min(left, innerWidth - 270)}px`);
     note.style.setProperty("--top", `${bottom + 4}px`);
     document.body.append(note);

@@ -232,13 +232,16 @@ class ChangeScene(ScenePart):
 
     def updates(self, placed: Placed) -> Updates:
         """Yield the updates that draw the ghost of this frame."""
-        before, now = self._change.before, placed.frame
-        ratio = 1.0 if before is None else _reach(before) / _reach(now)
-        visible = before is not None and 1.0 / MOST_RATIO <= ratio <= MOST_RATIO
-        yield self._lines, "visible", visible
-        if before is not None and visible:
-            scale = placed.scale * before.state.design.unit_mm / now.state.design.unit_mm
-            yield self._lines, "points", (scale * outline(before.snapshot)).astype(np.float32)
+        before, now = self._change.before, placed.frame.state.design
+        is_visible = False
+        if before is not None:
+            old = before.state.design
+            scale = old.unit_mm / now.unit_mm
+            is_visible = 1.0 / MOST_RATIO <= scale * old.reach / now.reach <= MOST_RATIO
+            if is_visible:
+                lines = placed.scale * scale * outline(before.snapshot)
+                yield self._lines, "points", lines.astype(np.float32)
+        yield self._lines, "visible", is_visible
 
 
 HISTORY = Feature(

@@ -247,7 +247,7 @@ def clearance_figure(frame: Frame) -> str:
     words = state.unit.text(clearance, 3, size=state.design.reach)
     pair = pair_name(PAIRS[closest])
     hint = f"Clearance of the closest legs, {pair}: distance of their axes less their radii."
-    if not any(design.limits.leg_radii):
+    if not any(state.design.limits.leg_radii):
         words += f" {dim('axes only')}"
         hint = f"Distance of the axes of the closest legs, {pair}: the design states no radii."
     look = "ex-beyond" if clearance < 0.0 else ""

@@ -81,7 +81,7 @@ class SingularityPanel:
             )
         controls.number(
             "Warn below ({unit})",
-            "Warning length of all margins, to which those of distances, turns and "
+            "Warning length of all margins, to which those of motions, turns and "
             "1/cond J are proportional: what is below is orange.",
             At("view.warn_below", default=lambda state: state.warn_below),
             least=0.0,
@@ -211,7 +211,7 @@ def fold_dial(frame: Frame, index: int) -> str:
 
 
 def distance_figure(frame: Frame) -> str:
-    """Return the distance to the nearest singular pose, and which margin is zero there."""
+    """Return the motion to the nearest singular pose, and which margin is zero there."""
     verdict, unit = frame.verdict, frame.state.unit
     hint, look = f"{verdict.title}: {verdict.reason(unit)}.", f"ex-{blocks.LOOKS[verdict.kind]}"
     name = "Nearest singular pose"
