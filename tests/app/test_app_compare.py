@@ -88,9 +88,8 @@ def columns(
 ) -> tuple[Column, ...]:
     """Return the columns of designs, all measured."""
     name, unit = ("mm", 1.0) if millimetres else ("units", live.unit_mm)
-    size = live.reach * live.unit_mm / unit
     return tuple(
-        Column(number, design, measured(design), Unit(name, design.unit_mm / unit), size)
+        Column(number, design, measured(design), Unit(name, design.unit_mm / unit))
         for number, design in enumerate((live, *pinned))
     )
 
@@ -201,8 +200,10 @@ def test_same_manipulator_in_other_units_has_the_same_values_and_a_note() -> Non
         live, same = (column.value(measure) for column in found)
         expected = None if live is None else pytest.approx(live, rel=1e-6, abs=1e-9)
         assert same == expected, measure.name
-    (note,) = notes(compared(other), found)
-    assert "One unit of the live design is 10 mm; A has 5 mm. Lengths are in units" in note
+    state = compared(other)
+    assert notes(state, found) == []
+    (note,) = notes(Set("view.lengths", "design units").apply(state), found)
+    assert "in units of the live design, of 10 mm" in note
 
 
 def test_bars_are_as_long_as_their_values() -> None:

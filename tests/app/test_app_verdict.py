@@ -47,7 +47,7 @@ def test_verdict_seven_degrees_from_an_incidence_is_near_and_so_is_its_margin() 
     assert np.abs(frame.snapshot.margins).min() > frame.state.warn_below
     text = summary(frame)
     assert "Near a singularity" in text
-    assert "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting" in text
+    assert "2.52 mm of motion to δ2 = 0, lines a1a2 and b2b3 meeting" in text
     colours = re.findall(r'class="ex-swatch" style="--colour:(#\w+)"', distance_table(frame))
     levels = frame.verdict.levels
     assert colours == [css(proximity_colour(level)) for level in levels]

@@ -128,7 +128,7 @@ def study() -> Study:
 
 def test_compare_lists_a_new_measure() -> None:
     measured = measure_design(Case(DESIGN), measures_in("compare"))
-    html = table([Column(0, DESIGN, measured, UNITS, DESIGN.reach)])
+    html = table([Column(0, DESIGN, measured, UNITS)])
     assert f"{NEW.label} " in html
     assert "units²" in html
     assert f"{AREA:.4f}" in html

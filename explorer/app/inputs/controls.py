@@ -142,19 +142,6 @@ def _span_in_unit(span: Span | Callable[[State], Span], power: int) -> Callable[
     return span_of
 
 
-def _parts_in_unit(
-    tinted: Callable[[Frame], Intervals] | None,
-) -> Callable[[Frame], Intervals] | None:
-    if tinted is None:
-        return None
-
-    def parts(frame: Frame) -> Intervals:
-        factor = frame.state.unit.factor
-        return tuple((low * factor, high * factor) for low, high in tinted(frame))
-
-    return parts
-
-
 def _step_in_unit(step: float | Callable[[State], float], power: int) -> Callable[[State], float]:
     return lambda state: unit_step(step(state) if callable(step) else step, state.unit_of(power))
 
@@ -323,13 +310,13 @@ class Controls:
                 CSS gradient; None for grey.
             closes_up: Whether the track shows only the surroundings of its tinted parts.
             power: Exponent of length in the unit of the value, 0 if it is plain: a length or a
-                volume is shown in the unit of the view; range and tinted parts are in design units.
+                volume is shown in the unit of the view; the range is in design units.
             conditions: In which states it is disabled and visible.
         """
         # The stylesheet puts the colours on the track.
         colours = None if coloured is None else (self._gui.add_html(""), coloured)
         if power:
-            span, tinted = _span_in_unit(span, power), _parts_in_unit(tinted)
+            span = _span_in_unit(span, power)
         handle = self._gui.add_slider(label, 0.0, 1.0, 0.01, 0.0, hint=hint, marks=())
         slider = Slider(
             self._session,
@@ -381,7 +368,6 @@ class Controls:
         *,
         least: float,
         step: float | Callable[[State], float],
-        small: bool = False,
         power: int = 0,
         **conditions: Unpack[Conditions],
     ) -> None:
@@ -393,15 +379,13 @@ class Controls:
             at: Source of its value.
             least: Least value.
             step: Step of its buttons, whose decimals are shown.
-            small: Whether values far below a step that is given count, and have their decimals.
             power: Exponent of length, as in `slider`; least value and step are in design units.
             conditions: In which states it is disabled and visible.
         """
         follows = _step_in_unit(step, power) if power else step if callable(step) else None
         fixed = None if callable(step) else step
         handle = self._gui.add_number(label, least, min=least, step=fixed, hint=hint)
-        if small:
-            handle.precision = MOST_DECIMALS
+        handle.precision = MOST_DECIMALS
         bound = self._bound(handle, at, label, power=power)
         self._bind(handle, bound, follows, **conditions)
 
@@ -412,14 +396,12 @@ class Controls:
         at: Source[Triple],
         *,
         step: float,
-        small: bool = False,
         power: int = 0,
         **conditions: Unpack[Conditions],
     ) -> None:
-        """Add three number fields side by side; `small` and `power` as in `number`."""
+        """Add three number fields side by side; `power` as in `number`."""
         handle = self._gui.add_vector3(label, (0.0, 0.0, 0.0), step=step, hint=hint)
-        if small:
-            handle.precision = MOST_DECIMALS
+        handle.precision = MOST_DECIMALS
         bound = self._bound(handle, at, label, power=power)
         self._bind(handle, bound, _step_in_unit(step, power) if power else None, **conditions)
 

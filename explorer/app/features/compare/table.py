@@ -23,6 +23,7 @@ from explorer.singularity.colours import Rgb
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9
 PERCENT = 100.0
+PER_CENT = Unit("%", 1.0)
 # Digits of the largest value of a row, of which four are decimals at most.
 DIGITS, MOST_DECIMALS = 6, 4
 # The measures that begin a group of rows.
@@ -64,7 +65,6 @@ class Column:
         design: The design.
         measured: Values of its measures; None until they are computed.
         unit: Unit of lengths in the comparison, of one name for all columns.
-        size: Reach of the live design in that unit.
         is_current: Whether no newer values are being computed.
         problem: Why something is missing; None if nothing is.
     """
@@ -73,7 +73,6 @@ class Column:
     design: Design
     measured: Measurements | None
     unit: Unit
-    size: float
     is_current: bool = True
     problem: str | None = None
 
@@ -103,15 +102,12 @@ class Column:
 
     def unit_of(self, measure: Measure) -> Unit:
         """Return the unit in which a measure is shown."""
-        if measure.power:
-            return self.unit.raised(measure.power, (self.size / self.unit.factor) ** 3)
-        return Unit("%" if measure.unit == "share" else measure.unit, 1.0)
+        return PER_CENT if measure.unit == "share" else measure.unit_in(self.unit, math.inf)
 
 
 def columns_of(state: State, feeds: Sequence[CompareFeed]) -> tuple[Column, ...]:
     """Return the columns of the live design and of the pinned ones, given the feed of each."""
     columns: list[Column] = []
-    size = state.design.reach * state.unit.factor
     designs = (state.design, *state.compared.pinned)
     for number, (design, feed) in enumerate(zip(designs, feeds, strict=True)):
         if design is not None:
@@ -120,7 +116,7 @@ def columns_of(state: State, feeds: Sequence[CompareFeed]) -> tuple[Column, ...]
             problem = feed.problem or (None if drawing is None else drawing.problem)
             ratio = design.unit_mm / state.design.unit_mm
             unit = Unit(state.unit.name, state.unit.factor * ratio)
-            columns.append(Column(number, design, measured, unit, size, feed.is_current, problem))
+            columns.append(Column(number, design, measured, unit, feed.is_current, problem))
     return tuple(columns)
 
 
@@ -135,16 +131,10 @@ def notes(state: State, columns: tuple[Column, ...]) -> list[str]:
         if column.measured is not None and column.measured.empty_because:
             causes = ", ".join(map(escape, column.measured.empty_because))
             remarks.append(f"{who} has an empty workspace; emptied by: {causes}.")
-    others = [other for other in columns if not math.isclose(other.design.unit_mm, live.unit_mm)]
-    if others:
-        others_units = ", ".join(
-            f"{other.letter} has {number_text.format_number(other.design.unit_mm, 6)} mm"
-            for other in others
-        )
-        unit = "mm" if state.view.lengths == "mm" else "units of the live design"
+    if state.view.lengths != "mm" and len({column.design.unit_mm for column in columns}) > 1:
         remarks.append(
-            f"One unit of the live design is {number_text.format_number(live.unit_mm, 6)} mm; "
-            f"{others_units}. Lengths are in {unit}, and workspaces are drawn to true size."
+            "Lengths are in units of the live design, of "
+            f"{live.millimetres.text(1.0)}, and workspaces are drawn to true size."
         )
     return remarks
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from viser import uplot
 
 from explorer.app.features.feature import Feature, InBar, Services, Tab, show, show_html
 from explorer.app.features.workspace.feeds import workspace_rows, workspace_start
@@ -35,7 +34,7 @@ from explorer.measures.blocks.source import pose_source
 from explorer.mechanism.configuration import Configuration
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import UNITS, Unit, format_number
+from explorer.numerics.number_text import Unit, format_number
 from explorer.singularity.colours import OUTLINE, Rgb
 from explorer.workspace.accessible.radii import RadiusCurve, with_radius
 
@@ -91,7 +90,10 @@ class ClearancePanel:
             self._chart = charts.add_chart(
                 gui,
                 (charts.line("volume", charts.BLUE), *(charts.dots(*mark) for mark in MARKS)),
-                _axes(UNITS, UNITS),
+                (
+                    charts.axis("radius of all four legs", label_size=20, size=28),
+                    charts.axis("accessible volume", label_size=18, size=46),
+                ),
                 height=HEIGHT,
                 padding=(8, 14, 0, 0),
             )
@@ -121,17 +123,8 @@ class ClearancePanel:
             columns = unit.factor * radii, *(cubic.factor * each for each in volumes)
             across = {"time": False, "range": (0.0, float(columns[0][-1]))}
             up = {"range": (0.0, 1.08 * cubic.factor * float(curve.volumes[0]))}
-            yield self._chart, "axes", _axes(unit, cubic)
             yield self._chart, "scales", {"x": across, "y": up}
             yield self._chart, "data", columns
-
-
-def _axes(unit: Unit, cubic: Unit) -> tuple[uplot.Axis, uplot.Axis]:
-    """Return the axes of the chart with their units."""
-    return (
-        charts.axis(f"radius of all four legs ({unit.name})", label_size=20, size=28),
-        charts.axis(f"accessible volume ({cubic.name})", label_size=18, size=46),
-    )
 
 
 def move_table(frame: Frame) -> str:
@@ -199,7 +192,8 @@ def radius_words(frame: Frame, feed: Feed[Selection, RadiusCurve | Trouble]) -> 
         for (name, colour, _), radius in zip(MARKS, radii, strict=True)
     )
     return box(
-        f'<div class="ex-line"><b>Accessible volume</b>{note}</div>',
+        f'<div class="ex-line"><b>Accessible volume ({frame.state.unit_of(3).name}) over the '
+        f"radius ({unit.name})</b>{note}</div>",
         table(rows),
         f'<div class="ex-dim ex-after">{first_collision(curve, design.reach, unit)}</div>',
     )

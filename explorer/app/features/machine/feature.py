@@ -231,7 +231,6 @@ class MachinePanel:
                 f"Tolerance of {name}, along the axes of the {body}.",
                 f"design.tolerances.{name}",
                 step=FINE,
-                small=True,
             )
         for index, axis in enumerate("yz"):
             hint = f"Tolerance of the guide's turn about {axis} through a1."

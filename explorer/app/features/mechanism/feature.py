@@ -19,7 +19,7 @@ from explorer.app.features.mechanism.sketch import sketch
 from explorer.app.inputs import ranges
 from explorer.app.inputs.controls import Bound, Controls, item
 from explorer.app.inputs.limits import bound_entry, bound_switch, limit_span
-from explorer.app.inputs.ranges import Span
+from explorer.app.inputs.ranges import Intervals, Span
 from explorer.app.state import actions
 from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
@@ -86,7 +86,7 @@ class MovePanel:
                     hint,
                     item(lambda frame: frame.state.joints, joint, actions.SetJoint),
                     partial(ranges.joint_span, joint=joint),
-                    tinted=lambda frame, joint=joint: frame.snapshot.intervals[joint],
+                    tinted=partial(closing_values, joint=joint),
                     closes_up=True,
                     power=1,
                 )
@@ -149,6 +149,12 @@ class MovePanel:
         yield self._nearest, "disabled", unclosed is None or unclosed.nearest is None
         yield from self._controls.updates(frame)
         yield from self._modes.updates(frame)
+
+
+def closing_values(frame: Frame, joint: int) -> Intervals:
+    """Return the values of a joint at which the lengths close, in the unit of the view."""
+    unit = frame.state.unit.factor
+    return tuple((unit * low, unit * high) for low, high in frame.snapshot.intervals[joint])
 
 
 def _is_by_position(state: State) -> bool:

@@ -97,7 +97,7 @@ def _reached_text(problem: problems.Problem, iterate: Iterate, state: State) -> 
 def goal_unit(problem: problems.Problem, state: State) -> Unit:
     """Return the unit in which the objective of a problem is shown."""
     goal = CATALOGUE[GOALS[problem.objective]]
-    return state.unit_of(goal.power) if goal.power else Unit(goal.unit_in(""), 1.0)
+    return goal.unit_in(state.unit, state.design.reach**3)
 
 
 def result_words(state: State, built: str = "") -> str:
@@ -208,11 +208,9 @@ def comparison_table(run: SearchRun, view: View) -> str:
     """Return the user's own design and the best one side by side, as HTML."""
     if run.comparison is None:
         return markup.dim("Comparing …")
-    units = [view.unit_for(each.design) for each in run.comparison]
-    size = units[0].factor * run.comparison[0].design.reach
     columns = [
-        Column(number, each.design, each, unit, size)
-        for number, (each, unit) in enumerate(zip(run.comparison, units, strict=True))
+        Column(number, each.design, each, view.unit_for(each.design))
+        for number, each in enumerate(run.comparison)
     ]
     rows = (
         _comparison_row(run.problem, name, columns)

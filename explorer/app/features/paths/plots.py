@@ -77,19 +77,13 @@ class TimeChart:
         time = axis("", label_size=0, size=room)
         if not has_times:
             time["values"] = ()
-        self._axes = (time, *axes)
         self._handle = add_chart(
             gui,
             (*series, line("now", NEUTRAL, width=1.5)),
-            self._axes,
+            (time, *axes),
             height=8 + height + room,
             padding=(8, 0, 0, 0),
         )
-
-    def name(self, vertical: uplot.Axis) -> Updates:
-        """Yield the updates that give the chart another vertical axis."""
-        time, _, levels = self._axes
-        yield self._handle, "axes", (time, vertical, levels)
 
     def show(self, columns: tuple[NDArray[Any], ...], *, is_visible: bool) -> Updates:
         """Yield the updates that make the chart show its columns."""
@@ -209,8 +203,8 @@ def margins_in(unit: Unit) -> Quantity:
     def values(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
         return unit.factor * margins(position, rotation)
 
-    vertical = axis(f"δ ({unit.name})", label_size=18, size=40, space=18)
-    return Quantity("δ{}", vertical, (0.0,), 2, "", values)
+    vertical = axis("margin δ", label_size=18, size=40, space=18)
+    return Quantity("δ{}", vertical, (0.0,), 2, f" {unit.name}", values)
 
 
 FOLDS = Quantity(
@@ -251,7 +245,6 @@ class IncidencePlot:
     def updates(self, frame: Frame) -> Updates:
         """Yield the updates that make the chart and its legend show the frame."""
         journey, quantity = frame.state.journey, self._quantity_in(frame.state.unit)
-        yield from self._chart.name(quantity.vertical)
         yield from self._chart.show(incidence_columns(journey, quantity), is_visible=True)
         words = "" if journey is None else legend(journey.pose, quantity)
         yield from show_html(self._legend, words)
