@@ -341,7 +341,7 @@ def test_accept_keeps_the_result_and_reset_returns_to_the_design_that_was_opened
 ) -> None:
     notice = search_notice(found)
     assert notice is not None
-    assert (notice.title, notice.text) == ("Converged", "volume 8,000 units³")
+    assert (notice.title, notice.text) == ("Converged", "volume 8,000 cm³")
     assert notice.buttons == (ACCEPT, REVERT)
     assert (buttons_of(found)[ACCEPT], buttons_of(found)[REVERT]) == ("filled", "enabled")
     after = Accept().apply(found)

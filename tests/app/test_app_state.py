@@ -170,7 +170,7 @@ def test_held_pose_or_held_legs_stay_while_the_design_changes(state: State, name
 
 
 def test_held_legs_that_cannot_be_assembled_refuse_the_design(state: State) -> None:
-    with pytest.raises(InputError, match=r"a3x = 80 cannot be assembled .* stays 19\.1829"):
+    with pytest.raises(InputError, match=r"a3x = 800 mm cannot be assembled .* stays 191\.829 mm"):
         SetVariable("a3x", 80.0).apply(Set("hold", "legs").apply(state))
 
 

@@ -147,8 +147,8 @@ def test_choice_of_the_point_is_one_step_that_can_be_undone(desk: Desk, services
     assert desk.session.history.step.words == "Position of: tool point"
     labels = {value for _, name, value in panel.updates(Frame(after)) if name == "label"}
     assert labels == {
-        "Pose of the tool (design units, degrees)",
-        "Assembly modes: the tool (design units)",
+        "Pose of the tool (units, degrees)",
+        "Assembly modes: the tool (units)",
     }
 
 
@@ -166,7 +166,7 @@ def test_sliders_show_and_set_the_tool(desk: Desk, services: Services) -> None:
     desk.use(sliders()["y"], 2.5)
     expected = [shown[0], 2.5, shown[2]]
     np.testing.assert_allclose(tool_of(desk.state), expected, atol=1e-12)
-    assert desk.session.history.step.words == "y of the tool = 2.5"
+    assert desk.session.history.step.words == "y of the tool = 2.5 units"
     # A field does not show 2.5 with the rounding of the computation.
     assert sliders()["y"].value == 2.5
     desk.use(sliders()["roll (°)"], 20.0)
@@ -196,7 +196,7 @@ def test_words_and_numbers_are_those_of_the_point() -> None:
     for text in (caption.partition(")")[0], numbers.partition(" ·")[0]):
         shown = [number(part) for part in text.split(", ")]
         np.testing.assert_allclose(shown, tool_of(state), atol=0.06)
-    assert "of the tool in design units" in end_numbers(state, "start")
+    assert "x, y, z of the tool" in end_numbers(state, "start")
 
 
 # The scene

@@ -298,7 +298,7 @@ def test_undo_in_a_field_is_that_of_the_explorer(tab: Tab) -> None:
         tab.page.keyboard.press(undo)
     tab.page.keyboard.press("ControlOrMeta+y")
     tab.wait_for(lambda: tab.state.pose.position[1] == 6.5, "redone")
-    assert words_of_steps(tab)[1:] == ["y = 6.5"]
+    assert words_of_steps(tab)[1:] == ["y = 6.5 units"]
 
 
 def test_name_may_hold_blanks_be_emptied_and_be_saved_right_after_typing(data_tab: Tab) -> None:
