@@ -415,7 +415,7 @@ def test_end_is_the_present_pose_a_mode_or_six_numbers(
     def numbers() -> Pose:
         return ends_of(desk.state)[ENDS.index(end)]
 
-    typed = (f"{title} x, y, z", f"{title} angles (°)")
+    typed = (f"{title} x, y, z (units)", f"{title} angles (°)")
     assert not {*typed} & {*controls()}
     for mode, option in enumerate(MODES):
         desk.use(controls()[title], option)

@@ -179,7 +179,9 @@ def _numbers(drawing: work.WorkspaceDrawing, state: State) -> str:
         ends = np.array(drawing.extent) + state.offset(request.rotation)
         name = "Extent" if state.view.at == "b4" else "Extent of the tool"
         for axis, low, high in zip("xyz", *ends.tolist(), strict=True):
-            text = f"{unit.text(low, size=size)} … {unit.text(high, size=size)}"
+            places = (unit.factor * low, unit.factor * high)
+            texts = (format_number(end, size=unit.factor * size) for end in places)
+            text = f"{' … '.join(texts)} {unit.name}"
             add(f"{name} {axis}", text, "Extent of the workspace")
     if drawing.hull_volume is not None:
         add("Hull volume", cubic.text(drawing.hull_volume, 6), "Volume of the convex hull")
