@@ -14,7 +14,7 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.margins import INCIDENCES, MARGIN_KINDS, TETRAHEDRA
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import Unit, format_number
+from explorer.numerics.number_text import UNITS, Unit, format_number
 from explorer.singularity.ellipsoids import Performance, SingularityFreeBall
 from explorer.singularity.freedoms import FreeTurn
 from explorer.singularity.strata import GENERIC, Stratum, describe_stratum, incidences, inversions
@@ -112,14 +112,15 @@ def nearest_poses(snapshot: Snapshot) -> block.Table:
     )
 
 
-def conditioning(snapshot: Snapshot) -> block.Facts:
+def conditioning(snapshot: Snapshot, unit: Unit = UNITS) -> block.Facts:
     """Return the measures of the actuator Jacobian J, the mode and the stratum."""
 
     def ratio(value: float | FloatArray) -> block.Words:
         return (block.Number(float(value), digits=5, size=1.0, span=1.0),)
 
     worst = int(snapshot.transmissions.argmin())
-    determinant = block.Number(snapshot.determinant, " units³", size=snapshot.design.reach**3)
+    size = snapshot.design.reach**3
+    determinant = block.measured(snapshot.determinant, unit.raised(3, size), size=size)
     return block.Facts(
         "Conditioning",
         (

@@ -137,7 +137,7 @@ def measures_table(frame: Frame) -> str:
         f'<div title="{escape(hint)}"><div class="ex-legend" style="--colours:{stops}"></div>'
         f"{ticks((0.0, '0'), (edge, 'warned below'), (100.0, most))}</div>"
     )
-    return box(legend) + render([blocks.conditioning(frame.snapshot)])
+    return box(legend) + render([blocks.conditioning(frame.snapshot, frame.state.unit)])
 
 
 def performance_table(frame: Frame) -> str:
