@@ -140,7 +140,7 @@ def test_design_file_of_another_editor_opens_and_its_fault_is_reported_with_line
         assert "1 unit = 5 mm" in cli.text("inverse", "--design", file)
         file.write_bytes(text.replace("unit_mm", "unitmm").encode(encoding))
         assert cli.refusal("inverse", "--design", file) == (
-            f"explorer: {file}: line 6: unknown field `unitmm`; did you mean `unit_mm`?"
+            f"explorer: {file}: line 6: unitmm is unknown, did you mean unit_mm?"
         )
 
 
