@@ -97,6 +97,10 @@ class StubDownloads(Downloads):
         self.sent.append((who, doing))
 
 
+def _paint_nothing(*_: object) -> None:
+    """Leave a node without colours of a theme."""
+
+
 def services_for(
     server: viser.ViserServer | None = None,
     session: Session | None = None,
@@ -124,7 +128,7 @@ def services_for(
     some_server: Any = server
     some_session: Any = SimpleNamespace(redraw=redraw) if session is None else session
     missing: Any = None
-    no_theme: Any = SimpleNamespace(paint=lambda *_: None)
+    no_theme: Any = SimpleNamespace(paint=_paint_nothing)
     return Services(
         server=some_server,
         session=some_session,
