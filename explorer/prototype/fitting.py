@@ -136,7 +136,7 @@ class Buildability:
         )
 
     @property
-    def limited(self) -> Design | None:
+    def within_strokes(self) -> Design | None:
         """The design with the strokes of its short legs as their limits; None if none is short."""
         design, limits = self.sizes.design, dict[str, Stroke]()
         for leg in self.short_legs:

@@ -427,11 +427,11 @@ def test_offer_is_the_least_unit_at_which_any_open_radius_fits() -> None:
 @pytest.mark.parametrize("design", [OPTIMAL, INITIAL, limited(OPTIMAL, leg_radii=(0.2,) * 4)])
 def test_limits_at_the_strokes_are_covered_by_the_rods(design: Design) -> None:
     assert buildability(design).short_legs == (1, 2, 3, 4)
-    limited = buildability(design).limited
+    limited = buildability(design).within_strokes
     assert limited is not None
     covered = buildability(limited)
     assert covered.short_legs == covered.problems == ()
-    assert covered.limited is None
+    assert covered.within_strokes is None
 
 
 def test_homes_beyond_joint_limits_are_refused() -> None:

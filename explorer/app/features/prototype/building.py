@@ -79,7 +79,7 @@ class BuildVerdict:
         # What was found for another design would bring that one back.
         if built is None or not self._feed.is_current or self._feed.request != state.design:
             return None
-        mended = built.mended if what == FITTING else built.limited
+        mended = built.mended if what == FITTING else built.within_strokes
         words = mend_words(built) if what == FITTING else STROKES_WORDS
         return None if mended is None else Set("design", mended, "Design", words)
 
