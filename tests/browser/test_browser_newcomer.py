@@ -7,13 +7,18 @@ import re
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
+from limited_designs import scaled_design
 from newcomer import Newcomer, hue, numbers
 from playwright.sync_api import expect
 from tab import Tab, middle
 
+from explorer.app.scene.placing import Placed
+from explorer.app.screenshot import SCENE_CANVAS
+from explorer.app.state.frame import Frame
 from explorer.mechanism.design import Design
-from explorer.mechanism.design_file import PRESETS, decode_design
+from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 from explorer.numerics.number_text import format_number
 from explorer.workspace.slices.volume import workspace_volume
 
@@ -277,6 +282,30 @@ def test_design_is_saved_renamed_reloaded_and_undone(newcomer: Newcomer) -> None
     newcomer.press(re.compile("^Undo x = 13"))
     expect(newcomer.field("x")).to_have_value("12")
     newcomer.button("second try saved").wait_for()
+
+
+def test_mechanism_ten_thousand_times_larger_is_in_sight_and_again_after_undo(
+    newcomer: Newcomer, data_tab: Tab, tmp_path: Path
+) -> None:
+    def is_in_sight() -> bool:
+        box = data_tab.page.locator(SCENE_CANVAS).bounding_box()
+        points = Placed(Frame(data_tab.state)).points
+        ends = np.array([data_tab.on_screen(points[name]) for name in ("a1", "a3", "b4")])
+        assert box is not None
+        size = np.array([box["width"], box["height"]])
+        inside = (ends > [box["x"], box["y"]]) & (ends < size + [box["x"], box["y"]])
+        # A mechanism as small as a dot is not seen.
+        return bool(inside.all() and np.ptp(ends, axis=0).max() > 0.2 * size.min())
+
+    file = tmp_path / "larger.json"
+    file.write_bytes(encode_design(scaled_design(OPTIMAL, 1e4)))
+    newcomer.upload(file)
+    data_tab.wait_for(is_in_sight, "the larger mechanism in sight")
+    newcomer.presses_for()
+    newcomer.press(re.compile("^Undo"))
+    data_tab.wait_for(is_in_sight, "the mechanism in sight again")
+    assert data_tab.state.design == OPTIMAL
+    assert newcomer.presses_for() == 1
 
 
 def test_design_scene_and_report_are_shared(newcomer: Newcomer, tmp_path: Path) -> None:
