@@ -116,14 +116,14 @@ class Buildability:
         sizes: Sizes of the parts. Legs without a radius in the design have the largest that fits,
             up to a share of the reach, or the thinnest if none fits.
         problems: Clauses on what does not fit at home, and by how much; none if all fits.
-        mended: Design in which all fits, with the least unit and, if the joints cannot take the
+        remedy: Design in which all fits, with the least unit and, if the joints cannot take the
             home pose, with a near home; None if there is none, or if all fits.
         advice: Clause on that, and on radii of the legs that would fit; "" if all fits.
     """
 
     sizes: Sizes
     problems: tuple[str, ...] = ()
-    mended: Design | None = None
+    remedy: Design | None = None
     advice: str = ""
 
     @property
@@ -155,8 +155,8 @@ def buildability(design: Design) -> Buildability:
     problems = tuple(_problems(sizes))
     if not problems:
         return Buildability(sizes)
-    mended = _mend(sizes)
-    return Buildability(sizes, problems, mended, _advice(design, mended))
+    remedy = _mend(sizes)
+    return Buildability(sizes, problems, remedy, _advice(design, remedy))
 
 
 def sizes_of(design: Design) -> Sizes:
@@ -221,8 +221,8 @@ def _mend(sizes: Sizes) -> Design | None:
     if factor is None:
         return None
     unit_mm = design.unit_mm if factor == 1.0 else _round(factor * design.unit_mm, up=True)
-    mended = fitting(unit_mm / design.unit_mm)
-    return mended and msgspec.structs.replace(mended, unit_mm=unit_mm)
+    remedy = fitting(unit_mm / design.unit_mm)
+    return remedy and msgspec.structs.replace(remedy, unit_mm=unit_mm)
 
 
 def _near_homes(design: Design) -> list[Pose]:
@@ -254,13 +254,13 @@ def _least(fits: Callable[[float], bool], low: float, high: float) -> float | No
     return high
 
 
-def _advice(design: Design, mended: Design | None) -> str:
+def _advice(design: Design, remedy: Design | None) -> str:
     """Return a clause on what would make the parts of a design fit."""
     unit, ways = design.unit_mm, list[str]()
-    if mended is not None:
-        larger = f"a unit of at least {mended.unit_mm:.6g} mm" * (mended.unit_mm != unit)
-        x, y, z = mended.home_pose.position
-        home = f"its home at ({x:.4g}, {y:.4g}, {z:.4g})" * (mended.home != design.home)
+    if remedy is not None:
+        larger = f"a unit of at least {remedy.unit_mm:.6g} mm" * (remedy.unit_mm != unit)
+        x, y, z = remedy.home_pose.position
+        home = f"its home at ({x:.4g}, {y:.4g}, {z:.4g})" * (remedy.home != design.home)
         ways.append(" and ".join(filter(None, (larger, home))))
     radii = [radius * unit for radius in design.limits.leg_radii if radius]
     if radii:

@@ -395,7 +395,7 @@ def test_design_too_tight_for_parts_names_what_would_fit(design: Design, words: 
         if phrase in message
     }
     assert offered or "no unit makes that fit" in message
-    assert (built.mended and built.mended.unit_mm) == offered.get(unit)
+    assert (built.remedy and built.remedy.unit_mm) == offered.get(unit)
     if unit in offered:
         make_prototype(msgspec.structs.replace(design, unit_mm=offered[unit]))
         refusal(make_prototype, msgspec.structs.replace(design, unit_mm=0.98 * offered[unit]))
@@ -413,12 +413,12 @@ def test_offer_is_the_least_unit_at_which_any_open_radius_fits() -> None:
     built = buildability(limited(found, box=OPTIMAL.limits.box))
     assert "carriages 2 and 3 at home are 2.3 mm apart and need 2.6 mm" in built.problems
     assert "the universal joint at a3 leans 72.1°" in " ".join(built.problems)
-    mended = built.mended
-    assert mended is not None
-    assert mended.home_pose.quaternion == found.home_pose.quaternion
-    assert mended.home_signs == found.home_signs
-    assert buildability(mended).problems == ()
-    smaller = msgspec.structs.replace(mended, unit_mm=0.99 * mended.unit_mm)
+    remedy = built.remedy
+    assert remedy is not None
+    assert remedy.home_pose.quaternion == found.home_pose.quaternion
+    assert remedy.home_signs == found.home_signs
+    assert buildability(remedy).problems == ()
+    smaller = msgspec.structs.replace(remedy, unit_mm=0.99 * remedy.unit_mm)
     for share in np.geomspace(1e-3, 1.0, 60):
         each = THICKEST_SHARE * share * smaller.reach
         assert buildability(limited(smaller, leg_radii=(each,) * 4)).problems

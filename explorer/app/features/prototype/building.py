@@ -79,17 +79,17 @@ class BuildVerdict:
         # What was found for another design would bring that one back.
         if built is None or not self._feed.is_current or self._feed.request != state.design:
             return None
-        mended = built.mended if what == FITTING else built.within_strokes
+        remedy = built.remedy if what == FITTING else built.within_strokes
         words = mend_words(built) if what == FITTING else STROKES_WORDS
-        return None if mended is None else Set("design", mended, "Design", words)
+        return None if remedy is None else Set("design", remedy, "Design", words)
 
 
 def mend_words(built: Buildability) -> str:
     """Return the words of the press that makes the parts fit."""
-    mended, design, words = built.mended, built.sizes.design, list[str]()
-    if mended is not None and mended.unit_mm != design.unit_mm:
-        words.append(f"set the unit to {mended.unit_mm:.6g} mm")
-    if mended is not None and mended.home != design.home:
+    remedy, design, words = built.remedy, built.sizes.design, list[str]()
+    if remedy is not None and remedy.unit_mm != design.unit_mm:
+        words.append(f"set the unit to {remedy.unit_mm:.6g} mm")
+    if remedy is not None and remedy.home != design.home:
         words.append("move home")
     return " and ".join(words).capitalize()
 
@@ -100,7 +100,7 @@ def verdict_words(built: Buildability) -> str:
         return status("Buildable", "within")
     if built.problems:
         head, problems, press = "Not buildable", [*built.problems], ""
-        if built.mended is None:
+        if built.remedy is None:
             problems.append(built.advice)
         else:
             press = _button(FITTING, mend_words(built), sentence(built.advice))
