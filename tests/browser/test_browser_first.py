@@ -25,6 +25,11 @@ FIGURES = """() => {
     return [...document.querySelectorAll(".ex-figure")].map((each) =>
         [each.innerText, [each, ...each.children].map(within)]);
 }"""
+# Whether a panel covers the lower corner of the scene.
+COVERED = """() => {
+    const { right, bottom } = document.querySelector("canvas").getBoundingClientRect();
+    return !!document.elementFromPoint(right - 20, bottom - 8).closest(".mantine-Paper-root");
+}"""
 # Windows of a small laptop, half a screen, and a phone, with the figures that they show at least.
 WINDOWS = {(1000, 700): 3, (820, 600): 2, (390, 844): 1}
 
@@ -68,3 +73,5 @@ def test_bar_of_any_window_shows_the_verdict_and_cuts_no_figure(
             assert "Nearest singular pose\n10.3 mm to δ1 = 0" in shown
             assert len(shown) >= least
             expect(tab.page.locator("[data-document]")).to_be_in_viewport(ratio=1.0)
+        # On a phone, the last of the windows, the panels are below the scene.
+        tab.wait_for(lambda: not tab.page.evaluate(COVERED), "a scene that no panel covers")
