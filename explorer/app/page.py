@@ -167,6 +167,7 @@ class Page:
         server.scene.set_up_direction("+z")
         self._features = tuple(each for each in FEATURES if each.is_offered(self.services))
         self.services.exports = tuple(each for one in self._features for each in one.exports)
+        self.services.openers = {k: v for one in self._features for k, v in one.openers.items()}
         self._scene = [self.services.get(part) for each in self._features for part in each.scene]
         # The worker computes in the order of their requests. The scene alone needs those feeds
         # only of which it draws.

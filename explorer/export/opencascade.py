@@ -5,7 +5,6 @@ OpenCASCADE comes with the extra `cad`; it has no types, hence `Any`.
 
 from __future__ import annotations
 
-import importlib
 import math
 import re
 import tempfile
@@ -17,8 +16,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from explorer.errors import ExplorerError, MissingExtraError
+from explorer.errors import ExplorerError
 from explorer.export.mesh import printable_name
+from explorer.files.extras import load_extra
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.shapes import Circle, Kernel
@@ -39,18 +39,8 @@ def occ(name: str) -> Any:
     Raises:
         MissingExtraError: OpenCASCADE is not installed; the message says how to install it.
     """
-    try:
-        package = importlib.import_module(f"OCP.{name.partition('_')[0]}")
-    except ImportError:
-        raise MissingExtraError(
-            'STEP needs OpenCASCADE, which is not installed: pip install "flagged-explorer[cad]"'
-        ) from None
+    (package,) = load_extra("cad", f"OCP.{name.partition('_')[0]}")
     return getattr(package, name)
-
-
-def check_extra() -> None:
-    """Raise a MissingExtraError, which says how to get OpenCASCADE, if it is not installed."""
-    occ("gp_Pnt")
 
 
 def point(position: FloatArray) -> Any:

@@ -20,6 +20,7 @@ from explorer.errors import ExplorerError, NoAnswerError
 from explorer.export import opencascade as cad
 from explorer.export.mesh import colour_of
 from explorer.export.opencascade import Document, ExactShape, occ, primitive
+from explorer.files.extras import check_extra
 from explorer.measures.box import corners_of
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, triple
@@ -74,7 +75,7 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
         NoAnswerError: The workspace is empty.
         ExplorerError: A boolean operation fails, or OpenCASCADE is off by too much of the volume.
     """
-    cad.check_extra()
+    check_extra("cad")
     r = orientation_of(design, rotation)
     exact = workspace_volume(design, r)
     if exact.volume <= 0.0:

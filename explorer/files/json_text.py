@@ -25,6 +25,8 @@ T = TypeVar("T")
 LONGEST_LINE = 300
 # Longest part of a file in a message, in characters.
 _LONGEST_QUOTE = 60
+# Bytes of a file that are searched for the names of fields; a multiple of four.
+_LONGEST_START = 1 << 17
 # Fields that are nested deeper than any of ours are not looked for.
 _DEEPEST = 16
 
@@ -86,6 +88,15 @@ def decode_text(data: bytes) -> str:
     if not text.strip():
         raise InputError("the file is empty or truncated")
     return text
+
+
+def field_names(data: bytes) -> set[str | int | EllipsisType]:
+    """Return the names of the outermost fields at the start of a text; none if it is no JSON."""
+    try:
+        places = _places(decode_text(data[:_LONGEST_START]))
+        return {path[0] for path, _ in places if len(path) == 1}
+    except InputError:
+        return set()
 
 
 def check_unique_fields(text: str) -> None:
@@ -185,8 +196,8 @@ def _words_of_refusal(fault: msgspec.ValidationError, text: str, kind: Any) -> s
     elif unknown is not None:
         name, known = unknown[1][:_LONGEST_QUOTE], _allowed_at(kind, path)
         close = difflib.get_close_matches(name.lower(), known, n=1)
-        hint = f"did you mean `{close[0]}`?" if close else f"there are {', '.join(known)}"
-        words = f"unknown field `{name}`{_path_text(path, ' of ')}; {hint}"
+        hint = f", did you mean {close[0]}?" if close else f"; there are {', '.join(known)}"
+        words = f"{name}{_path_text(path, ' in ')} is unknown{hint}"
         path = (*path, unknown[1])
     elif missing is not None:
         words = f"the field `{missing[1]}`{_path_text(path, ' of ')} is missing"

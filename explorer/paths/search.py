@@ -15,7 +15,6 @@ the rest of an old move is valid as part of it. Loads are sampled.
 from __future__ import annotations
 
 import functools
-import importlib
 import itertools
 import math
 from collections.abc import Sequence
@@ -24,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from explorer.errors import MissingExtraError
+from explorer.files.extras import load_extra
 from explorer.legs.moves import StraightMoves, poses_between
 from explorer.mechanism.design import Design
 from explorer.mechanism.folds import from_folds, write_pose, write_poses
@@ -169,13 +168,7 @@ def load_ompl() -> tuple[Any, Any]:
         MissingExtraError: OMPL is not installed.
     """
     names = ("ompl.util", "ompl.base", "ompl.geometric")
-    try:
-        util, base, geometric = map(importlib.import_module, names)
-    except ImportError:
-        raise MissingExtraError(
-            "a path that is not straight in the folds needs OMPL: pip install "
-            "'flagged-explorer[planning]'"
-        ) from None
+    util, base, geometric = load_extra("planning", *names)
     util.setLogLevel(util.LOG_NONE)
     util.RNG.setSeed(1)
     return base, geometric

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib
 import logging
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any
 
-from explorer.errors import InputError, MissingExtraError
+from explorer.errors import InputError
+from explorer.files.extras import load_extra
 from explorer.sweep.workers import Arguments, Result, Workers
 
 # Seconds to wait for a scheduler that may not be there.
@@ -31,13 +31,7 @@ class DaskWorkers(Workers):
     """
 
     def __init__(self, address: str, *, patience: float = PATIENCE) -> None:
-        try:
-            distributed = importlib.import_module("distributed")
-        except ImportError:
-            raise MissingExtraError(
-                "a scheduler needs the extra cluster, in this environment and in that of every "
-                'worker: pip install "flagged-explorer[study,cluster]"'
-            ) from None
+        (distributed,) = load_extra("cluster", "distributed")
         # Of a lost scheduler Dask would log many lines at any time; the explorer writes one.
         for name in ("distributed", "distributed.client"):
             logging.getLogger(name).setLevel(logging.CRITICAL)

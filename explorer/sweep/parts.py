@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import importlib
 import io
 import json
 from collections.abc import Generator, Iterator, Mapping, Sequence
@@ -19,7 +18,8 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from explorer.errors import InputError, MissingExtraError
+from explorer.errors import InputError
+from explorer.files.extras import load_extra
 from explorer.files.json_text import one_line
 from explorer.files.writing import make_folder, storage_error, write_whole
 from explorer.sweep.rows import Rows, columns_of
@@ -183,14 +183,7 @@ def pyarrow() -> Any:
     Raises:
         MissingExtraError: It is not installed.
     """
-    try:
-        importlib.import_module("pyarrow.parquet")
-        return importlib.import_module("pyarrow")
-    except ImportError:
-        raise MissingExtraError(
-            "studies are kept as Parquet, which needs the extra study: "
-            'pip install "flagged-explorer[study]"'
-        ) from None
+    return load_extra("study", "pyarrow", "pyarrow.parquet")[0]
 
 
 LOCK_FILE = ".lock"

@@ -5,19 +5,21 @@ The front has the designs that no other beats in one objective without being wor
 
 from __future__ import annotations
 
+import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from explorer.errors import InputError
+from explorer.files.extras import load_extra
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.sweep.parts import sound_parts, stray_paths, words_of_paths
+from explorer.sweep.parts import pyarrow, sound_parts, stray_paths, words_of_paths
 from explorer.sweep.rows import Kind, Value, columns_of, design_of
 from explorer.sweep.study import Objective, Study
 
@@ -156,6 +158,24 @@ def load_results(folder: str | Path, study: Study | None = None) -> Results:
         found = [_column(table, name, kind) for *_, table in parts]
         columns[name] = np.concatenate([np.zeros(0, _dtype(name, kind)), *found])
     return Results(known, columns)
+
+
+TableFormat = Literal["csv", "parquet"]
+
+
+def table_bytes(results: Results, file_format: TableFormat) -> bytes:
+    """Return all rows as one file; a number that a row lacks is empty or null.
+
+    Raises:
+        MissingExtraError: Pyarrow is not installed.
+    """
+    arrow, csv = load_extra("study", "pyarrow", "pyarrow.csv")
+    pairs = results.columns.items()
+    rows = arrow.table({name: arrow.array(each, from_pandas=True) for name, each in pairs})
+    data = io.BytesIO()
+    write = csv.write_csv if file_format == "csv" else pyarrow().parquet.write_table
+    write(rows, data)
+    return data.getvalue()
 
 
 def summarise(folder: str | Path) -> Summary:

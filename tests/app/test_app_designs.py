@@ -13,11 +13,12 @@ from services import services_for
 
 from explorer.app.features.designs.feature import DesignsPanel, SavedDesigns, rows_of
 from explorer.app.features.feature import Services
+from explorer.app.features.history.feature import HISTORY
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import MarkSaved, Open, Set, SetName, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.storage.library import Library
-from explorer.app.storage.session_file import SessionFile
+from explorer.app.storage.session_file import SessionFile, encode_session
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError, StorageError
@@ -146,7 +147,7 @@ def test_name_of_a_design_is_one_printable_line(desk: Desk, name: str) -> None:
 
 
 def test_upload_is_read_strictly_and_its_name_is_no_path(
-    desk: Desk, saved: SavedDesigns, library: Library, tmp_path: Path
+    desk: Desk, saved: SavedDesigns, library: Library, services: Services, tmp_path: Path
 ) -> None:
     named = msgspec.structs.replace(OPTIMAL, name="../../evil")
     saved.take(encode_design(named), "../../evil.json")
@@ -156,6 +157,18 @@ def test_upload_is_read_strictly_and_its_name_is_no_path(
     assert library.open("../../evil").name == "../../evil"
     # Beside the designs' own folder there is nothing new.
     assert [each.name for each in tmp_path.iterdir()] == ["designs"]
+    # A session is one step; its own steps are not taken over.
+    desk.session.do(SetVariable("a3x", 15.0))
+    changed = desk.state.design
+    session = encode_session(desk.session.history)
+    desk.session.do(Open(OPTIMAL))
+    services.openers = HISTORY.openers
+    for encoding in ("utf-8", "utf-8-sig", "utf-16"):
+        saved.take(session.decode().encode(encoding), "left.json")
+        settle(desk, saved)
+        assert desk.state.design == changed
+        desk.session.do(UNDO)
+        assert desk.state.design == OPTIMAL
     before = desk.state
     for data in (b"", b"{", b"[" * 10000, b'{"schema": 2, "a3": [1, 2, 3]}', b"\xff\xfe"):
         saved.take(data, "broken.json")

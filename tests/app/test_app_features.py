@@ -25,6 +25,7 @@ from explorer.app.features.designs.feature import SavedDesigns
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
 from explorer.app.features.help.manual import list_entries
 from explorer.app.features.help.tour import EndTour
+from explorer.app.features.history.feature import OpenSession
 from explorer.app.features.loads.load import WEIGHTS_FEED, SetForce
 from explorer.app.features.machine.feature import SetToolAngle
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
@@ -261,9 +262,9 @@ def test_scene_without_panels_has_the_feeds_that_it_draws() -> None:
 
 OF_VALUES = (
     SetJoint, SetPosition, SetAngle, SetPose, SetTiltTorsion, SetToolAngle, GoToTilt, SetForce,
-    SetFold, SetVariable, SetName, SetPathTime, SetEnd, PickDesign,
+    SetFold, SetVariable, SetName, SetPathTime, SetEnd, PickDesign, OpenSession,
 )  # fmt: skip
-"""Actions that take a value, which a slider, a field, a map or a handle gives."""
+"""Actions that take a value, which a slider, a field, a map, a handle or a file gives."""
 
 OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan, EndTour)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""

@@ -50,6 +50,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import open_state
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
+from explorer.files import extras
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
@@ -375,9 +376,16 @@ def test_plots_hold_what_was_computed(feed: StudyFeed, home: Path) -> None:
     assert drawing.plotted is not None
     assert (drawing.plotted.across, drawing.plotted.up) == ("volume", "reach")
     lines, points = (json.loads(plot.to_json()) for plot in drawing.plots)
-    for dimension in lines["data"][0]["dimensions"]:
-        column = results.columns[dimension["name"]][done]
-        assert unpacked(dimension["values"]) == column.astype(np.float32).tolist()
+    assert_lines_of(results, np.flatnonzero(done), lines)
+    logarithmic = draw_study(feed, Studies(name="some", logarithmic=True)).plots
+    assert logarithmic is not None
+    assert_lines_of(results, np.flatnonzero(done), json.loads(logarithmic[0].to_json()))
+    kinds = [json.loads(logarithmic[1].to_json())["layout"][axis]["type"] for axis in AXES]
+    assert kinds == ["log" if column[done].min() > 0.0 else "linear" for column in (volume, reach)]
+    only = draw_study(feed, Studies(name="some", front_only=True)).plots
+    assert only is not None
+    assert_lines_of(results, np.flatnonzero(best), json.loads(only[0].to_json()))
+    assert points_of(json.loads(only[1].to_json())) == np.flatnonzero(best).tolist()
     marked = [trace for trace in points["data"] if "markers" in trace["mode"]]
     seen = [index for trace in marked for index in unpacked(trace["customdata"])]
     assert sorted(seen) == results.columns["index"][done].tolist()
@@ -385,6 +393,28 @@ def test_plots_hold_what_was_computed(feed: StudyFeed, home: Path) -> None:
         rows = unpacked(trace["customdata"])
         assert unpacked(trace["x"]) == volume[rows].astype(np.float32).tolist()
         assert unpacked(trace["y"]) == reach[rows].astype(np.float32).tolist()
+
+
+AXES = ("xaxis", "yaxis")
+
+
+def assert_lines_of(results: Results, rows: Any, figure: dict[str, Any]) -> None:
+    """Compare the values on the axes of all lines with those of rows."""
+    meta: dict[str, Any] = figure["layout"]["meta"]
+    heights: dict[int, Any] = {}
+    for trace in figure["data"]:
+        if "customdata" in trace:
+            lines = np.reshape(unpacked(trace["y"]), (-1, len(meta["axes"]) + 1))
+            assert np.isnan(lines[:, -1]).all()
+            heights |= dict(zip(unpacked(trace["customdata"]), lines[:, :-1], strict=True))
+    assert sorted(heights) == results.columns["index"][rows].tolist()
+    for row in rows:
+        line = heights[int(results.columns["index"][row])]
+        for name, height, (low, high, is_log) in zip(meta["axes"], line, meta["ends"], strict=True):
+            at = low * (high / low) ** height if is_log else low + height * (high - low)
+            assert at == pytest.approx(
+                results.columns[name][row], rel=1e-5, abs=1e-6 * (high - low)
+            )
 
 
 def test_plots_show_brushes_and_the_picked_design(feed: StudyFeed, home: Path) -> None:
@@ -398,11 +428,12 @@ def test_plots_show_brushes_and_the_picked_design(feed: StudyFeed, home: Path) -
     assert drawing.inside.tolist() == expected
     assert drawing.plots is not None
     lines, points = (json.loads(plot.to_json()) for plot in drawing.plots)
-    constrained = {
-        each["name"]: each.get("constraintrange") for each in lines["data"][0]["dimensions"]
-    }
-    assert constrained.pop("volume") == [[low, high]]
-    assert not any(constrained.values())
+    (bar,), meta = lines["layout"]["shapes"], lines["layout"]["meta"]
+    axis = meta["axes"].index("volume")
+    assert bar["x0"] < axis < bar["x1"]
+    least, most, _ = meta["ends"][axis]
+    ends = [least + bar[end] * (most - least) for end in ("y0", "y1")]
+    assert ends == pytest.approx([low, high])
     (box,) = points["layout"]["shapes"]
     assert (box["x0"], box["x1"], box["yref"]) == (low, high, "y domain")
     assert unpacked(points["data"][-1]["customdata"]) == [picked]
@@ -478,9 +509,7 @@ def test_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of() -
     assert points_of(scatter(seen, 1, dark=False)) == [0, 1, 2, 3]
     lines = parallel(seen, 1, dark=False)
     # A line needs a place on each axis; a design without one is counted.
-    assert lines["layout"]["meta"]["designs"] == [0, 2]
-    for dimension in lines["data"][0]["dimensions"]:
-        assert unpacked(dimension["values"]) == [columns[dimension["name"]][k] for k in (0, 2)]
+    assert_lines_of(results, np.array([0, 2]), lines)
     assert "<b>2</b> without a line, which lack reach" in status_of(results, seen)
     # As an axis it places no design that lacks it, picked or not.
     other = select_rows(results, results.front(), replace(studies, up="reach", picked=1))
@@ -498,7 +527,7 @@ def test_measure_that_all_designs_lack_or_share_is_no_axis_and_hides_nothing() -
         assert seen is not None
         assert seen.axes == ("b2", "volume")
         assert points_of(scatter(seen, 1, dark=False)) == [0, 1, 2, 3]
-        assert parallel(seen, 1, dark=False)["layout"]["meta"]["designs"] == [0, 1, 2, 3]
+        assert_lines_of(results, np.arange(4), parallel(seen, 1, dark=False))
         assert "without a line" not in status_of(results, seen)
     # Where no design has all axes, points are drawn and no line.
     columns |= {"volume": [4.0, 2.0, nan, nan], "reach": [nan, nan, 3.0, 1.0]}
@@ -506,7 +535,7 @@ def test_measure_that_all_designs_lack_or_share_is_no_axis_and_hides_nothing() -
     seen = select_rows(results, results.front(), Studies(name="s", across="b2", up="reach"))
     assert seen is not None
     assert points_of(scatter(seen, 1, dark=False)) == [2, 3]
-    assert parallel(seen, 1, dark=True)["layout"]["meta"]["designs"] == []
+    assert_lines_of(results, np.arange(0), parallel(seen, 1, dark=True))
     assert "<b>4</b> without a line, which lack volume or reach" in status_of(results, seen)
 
 
@@ -541,6 +570,26 @@ def studio(desk: Desk, tmp_path: Path) -> Generator[Studio]:
 
 def bytes_of(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in part_paths(folder)}
+
+
+def test_study_that_is_refused_or_lacks_a_library_leaves_no_entry(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runner, desk = studio.runner, studio.desk
+    # A folder of another study, found only where the rows are to be computed.
+    other = studio.folders.home / "paper-optimal-1"
+    monkeypatch.setattr(StudyFolders, "new", lambda *_: other)  # pyright: ignore
+    other.mkdir(parents=True)
+    (other / "notes.txt").write_text("mine")
+    runner.start(OPTIMAL, QUICK)
+    assert runner.wait_until_idle(PATIENCE)
+    assert "is not empty" in desk.complaints.pop()
+    monkeypatch.setattr(extras, "is_missing", lambda *_: True)  # pyright: ignore
+    runner.start(OPTIMAL, QUICK)
+    assert desk.complaints.pop() == 'studies need the extra study: pip install ".[study]"'
+    assert Studies.of(desk.state).name is None
+    assert studio.folders.by_name() == {}
+    assert (other / "notes.txt").read_text() == "mine"
 
 
 def test_study_that_was_cancelled_is_continued_with_the_rows_it_has(studio: Studio) -> None:

@@ -41,6 +41,13 @@ GROUND = """() => {
 COLOUR = "it => getComputedStyle(it).color.match(/[\\d.]+/g)?.slice(0, 3).map(Number)"
 
 
+DROPPED = """([name, text]) => {
+  const transfer = new DataTransfer();
+  transfer.items.add(new File([text], name));
+  return transfer;
+}"""
+
+
 class Newcomer:
     """Somebody who uses the page for the first time.
 
@@ -144,6 +151,15 @@ class Newcomer:
         with self.page.expect_file_chooser() as chooser:
             self.press("Open a file …")
         chooser.value.set_files(file)
+
+    def drop(self, file: Path) -> None:
+        """Drop a file on the scene."""
+        transfer = self.page.evaluate_handle(DROPPED, [file.name, file.read_text()])
+        self.page.dispatch_event("canvas", "drop", {"dataTransfer": transfer})
+
+    def notices(self, words: Words) -> Locator:
+        """Return the notices in sight with some words."""
+        return self.page.locator(".mantine-Notification-root").filter(has_text=words)
 
     def figure(self, name: str) -> Locator:
         """Return a figure of the bar, which begins with its name."""

@@ -329,6 +329,7 @@ def test_design_scene_and_report_are_shared(newcomer: Newcomer, tmp_path: Path) 
     shared = tmp_path / "shared.json"
     shared.write_bytes(data)
     newcomer.upload(shared)
+    expect(newcomer.notices("shared.json")).to_contain_text("The design paper-optimal.")
     expect(newcomer.figure("Volume")).to_contain_text(volume_of(CHANGED))
 
 
@@ -413,11 +414,12 @@ def test_mistakes_are_refused_with_a_reason_and_lose_nothing(
     expect(newcomer.button("Lift the box")).to_be_visible()
     expect(newcomer.button("Optimise")).to_be_disabled()
     broken = tmp_path / "broken.json"
-    broken.write_text('{"a3": [1, 2]}')
-    newcomer.upload(broken)
-    newcomer.sees("broken.json")
-    newcomer.key("Escape")
-    expect(newcomer.button("paper-optimal preset")).to_be_visible()
+    broken.write_text('{"schema": 2,\n"a3": [1, 2],\n"unitmm": 3}')
+    newcomer.drop(broken)
+    expect(newcomer.notices("broken.json")).to_contain_text(
+        "broken.json: line 3: unitmm is unknown, did you mean unit_mm?"
+    )
+    expect(newcomer.notices("broken.json")).to_have_count(1)
     expect(volume).to_contain_text(volume_of(OPTIMAL))
 
 

@@ -219,7 +219,7 @@ def test_export_step_without_extra_is_one_line(
     monkeypatch.setitem(sys.modules, "OCP.gp", None)
     for what in ("workspace", "mechanism"):
         refused = cli.refusal(what, "--out", str(tmp_path / "file.step"))
-        assert 'pip install "flagged-explorer[cad]"' in refused
+        assert 'pip install ".[cad]"' in refused
     assert list(tmp_path.iterdir()) == []
 
 

@@ -130,6 +130,20 @@ def test_option_given_twice_is_refused(cli: CommandLine) -> None:
                 assert message.startswith(f"explorer {command}: {option} is given twice; ")
 
 
+def test_design_file_of_another_editor_opens_and_its_fault_is_reported_with_line_and_field(
+    cli: CommandLine, tmp_path: Path
+) -> None:
+    text = '{\r\n"a3": [1, 2],\r\n"b1": [1, 2],\r\n"b2": 1,\r\n"b3": 2,\r\n"unit_mm": 5}'
+    file = tmp_path / "mine.json"
+    for encoding in ("utf-8-sig", "utf-16"):
+        file.write_bytes(text.encode(encoding))
+        assert "1 unit = 5 mm" in cli.text("inverse", "--design", file)
+        file.write_bytes(text.replace("unit_mm", "unitmm").encode(encoding))
+        assert cli.refusal("inverse", "--design", file) == (
+            f"explorer: {file}: line 6: unitmm is unknown, did you mean unit_mm?"
+        )
+
+
 def test_screenshot_unwritable_file_is_refused_first(cli: CommandLine, tmp_path: Path) -> None:
     for name, words in (("shot.jpg", "must end in .png"), ("missing/shot.png", "no folder")):
         assert words in cli.refusal("screenshot", "--out", tmp_path / name)

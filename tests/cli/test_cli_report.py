@@ -81,6 +81,6 @@ def test_report_without_browser_refuses_pdf_only(
     out = tmp_path / "report.pdf"
     out.write_bytes(b"old")
     refused = cli.refusal("--out", out)
-    assert 'pip install "flagged-explorer[screenshot]"' in refused
+    assert 'pip install ".[screenshot]"' in refused
     assert out.read_bytes() == b"old"
     assert cli.text("--out", tmp_path / "report.html")

@@ -186,17 +186,17 @@ def test_misspelt_field_is_named_with_its_line_and_the_nearest_name(
         text = lay_out(with_value(fields, path, value, name), rng)
         message = refusal(decode, text.encode("utf-16"), "mine.json")
         line = line_of(text, f'"{name}":')
-        of = f" of {path_text(tuple(outer))}" if outer else ""
-        start = f"mine.json: line {line}: unknown field `{name}`{of}; "
+        place = f" in {path_text(tuple(outer))}" if outer else ""
+        start = f"mine.json: line {line}: {name}{place} is unknown"
         assert message.startswith(start)
         # Short names are similar to several.
-        assert len(last) < 3 or message == f"{start}did you mean `{last}`?"
+        assert len(last) < 3 or message == f"{start}, did you mean {last}?"
 
 
 @pytest.mark.parametrize("decode", [decode_design, decode_study, decode_record])
 def test_field_without_a_similar_name_is_reported_with_all_names(decode: Decode) -> None:
     message = refusal(decode, b'{\n\n"xyzzy": 1}', "it")
-    assert message.startswith("it: line 3: unknown field `xyzzy`; there are schema, ")
+    assert message.startswith("it: line 3: xyzzy is unknown; there are schema, ")
 
 
 @pytest.mark.parametrize("seed", range(15))

@@ -31,7 +31,7 @@ def decode(**fields: Any) -> Design:
         ({"tool": {"position": [20_000, 0, 0]}}, "tool.position must lie within 100 reaches"),
         ({"tool": {"position": [0, 0]}}, "tool.position"),
         ({"tool": {"quaternion": [0, 0, 0, 0]}}, "tool.quaternion must not be all zeros"),
-        ({"tool": {"offset": 1}}, "unknown field `offset`"),
+        ({"tool": {"offset": 1}}, "offset in tool is unknown"),
         ({"payload": {"mass_kg": -1}}, "payload.mass_kg must not be negative; got -1"),
         ({"payload": {"centre": [0, 1e5, 0]}}, "payload.centre must lie within"),
         ({"payload": None}, "payload"),

@@ -129,7 +129,7 @@ def test_packaged_studies_can_be_run_and_no_variable_is_a_measure() -> None:
         ({"design": "paper"}, "no preset 'paper'"),
         ({"name": "two\nlines"}, "one printable line"),
         ({"schema": 2}, "schema"),
-        ({"colour": "red"}, "unknown field `colour`"),
+        ({"colour": "red"}, "colour is unknown"),
     ],
 )
 def test_study_with_bad_field_is_refused_in_one_line(changes: dict[str, Any], words: str) -> None:

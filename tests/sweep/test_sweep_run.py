@@ -293,7 +293,7 @@ def test_run_without_pyarrow_names_the_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(MissingExtraError, match=r"flagged-explorer\[study\]"):
+    with pytest.raises(MissingExtraError, match=r"\.\[study\]"):
         run_study(STUDY, tmp_path / "new", HereWorkers())
     assert not (tmp_path / "new").exists()
 

@@ -47,7 +47,7 @@ class Downloads:
         """Send a file that is made already."""
         client = self._client(who)
         if client is not None:
-            client.send_file_download(name, data, save_immediately=True)
+            _send(client, name, data)
 
     def compute(
         self,
@@ -78,7 +78,7 @@ class Downloads:
         def done(data: bytes) -> None:
             if notification is not None:
                 notification.remove()
-            client.send_file_download(name, data, save_immediately=True)
+            _send(client, name, data)
 
         def failed(problem: str) -> None:
             if notification is not None:
@@ -104,8 +104,7 @@ class Downloads:
         def work() -> None:
             notice = client.add_notification(doing, "", loading=True, with_close_button=False)
             try:
-                name, data = make(client)
-                client.send_file_download(name, data, save_immediately=True)
+                _send(client, *make(client))
             except ExplorerError as error:
                 self._complain(str(error), who)
             finally:
@@ -115,3 +114,8 @@ class Downloads:
 
     def _client(self, who: Who) -> viser.ClientHandle | None:
         return self._server.get_clients().get(-1 if who is None else who)
+
+
+def _send(client: viser.ClientHandle, name: str, data: bytes) -> None:
+    # Shells and addresses read a "#" as the end of a name; designs of studies have one.
+    client.send_file_download(name.replace("#", ""), data, save_immediately=True)

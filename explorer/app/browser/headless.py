@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from explorer.errors import ExplorerError, InputError, MissingExtraError
+from explorer.files.extras import load_extra
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -51,14 +52,9 @@ def headless_browser(
         MissingExtraError: Playwright or a Chromium is missing.
         PictureError: The browser did not start, or failed at what it was then told to do.
     """
-    try:
-        from playwright.sync_api import Error, sync_playwright
-    except ImportError:
-        raise MissingExtraError(
-            'pictures need the extra "screenshot": pip install "flagged-explorer[screenshot]"'
-        ) from None
+    (api,) = load_extra("screenshot", "playwright.sync_api")
     found = find_chromium()
-    with sync_playwright() as playwright:
+    with api.sync_playwright() as playwright:
         chromium = found or playwright.chromium.executable_path
         is_known = os.access(chromium, os.X_OK)
         try:
@@ -68,7 +64,7 @@ def headless_browser(
                 args=[*CHROMIUM_FLAGS, *graphics],
                 env={**os.environ, **(environment or {})},
             )
-        except Error as error:
+        except api.Error as error:
             if not is_known:
                 raise MissingExtraError(
                     "pictures need a Chromium: install chromium or google-chrome with the system's "
@@ -78,7 +74,7 @@ def headless_browser(
             raise PictureError(f"the browser {chromium} did not start: {reason}") from None
         try:
             yield browser
-        except Error as error:
+        except api.Error as error:
             reason = str(error).splitlines()[0]
             raise PictureError(f"the browser {chromium} failed: {reason}") from None
         finally:

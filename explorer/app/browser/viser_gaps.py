@@ -120,7 +120,9 @@ def resend(handle: Any, name: str) -> None:
         state.gui_api._websock_interface.queue_message(message)
 
 
-def element_id(control: viser.GuiInputHandle[Any] | viser.GuiButtonHandle) -> str:
+def element_id(
+    control: viser.GuiInputHandle[Any] | viser.GuiButtonHandle | viser.GuiUploadButtonHandle,
+) -> str:
     """Return the id of a control in the page. Gap: scripts and labels of HTML cannot name it."""
     internals: Any = control
     return str(internals._impl.uuid)

@@ -105,24 +105,19 @@ def stop_viser(server: viser.ViserServer) -> None:
 
 
 def protect(server: viser.ViserServer) -> None:
-    """Refuse public tunnels and giant files, and report an upload to its sender alone."""
+    """Refuse public tunnels and giant files, and report no uploads."""
     gui: Any = server.gui
     interface = gui._websock_interface
     # Gap: viser opens a public tunnel for any client that asks.
     for kind in (ShareUrlRequest, ShareUrlDisconnect, FileTransferStartUpload):
         interface.unregister_handler(kind)
-    # Gap: viser stores uploads of any size, and reports their progress to all browsers, also later
-    # ones, which then show a file without a name.
+    # Gap: viser stores uploads of any size, and reports to all browsers, also later ones, that a
+    # file has arrived, as a success before it is read.
     queue_for_all, start_upload = interface.queue_message, gui._handle_file_transfer_start
 
     def queue_message(message: Any) -> None:
         if not isinstance(message, FileTransferPartAck):
             queue_for_all(message)
-            return
-        upload = gui._current_file_upload_states.get(message.transfer_uuid)
-        sender: Any = server.get_clients().get(upload["client_id"]) if upload else None
-        if sender is not None:
-            sender._websock_connection.queue_message(message)
 
     def start_small_upload(client_id: int, message: Any) -> None:
         if message.size_bytes <= LARGEST_UPLOAD:

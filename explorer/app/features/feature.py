@@ -35,6 +35,10 @@ Side = Literal["left", "middle", "right"]
 Shared = TypeVar("Shared")
 
 
+Opener = Callable[["Services", bytes, str], tuple[Action, str]]
+"""Returns the action that opens a file by its content and name, and a sentence on what it is."""
+
+
 @dataclass
 class Services:
     """The services that the page offers to its features.
@@ -71,6 +75,7 @@ class Services:
     autosaver: Autosaver | None = None
     commands: Callable[[], tuple[Command, ...]] = tuple
     exports: tuple[Export, ...] = ()
+    openers: Mapping[str, Opener] = field(default_factory=dict[str, Opener])
     tab: viser.GuiTabHandle | None = None
     _shared: dict[object, Any] = field(default_factory=dict[object, Any])
     _ends: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
@@ -275,12 +280,14 @@ class Export:
         hint: Sentence on what the files hold.
         formats: Names of the formats, each that of a button.
         send: Function that sends a client a file in a format.
+        is_ready: Function that tells whether there is such a thing now.
     """
 
     title: str
     hint: str
     formats: tuple[str, ...]
     send: Callable[[Services, str, Who], None]
+    is_ready: Callable[[Services], bool] = lambda _: True
 
 
 @dataclass(frozen=True)
@@ -326,6 +333,8 @@ class Feature:
         tabs: Its panels, in their order.
         bar: Its parts of the bar on top of the page.
         exports: The files that it offers.
+        openers: Functions that open files, by a field that no other kind of file has; a file with
+            none of these fields is a design.
         scene: Classes of its parts of the scene.
         feeds: Feeds, which request drawings from the worker; `feed_of` declares one.
         later_feeds: Feeds whose requests come after those of all features' `feeds`, since nobody
@@ -348,6 +357,7 @@ class Feature:
     tabs: tuple[Tab, ...] = ()
     bar: tuple[InBar, ...] = ()
     exports: tuple[Export, ...] = ()
+    openers: Mapping[str, Opener] = field(default_factory=dict[str, Opener])
     scene: tuple[Callable[[Services], ScenePart], ...] = ()
     feeds: tuple[Callable[[Services], Feed], ...] = ()
     later_feeds: tuple[Callable[[Services], Feed], ...] = ()

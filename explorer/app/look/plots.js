@@ -9,37 +9,30 @@ window.explorer.plots ??= (() => {
     tell(plot, { brushes });
   };
   const ordered = ([a, b]) => (a <= b ? [a, b] : [b, a]);
-  const rangesOf = ({ constraintrange: given }) =>
-    !given || !given.length ? [] : Array.isArray(given[0]) ? given : [given];
-  // Row of the line within all brushes that passes nearest to a point of the window; null if none.
-  const lineAt = (plot, x, y) => {
-    const brushes = plot.querySelectorAll(".axis-brush .background");
-    const axes = plot._fullData[0].dimensions.map((dimension, k) => {
-      const {
-          values,
-          range: [low, high],
-        } = dimension,
-        ranges = rangesOf(dimension);
-      const box = brushes[k].getBoundingClientRect();
-      const at = (row) => box.bottom - (box.height * (values[row] - low)) / (high - low);
-      const isIn = (row) =>
-        !ranges.length || ranges.some(([a, b]) => values[row] >= a && values[row] <= b);
-      return { at, isIn, x: box.x + box.width / 2 };
-    });
-    const inOrder = axes.toSorted((a, b) => a.x - b.x);
-    const next = inOrder.findIndex((axis) => axis.x >= x);
-    if (next < 1) return null;
-    const [from, to] = [inOrder[next - 1], inOrder[next]];
+  // Value at a height from 0 to 1 of an axis of the parallel lines.
+  const valueAt = ([low, high, isLogarithmic], share) =>
+    isLogarithmic ? low * (high / low) ** share : low + share * (high - low);
+  // Design whose line passes nearest to a point of the window; null if none is near.
+  const designAt = (plot, x, y) => {
+    const { xaxis, yaxis } = plot._fullLayout,
+      box = plot.querySelector(".nsewdrag").getBoundingClientRect();
+    const count = plot.layout.meta.axes.length,
+      place = xaxis.p2l(x - box.x),
+      first = Math.floor(place);
+    if (first < 0 || first > count - 2) return null;
+    const run = xaxis.l2p(1) - xaxis.l2p(0);
     let nearest = null,
       least = 6;
-    plot.layout.meta.designs.forEach((_, row) => {
-      const start = from.at(row),
-        rise = to.at(row) - start,
-        run = to.x - from.x;
-      const above = start + (rise * (x - from.x)) / run - y;
-      const away = Math.abs(above) * (run / Math.hypot(run, rise));
-      if (away < least && axes.every((axis) => axis.isIn(row))) [nearest, least] = [row, away];
-    });
+    for (const { customdata, y: heights } of plot._fullData) {
+      customdata?.forEach((design, line) => {
+        const at = line * (count + 1) + first;
+        const start = yaxis.l2p(heights[at]),
+          rise = yaxis.l2p(heights[at + 1]) - start;
+        const above = start + rise * (place - first) - (y - box.y);
+        const away = Math.abs(above) * (run / Math.hypot(run, rise));
+        if (away < least) [nearest, least] = [Number(design), away];
+      });
+    }
     return nearest;
   };
   const listen = {
@@ -57,22 +50,33 @@ window.explorer.plots ??= (() => {
     },
     parallel(plot) {
       let pressed = null;
-      plot.addEventListener("mousedown", (e) => (pressed = [e.clientX, e.clientY]), true);
-      plot.addEventListener("click", (e) => {
-        if (!e.target.classList.contains("gl-canvas") || !pressed) return;
-        if (Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) > 4) return;
-        const row = lineAt(plot, e.clientX, e.clientY);
-        if (row !== null) tell(plot, { index: plot.layout.meta.designs[row] });
+      plot.addEventListener("pointerdown", (e) => (pressed = [e.clientX, e.clientY]), true);
+      // Plotly covers the page during a press, so that no click reaches the plot.
+      addEventListener("pointerup", ({ clientX: x, clientY: y }) => {
+        const isClick = pressed && Math.hypot(x - pressed[0], y - pressed[1]) <= 4;
+        pressed = null;
+        const index = isClick ? designAt(plot, x, y) : null;
+        if (index !== null) tell(plot, { index });
       });
-      plot.on("plotly_restyle", ([changes]) => {
-        for (const key of Object.keys(changes)) {
-          const found = key.match(/^dimensions\[(\d+)\]\.constraintrange$/);
-          if (!found) continue;
-          const dimension = plot.data[0].dimensions[Number(found[1])];
-          const ranges = rangesOf(dimension).map((each) => ordered(Array.from(each)));
-          tell(plot, { brushes: [{ axis: dimension.name, ranges }] });
-        }
+      plot.on("plotly_selected", (event) => {
+        if (!event?.range) return;
+        const { axes, ends } = plot.layout.meta;
+        const [left, right] = ordered(event.range.x),
+          heights = ordered(event.range.y);
+        // The axes in the box, or else the one beside it.
+        const nearest = Math.round((left + right) / 2);
+        const isIn = (k) => (k >= left && k <= right) || k === nearest;
+        const brushes = axes.flatMap((axis, k) =>
+          isIn(k) ? [{ axis, ranges: [heights.map((each) => valueAt(ends[k], each))] }] : [],
+        );
+        tell(plot, { brushes });
       });
+      plot.on("plotly_deselect", () =>
+        brush(
+          plot,
+          plot.layout.meta.axes.map(() => []),
+        ),
+      );
     },
   };
   // Milliseconds after which a plot that is not drawn yet is looked at again.

@@ -21,6 +21,7 @@ from explorer.app.browser.viser_gaps import element_id, run_script, run_script_i
 from explorer.app.look import read_script
 from explorer.app.widgets.markup import meter
 from explorer.app.widgets.palette import STEP, Command, Key
+from explorer.files.extras import EXTRAS, install_command, need_of
 from explorer.measures.blocks.source import Source
 
 MANUAL = "help.open"
@@ -65,6 +66,7 @@ class Buttons:
                 self.receive(event.target.value, event.client)
 
         run_script(server, read_script("buttons", element_id(self.inbox)))
+        self.on(COPY_INSTALL, _copy_install, values=EXTRAS)
 
     def on(self, name: str, does: PressHandler, *, values: Container[str] | None = None) -> None:
         """Register the function that handles presses on the buttons with a name.
@@ -169,6 +171,21 @@ def press_button(
     given = "".join(f' {key}="{escape(text)}"' for key, text in attributes.items() if text)
     disabled = " disabled" if is_disabled else ""
     return f'<button type="button"{given}{disabled}>{content}</button>'
+
+
+COPY_INSTALL = "extra.copy"
+
+
+def extra_button(extra: str) -> str:
+    """Return a button as HTML that says which extra is missing for what, and copies the command."""
+    words = need_of(extra)
+    content = escape(words[:1].upper() + words[1:])
+    hint = "Copy the command; run it in the checkout of the explorer, and start the explorer again."
+    return press_button(COPY_INSTALL, extra, content, hint=hint, class_name="ex-button")
+
+
+def _copy_install(extra: str, client: viser.ClientHandle) -> None:
+    run_script_in(client, read_script("copies", install_command(extra)))
 
 
 def open_button(

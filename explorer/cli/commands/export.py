@@ -16,7 +16,7 @@ import tyro
 from explorer.cli import options, output, values
 from explorer.errors import InputError, NoAnswerError
 from explorer.export import assembly, mesh, simulation, step
-from explorer.export.opencascade import check_extra
+from explorer.files.extras import check_extra
 from explorer.files.writing import check_writable, write_whole
 from explorer.mechanism.design import JOINTS, Design
 from explorer.numerics.arrays import FloatArray
@@ -164,7 +164,7 @@ def _step(command: Export) -> tuple[bytes, Facts]:
             "of facets: write 3mf, stl, glb, obj or ply"
         )
     command.refuse_all_but(*_ORIENTATION)
-    check_extra()
+    check_extra("cad")
     design = command.read_design()
     home = command.oriented_home(design)
     solid = step.exact_workspace(design, home.rotation)
@@ -180,7 +180,7 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     mesh.check_format(file_format, assembly.FORMATS, "assembly")
     if file_format == "step":
-        check_extra()
+        check_extra("cad")
     prototype = make_prototype(command.read_design())
     data = assembly.assembly_bytes(prototype, file_format)
     bill = bill_of_materials(prototype, command.density or simulation.DENSITY)

@@ -13,11 +13,13 @@ from html import escape
 
 import viser
 
+from explorer.app.browser.viser_gaps import element_id, run_script, run_script_in
 from explorer.app.features.feature import Export, Feature, Services, Tab
 from explorer.app.inputs.controls import Bound, Controls
+from explorer.app.look import call_script, read_script
 from explorer.app.session.latest import LatestWins
 from explorer.app.session.session import Who
-from explorer.app.state.actions import MarkSaved, Open, SetName
+from explorer.app.state.actions import Action, MarkSaved, Open, SetName
 from explorer.app.state.frame import Frame
 from explorer.app.storage.library import Entry, copy_name
 from explorer.app.widgets.assigning import Update
@@ -25,8 +27,9 @@ from explorer.app.widgets.buttons import PressHandler, open_button, press_button
 from explorer.app.widgets.markup import box, note
 from explorer.app.widgets.palette import Command
 from explorer.errors import ExplorerError, InputError
+from explorer.files.json_text import field_names
 from explorer.mechanism.design import Design
-from explorer.mechanism.design_file import LARGEST_FILE, PRESETS, decode_design, encode_design
+from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 from explorer.numerics.number_text import format_number
 
 _Request = tuple[Callable[[], object], Who]
@@ -52,7 +55,7 @@ class SavedDesigns:
             raise RuntimeError("a page that keeps nothing has no library")
         self._library = services.user_data.library
         self._session = services.session
-        self._complain = services.complain
+        self._services = services
         self.entries: tuple[Entry, ...] = ()
         self.commands: tuple[Command, ...] = ()
         self.last_deleted: str | None = None
@@ -110,9 +113,20 @@ class SavedDesigns:
         """Restore the design that was deleted or replaced last."""
         self._post(self._library.restore, who)
 
-    def take(self, data: bytes, name: str, who: Who = None) -> None:
-        """Open an uploaded design file."""
-        self._post(lambda: self._session.do(Open(decode_design(data, name))), who)
+    def take(self, data: bytes, name: str, client: viser.ClientHandle | None = None) -> None:
+        """Open a file of a browser: a design, or what one of its fields says that it is."""
+        who = None if client is None else client.client_id
+
+        def work() -> None:
+            openers, fields = self._services.openers, field_names(data)
+            opener = next((openers[each] for each in openers if each in fields), open_design)
+            action, words = opener(self._services, data, name)
+            before = self._session.latest_state()
+            self._session.do(action, who=who)
+            if client is not None and self._session.latest_state() is not before:
+                client.add_notification(f"{name} is open", words, auto_close_seconds=6.0)
+
+        self._post(work, who)
 
     def wait_until_idle(self, timeout: float = 10.0) -> bool:
         """Wait until all requests are done; return whether they are."""
@@ -130,7 +144,7 @@ class SavedDesigns:
             try:
                 work()
             except ExplorerError as error:
-                self._complain(str(error), who)
+                self._services.complain(str(error), who)
         self.entries = self._library.list()
         self.commands = tuple(self._command(each) for each in self.entries if each.design)
         self.last_deleted = self._library.last_deleted
@@ -142,6 +156,12 @@ class SavedDesigns:
             "Open this saved design.",
             lambda client: self.open(entry.name, client.client_id),
         )
+
+
+def open_design(_: Services, data: bytes, name: str) -> tuple[Action, str]:
+    """Return the action that opens the design in a file, and what it is; see `Opener`."""
+    design = decode_design(data, name)
+    return Open(design), f"The design {design.name}."
 
 
 # Name of the button that shows why the session is not saved, and its label.
@@ -223,11 +243,18 @@ class DesignsPanel:
             color="gray",
             icon=viser.Icon.UPLOAD,
             mime_type="application/json",
-            hint=f"A design file (JSON) of at most {LARGEST_FILE // 1000} kB from this computer.",
+            hint="A design, a study or a session (JSON) from this computer; or drop it anywhere on "
+            "the page.",
         )
-        upload.on_upload(
-            lambda event: saved.take(upload.value.content, upload.value.name, event.client_id)
-        )
+        run_script(services.server, read_script("files", element_id(upload)))
+
+        @upload.on_upload
+        def _(event: viser.GuiEvent[viser.GuiUploadButtonHandle]) -> None:
+            saved.take(upload.value.content, upload.value.name, event.client)
+            # The button holds one file; the next one of several comes now.
+            if event.client is not None:
+                run_script_in(event.client, call_script("sendFile"))
+
         self.list = gui.add_html("")
         self.restore = gui.add_button(
             "Bring back",

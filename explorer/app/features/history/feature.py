@@ -5,7 +5,9 @@ The last change of the design is shown by a ghost of what was before, and by the
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from html import escape
+from typing import ClassVar
 
 import numpy as np
 import viser
@@ -18,14 +20,17 @@ from explorer.app.look import read_script
 from explorer.app.scene.placing import Placed, ScenePart, outline
 from explorer.app.scene.shapes import GHOST, add_lines
 from explorer.app.session.feed import Feed
-from explorer.app.session.history import History, Step
+from explorer.app.session.history import History, Step, restore
 from explorer.app.session.session import REDO, UNDO, move_to
+from explorer.app.state.actions import Action, Open
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.storage.session_file import decode_session
 from explorer.app.widgets.assigning import Updates
 from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.markup import box, dim, row, table
 from explorer.app.widgets.palette import Key, with_keys
+from explorer.files.json_text import decode_text
 from explorer.numerics.number_text import drop_rounding, format_number
 
 GO = "history.go"
@@ -255,6 +260,34 @@ class ChangeScene(ScenePart):
             yield self._lines, "points", (scale * outline(before.snapshot)).astype(np.float32)
 
 
+@dataclass(frozen=True)
+class OpenSession(Open):
+    """Open the design of a session as it was left there.
+
+    Attributes:
+        history: The history of that session.
+    """
+
+    template: ClassVar[str] = "Open the session of {design}"
+
+    history: History
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: The design is being optimised.
+        """
+        return replace(restore(self.history, state)[0], view=self.history.step.state.view)
+
+
+def open_session(_: Services, data: bytes, name: str) -> tuple[Action, str]:
+    """Return the action that opens the session in a file, and what it is; see `Opener`."""
+    history = decode_session(decode_text(data).encode(), name)
+    design = history.step.state.design
+    return OpenSession(design, history), f"The session of {design.name}; undo brings yours back."
+
+
 HISTORY = Feature(
     "history",
     tabs=(Tab("dialog", "History", HistoryPanel),),
@@ -264,4 +297,5 @@ HISTORY = Feature(
     ),
     scene=(ChangeScene,),
     feeds=(DesignChange,),
+    openers={"words": open_session},
 )

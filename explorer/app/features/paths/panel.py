@@ -18,10 +18,11 @@ from explorer.app.state.paths import End, PathKind
 from explorer.app.state.state import State, angles_of
 from explorer.app.widgets import markup
 from explorer.app.widgets.assigning import Updates
-from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.buttons import extra_button, press_button
 from explorer.app.widgets.chips import Chip, Chips, choose
 from explorer.errors import InputError
 from explorer.export.tables import trajectory_csv
+from explorer.files.extras import is_missing
 from explorer.mechanism.configuration import position_of
 from explorer.mechanism.margins import margins, mode_name, mode_of
 from explorer.mechanism.pose import Pose, Triple
@@ -71,6 +72,7 @@ class PathsPanel:
             kind: Chip(words, f"Paths › {words}", hint, choose("paths.kind", kind, "Path"))
             for kind, (words, hint) in KINDS.items()
         }
+        self._missing = extra_button("planning") if is_missing("planning") else ""
         self._kind_chips = Chips(services.buttons, services.session, "paths.kind", "", kinds)
         gui.add_html(markup.beside(2))
         with gui.add_folder("Path"):
@@ -150,7 +152,8 @@ class PathsPanel:
             is_typed = _is_typed(state, end)
             yield from show_html(handle, "" if is_typed else end_numbers(state, end))
         chips = f'<div class="ex-flow">{self._kind_chips.buttons(state)}</div>'
-        kinds = markup.box(chips, f'<div class="ex-small">{kind_note(state)}</div>')
+        missing = self._missing if state.paths.kind == "planned" else ""
+        kinds = markup.box(chips, f'<div class="ex-small">{kind_note(state)}</div>', missing)
         yield self._kinds, "content", kinds
         yield self.go, "disabled", state.paths.is_planning
         title = plan_words(state) or path_title(state, self._loads.shares(frame), self._clear)

@@ -18,8 +18,9 @@ from explorer.app.features.sharing.reporting import ReportFormat, make_report
 from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import open_button, press_button
+from explorer.app.widgets.buttons import extra_button, open_button, press_button
 from explorer.app.widgets.markup import box
+from explorer.files.extras import is_missing
 
 PRESS = "export"
 PICTURES: dict[str, tuple[int, int] | float] = {
@@ -29,6 +30,8 @@ PICTURES: dict[str, tuple[int, int] | float] = {
 }
 """Formats of pictures: width and height, or a factor on the size in the browser."""
 REPORTS: dict[str, ReportFormat] = {"HTML": "html", "PDF": "pdf"}
+# Extras that formats need.
+EXTRA_OF_FORMAT = {"STEP": "cad", "PDF": "screenshot"}
 # Background of the scene on viser's page, by whether it is dark.
 BACKGROUNDS = {False: (255, 255, 255), True: (20, 20, 20)}
 
@@ -87,15 +90,19 @@ class ExportDialog:
 
     def __init__(self, services: Services) -> None:
         gui, buttons = services.gui, services.buttons
+        self._ready: tuple[bool, ...] = ()
         sends: dict[str, Callable[[Who], None]] = {}
         for each in services.exports:
             for name in each.formats:
                 value = f"{each.title} as {name}"
+                if is_missing(EXTRA_OF_FORMAT.get(name)):
+                    continue
                 sends[value] = partial(each.send, services, name)
-                buttons.offer(f"Export › {each.title} › {name}", each.hint, PRESS, value)
+                ready = partial(each.is_ready, services)
+                buttons.offer(f"Export › {each.title} › {name}", each.hint, PRESS, value, ready)
         buttons.on(PRESS, lambda value, client: sends[value](client.client_id), values=sends)
         self._verdict, self._built = services.get(BuildVerdict), gui.add_html("")
-        gui.add_html(box("".join(_row(each) for each in services.exports)))
+        self._services, self._list = services, gui.add_html("")
         with gui.add_folder("Picture of another size", expand_by_default=False):
             least, most = scene_files.LEAST, scene_files.MOST
             hint = f"{least} to {most} pixels."
@@ -120,19 +127,27 @@ class ExportDialog:
         )
 
     def updates(self, _: Frame) -> Iterator[Update]:
-        """Yield the update that shows whether the machine can be built."""
+        """Yield the updates that show whether the machine can be built, and what there is now."""
         yield self._built, "content", box(self._verdict.html())
+        ready = tuple(each.is_ready(self._services) for each in self._services.exports)
+        if ready != self._ready:
+            self._ready = ready
+            rows = map(_row, self._services.exports, ready)
+            yield self._list, "content", box("".join(rows))
 
 
-def _row(export: Export) -> str:
+def _row(export: Export, is_ready: bool) -> str:
     """Return a thing and the buttons of its formats, as HTML."""
     buttons = "".join(
-        press_button(
+        extra_button(EXTRA_OF_FORMAT[name])
+        if is_missing(EXTRA_OF_FORMAT.get(name))
+        else press_button(
             PRESS,
             f"{export.title} as {name}",
             escape(name),
             label=f"Export {export.title} as {name}",
             class_name="ex-button",
+            is_disabled=not is_ready,
         )
         for name in export.formats
     )

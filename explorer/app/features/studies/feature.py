@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
+from functools import partial
 from typing import Annotated, Any, Literal, cast
 
 import msgspec
 import viser
 
 from explorer.app.browser.browser_facts import decode_text
+from explorer.app.browser.downloads import File
 from explorer.app.browser.viser_gaps import run_script
-from explorer.app.features.feature import Feature, InBar, Services, Tab
+from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
 from explorer.app.features.studies.feed import PlotJson, StudyDrawing
-from explorer.app.features.studies.folders import study_folders
+from explorer.app.features.studies.folders import keep_study, study_folders
 from explorer.app.features.studies.state import (
     COUNTS,
     PERCENTS,
@@ -33,30 +34,38 @@ from explorer.app.features.studies.work import study_runner
 from explorer.app.inputs.controls import At, Bound, Control, Controls
 from explorer.app.inputs.ranges import Span
 from explorer.app.look import read_script
-from explorer.app.session.session import Who
+from explorer.app.session.session import Change, Who
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, PressHandler, activity, press_button
+from explorer.app.widgets.chips import Chip, Chips, turn
 from explorer.app.widgets.markup import alert, beside
 from explorer.app.widgets.palette import NO_OPTION
 from explorer.errors import ExplorerError
+from explorer.files.extras import check_extra, is_missing
 from explorer.measures.catalogue import measures_in
 from explorer.numerics.number_text import format_number
-from explorer.sweep.study import NAMES
+from explorer.sweep.results import TableFormat, load_results, table_bytes
+from explorer.sweep.study import NAMES, decode_study
 
 # Height over width.
 PARALLEL_ASPECT, SCATTER_ASPECT = 0.28, 0.42
-HINT = 'Plots of studies need the extra study: pip install "flagged-explorer[study]"'
-
-HAS_PLOTLY = find_spec("plotly") is not None
-
 Axis = Literal["across", "up", "colour"]
 AXES: dict[Axis, tuple[str, str]] = {
     "across": ("Across", "Measure or variable from left to right in the scatter plot."),
     "up": ("Up", "Measure or variable from bottom to top in the scatter plot."),
     "colour": ("Coloured by", "Measure or variable that colours the designs in both plots."),
+}
+
+
+LOOKS = {
+    name: Chip(words, f"Studies › {words}", hint, turn(f"studies.{name}", words))
+    for name, words, hint in (
+        ("logarithmic", "Logarithmic axes", "Draw axes of positive values on a logarithm."),
+        ("front_only", "Only the front", "Draw only the designs on the Pareto front."),
+    )
 }
 
 
@@ -119,6 +128,7 @@ class StudiesPanel:
         self.feed = self.runner.feed
         services.buttons.on("studies.plot", self._receive)
         self._add_buttons(services.buttons)
+        self._looks = Chips(services.buttons, session, "studies.look", "", LOOKS)
         self._key: tuple[object, ...] = ()
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -144,12 +154,11 @@ class StudiesPanel:
             return
         self._key = key
         can_go_on = drawing is not None and not drawing.is_complete
-        yield self._acts, "content", acts(run, is_new=is_new, can_go_on=can_go_on)
+        looks = "" if drawing is None else self._looks.buttons(frame.state)
+        yield self._acts, "content", acts(run, looks, is_new=is_new, can_go_on=can_go_on)
         problem = None
         if self.feed.problem is not None:
             problem = alert("This study cannot be shown", self.feed.problem)
-        elif not is_new and not HAS_PLOTLY:
-            problem = alert("No plots", HINT)
         plan = studies.plan if is_new else None
         lines = head(None if problem else drawing, run, plan, frame.state.design.name)
         yield self._head, "content", lines + (problem or "")
@@ -173,7 +182,7 @@ class StudiesPanel:
 
     def _plots(self, drawing: StudyDrawing | None) -> Iterator[Update]:
         plots = None if drawing is None else drawing.plots
-        if plots is not None and self.plots is None and HAS_PLOTLY:
+        if plots is not None and self.plots is None and not is_missing("study"):
             self.plots = self._add_plots()
         for handle in self.plots or ():
             yield handle, "visible", plots is not None
@@ -235,21 +244,27 @@ class StudiesPanel:
 
     def _add_buttons(self, buttons: Buttons) -> None:
         handlers: dict[str, tuple[PressHandler, Callable[[], bool]]] = {
-            "start": (self._start, lambda: self.runner.run is None),
+            "start": (self._start, lambda: self.runner.run is None and not is_missing("study")),
             "cancel": (lambda _, __: self.runner.cancel(), lambda: self.runner.run is not None),
             "continue": (self._go_on, self._can_go_on),
-            "new": (self._close, lambda: Studies.of(self._session.state).name is not None),
-            "clear": (self._clear, lambda: bool(Studies.of(self._session.state).brushes)),
+            "new": (
+                lambda _, client: self._session.do(OpenStudy(None), who=client.client_id),
+                lambda: Studies.of(self._session.state).name is not None,
+            ),
+            "clear": (
+                lambda _, client: self._session.do(free_axes, who=client.client_id),
+                lambda: bool(Studies.of(self._session.state).brushes),
+            ),
         }
         for name, (handle, is_ready) in handlers.items():
             words, hint = BUTTONS[name]
             buttons.on(f"studies.{name}", handle)
             buttons.offer(f"Studies › {words}", hint, f"studies.{name}", is_ready=is_ready)
         buttons.on("studies.pick", self._pick_row)
-        buttons.on("studies.vary", self._switch(StudyPlan.with_variable_toggled), values=NAMES)
+        do_on_press = self._services.do_on_press
+        do_on_press("studies.vary", partial(_turn, StudyPlan.with_variable_toggled), NAMES)
         measures = measures_in("studies")
-        turn = self._switch(StudyPlan.with_measure_advanced)
-        buttons.on("studies.measure", turn, values=measures)
+        do_on_press("studies.measure", partial(_turn, StudyPlan.with_measure_advanced), measures)
 
     def _start(self, _: str, client: viser.ClientHandle) -> None:
         state = self._session.latest_state()
@@ -264,26 +279,16 @@ class StudiesPanel:
         drawing = self.feed.drawing
         return self.runner.run is None and drawing is not None and not drawing.is_complete
 
-    def _close(self, _: str, client: viser.ClientHandle) -> None:
-        self._session.do(OpenStudy(None), who=client.client_id)
-
     def _pick_row(self, index: str, client: viser.ClientHandle) -> None:
         if index.isascii() and index.isdecimal():
             self.pick(int(index), client.client_id)
 
-    def _clear(self, _: str, client: viser.ClientHandle) -> None:
-        self._session.do(free_axes, who=client.client_id)
 
-    def _switch(self, turn: Callable[[StudyPlan, str], StudyPlan]) -> PressHandler:
-        def press(name: str, client: viser.ClientHandle) -> None:
-            self._session.do(
-                lambda state: Set(
-                    "studies.plan", turn(Studies.of(state).plan, name), "New study", label_of(name)
-                ),
-                who=client.client_id,
-            )
-
-        return press
+def _turn(turn: Callable[[StudyPlan, str], StudyPlan], name: str) -> Change:
+    """Return the change that a press on a variable or measure of the new study makes."""
+    return lambda state: Set(
+        "studies.plan", turn(Studies.of(state).plan, name), "New study", label_of(name)
+    )
 
 
 class StudyChip:
@@ -309,10 +314,42 @@ class StudyChip:
         return activity("Studies", run.name, f"{format_number(done)} designs", run.share, cancel)
 
 
+def open_study(services: Services, data: bytes, name: str) -> tuple[Action, str]:
+    """Return the action that opens the study in a file, and what it is; see `Opener`."""
+    check_extra("study")
+    study, folders = decode_study(data, name), services.get(study_folders)
+    folder = folders.new(study.name)
+    keep_study(folder, study)
+    services.get(study_runner).feed.look()
+    return OpenStudy(folder.name), f"The study {study.name}; {BUTTONS['continue'][0]} computes it."
+
+
+def send_table(services: Services, name: str, who: Who) -> None:
+    """Send the rows of the open study."""
+    study = str(Studies.of(services.session.latest_state()).name)
+    folder = services.get(study_folders).folder(study)
+
+    def make(_: viser.ClientHandle) -> File:
+        file_format: TableFormat = "csv" if name == "CSV" else "parquet"
+        return f"{study}.{file_format}", table_bytes(load_results(folder), file_format)
+
+    services.downloads.make(who, "Writing the table", make)
+
+
 STUDIES = Feature(
     "studies",
     manual="studies.md",
     tabs=(Tab("work", "Studies", StudiesPanel, viser.Icon.CHART_DOTS),),
     bar=(InBar("right", StudyChip),),
+    exports=(
+        Export(
+            "Study",
+            "The table of the study that is open in the tab Studies, a line for each design.",
+            ("CSV", "Parquet"),
+            send_table,
+            lambda services: Studies.of(services.session.state).name is not None,
+        ),
+    ),
+    openers=dict.fromkeys(("variables", "sampling", "measures", "objectives"), open_study),
     is_offered=lambda services: services.has(study_folders),
 )

@@ -17,21 +17,20 @@ from numpy.typing import NDArray
 
 from explorer.app.features.studies import state
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.number_text import format_number
 from explorer.sweep.results import Results
 
 Figure: TypeAlias = dict[str, Any]
 
-MOST_ROWS = 5000
-"""Largest number of rows drawn; of more rows, the front and some of the others."""
+MOST_ROWS, MOST_LINES = 2000, 500
+"""Largest numbers of rows drawn as points and as lines; of more rows, the front and some of the
+others. More would cover one another, and without a graphics card would stop the page."""
 
 # Statuses of designs that have measures.
 MEASURED = ("done", "not converged")
 
 # Least spread of an axis as a share of the size of its values; one with less is left out.
 NO_SPREAD = 1e-9
-
-# With more points than this the graphics processor draws the scatter plot.
-MOST_AS_SVG = 1500
 
 FRONT, PICKED = "#c2185b", "#0a9d6c"
 # Colours of the other designs from the least to the greatest value, by whether the page is dark.
@@ -46,12 +45,12 @@ TEXT = "#7d8794"
 GRID = "rgba(128,136,148,0.22)"
 # Background of the plots, by theme; digits have a rim of this colour.
 PAPER = {False: "#ffffff", True: "#242424"}
-# Ends of the scale of the parallel lines: the other designs, the front, the picked one.
-OTHERS, ON_FRONT, ON_PICKED = 0.8, 0.9, 1.0
-# Largest number of axes with level titles, and the tilt of titles with more axes, in degrees.
-MOST_LEVEL, TILT = 7, 24
-# Widths of a character of a title and of a scroll bar, in pixels.
-CHARACTER, SCROLL_BAR = 6.2, 14
+# Colour of the values on the axes, by theme.
+INK = {False: "#1f2328", True: "#f0f2f4"}
+# Half the width of a brush on an axis of the parallel lines, as a share of their distance.
+BRUSH = 0.06
+# Tilt of the titles of the parallel lines, in degrees.
+TILT = 24
 
 
 @dataclass(frozen=True)
@@ -71,6 +70,7 @@ class PlotRows:
         count: Number of rows with values on both axes of the scatter plot, drawn or not.
         lacking: Number of measured rows without a line, and the axes that they lack.
         picked: Row of the picked design, none or one, shape (0 or 1,).
+        ends: Least and greatest value on each axis.
     """
 
     results: Results
@@ -86,6 +86,25 @@ class PlotRows:
     count: int
     lacking: tuple[int, tuple[str, ...]]
     picked: IntArray
+    ends: Mapping[str, state.Range]
+
+    def is_logarithmic(self, name: str) -> bool:
+        """Whether an axis is one of logarithms: as chosen, where all values are positive."""
+        return self.studies.logarithmic and self.ends[name][0] > 0.0
+
+    def share_of(self, name: str, values: FloatArray) -> FloatArray:
+        """Return the heights of values on an axis of the parallel lines, from 0 to 1."""
+        low, high = self.ends[name]
+        if self.is_logarithmic(name):
+            return np.log(values / low) / math.log(high / low)
+        return (values - low) / (high - low)
+
+    def value_at(self, name: str, share: float) -> float:
+        """Return the value at a height of an axis of the parallel lines."""
+        low, high = self.ends[name]
+        if self.is_logarithmic(name):
+            return low * (high / low) ** share
+        return low + share * (high - low)
 
     def column(self, name: str) -> FloatArray:
         """Return the values of all rows."""
@@ -116,7 +135,9 @@ def select_rows(results: Results, front: BoolArray, studies: state.Studies) -> P
     across = studies.across if studies.across in axes else first
     up = studies.up if studies.up in axes else second
     on_lines = np.all([has_value[name] for name in axes], axis=0)
-    points, lines = np.flatnonzero(has_value[across] & has_value[up]), np.flatnonzero(on_lines)
+    shown = front if studies.front_only else np.ones_like(front)
+    points = np.flatnonzero(has_value[across] & has_value[up] & shown)
+    lines = np.flatnonzero(on_lines & shown)
     picked = np.flatnonzero(columns["index"] == (-1 if studies.picked is None else studies.picked))
     keep = front.copy()
     keep[picked] = True
@@ -130,13 +151,14 @@ def select_rows(results: Results, front: BoolArray, studies: state.Studies) -> P
         up,
         studies.colour if studies.colour in axes else first,
         thin_out(points, keep[points], MOST_ROWS),
-        thin_out(lines, keep[lines], MOST_ROWS),
+        thin_out(lines, keep[lines], MOST_LINES),
         len(points),
         (
             int((is_measured & ~on_lines).sum()),
             tuple(name for name in axes if (is_measured & ~has_value[name]).any()),
         ),
         picked,
+        {name: _ends(columns[name][has_value[name]]) for name in axes},
     )
 
 
@@ -170,68 +192,87 @@ def _has_spread(values: FloatArray) -> bool:
 def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
     """Return the plot with an axis for each variable and measure, and a line for each design.
 
+    The lines of one colour are one path of the page, which takes a thousandth of the time that
+    Plotly's own plot of this kind takes without a graphics card.
+
     Args:
         plotted: Rows and axes to draw.
-        revision: Number that differs from the last plot's, so that Plotly resets its brushes.
+        revision: Number that differs from the last plot's, so that Plotly forgets its boxes.
         dark: Whether the page is dark.
     """
-    level = OTHERS * _shares(plotted.column(plotted.colour)[plotted.lines])
-    level[plotted.front[plotted.lines]] = ON_FRONT
-    level[np.isin(plotted.lines, plotted.picked)] = ON_PICKED
-    line = {
-        "color": pack(level),
-        "cmin": 0.0,
-        "cmax": 1.0,
-        "showscale": False,
-        "colorscale": [
-            *([OTHERS * k / 3, colour] for k, colour in enumerate(SCALE[dark])),
-            [OTHERS + 0.05, FRONT],
-            [ON_FRONT + 0.04, FRONT],
-            [ON_FRONT + 0.06, PICKED],
-            [ON_PICKED, PICKED],
-        ],
-    }
-    dimensions: list[dict[str, Any]] = []
-    for name in plotted.axes:
-        column = plotted.column(name)[plotted.lines]
-        dimension: dict[str, Any] = {
-            "name": name,
-            "label": state.short_title_of(name),
-            "values": pack(column),
-            "range": _with_room(column),
-            "tickformat": ",~g",
-            "multiselect": True,
-        }
-        ranges = plotted.studies.ranges_of(name)
-        if ranges:
-            dimension["constraintrange"] = [[*ends] for ends in ranges]
-        dimensions.append(dimension)
-    is_tilted = len(plotted.axes) > MOST_LEVEL
-    trace = {
-        "type": "parcoords",
-        "dimensions": dimensions,
-        "line": line,
-        "unselected": {"line": {"color": LEFT_OUT, "opacity": 0.25}},
-        "labelangle": -TILT if is_tilted else 0,
-        "tickfont": {"size": 11},
-        # The ends are ticks like others; their own digits would run into one another.
-        "rangefont": {"size": 1, "color": "rgba(0,0,0,0)"},
-        "uirevision": revision,
-    }
-    # Titles have their middle above their axes; a scroll bar may cover the edge of the plot.
-    left, right = (
-        math.ceil(0.5 * CHARACTER * len(state.short_title_of(plotted.axes[end]))) for end in (0, -1)
+    rows, names = plotted.lines, plotted.axes
+    inside, front = plotted.inside[rows], plotted.front[rows]
+    heights = np.column_stack(
+        [plotted.share_of(name, plotted.column(name)[rows]) for name in names]
     )
-    margin = {
-        "l": max(34, left),
-        "r": max(44, SCROLL_BAR + right),
-        "t": 64 if is_tilted else 40,
-        "b": 12,
+    level = heights[:, names.index(plotted.colour)]
+    bin_of = np.minimum(level * len(SCALE[dark]), len(SCALE[dark]) - 1).astype(np.int64)
+    others = inside & ~front
+    groups = [
+        (~inside, LEFT_OUT, 0.7),
+        *((others & (bin_of == k), colour, 0.8) for k, colour in enumerate(SCALE[dark])),
+        (inside & front, FRONT, 1.0),
+        (np.isin(rows, plotted.picked), PICKED, 3.0),
+    ]
+    gap = np.array([math.nan])
+    traces: list[Figure] = [
+        {
+            "type": "scatter",
+            "mode": "lines",
+            "x": pack(np.tile(np.append(np.arange(len(names)), gap), int(which.sum()))),
+            "y": pack(np.column_stack([heights[which], np.repeat(gap, which.sum())]).ravel()),
+            "customdata": pack(plotted.results.columns["index"][rows[which]], "i4"),
+            "line": {"color": colour, "width": width},
+            "hoverinfo": "skip",
+        }
+        for which, colour, width in groups
+        if which.any()
+    ]
+    marks = [(k, share) for k in range(len(names)) for share in (0.0, 0.5, 1.0)]
+    traces.append(
+        {
+            "type": "scatter",
+            "mode": "text",
+            "x": [k for k, _ in marks],
+            "y": [share for _, share in marks],
+            "text": [format_number(plotted.value_at(names[k], share), 3) for k, share in marks],
+            "textposition": "middle right",
+            "textfont": {"size": 10, "color": INK[dark]},
+            "cliponaxis": False,
+            "hoverinfo": "skip",
+        }
+    )
+    margin = {"l": 34, "r": 104, "t": 70, "b": 12}
+    figure = _figure(plotted, "parallel", traces, margin, dark=dark)
+    figure["layout"]["meta"] |= {
+        "axes": names,
+        "ends": [[*plotted.ends[name], plotted.is_logarithmic(name)] for name in names],
     }
-    figure = _figure(plotted, "parallel", [trace], margin, dark=dark)
-    # Lines carry no data that could name their designs.
-    designs = plotted.results.columns["index"][plotted.lines].tolist()
-    figure["layout"]["meta"]["designs"] = designs
+    figure["layout"] |= {
+        "xaxis": {
+            "tickvals": [*range(len(names))],
+            "ticktext": [*map(state.short_title_of, names)],
+            "tickangle": -TILT,
+            "ticklabeloverflow": "allow",
+            "side": "top",
+            "range": [-0.1, len(names) - 0.9],
+            "gridcolor": GRID,
+            "zeroline": False,
+            "fixedrange": True,
+        },
+        "yaxis": {"visible": False, "range": [-0.05, 1.05], "fixedrange": True},
+        "hovermode": False,
+        "selectdirection": "d",
+        "shapes": [
+            _box(
+                (k - BRUSH, k + BRUSH),
+                plotted.share_of(name, np.clip(ends, *plotted.ends[name])).tolist(),
+            )
+            for k, name in enumerate(names)
+            for ends in plotted.studies.ranges_of(name)
+        ],
+        **_selecting(revision),
+    }
     return figure
 
 
@@ -277,16 +318,18 @@ def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
     traces += [on_front, _points(plotted, is_picked, ring)]
     figure = _figure(plotted, "scatter", traces, {"l": 62, "r": 10, "t": 12, "b": 42}, dark=dark)
     figure["layout"] |= {
-        "xaxis": _axis(plotted.across),
-        "yaxis": _axis(plotted.up),
-        "showlegend": False,
-        "dragmode": "select",
+        "xaxis": _axis(plotted, plotted.across),
+        "yaxis": _axis(plotted, plotted.up),
         "hovermode": "closest",
-        "selections": [],
-        "selectionrevision": revision,
         "shapes": _boxes(plotted),
+        **_selecting(revision),
     }
     return figure
+
+
+def _selecting(revision: int) -> Figure:
+    """Return the part of a layout by which a drag selects a box, forgotten at a new revision."""
+    return {"dragmode": "select", "selections": (), "selectionrevision": revision}
 
 
 def pack(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
@@ -303,7 +346,7 @@ def _points(plotted: PlotRows, which: BoolArray, marker: Mapping[str, Any]) -> F
         for axis, name in (("x", plotted.across), ("y", plotted.up))
     )
     return {
-        "type": "scatter" if len(plotted.rows) <= MOST_AS_SVG else "scattergl",
+        "type": "scatter",
         "mode": "markers",
         "x": pack(plotted.column(plotted.across)[rows]),
         "y": pack(plotted.column(plotted.up)[rows]),
@@ -325,25 +368,28 @@ def _boxes(plotted: PlotRows) -> list[dict[str, Any]]:
     columns = tuple((ends, "") for ends in across) or free
     rows = tuple((ends, "") for ends in up) or free
     return [
-        {
-            "type": "rect",
-            "layer": "below",
-            "xref": f"x{x_domain}",
-            "yref": f"y{y_domain}",
-            "x0": x[0],
-            "x1": x[1],
-            "y0": y[0],
-            "y1": y[1],
-            "fillcolor": "rgba(34,104,212,0.08)",
-            "line": {"width": 1, "color": "rgba(34,104,212,0.55)"},
-        }
+        {**_box(x, y), "xref": f"x{x_domain}", "yref": f"y{y_domain}"}
         for x, x_domain in columns
         for y, y_domain in rows
     ]
 
 
-def _axis(name: str) -> dict[str, Any]:
+def _box(x: state.Range, y: state.Range) -> Figure:
+    """Return a box over points and lines, from its ends on both axes."""
     return {
+        "type": "rect",
+        "x0": x[0],
+        "x1": x[1],
+        "y0": y[0],
+        "y1": y[1],
+        "fillcolor": "rgba(34,104,212,0.12)",
+        "line": {"width": 1, "color": "rgba(34,104,212,0.55)"},
+    }
+
+
+def _axis(plotted: PlotRows, name: str) -> dict[str, Any]:
+    return {
+        "type": "log" if plotted.is_logarithmic(name) else "linear",
         "title": {"text": state.title_of(name), "standoff": 6, "font": {"size": 11}},
         "gridcolor": GRID,
         "zeroline": False,
@@ -358,6 +404,7 @@ def _figure(
     plotted: PlotRows, plot: str, data: list[Figure], margin: Mapping[str, int], *, dark: bool
 ) -> Figure:
     layout = {
+        "showlegend": False,
         "paper_bgcolor": PAPER[dark],
         "plot_bgcolor": "rgba(0,0,0,0)",
         "font": {"color": TEXT if not dark else "#aeb6c0", "family": "inherit", "size": 11},
@@ -378,15 +425,3 @@ def _ends(values: FloatArray) -> state.Range:
     if not len(values):
         return 0.0, 1.0
     return float(values.min()), float(values.max())
-
-
-def _with_room(values: FloatArray) -> list[float]:
-    low, high = _ends(values)
-    room = 0.02 * (high - low)
-    return [low - room, high + room]
-
-
-def _shares(values: FloatArray) -> FloatArray:
-    low, high = _ends(values)
-    # All of a few lines may have the same value.
-    return (values - low) / (high - low) if high > low else np.zeros(len(values))

@@ -6,6 +6,7 @@ kept as a file beside the folder of its results, so that it is known before ther
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
@@ -68,6 +69,13 @@ class StudyFolders:
             known = ", ".join(folders) or "none yet"
             raise InputError(f"there is no study {name!r}; there are {known}")
         return folders[name]
+
+    def drop(self, name: str) -> None:
+        """Remove a study of the page from the list, unless it has results."""
+        folder = self.by_name().get(name)
+        if folder is not None and folder.parent == self.home and not part_paths(folder):
+            with contextlib.suppress(OSError):
+                _file_beside(folder).unlink()
 
     def new(self, name: str) -> Path:
         """Return a folder that does not exist yet, whose name no study has, for a new study.

@@ -99,6 +99,8 @@ class Studies(StudiesPart):
         brushes: The filters, at most one for each axis.
         across, up: Names of the axes of the scatter plot; None for the first two objectives.
         colour: Name of what colours both plots; None for the first objective.
+        logarithmic: Whether axes with positive values alone are logarithmic.
+        front_only: Whether the plots show the designs of the Pareto front alone.
         picked: Index of the design that was picked last.
         plan: The small study that can be started.
     """
@@ -108,6 +110,8 @@ class Studies(StudiesPart):
     across: str | None = None
     up: str | None = None
     colour: str | None = None
+    logarithmic: bool = False
+    front_only: bool = False
     picked: int | None = None
     plan: StudyPlan = StudyPlan()
 

@@ -8,11 +8,12 @@ from html import escape
 import numpy as np
 
 from explorer.app.features.studies.feed import StudyDrawing
-from explorer.app.features.studies.figures import FRONT, MOST_ROWS, PICKED, SCALE
+from explorer.app.features.studies.figures import FRONT, MOST_LINES, PICKED, SCALE
 from explorer.app.features.studies.state import StudyPlan, choices_for, label_of, title_of
 from explorer.app.features.studies.work import StudyRun
-from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.buttons import extra_button, press_button
 from explorer.app.widgets.markup import box, by_theme, dim, meter
+from explorer.files.extras import is_missing
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import IntArray
@@ -60,8 +61,9 @@ def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
         clear = press_button("studies.clear", "", "clear", hint=hint, class_name="ex-link")
         parts.append(f"<b>{format_number(inside)}</b> within the brushes {clear}")
     plotted = drawing.plotted
-    if plotted is not None and plotted.count > MOST_ROWS:
-        parts.append(f"{format_number(len(plotted.rows))} of them drawn, the front first")
+    if plotted is not None and plotted.count > MOST_LINES:
+        points, lines = map(format_number, (len(plotted.rows), len(plotted.lines)))
+        parts.append(f"{points} drawn as points and {lines} as lines, the front first")
     if plotted is not None and plotted.lacking[0]:
         lacking, names = plotted.lacking
         lacks = escape(" or ".join(map(label_of, names)))
@@ -151,21 +153,24 @@ def head(
     return box(*parts)
 
 
-def acts(run: StudyRun | None, *, is_new: bool, can_go_on: bool) -> str:
+def acts(run: StudyRun | None, looks: str, *, is_new: bool, can_go_on: bool) -> str:
     """Return the buttons on top of the tab as HTML.
 
     Args:
+        looks: Switches of how the open study is drawn, HTML.
         run: The study that is being computed; None if none is.
         is_new: Whether a new study is being set up.
         can_go_on: Whether designs of the open study are missing.
     """
-    if run is not None:
+    if is_missing("study"):
+        buttons = extra_button("study") + ("" if is_new else _button("new"))
+    elif run is not None:
         buttons = _button("cancel")
     elif is_new:
         buttons = _button("start", is_main=True)
     else:
         buttons = _button("continue", is_main=True) * can_go_on + _button("new")
-    return box(f'<div class="ex-ends ex-acts-line">{buttons}</div>')
+    return box(f'<div class="ex-ends ex-acts-line">{looks}{buttons}</div>')
 
 
 def _button(name: str, *, is_main: bool = False) -> str:

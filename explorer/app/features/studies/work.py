@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.features.studies.feed import StudyFeed
 from explorer.app.features.studies.folders import keep_study, study_folders, study_in
-from explorer.app.features.studies.state import StudyPlan, study_around
+from explorer.app.features.studies.state import Studies, StudyPlan, study_around
 from explorer.app.session.session import Session, Who
 from explorer.app.session.worker import Channel, Worker
 from explorer.errors import ExplorerError
+from explorer.files.extras import check_extra
 from explorer.mechanism.design import Design
 from explorer.sweep.run import Progress, run_study
 from explorer.sweep.study import Study
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from explorer.app.features.feature import Services
 
 # Seconds between two drawings of the results so far.
-PACE = 1.0
+PACE = 2.0
 # Seconds after which the process of a cancelled study is ended; workers that are about to begin
 # notice late.
 PATIENCE = 5.0
@@ -160,6 +161,7 @@ class StudyRunner:
                 self._complain(message, who)
                 return
             try:
+                check_extra("study")
                 name, study, folder = make_study()
             except ExplorerError as error:
                 self._complain(str(error), who)
@@ -191,8 +193,14 @@ class StudyRunner:
         run = self.run
         self._finish()
         # The process of a cancelled study may have been ended.
-        if run is not None and not run.is_cancelled:
-            self._complain(problem, None)
+        if run is None or run.is_cancelled:
+            return
+        self._complain(problem, None)
+        if run.progress is None and problem != DIED:
+            # It was refused: nothing remains of it.
+            self.feed.folders.drop(run.name)
+            self.feed.look()
+            self._session.do(lambda s: OpenStudy(None) if Studies.of(s).name == run.name else None)
 
     def _finish(self) -> None:
         with self._lock:
