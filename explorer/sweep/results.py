@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,11 +160,8 @@ def load_results(folder: str | Path, study: Study | None = None) -> Results:
     return Results(known, columns)
 
 
-TableFormat = Literal["csv", "parquet"]
-
-
-def table_bytes(results: Results, file_format: TableFormat) -> bytes:
-    """Return all rows as one file; a number that a row lacks is empty or null.
+def table_bytes(results: Results, *, is_csv: bool) -> bytes:
+    """Return all rows as CSV or as Parquet; a number that a row lacks is empty or null.
 
     Raises:
         MissingExtraError: Pyarrow is not installed.
@@ -173,8 +170,7 @@ def table_bytes(results: Results, file_format: TableFormat) -> bytes:
     pairs = results.columns.items()
     rows = arrow.table({name: arrow.array(each, from_pandas=True) for name, each in pairs})
     data = io.BytesIO()
-    write = csv.write_csv if file_format == "csv" else pyarrow().parquet.write_table
-    write(rows, data)
+    (csv.write_csv if is_csv else pyarrow().parquet.write_table)(rows, data)
     return data.getvalue()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import io
 import json
 import multiprocessing
 import os
@@ -33,7 +34,7 @@ from explorer.errors import MissingExtraError
 from explorer.sweep import run as runs
 from explorer.sweep.cluster import DaskWorkers
 from explorer.sweep.parts import LOCK_FILE, part_path, part_paths, read_part
-from explorer.sweep.results import front, load_results, summarise
+from explorer.sweep.results import front, load_results, summarise, table_bytes
 from explorer.sweep.rows import columns_of, samples
 from explorer.sweep.run import Progress, RunError, run_study
 from explorer.sweep.study import Objective, Polish, Sampling, Study, encode_study
@@ -280,6 +281,21 @@ def test_folder_with_only_damaged_parts_names_them(tmp_path: Path) -> None:
         part_path(tmp_path, chunk).unlink()
     run_study(study, tmp_path, HereWorkers())
     assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", ["csv", "parquet"])
+def test_table_of_results_has_the_value_of_each_row_and_column(whole: Path, name: str) -> None:
+    polars: Any = importlib.import_module("polars")
+    results = load_results(whole)
+    data = io.BytesIO(table_bytes(results, is_csv=name == "csv"))
+    table = polars.read_csv(data) if name == "csv" else polars.read_parquet(data)
+    assert table.columns == [*results.columns]
+    for column, values in results.columns.items():
+        # A number that a row lacks is NaN here and nothing there.
+        lacks = [str(each) in ("nan", "") for each in values.tolist()]
+        assert [each in (None, "") for each in table[column]] == lacks
+        there = [each for each in table[column] if each not in (None, "")]
+        assert there == values[~np.array(lacks)].tolist()
 
 
 def test_folder_in_use_is_refused(tmp_path: Path) -> None:

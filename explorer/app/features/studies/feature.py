@@ -47,7 +47,7 @@ from explorer.errors import ExplorerError
 from explorer.files.extras import check_extra, is_missing
 from explorer.measures.catalogue import measures_in
 from explorer.numerics.number_text import format_number
-from explorer.sweep.results import TableFormat, load_results, table_bytes
+from explorer.sweep.results import load_results, table_bytes
 from explorer.sweep.study import NAMES, decode_study
 
 # Height over width.
@@ -327,11 +327,10 @@ def open_study(services: Services, data: bytes, name: str) -> tuple[Action, str]
 def send_table(services: Services, name: str, who: Who) -> None:
     """Send the rows of the open study."""
     study = str(Studies.of(services.session.latest_state()).name)
-    folder = services.get(study_folders).folder(study)
 
     def make(_: viser.ClientHandle) -> File:
-        file_format: TableFormat = "csv" if name == "CSV" else "parquet"
-        return f"{study}.{file_format}", table_bytes(load_results(folder), file_format)
+        results = load_results(services.get(study_folders).folder(study))
+        return f"{study}.{name.lower()}", table_bytes(results, is_csv=name == "CSV")
 
     services.downloads.make(who, "Writing the table", make)
 
