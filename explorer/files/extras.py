@@ -14,7 +14,7 @@ EXTRAS = {
     "cluster": ("a scheduler and each of its workers", ("distributed",)),
     "planning": ("paths that are not straight in the folds", ("ompl",)),
     "screenshot": ("pictures and PDF files", ("playwright",)),
-    "study": ("studies", ("pyarrow", "plotly")),
+    "study": ("studies", ("pyarrow",)),
 }
 """What needs each extra, in the plural, and the packages that it installs."""
 

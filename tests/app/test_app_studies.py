@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import base64
-import json
 import math
 import os
+import re
 import signal
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -25,7 +23,22 @@ from explorer.app.features.feature import Services
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
 from explorer.app.features.studies.feature import DECODER, PlotEvent, StudiesPanel
 from explorer.app.features.studies.feed import StudyDrawing, StudyFeed
-from explorer.app.features.studies.figures import PlotRows, parallel, scatter, select_rows, thin_out
+from explorer.app.features.studies.figures import (
+    LEFT_OUT,
+    PICKED,
+    SIDE,
+    PlotName,
+    PlotRows,
+    brushes_in,
+    lines_html,
+    path_of,
+    points_html,
+    reading_of,
+    row_at,
+    select_rows,
+    thin_out,
+    ticks_of,
+)
 from explorer.app.features.studies.folders import (
     StudyFolders,
     check_given,
@@ -265,22 +278,24 @@ def test_plan_offers_what_the_machine_of_the_design_has_and_refuses_the_rest() -
         assert study_around(LOADED, plan, "s").base == expected
 
 
+PICK = '{"study":"s","plot":"lines","act":"pick","start":[0,0],"end":[0.5,1],"size":[9,9]}'
+
+
 @pytest.mark.parametrize(
     ("line", "event"),
     [
-        ('{"study":"s","index":7}', PlotEvent(study="s", index=7)),
         (
-            '{"study":"s","brushes":[{"axis":"b2","ranges":[[0,1.5]]},{"axis":"a3x","ranges":[]}]}',
-            PlotEvent(study="s", brushes=(Brush("b2", ((0.0, 1.5),)), Brush("a3x", ()))),
+            PICK,
+            PlotEvent(study="s", plot="lines", act="pick", start=(0, 0), end=(0.5, 1), size=(9, 9)),
         ),
         ("", None),
         ("null", None),
         ("\ud800", None),
-        ('{"study":"s","index":-1}', None),
-        ('{"study":"s","index":1.5}', None),
-        ('{"study":"s","index":1,"path":"/etc"}', None),
-        ('{"study":"s","brushes":[{"axis":"b2","ranges":[[0,NaN]]}]}', None),
-        ('{"study":"s","brushes":[{"axis":"b2"}]}', None),
+        (PICK.replace("0.5", "1.5"), None),
+        (PICK.replace("0.5", "NaN"), None),
+        (PICK.replace("[9,9]", "[9,0]"), None),
+        (PICK.replace("pick", "open"), None),
+        (PICK.replace("{", '{"path":"/etc",'), None),
         ("[" * 2000, None),
     ],
 )
@@ -330,9 +345,22 @@ def draw_study(feed: StudyFeed, studies: Studies) -> StudyDrawing:
     return feed.drawing
 
 
-def unpacked(array: dict[str, str]) -> list[Any]:
-    kind = {"f4": "<f4", "i4": "<i4"}[array["dtype"]]
-    return np.frombuffer(base64.b64decode(array["bdata"]), dtype=kind).tolist()
+def designs_in(html: str) -> list[str]:
+    """Return the paths of the designs of a plot, one for each, in any order."""
+    drawn = re.findall('<path class="(?:|front)" style="[^"]*" d="([^"]*)"/>', html)
+    return sorted(f"M{each}" for path in drawn for each in path.split("M")[1:])
+
+
+def assert_designs(plotted: PlotRows, plot: PlotName, rows: Any, html: str) -> None:
+    """Compare the designs of a plot with rows, and their places with the values of the rows."""
+    assert plotted.rows[plot].tolist() == np.asarray(rows).tolist()
+    places = plotted.places(plot, plotted.rows[plot])
+    assert designs_in(html) == sorted(path_of(each[None]) for each in places)
+    along = places[:, 0].T if plot == "points" else places[:, :, 1].T
+    for name, there in zip(plotted.axes_of(plot), along, strict=True):
+        assert np.all((there > 0.0) & (there < 1.0))
+        found = [plotted.value_at(name, place) for place in there.tolist()]
+        assert found == pytest.approx(plotted.column(name)[rows].tolist(), rel=1e-9, abs=1e-9)
 
 
 def test_folders_offer_only_studies_and_no_name_leads_elsewhere(home: Path) -> None:
@@ -365,56 +393,33 @@ def test_plots_hold_what_was_computed(feed: StudyFeed, home: Path) -> None:
     drawing = draw_study(feed, Studies(name="some"))
     assert (drawing.results.count, drawing.is_complete) == (12, False)
     done = results.columns["status"] == "done"
-    volume, reach = results.columns["volume"], results.columns["reach"]
-    best = results.front()
+    volume, best = results.columns["volume"], results.front()
     assert sorted(drawing.front.tolist()) == np.flatnonzero(best).tolist()
     assert np.all(np.diff(volume[drawing.front]) <= 0.0)
     counts = [count for *_, count in drawing.reasons]
     assert counts == sorted(counts, reverse=True)
     assert sum(counts) == int((~done).sum()) > 0
-    assert drawing.plots is not None
     assert drawing.plotted is not None
     assert (drawing.plotted.across, drawing.plotted.up) == ("volume", "reach")
-    lines, points = (json.loads(plot.to_json()) for plot in drawing.plots)
-    assert_lines_of(results, np.flatnonzero(done), lines)
-    logarithmic = draw_study(feed, Studies(name="some", logarithmic=True)).plots
-    assert logarithmic is not None
-    assert_lines_of(results, np.flatnonzero(done), json.loads(logarithmic[0].to_json()))
-    kinds = [json.loads(logarithmic[1].to_json())["layout"][axis]["type"] for axis in AXES]
-    assert kinds == ["log" if column[done].min() > 0.0 else "linear" for column in (volume, reach)]
-    only = draw_study(feed, Studies(name="some", front_only=True)).plots
-    assert only is not None
-    assert_lines_of(results, np.flatnonzero(best), json.loads(only[0].to_json()))
-    assert points_of(json.loads(only[1].to_json())) == np.flatnonzero(best).tolist()
-    marked = [trace for trace in points["data"] if "markers" in trace["mode"]]
-    seen = [index for trace in marked for index in unpacked(trace["customdata"])]
-    assert sorted(seen) == results.columns["index"][done].tolist()
-    for trace in marked:
-        rows = unpacked(trace["customdata"])
-        assert unpacked(trace["x"]) == volume[rows].astype(np.float32).tolist()
-        assert unpacked(trace["y"]) == reach[rows].astype(np.float32).tolist()
+    for studies, rows in (
+        (Studies(name="some"), np.flatnonzero(done)),
+        (Studies(name="some", logarithmic=True), np.flatnonzero(done)),
+        (Studies(name="some", front_only=True), np.flatnonzero(best)),
+    ):
+        drawing = draw_study(feed, studies)
+        assert drawing.plotted is not None
+        for plot, html in zip(PLOTS, drawing.plots, strict=True):
+            assert_designs(drawing.plotted, plot, rows, html)
+        for name, column in (("volume", volume), ("a3x", results.columns["a3x"])):
+            is_log = studies.logarithmic and bool(column[rows].min() > 0.0)
+            assert drawing.plotted.is_logarithmic(name) == is_log
+            low, high = column[rows].min(), column[rows].max()
+            ticks = ticks_of(drawing.plotted, name)
+            assert 2 <= len(ticks) <= 12
+            assert np.all((ticks >= low) & (ticks <= high) & (np.diff(ticks, prepend=-1.0) > 0.0))
 
 
-AXES = ("xaxis", "yaxis")
-
-
-def assert_lines_of(results: Results, rows: Any, figure: dict[str, Any]) -> None:
-    """Compare the values on the axes of all lines with those of rows."""
-    meta: dict[str, Any] = figure["layout"]["meta"]
-    heights: dict[int, Any] = {}
-    for trace in figure["data"]:
-        if "customdata" in trace:
-            lines = np.reshape(unpacked(trace["y"]), (-1, len(meta["axes"]) + 1))
-            assert np.isnan(lines[:, -1]).all()
-            heights |= dict(zip(unpacked(trace["customdata"]), lines[:, :-1], strict=True))
-    assert sorted(heights) == results.columns["index"][rows].tolist()
-    for row in rows:
-        line = heights[int(results.columns["index"][row])]
-        for name, height, (low, high, is_log) in zip(meta["axes"], line, meta["ends"], strict=True):
-            at = low * (high / low) ** height if is_log else low + height * (high - low)
-            assert at == pytest.approx(
-                results.columns[name][row], rel=1e-5, abs=1e-6 * (high - low)
-            )
+PLOTS: tuple[PlotName, ...] = ("lines", "points")
 
 
 def test_plots_show_brushes_and_the_picked_design(feed: StudyFeed, home: Path) -> None:
@@ -426,20 +431,70 @@ def test_plots_show_brushes_and_the_picked_design(feed: StudyFeed, home: Path) -
     drawing = draw_study(feed, Studies(name="some", brushes=brushes, picked=picked))
     expected = [bool(low <= each <= high) for each in results.columns["volume"]]
     assert drawing.inside.tolist() == expected
-    assert drawing.plots is not None
-    lines, points = (json.loads(plot.to_json()) for plot in drawing.plots)
-    (bar,), meta = lines["layout"]["shapes"], lines["layout"]["meta"]
-    axis = meta["axes"].index("volume")
-    assert bar["x0"] < axis < bar["x1"]
-    least, most, _ = meta["ends"][axis]
-    ends = [least + bar[end] * (most - least) for end in ("y0", "y1")]
-    assert ends == pytest.approx([low, high])
-    (box,) = points["layout"]["shapes"]
-    assert (box["x0"], box["x1"], box["yref"]) == (low, high, "y domain")
-    assert unpacked(points["data"][-1]["customdata"]) == [picked]
-    # Of the points, those left out are drawn apart from the others.
-    rows = unpacked(points["data"][0]["customdata"]) + unpacked(points["data"][2]["customdata"])
-    assert sorted(rows) == np.flatnonzero(done & ~np.array(expected)).tolist() != []
+    plotted = drawing.plotted
+    assert plotted is not None
+    for plot, html in zip(PLOTS, drawing.plots, strict=True):
+        place = plotted.places(plot, plotted.picked)
+        assert f'class="picked" style="stroke:{PICKED}" d="{path_of(place)}"' in html
+        # Those left out are drawn apart from the others.
+        (left_out,) = re.findall(f'style="stroke:{re.escape(LEFT_OUT)}" d="([^"]*)"', html)
+        rows = np.flatnonzero(done & ~np.array(expected))
+        assert left_out.count("M") == len(rows) > 0
+        (box,) = re.findall(BOX, html)
+        x, top, width, height = (float(each) / SIDE for each in box)
+        if plot == "points":
+            assert (top, height) == (0.0, 1.0)
+            ends = x, x + width
+        else:
+            middle = plotted.middles()[plotted.axes.index("volume")]
+            assert x < middle < x + width
+            ends = 1.0 - top - height, 1.0 - top
+        found = [plotted.value_at("volume", end) for end in ends]
+        assert found == pytest.approx([low, high], rel=1e-3)
+
+
+BOX = r'<rect class="brush" x="(\d+)" y="(\d+)" width="(\d+)" height="(\d+)"/>'
+
+
+def test_place_on_a_plot_has_the_nearest_design_and_the_axes_there(
+    feed: StudyFeed, home: Path
+) -> None:
+    """A place beside a design is on it; a box brushes what a person sees in it."""
+    results, size = load_results(home / "some"), (700.0, 250.0)
+    plotted = draw_study(feed, Studies(name="some", logarithmic=True)).plotted
+    assert plotted is not None
+    for plot in PLOTS:
+        for row in plotted.rows[plot].tolist():
+            places = plotted.places(plot, np.array([row]))[0]
+            place = places[0] if plot == "points" else 0.7 * places[1] + 0.3 * places[2]
+            found = row_at(plotted, plot, tuple(place + 0.2 / np.array(size)), size)
+            # Another design may be as near.
+            others = plotted.places(plot, plotted.rows[plot])
+            assert found is not None
+            words, path = reading_of(plotted, plot, found)
+            assert words.startswith(f"Design {results.columns['index'][found]}: ")
+            assert path == path_of(plotted.places(plot, np.array([found])))
+            if plot == "points":
+                away = np.linalg.norm((others[:, 0] - place) * size, axis=1)
+                assert away[plotted.rows[plot] == found] < 1.0
+    assert row_at(plotted, "points", (0.0, 0.0), size) is None
+    assert reading_of(plotted, "points", None) == ("", "")
+    brushes = brushes_in(plotted, "points", (0.8, 0.9), (0.3, 0.1))
+    assert [each.axis for each in brushes] == ["volume", "reach"]
+    inside = within(results.columns, tuple(brushes))
+    for row in plotted.rows["points"].tolist():
+        x, y = plotted.places("points", np.array([row]))[0, 0]
+        assert inside[row] == (0.3 <= x <= 0.8 and 0.1 <= y <= 0.9)
+    # Beside an axis a box is that of the nearest one; over several, of these.
+    middles = plotted.middles()
+    beside = middles[1] + 0.1 * (middles[2] - middles[1])
+    (brush,) = brushes_in(plotted, "lines", (beside, 0.2), (beside, 0.7))
+    assert brush.axis == plotted.axes[1]
+    assert [plotted.place_of(brush.axis, np.array(each)) for each in brush.ranges[0]] == (
+        pytest.approx([0.2, 0.7])
+    )
+    brushes = brushes_in(plotted, "lines", (middles[0], 0.2), (middles[2], 0.7))
+    assert [each.axis for each in brushes] == [*plotted.axes[:3]]
 
 
 def test_picked_design_is_live_and_one_step_to_undo(desk: Desk, feed: StudyFeed) -> None:
@@ -506,15 +561,14 @@ def test_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of() -
     seen = select_rows(results, results.front(), studies)
     assert seen is not None
     assert seen.axes == ("b2", "volume", "reach")
-    assert points_of(scatter(seen, 1, dark=False)) == [0, 1, 2, 3]
-    lines = parallel(seen, 1, dark=False)
+    assert_designs(seen, "points", [0, 1, 2, 3], points_html(seen))
     # A line needs a place on each axis; a design without one is counted.
-    assert_lines_of(results, np.array([0, 2]), lines)
+    assert_designs(seen, "lines", [0, 2], lines_html(seen))
     assert "<b>2</b> without a line, which lack reach" in status_of(results, seen)
     # As an axis it places no design that lacks it, picked or not.
     other = select_rows(results, results.front(), replace(studies, up="reach", picked=1))
     assert other is not None
-    assert points_of(scatter(other, 1, dark=False)) == [0, 2]
+    assert_designs(other, "points", [0, 2], points_html(other))
 
 
 def test_measure_that_all_designs_lack_or_share_is_no_axis_and_hides_nothing() -> None:
@@ -526,28 +580,22 @@ def test_measure_that_all_designs_lack_or_share_is_no_axis_and_hides_nothing() -
         seen = select_rows(results, results.front(), Studies(name="s"))
         assert seen is not None
         assert seen.axes == ("b2", "volume")
-        assert points_of(scatter(seen, 1, dark=False)) == [0, 1, 2, 3]
-        assert_lines_of(results, np.arange(4), parallel(seen, 1, dark=False))
+        assert_designs(seen, "points", [0, 1, 2, 3], points_html(seen))
+        assert_designs(seen, "lines", [0, 1, 2, 3], lines_html(seen))
         assert "without a line" not in status_of(results, seen)
     # Where no design has all axes, points are drawn and no line.
     columns |= {"volume": [4.0, 2.0, nan, nan], "reach": [nan, nan, 3.0, 1.0]}
     results = results_of(columns)
     seen = select_rows(results, results.front(), Studies(name="s", across="b2", up="reach"))
     assert seen is not None
-    assert points_of(scatter(seen, 1, dark=False)) == [2, 3]
-    assert_lines_of(results, np.arange(0), parallel(seen, 1, dark=True))
+    assert_designs(seen, "points", [2, 3], points_html(seen))
+    assert seen.rows["lines"].tolist() == [] == designs_in(lines_html(seen))
     assert "<b>4</b> without a line, which lack volume or reach" in status_of(results, seen)
-
-
-def points_of(figure: dict[str, Any]) -> list[int]:
-    """Return the designs that are points of a scatter plot, those picked once."""
-    traces = [each for each in figure["data"] if "markers" in each["mode"]]
-    return sorted({index for each in traces for index in unpacked(each["customdata"])})
 
 
 def status_of(results: Results, seen: PlotRows) -> str:
     front = np.flatnonzero(seen.front)
-    return status(StudyDrawing(seen.studies, results, front, seen.inside, seen, None, ()))
+    return status(StudyDrawing(seen.studies, results, front, seen.inside, seen, ("", ""), ()))
 
 
 class Studio:
@@ -657,10 +705,8 @@ def test_study_whose_process_dies_is_reported_and_keeps_what_is_finished(studio:
 def test_new_study_closes_the_open_one_and_shows_the_settings(
     services: Services, desk: Desk, buttons: Buttons, home: Path
 ) -> None:
-    theme: Any = SimpleNamespace(is_dark=False)
-    shared = replace(services, theme=theme)
-    shared.give(study_folders, StudyFolders(home))
-    panel = StudiesPanel(shared)
+    services.give(study_folders, StudyFolders(home))
+    panel = StudiesPanel(services)
     desk.session.do(OpenStudy("some"))
     draw_study(panel.feed, Studies.of(desk.state))
     # Without a request the settings of a new study are not shown while one is open.

@@ -30,10 +30,6 @@ SCROLL = """it => {
     // A part of a pixel may stay outside, since scrolling goes by whole ones.
     return it.isConnected && top > -1 && bottom < innerHeight + 1;
 }"""
-PLOTS = """() => {
-    const plots = [...document.querySelectorAll(".js-plotly-plot")];
-    return plots.length === 2 && plots.every((plot) => plot.explorerListens);
-}"""
 GROUND = """() => {
     const { backgroundColor } = getComputedStyle(document.body);
     return backgroundColor.match(/[\\d.]+/g).slice(0, 3).map(Number);
@@ -191,10 +187,6 @@ class Newcomer:
             return all(any(abs(each - value) <= tolerance for each in found) for value in values)
 
         self._tab.wait_for(are_there, f"{values} in sight")
-
-    def wait_for_plots(self) -> None:
-        """Wait until both plots of a study are drawn and notice what is done to them."""
-        self._tab.wait_for(lambda: bool(self.page.evaluate(PLOTS)), "plots")
 
     def lightness(self) -> float:
         """Return how light the ground of the page is, from 0 to 1."""

@@ -13,7 +13,7 @@ from explorer.app.state.actions import Set
 
 SIZE = (1280, 720)
 LEAST_SIZE, LEAST_CONTRAST = 11.0, 4.5
-# Sizes of type of the stylesheet. The plots of Plotly set type of their own.
+# Sizes of type of the stylesheet.
 SIZES = {11.0, 12.5, 15.0, 20.0}
 # Sizes are computed in floating point.
 ROUNDING = 0.02

@@ -246,15 +246,12 @@ def test_study_is_started_brushed_and_a_design_of_it_picked(newcomer: Newcomer) 
     newcomer.sees(re.compile("32 designs · .* on the Pareto front"))
     newcomer.button("New study").wait_for()
     assert newcomer.presses_for() == 4
-    newcomer.wait_for_plots()
     newcomer.wait()
     # The words of an axis stand above its middle.
-    x, y = middle(newcomer.sees("volume [u³]"))
+    x, y = middle(newcomer.sees("volume [units³]"))
     newcomer.drag((x, y + BRUSH[0]), (x, y + BRUSH[1]))
     within = numbers(newcomer.sees("within the brushes").inner_text())
     assert 0.0 < within[-1] < 32.0
-    # It comes with the pointer.
-    newcomer.button("Expand plot").wait_for()
     newcomer.wait()
     row = newcomer.button(re.compile(r"^\d+ [\d,]+ "))
     name, volume = row.inner_text().split()[:2]

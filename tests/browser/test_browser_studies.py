@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from playwright.sync_api import expect
 from tab import Tab
 
 from explorer.app.features.studies.feature import StudiesPanel
-from explorer.app.features.studies.feed import PlotJson
-from explorer.app.features.studies.state import Studies, StudyPlan
+from explorer.app.features.studies.figures import LEFT_OUT, PlotName, PlotRows, reading_of
+from explorer.app.features.studies.state import Studies, StudyPlan, within
 from explorer.app.session.session import UNDO
 from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.parts import write_part
@@ -26,33 +25,13 @@ OPTIMAL = PRESETS["paper-optimal"]
 WINDOW = {"width": 1280, "height": 900}
 COUNT = 24
 
-# Where a point of the scatter plot is in the window, and what each trace of it shows.
-POINT = """([name, x, y]) => {
-  const plot = document.querySelectorAll(".js-plotly-plot")[1], { xaxis, yaxis } = plot._fullLayout;
-  plot.scrollIntoView({ block: "center" });
-  const box = plot.getBoundingClientRect();
-  return [box.x + xaxis._offset + xaxis.l2p(x), box.y + yaxis._offset + yaxis.l2p(y)];
+# A plot by its name, brought into view, as its box: left, top, width and height.
+BOX = """(plot) => {
+  const svg = document.querySelector(`.is-${plot} [data-plot]`);
+  svg.scrollIntoView({ block: "center" });
+  const { x, y, width, height } = svg.getBoundingClientRect();
+  return [x, y, width, height];
 }"""
-LEFT_OUT = """() => [0, 2].flatMap((k) =>
-  Array.from(document.querySelectorAll(".js-plotly-plot")[1]._fullData[k].customdata || []))"""
-BRUSHES = """() => document.querySelector(".js-plotly-plot").layout.shapes"""
-# Close to where the line of a design crosses the third axis, that of the volume.
-LINE = """(design) => {
-  const plot = document.querySelector(".js-plotly-plot"), { xaxis, yaxis } = plot._fullLayout;
-  const box = plot.querySelector(".nsewdrag").getBoundingClientRect();
-  const count = plot.layout.meta.axes.length;
-  const trace = plot._fullData.find((each) => each.customdata?.includes(design));
-  const at = Array.from(trace.customdata).indexOf(design) * (count + 1) + 2;
-  const height = 0.95 * trace.y[at] + 0.05 * trace.y[at + 1];
-  return [box.x + xaxis.l2p(2.05), box.y + yaxis.l2p(height)];
-}"""
-# Where an axis is in the window: from left, and its top and foot.
-AXIS = """(axis) => {
-  const plot = document.querySelector(".js-plotly-plot"), { xaxis, yaxis } = plot._fullLayout;
-  const box = plot.querySelector(".nsewdrag").getBoundingClientRect();
-  return [box.x + xaxis.l2p(axis), box.y + yaxis.l2p(1), box.y + yaxis.l2p(0)];
-}"""
-TOP = "() => document.querySelector('.js-plotly-plot').scrollIntoView({ block: 'center' })"
 
 
 @pytest.fixture
@@ -85,33 +64,32 @@ def panel_of(tab: Tab) -> StudiesPanel:
     return tab.running.page.services.get(StudiesPanel)
 
 
-def wait_for_plots(tab: Tab) -> None:
-    """Wait until the plots are those of the state, and are listened to."""
-    feed = panel_of(tab).feed
-
-    def plots() -> tuple[PlotJson, PlotJson] | None:
-        drawing, studies = feed.drawing, replace(Studies.of(tab.state), plan=StudyPlan())
-        is_new = drawing is not None and drawing.studies == studies and feed.wait_until_idle(0.0)
-        return drawing.plots if drawing is not None and is_new else None
-
-    shows = """(revision) => { const all = [...document.querySelectorAll(".js-plotly-plot")];
-      return all.length === 2 && all.every((each) => each.explorerListens)
-        && all[0].layout.selectionrevision === revision; }"""
-
-    def are_shown() -> bool:
-        # A study that has just been computed is drawn again, so which ones they are may change.
-        found = plots()
-        if found is None:
-            return False
-        return bool(tab.page.evaluate(shows, revision_in(found[0].to_json())))
-
-    tab.wait_for(are_shown, "the plots of the state")
-    # A plot that has come moves those below it.
+def wait_for_plots(tab: Tab) -> PlotRows:
+    """Wait until the plots are those of the state; return their rows and axes."""
     tab.settle()
+    feed, studies = panel_of(tab).feed, replace(Studies.of(tab.state), plan=StudyPlan())
+    tab.wait_for(
+        lambda: feed.drawing is not None and feed.drawing.studies == studies,
+        "the plots of the state",
+    )
+    tab.settle()
+    assert feed.drawing is not None
+    assert feed.drawing.plotted is not None
+    return feed.drawing.plotted
 
 
-def revision_in(text: str) -> int:
-    return int(json.loads(text)["layout"]["selectionrevision"])
+def point_in(tab: Tab, plot: PlotName, place: tuple[float, float]) -> tuple[float, float]:
+    """Return where a place on a plot is in the window, scrolled into view."""
+    left, top, width, height = tab.page.evaluate(BOX, plot)
+    return left + place[0] * width, top + (1.0 - place[1]) * height
+
+
+def drag(tab: Tab, start: tuple[float, float], end: tuple[float, float]) -> None:
+    tab.page.mouse.move(*start)
+    tab.page.mouse.down()
+    tab.page.mouse.move(*end, steps=4)
+    tab.page.mouse.up()
+    tab.settle()
 
 
 def studies_of(tab: Tab) -> Studies:
@@ -122,65 +100,61 @@ def test_design_is_picked_and_brushed_by_clicks_and_drags_in_the_plots(
     data_tab: Tab, folder: Path
 ) -> None:
     tab, results = data_tab, load_results(folder)
-    volume, reach = results.columns["volume"], results.columns["reach"]
     open_studies(tab)
     tab.choose("Study", "some")
-    wait_for_plots(tab)
+    plotted = wait_for_plots(tab)
 
-    # A click on a point opens that very design.
+    # What the pointer is on is read, and a click opens that very design.
     row = loneliest_row(results)
-    click_until_picked(
-        tab,
-        lambda: tab.page.evaluate(POINT, ["", volume[row], reach[row]]),
-        int(results.columns["index"][row]),
-    )
+    x, y = plotted.places("points", np.array([row]))[0, 0].tolist()
+    place = point_in(tab, "points", (x, y))
+    tab.page.mouse.move(*place)
+    words, path = reading_of(plotted, "points", row)
+    expect(tab.page.get_by_text(words, exact=True)).to_be_visible()
+    expect(tab.page.locator(f'.is-points .near[d="{path}"]')).to_have_count(1)
+    tab.page.mouse.click(*place)
+    tab.settle()
+    assert studies_of(tab).picked == results.columns["index"][row]
     assert tab.state.design == results.design_of_row(row)
     wait_for_plots(tab)
 
     # A box around it brushes both axes, and all else is left out.
-    place = tab.page.evaluate(POINT, ["", volume[row], reach[row]])
-    tab.page.mouse.move(place[0] - 12, place[1] - 12)
-    tab.page.mouse.down()
-    tab.page.mouse.move(place[0] + 12, place[1] + 12, steps=4)
-    tab.page.mouse.up()
-    tab.wait_for(lambda: len(studies_of(tab).brushes) == 2, "a box")
-    assert {each.axis for each in studies_of(tab).brushes} == {"volume", "reach"}
-    wait_for_plots(tab)
+    left, top = point_in(tab, "points", (x, y))
+    drag(tab, (left - 12, top - 12), (left + 12, top + 12))
+    assert [each.axis for each in studies_of(tab).brushes] == ["volume", "reach"]
+    seen = wait_for_plots(tab)
+    assert seen.inside[row]
     assert_left_out(tab, results)
-    assert row not in tab.page.evaluate(LEFT_OUT)
 
     # What is undone is gone from the plots too.
     tab.running.page.session.do(UNDO)
-    tab.wait_for(lambda: not studies_of(tab).brushes, "no brush")
     wait_for_plots(tab)
-    assert tab.page.evaluate(LEFT_OUT) == []
-    assert tab.page.evaluate(BRUSHES) == []
+    assert not studies_of(tab).brushes
+    expect(tab.page.locator(".brush")).to_have_count(0)
 
     # A click on a line opens its design: the top of an axis is met by one line alone.
-    tab.page.evaluate(TOP)
-    other = int(volume.argmax())
-    click_until_picked(tab, lambda: tab.page.evaluate(LINE, other), other)
+    other = int(results.columns["volume"].argmax())
+    top_of_axis, after = plotted.places("lines", np.array([other]))[0, 2:4]
+    tab.page.mouse.click(*point_in(tab, "lines", tuple(0.95 * top_of_axis + 0.05 * after)))
+    tab.settle()
+    assert studies_of(tab).picked == other
     assert tab.state.design == results.design_of_row(other)
     wait_for_plots(tab)
 
-    # A drag along an axis brushes it.
-    tab.page.evaluate(TOP)
-    x, top, foot = tab.page.evaluate(AXIS, 1)
-    tab.page.mouse.move(x, 0.7 * top + 0.3 * foot)
-    tab.page.mouse.down()
-    tab.page.mouse.move(x, 0.3 * top + 0.7 * foot, steps=4)
-    tab.page.mouse.up()
-    tab.wait_for(lambda: len(studies_of(tab).brushes) == 1, "a brush")
+    # A drag along an axis brushes it, and a double click frees the axes.
+    middle = float(plotted.middles()[1])
+    drag(tab, *(point_in(tab, "lines", (middle, share)) for share in (0.7, 0.3)))
     (brush,) = studies_of(tab).brushes
     assert brush.axis == "b2"
     ((low, high),) = brush.ranges
     assert -4.2 < low < high < 4.2
-    wait_for_plots(tab)
+    seen = wait_for_plots(tab)
     assert_left_out(tab, results)
-    assert 0 < len(tab.page.evaluate(LEFT_OUT)) < COUNT
+    assert 0 < seen.inside.sum() < COUNT
+    tab.page.mouse.dblclick(*point_in(tab, "lines", (0.02, 0.02)))
+    tab.settle()
+    assert not studies_of(tab).brushes
 
-    tab.page.get_by_title("Free all axes.").click()
-    tab.wait_for(lambda: not studies_of(tab).brushes, "no brush")
     wait_for_plots(tab)
     drawing = panel_of(tab).feed.drawing
     assert drawing is not None
@@ -188,32 +162,6 @@ def test_design_is_picked_and_brushed_by_clicks_and_drags_in_the_plots(
     tab.page.get_by_title(f"Open design {best}", exact=True).click()
     tab.wait_for(lambda: studies_of(tab).picked == best, "the best")
     assert tab.state.design == results.design_of_row(int(drawing.front[0]))
-
-
-def click_until_picked(tab: Tab, place: Callable[[], tuple[float, float]], index: int) -> None:
-    """Click on a design in a plot until it is picked.
-
-    Plotly forgets where the pointer is when it draws a plot, and takes no click there until the
-    pointer has moved, which a user does without a thought.
-    """
-
-    def is_picked() -> bool:
-        if studies_of(tab).picked == index:
-            return True
-        x, y = place()
-        tab.page.mouse.move(x - 3, y)
-        tab.page.mouse.move(x, y, steps=3)
-        # Longer than the throttle of Plotly's hover.
-        tab.page.wait_for_timeout(100)
-        tab.page.mouse.click(x, y)
-        tab.settle()
-        if studies_of(tab).picked == index:
-            return True
-        # Two clicks would be a double one within 0.3 s.
-        tab.page.wait_for_timeout(400)
-        return False
-
-    tab.wait_for(is_picked, f"a pick of design {index}")
 
 
 def loneliest_row(results: Results) -> int:
@@ -226,13 +174,7 @@ def loneliest_row(results: Results) -> int:
 
 
 def assert_left_out(tab: Tab, results: Results) -> None:
-    """Compare what the plot leaves out with the law, row by row."""
-    expected = [
-        int(index)
-        for row, index in enumerate(results.columns["index"].tolist())
-        if not all(
-            any(low <= results.columns[brush.axis][row] <= high for low, high in brush.ranges)
-            for brush in studies_of(tab).brushes
-        )
-    ]
-    assert sorted(tab.page.evaluate(LEFT_OUT)) == expected
+    """Compare the designs that the points leave out with the law, row by row."""
+    inside = within(results.columns, studies_of(tab).brushes)
+    left_out = tab.page.locator(f'.is-points [style="stroke:{LEFT_OUT}"]')
+    assert str(left_out.get_attribute("d")).count("M") == (~inside).sum() > 0

@@ -349,7 +349,7 @@ def draw_studies(browser: Browser) -> bytes:
             assert panel.feed.wait_until_idle(60.0)
             page, client = open_page(browser, running, (1280, 1000))
             page.get_by_role("tab", name="Studies", exact=True).click()
-            page.locator(".js-plotly-plot").nth(1).wait_for()
+            page.locator("[data-plot]").nth(1).wait_for()
             pull_drawer(page, 300)
             settle(page, client)
             running.page.point_cameras("isometric")

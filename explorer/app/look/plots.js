@@ -1,103 +1,85 @@
-// Reports brushes and picks in the plots of studies as presses of "studies.plot".
+// Sends what a pointer does to the plots of studies as presses of "studies.plot", and shows what the
+// server reads there. Places are shares of the width and height of a plot, from its lower left corner.
 window.explorer.plots ??= (() => {
-  const tell = (plot, event) => {
-    const line = JSON.stringify({ study: plot.layout.meta.study, ...event });
-    window.explorer.press("studies.plot", line);
+  // Pixels beyond which a press is a drag.
+  const LEAST = 4;
+  const plotAt = (target) => target?.closest?.("[data-plot]") ?? null;
+  const within = (share) => Math.min(1, Math.max(0, share));
+  const placeIn = (plot, { clientX, clientY }) => {
+    const { left, bottom, width, height } = plot.getBoundingClientRect();
+    return [within((clientX - left) / width), within((bottom - clientY) / height)];
   };
-  const brush = (plot, ranges) => {
-    const brushes = plot.layout.meta.axes.map((axis, k) => ({ axis, ranges: ranges[k] }));
-    tell(plot, { brushes });
+  const tell = (plot, act, end, start = end) => {
+    const { width, height } = plot.getBoundingClientRect();
+    const event = { ...JSON.parse(plot.dataset.plot), act, start, end, size: [width, height] };
+    window.explorer.press("studies.plot", JSON.stringify(event));
   };
-  const ordered = ([a, b]) => (a <= b ? [a, b] : [b, a]);
-  // Value at a height from 0 to 1 of an axis of the parallel lines.
-  const valueAt = ([low, high, isLogarithmic], share) =>
-    isLogarithmic ? low * (high / low) ** share : low + share * (high - low);
-  // Design whose line passes nearest to a point of the window; null if none is near.
-  const designAt = (plot, x, y) => {
-    const { xaxis, yaxis } = plot._fullLayout,
-      box = plot.querySelector(".nsewdrag").getBoundingClientRect();
-    const count = plot.layout.meta.axes.length,
-      place = xaxis.p2l(x - box.x),
-      first = Math.floor(place);
-    if (first < 0 || first > count - 2) return null;
-    const run = xaxis.l2p(1) - xaxis.l2p(0);
-    let nearest = null,
-      least = 6;
-    for (const { customdata, y: heights } of plot._fullData) {
-      customdata?.forEach((design, line) => {
-        const at = line * (count + 1) + first;
-        const start = yaxis.l2p(heights[at]),
-          rise = yaxis.l2p(heights[at + 1]) - start;
-        const above = start + rise * (place - first) - (y - box.y);
-        const away = Math.abs(above) * (run / Math.hypot(run, rise));
-        if (away < least) [nearest, least] = [Number(design), away];
-      });
-    }
-    return nearest;
+  const readingOf = (plot) => plot.closest(".ex-plot").parentElement.querySelector(".ex-reading");
+  const show = (plot, words, path) => {
+    const reading = readingOf(plot);
+    reading.textContent = words || reading.dataset.hint;
+    plot.querySelector(".near").setAttribute("d", path);
   };
-  const listen = {
-    scatter(plot) {
-      plot.on("plotly_click", ({ points }) => {
-        const index = Number(points[points.length - 1].customdata);
-        if (Number.isInteger(index)) tell(plot, { index });
-      });
-      plot.on("plotly_selected", (event) => {
-        if (!event || !event.range) return;
-        const { x, y } = event.range;
-        brush(plot, [[ordered(x)], [ordered(y)]]);
-      });
-      plot.on("plotly_deselect", () => brush(plot, [[], []]));
-    },
-    parallel(plot) {
-      let pressed = null;
-      plot.addEventListener("pointerdown", (e) => (pressed = [e.clientX, e.clientY]), true);
-      // Plotly covers the page during a press, so that no click reaches the plot.
-      addEventListener("pointerup", ({ clientX: x, clientY: y }) => {
-        const isClick = pressed && Math.hypot(x - pressed[0], y - pressed[1]) <= 4;
-        pressed = null;
-        const index = isClick ? designAt(plot, x, y) : null;
-        if (index !== null) tell(plot, { index });
-      });
-      plot.on("plotly_selected", (event) => {
-        if (!event?.range) return;
-        const { axes, ends } = plot.layout.meta;
-        const [left, right] = ordered(event.range.x),
-          heights = ordered(event.range.y);
-        // The axes in the box, or else the one beside it.
-        const nearest = Math.round((left + right) / 2);
-        const isIn = (k) => (k >= left && k <= right) || k === nearest;
-        const brushes = axes.flatMap((axis, k) =>
-          isIn(k) ? [{ axis, ranges: [heights.map((each) => valueAt(ends[k], each))] }] : [],
-        );
-        tell(plot, { brushes });
-      });
-      plot.on("plotly_deselect", () =>
-        brush(
-          plot,
-          plot.layout.meta.axes.map(() => []),
-        ),
-      );
-    },
+  // The press that goes on; the plot under the pointer and the place there; whether the server is
+  // asked about one. It is asked again once it has answered, if the pointer is elsewhere by then.
+  let pressed = null,
+    pointer = null,
+    asked = null;
+  const ask = () => {
+    asked = pointer;
+    tell(pointer.plot, "read", pointer.place);
   };
-  // Milliseconds after which a plot that is not drawn yet is looked at again.
-  const AGAIN = 150;
-  let timer = null;
-  const look = () => {
-    for (const plot of document.querySelectorAll(".js-plotly-plot")) {
-      const meta = plot.layout?.meta;
-      if (!plot.on) timer ??= window.explorer.clock.after(AGAIN, lookAgain);
-      else if (!plot.explorerListens && listen[meta?.explorer]) {
-        plot.explorerListens = true;
-        listen[meta.explorer](plot);
-      }
+  const draw = ({ plot, start }, end) => {
+    const box = plot.querySelector(".drag"),
+      [left, right] = [start[0], end[0]].toSorted((a, b) => a - b),
+      [low, high] = [start[1], end[1]].toSorted((a, b) => a - b),
+      sides = { x: left, y: 1 - high, width: right - left, height: high - low };
+    for (const [name, share] of Object.entries(sides)) {
+      box.setAttribute(name, share * plot.viewBox.baseVal.width);
     }
   };
-  const lookAgain = () => {
-    timer = null;
-    look();
+  addEventListener("pointermove", (event) => {
+    if (pressed) {
+      if (isDrag(event)) draw(pressed, placeIn(pressed.plot, event));
+      return;
+    }
+    const plot = plotAt(event.target);
+    if (pointer && pointer.plot !== plot) {
+      show(pointer.plot, "", "");
+      pointer = asked = null;
+    }
+    if (!plot) return;
+    pointer = { plot, place: placeIn(plot, event) };
+    if (!asked) ask();
+  });
+  const isDrag = ({ clientX, clientY }) =>
+    Math.hypot(clientX - pressed.x, clientY - pressed.y) > LEAST;
+  addEventListener("pointerdown", (event) => {
+    const plot = plotAt(event.target);
+    if (!plot || event.button !== 0) return;
+    pressed = { plot, start: placeIn(plot, event), x: event.clientX, y: event.clientY };
+  });
+  addEventListener("pointerup", (event) => {
+    if (!pressed) return;
+    const { plot, start } = pressed,
+      end = placeIn(plot, event);
+    tell(plot, isDrag(event) ? "brush" : "pick", end, start);
+    draw(pressed, start);
+    pressed = null;
+  });
+  addEventListener("pointercancel", () => {
+    if (pressed) draw(pressed, pressed.start);
+    pressed = null;
+  });
+  addEventListener("dblclick", (event) => {
+    const plot = plotAt(event.target);
+    if (plot) tell(plot, "free", placeIn(plot, event));
+  });
+  return (name, words, path) => {
+    if (!asked || JSON.parse(asked.plot.dataset.plot).plot !== name) return;
+    show(asked.plot, words, path);
+    const isElsewhere = asked !== pointer;
+    asked = null;
+    if (isElsewhere) ask();
   };
-  // Plots come and go with their tab, and searching the page for them is cheap.
-  new MutationObserver(look).observe(document.body, { childList: true, subtree: true });
-  look();
-  return true;
 })();

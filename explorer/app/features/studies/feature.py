@@ -1,25 +1,24 @@
 """Studies: a tab to open one, brush and pick in its two plots, and start a small one; a chip.
 
-viser's plots report nothing to the server. The script `plots` sends each of their events as a press
-whose value is a line of JSON. The server draws brushes and picks, for every browser.
+The script `plots` sends what is done to a plot as a press whose value is a line of JSON. The server
+finds the design or the axes there, and draws brushes and picks, for every browser.
 """
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Literal
 
 import msgspec
 import viser
 
 from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.downloads import File
-from explorer.app.browser.viser_gaps import run_script
+from explorer.app.browser.viser_gaps import run_script, run_script_in
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
 from explorer.app.features.studies.actions import BrushAxes, OpenStudy, PickDesign, free_axes
-from explorer.app.features.studies.feed import PlotJson, StudyDrawing
+from explorer.app.features.studies.figures import PlotName, brushes_in, reading_of, row_at
 from explorer.app.features.studies.folders import keep_study, study_folders
 from explorer.app.features.studies.state import (
     COUNTS,
@@ -33,7 +32,7 @@ from explorer.app.features.studies.words import BUTTONS, acts, chips, head, lege
 from explorer.app.features.studies.work import study_runner
 from explorer.app.inputs.controls import At, Bound, Control, Controls
 from explorer.app.inputs.ranges import Span
-from explorer.app.look import read_script
+from explorer.app.look import call_script, read_script
 from explorer.app.session.session import Change, Who
 from explorer.app.state.actions import Action, Set
 from explorer.app.state.frame import Frame
@@ -50,8 +49,6 @@ from explorer.numerics.number_text import format_number
 from explorer.sweep.results import load_results, table_bytes
 from explorer.sweep.study import NAMES, decode_study
 
-# Height over width.
-PARALLEL_ASPECT, SCATTER_ASPECT = 0.28, 0.42
 Axis = Literal["across", "up", "colour"]
 AXES: dict[Axis, tuple[str, str]] = {
     "across": ("Across", "Measure or variable from left to right in the scatter plot."),
@@ -69,18 +66,27 @@ LOOKS = {
 }
 
 
+Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+Pixels = Annotated[float, msgspec.Meta(gt=0.0)]
+
+
 class PlotEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A click on a design in a plot, or a change of its brushes.
+    """What a pointer does to a plot.
 
     Attributes:
         study: Name of the study of the plot.
-        index: Index of the design; None for a brush.
-        brushes: New ranges of axes; an axis without ranges is freed.
+        plot: Name of the plot.
+        act: Read or pick the design at a place, brush the axes of a box, or free all axes.
+        start, end: Places where it begins and ends.
+        size: Width and height of the plot, in pixels.
     """
 
     study: str
-    index: Annotated[int, msgspec.Meta(ge=0, le=2**31)] | None = None
-    brushes: tuple[Brush, ...] = ()
+    plot: PlotName
+    act: Literal["read", "pick", "brush", "free"]
+    start: tuple[Share, Share]
+    end: tuple[Share, Share]
+    size: tuple[Pixels, Pixels]
 
 
 DECODER = msgspec.json.Decoder(PlotEvent)
@@ -92,7 +98,7 @@ class StudiesPanel:
     def __init__(self, services: Services) -> None:
         gui, session, none = services.gui, services.session, (NO_OPTION,)
         gui.add_html(beside(2))
-        self._services, self._tab = services, services.tab
+        self._services = services
         self._session = session
         self._complain = services.complain
         self.choice = gui.add_dropdown(
@@ -113,27 +119,27 @@ class StudiesPanel:
         # viser's folders cannot be folded from here; one without a title is shown or hidden.
         with gui.add_folder(None, visible=False) as self.form:
             self._add_new_study(gui)
-        lines_after = gui.add_html("")
+        self.lines = gui.add_html("")
         self._axes_mark = gui.add_html(beside(3), visible=False)
         self._axes: list[tuple[viser.GuiDropdownHandle[str], Control[str]]] = []
         for axis, (label, hint) in AXES.items():
             handle = gui.add_dropdown(label, none, hint=hint, visible=False)
             self._axes.append((handle, Control[str](session, handle, self._bind_axis(axis))))
         self.legend = gui.add_html("")
-        points_after = gui.add_html(beside(2, wide=True))
-        self._plots_after = lines_after, points_after
-        self.plots: tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle] | None = None
+        gui.add_html(beside(2, wide=True))
+        self.points = gui.add_html("")
         self.table = gui.add_html("")
         self.runner = services.get(study_runner)
         self.feed = self.runner.feed
         services.buttons.on("studies.plot", self._receive)
+        run_script(services.server, read_script("plots"))
         self._add_buttons(services.buttons)
         self._looks = Chips(services.buttons, session, "studies.look", "", LOOKS)
         self._key: tuple[object, ...] = ()
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
-        self.feed.follow(frame, dark=self._services.theme.is_dark)
+        self.feed.follow(frame)
         studies, drawing, run = Studies.of(frame.state), self.feed.drawing, self.runner.run
         names = (NO_OPTION, *dict.fromkeys((*self.feed.names, *filter(None, (studies.name,)))))
         yield self.choice, "options", names
@@ -162,7 +168,9 @@ class StudiesPanel:
         plan = studies.plan if is_new else None
         lines = head(None if problem else drawing, run, plan, frame.state.design.name)
         yield self._head, "content", lines + (problem or "")
-        yield from self._plots(drawing)
+        lines, points = ("", "") if drawing is None else drawing.plots
+        yield self.lines, "content", lines
+        yield self.points, "content", points
         yield self.legend, "content", "" if drawing is None else legend(drawing)
         yield self.table, "content", "" if drawing is None else table(drawing)
         yield self.chips, "content", chips(studies.plan, frame.state.design)
@@ -180,37 +188,27 @@ class StudiesPanel:
         name = str(drawing.studies.name)
         self._session.do(PickDesign(design, index=index, study=name), who=who)
 
-    def _plots(self, drawing: StudyDrawing | None) -> Iterator[Update]:
-        plots = None if drawing is None else drawing.plots
-        if plots is not None and self.plots is None and not is_missing("study"):
-            self.plots = self._add_plots()
-        for handle in self.plots or ():
-            yield handle, "visible", plots is not None
-        for handle, plot in zip(self.plots or (), plots or (), strict=False):
-            yield handle, "figure", plot
-
-    def _add_plots(self) -> tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle]:
-        """Add the plots when they are first needed: each browser then loads Plotly, some 5 MB."""
-        gui = self._services.gui
-        # viser only calls `to_json` of a figure.
-        empty = cast("Any", PlotJson({"data": [], "layout": {}}))
-        # Each plot comes between the elements before and after it.
-        after_lines, after_points = (handle.order + 0.5 for handle in self._plots_after)
-        with self._tab or contextlib.nullcontext():
-            lines = gui.add_plotly(empty, aspect=PARALLEL_ASPECT, order=after_lines)
-            points = gui.add_plotly(empty, aspect=SCATTER_ASPECT, order=after_points)
-        run_script(self._services.server, read_script("plots"))
-        return lines, points
-
     def _receive(self, line: str, client: viser.ClientHandle) -> None:
-        event = decode_text(line, DECODER)
+        event, drawing = decode_text(line, DECODER), self.feed.drawing
         # An event in the plot of another study is out of date.
-        if event is None or event.study != Studies.of(self._session.state).name:
+        if event is None or drawing is None or event.study != drawing.studies.name:
             return
-        if event.index is not None:
-            self.pick(event.index, client.client_id)
-        elif event.brushes:
-            self._session.do(BrushAxes(event.brushes), who=client.client_id)
+        plotted, who = drawing.plotted, client.client_id
+        if plotted is None:
+            return
+        if event.act == "free":
+            free = (Brush(name, ()) for name in plotted.axes_of(event.plot))
+            self._session.do(BrushAxes(tuple(free)), who=who)
+        elif event.act == "brush":
+            brushes = brushes_in(plotted, event.plot, event.start, event.end)
+            self._session.do(BrushAxes(tuple(brushes)), who=who)
+        else:
+            row = row_at(plotted, event.plot, event.end, event.size)
+            if event.act == "read":
+                answer = reading_of(plotted, event.plot, row)
+                run_script_in(client, call_script("plots", event.plot, *answer))
+            elif row is not None:
+                self.pick(int(plotted.results.columns["index"][row]), who)
 
     def _bind_axis(self, axis: Axis) -> Bound[str]:
         def read(_: Frame) -> str:

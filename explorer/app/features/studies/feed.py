@@ -12,10 +12,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-import msgspec
 import numpy as np
 
-from explorer.app.features.studies.figures import Figure, PlotRows, parallel, scatter, select_rows
+from explorer.app.features.studies.figures import PlotRows, lines_html, points_html, select_rows
 from explorer.app.features.studies.folders import StudyFolders, study_in
 from explorer.app.features.studies.state import Studies, StudyPlan
 from explorer.app.session.latest import LatestWins
@@ -30,20 +29,8 @@ MOST_ON_PAGE = 100_000
 """Number of designs of the largest study that the page shows."""
 
 
-class PlotJson:
-    """A figure in the form that viser takes, encoded at once."""
-
-    def __init__(self, figure: Figure) -> None:
-        self._text = msgspec.json.encode(figure).decode()
-
-    def to_json(self) -> str:
-        """Return the figure as JSON."""
-        return self._text
-
-
-Request: TypeAlias = tuple[Studies, int, bool]
-"""What is drawn: the studies without the plan, the version of their results, and whether the page
-is dark."""
+Request: TypeAlias = tuple[Studies, int]
+"""What is drawn: the studies without the plan, and the version of their results."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +43,7 @@ class StudyDrawing:
         front: Rows on the Pareto front, the best in the first objective first.
         inside: Whether each row lies within all brushes, shape (n,).
         plotted: Rows and axes of the plots; None while there is nothing to show.
-        plots: Parallel lines and scatter plot.
+        plots: The lines and the points as HTML; empty while there is nothing to show.
         reasons: Counts of the rows that are not done, by status and reason, most frequent first.
     """
 
@@ -65,7 +52,7 @@ class StudyDrawing:
     front: IntArray
     inside: BoolArray
     plotted: PlotRows | None
-    plots: tuple[PlotJson, PlotJson] | None
+    plots: tuple[str, str]
     reasons: tuple[tuple[str, str, int], ...]
 
     @property
@@ -94,7 +81,6 @@ class StudyFeed:
         self.problem: str | None = None
         self._redraw = redraw
         self._version = itertools.count(1)
-        self._revision = itertools.count(1)
         self._computed = 0
         self._request: Request | None = None
         self._drawing: StudyDrawing | None = None
@@ -110,13 +96,13 @@ class StudyFeed:
             return None
         return drawing if drawing.studies.name == request[0].name else None
 
-    def follow(self, frame: Frame, *, dark: bool = False) -> None:
+    def follow(self, frame: Frame) -> None:
         """Draw the study of a frame, unless it is drawn already."""
         studies = Studies.of(frame.state)
         if studies.name is None:
             self._request = self._drawing = self.problem = None
             return
-        request = replace(studies, plan=StudyPlan()), self._computed, dark
+        request = replace(studies, plan=StudyPlan()), self._computed
         if request != self._request:
             self._request = request
             self._jobs.post("draw", time.monotonic(), request)
@@ -151,16 +137,12 @@ class StudyFeed:
                 self._drawing, self.problem = None, f"{why}{error}"
         self._redraw()
 
-    def _draw(self, studies: Studies, version: int, dark: bool) -> StudyDrawing:
+    def _draw(self, studies: Studies, version: int) -> StudyDrawing:
         results, front = self._results(str(studies.name), version)
-        seen, plots = select_rows(results, front, studies), None
+        seen, plots = select_rows(results, front, studies), ("", "")
         inside = np.ones(results.count, dtype=np.bool_) if seen is None else seen.inside
         if seen is not None:
-            revision = next(self._revision)
-            plots = (
-                PlotJson(parallel(seen, revision, dark=dark)),
-                PlotJson(scatter(seen, revision, dark=dark)),
-            )
+            plots = lines_html(seen), points_html(seen)
         ordered = sort_front(results, front)
         return StudyDrawing(studies, results, ordered, inside, seen, plots, reasons(results))
 

@@ -1,30 +1,34 @@
-"""The two plots of a study as plain data for Plotly, limited to what a browser can draw.
+"""The two plots of a study as HTML, and the designs and ranges at a place on them.
 
-They are made without Plotly itself. Numbers go as pack arrays (`bdata`), which is a tenth of the
-work of text.
+All designs of one colour are one path of SVG, which the browser draws at once. The drawing is
+stretched to the room that there is; words stand beside it. A place on a plot is given in shares of
+its width and height, from its lower left corner.
 """
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from html import escape
+from typing import Literal
 
+import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from explorer.app.features.studies import state
+from explorer.app.widgets.markup import by_theme, reading
+from explorer.export.drawings.mechanism import round_length
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.number_text import format_number
 from explorer.sweep.results import Results
 
-Figure: TypeAlias = dict[str, Any]
+PlotName = Literal["lines", "points"]
+"""Name of a plot: each design as a line over all axes, or as a point over two of them."""
 
-MOST_ROWS, MOST_LINES = 2000, 500
-"""Largest numbers of rows drawn as points and as lines; of more rows, the front and some of the
-others. More would cover one another, and without a graphics card would stop the page."""
+MOST_ROWS: dict[PlotName, int] = {"lines": 500, "points": 2000}
+"""Largest number of designs in each plot; of more, the front and some of the others. More would
+cover one another."""
 
 # Statuses of designs that have measures.
 MEASURED = ("done", "not converged")
@@ -33,24 +37,32 @@ MEASURED = ("done", "not converged")
 NO_SPREAD = 1e-9
 
 FRONT, PICKED = "#c2185b", "#0a9d6c"
-# Colours of the other designs from the least to the greatest value, by whether the page is dark.
-SCALE = {
-    False: ("#c9d6e6", "#8fb0d2", "#4a7fb5", "#1f4f86"),
-    True: ("#34506f", "#4477a6", "#7aabd6", "#cbe2f6"),
-}
+SCALE = tuple(
+    by_theme(*colours)
+    for colours in (
+        ("#b9cbe0", "#3a5878"),
+        ("#86a9ce", "#4a7fb0"),
+        ("#4a7fb5", "#7aabd6"),
+        ("#1f4f86", "#cbe2f6"),
+    )
+)
+"""Colours of the designs that are not on the front, from the least to the greatest value."""
 # Colours of points without the value that colours the others, and of those outside the brushes.
-PLAIN = "rgba(128,136,148,0.6)"
-LEFT_OUT = "rgba(128,136,148,0.22)"
-TEXT = "#7d8794"
-GRID = "rgba(128,136,148,0.22)"
-# Background of the plots, by theme; digits have a rim of this colour.
-PAPER = {False: "#ffffff", True: "#242424"}
-# Colour of the values on the axes, by theme.
-INK = {False: "#1f2328", True: "#f0f2f4"}
-# Half the width of a brush on an axis of the parallel lines, as a share of their distance.
-BRUSH = 0.06
-# Tilt of the titles of the parallel lines, in degrees.
-TILT = 24
+PLAIN, LEFT_OUT = "rgb(128 136 148 / 60%)", "rgb(128 136 148 / 22%)"
+# Units of the drawing along its sides, and the share of a side before the first value of an axis
+# and after the last one.
+SIDE, RIM = 10_000, 0.04
+# Pixels from a design within which a place is on it.
+NEAR = 8.0
+# Width of a brush on an axis of the lines, as a share of the distance of the axes.
+BRUSH = 0.24
+HINTS: dict[PlotName, str] = {
+    "lines": "Drag along an axis to filter, double-click to free the axes; click a design to open "
+    "it.",
+    "points": "Drag a box to filter, double-click to free both axes; click a design to open it.",
+}
+
+Place = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -63,11 +75,10 @@ class PlotRows:
         inside: Whether each row lies within all brushes, shape (n,).
         studies: Open study, brushes, axes and pick.
         axes: Variables and measures that differ between rows.
-        across, up: Axes of the scatter plot, from left to right and from bottom to top.
+        across, up: Axes of the points, from left to right and from bottom to top.
         colour: Axis that colours the plots.
-        rows: Rows with values on both axes of the scatter plot, ascending.
-        lines: Rows with values on all axes of the parallel lines, ascending.
-        count: Number of rows with values on both axes of the scatter plot, drawn or not.
+        rows: Rows of each plot, with values on all of its axes, ascending.
+        count: Number of rows with values on both axes of the points, drawn or not.
         lacking: Number of measured rows without a line, and the axes that they lack.
         picked: Row of the picked design, none or one, shape (0 or 1,).
         ends: Least and greatest value on each axis.
@@ -81,8 +92,7 @@ class PlotRows:
     across: str
     up: str
     colour: str
-    rows: IntArray
-    lines: IntArray
+    rows: Mapping[PlotName, IntArray]
     count: int
     lacking: tuple[int, tuple[str, ...]]
     picked: IntArray
@@ -92,19 +102,37 @@ class PlotRows:
         """Whether an axis is one of logarithms: as chosen, where all values are positive."""
         return self.studies.logarithmic and self.ends[name][0] > 0.0
 
-    def share_of(self, name: str, values: FloatArray) -> FloatArray:
-        """Return the heights of values on an axis of the parallel lines, from 0 to 1."""
+    def place_of(self, name: str, values: FloatArray) -> FloatArray:
+        """Return the places of values along an axis."""
         low, high = self.ends[name]
         if self.is_logarithmic(name):
-            return np.log(values / low) / math.log(high / low)
-        return (values - low) / (high - low)
+            values, low, high = np.log(values), math.log(low), math.log(high)
+        return RIM + (1.0 - 2.0 * RIM) * (values - low) / (high - low)
 
-    def value_at(self, name: str, share: float) -> float:
-        """Return the value at a height of an axis of the parallel lines."""
+    def value_at(self, name: str, place: float) -> float:
+        """Return the value at a place along an axis."""
         low, high = self.ends[name]
+        share = (place - RIM) / (1.0 - 2.0 * RIM)
         if self.is_logarithmic(name):
             return low * (high / low) ** share
         return low + share * (high - low)
+
+    def axes_of(self, plot: PlotName) -> tuple[str, ...]:
+        """Return the axes of a plot."""
+        return self.axes if plot == "lines" else (self.across, self.up)
+
+    def places(self, plot: PlotName, rows: IntArray) -> FloatArray:
+        """Return the corners of the lines of rows, or their points, shape (n, k, 2)."""
+        along = np.column_stack(
+            [self.place_of(name, self.column(name)[rows]) for name in self.axes_of(plot)]
+        )
+        if plot == "points":
+            return along[:, None]
+        return np.stack([np.broadcast_to(self.middles(), along.shape), along], axis=-1)
+
+    def middles(self) -> FloatArray:
+        """Return the places of the axes of the lines from left to right, each within its column."""
+        return (np.arange(len(self.axes)) + 0.5) / len(self.axes)
 
     def column(self, name: str) -> FloatArray:
         """Return the values of all rows."""
@@ -150,8 +178,10 @@ def select_rows(results: Results, front: BoolArray, studies: state.Studies) -> P
         across,
         up,
         studies.colour if studies.colour in axes else first,
-        thin_out(points, keep[points], MOST_ROWS),
-        thin_out(lines, keep[lines], MOST_LINES),
+        {
+            "lines": thin_out(lines, keep[lines], MOST_ROWS["lines"]),
+            "points": thin_out(points, keep[points], MOST_ROWS["points"]),
+        },
         len(points),
         (
             int((is_measured & ~on_lines).sum()),
@@ -189,236 +219,179 @@ def _has_spread(values: FloatArray) -> bool:
     return len(values) > 0 and high - low > NO_SPREAD * max(abs(low), abs(high))
 
 
-def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
-    """Return the plot with an axis for each variable and measure, and a line for each design.
-
-    The lines of one colour are one path of the page, which takes a thousandth of the time that
-    Plotly's own plot of this kind takes without a graphics card.
+def row_at(plotted: PlotRows, plot: PlotName, place: Place, size: Place) -> int | None:
+    """Return the row drawn nearest to a place on a plot; None if none is near.
 
     Args:
-        plotted: Rows and axes to draw.
-        revision: Number that differs from the last plot's, so that Plotly forgets its boxes.
-        dark: Whether the page is dark.
+        plotted: Rows and axes of the plots.
+        plot: Name of the plot.
+        place: The place.
+        size: Width and height of the plot, in pixels.
     """
-    rows, names = plotted.lines, plotted.axes
-    inside, front = plotted.inside[rows], plotted.front[rows]
-    heights = np.column_stack(
-        [plotted.share_of(name, plotted.column(name)[rows]) for name in names]
-    )
-    level = heights[:, names.index(plotted.colour)]
-    bin_of = np.minimum(level * len(SCALE[dark]), len(SCALE[dark]) - 1).astype(np.int64)
-    others = inside & ~front
-    groups = [
-        (~inside, LEFT_OUT, 0.7),
-        *((others & (bin_of == k), colour, 0.8) for k, colour in enumerate(SCALE[dark])),
-        (inside & front, FRONT, 1.0),
-        (np.isin(rows, plotted.picked), PICKED, 3.0),
-    ]
-    gap = np.array([math.nan])
-    traces: list[Figure] = [
-        {
-            "type": "scatter",
-            "mode": "lines",
-            "x": pack(np.tile(np.append(np.arange(len(names)), gap), int(which.sum()))),
-            "y": pack(np.column_stack([heights[which], np.repeat(gap, which.sum())]).ravel()),
-            "customdata": pack(plotted.results.columns["index"][rows[which]], "i4"),
-            "line": {"color": colour, "width": width},
-            "hoverinfo": "skip",
+    rows = plotted.rows[plot]
+    corners, at = plotted.places(plot, rows) * size, np.multiply(place, size)
+    start = corners[:, :-1] if plot == "lines" else corners
+    way = np.diff(corners, axis=1) if plot == "lines" else np.zeros_like(corners)
+    square = np.maximum((way**2).sum(axis=-1), 1e-12)
+    share = np.clip(((at - start) * way).sum(axis=-1) / square, 0.0, 1.0)
+    away = np.linalg.norm(start + share[..., None] * way - at, axis=-1).min(axis=1, initial=NEAR)
+    return int(rows[away.argmin()]) if len(rows) and away.min() < NEAR else None
+
+
+def brushes_in(plotted: PlotRows, plot: PlotName, corner: Place, other: Place) -> list[state.Brush]:
+    """Return the brushes of a box between two corners: of the axes in it, or of the nearest one."""
+    (left, right), (low, high) = map(sorted, zip(corner, other, strict=True))
+    if plot == "points":
+        ends = {plotted.across: (left, right), plotted.up: (low, high)}
+    else:
+        middles = plotted.middles()
+        is_in = (middles >= left) & (middles <= right)
+        is_in[np.abs(middles - 0.5 * (left + right)).argmin()] = True
+        ends = {
+            name: (low, high) for name, chosen in zip(plotted.axes, is_in, strict=True) if chosen
         }
-        for which, colour, width in groups
-        if which.any()
-    ]
-    marks = [(k, share) for k in range(len(names)) for share in (0.0, 0.5, 1.0)]
-    traces.append(
-        {
-            "type": "scatter",
-            "mode": "text",
-            "x": [k for k, _ in marks],
-            "y": [share for _, share in marks],
-            "text": [format_number(plotted.value_at(names[k], share), 3) for k, share in marks],
-            "textposition": "middle right",
-            "textfont": {"size": 10, "color": INK[dark]},
-            "cliponaxis": False,
-            "hoverinfo": "skip",
-        }
-    )
-    margin = {"l": 34, "r": 104, "t": 70, "b": 12}
-    figure = _figure(plotted, "parallel", traces, margin, dark=dark)
-    figure["layout"]["meta"] |= {
-        "axes": names,
-        "ends": [[*plotted.ends[name], plotted.is_logarithmic(name)] for name in names],
-    }
-    figure["layout"] |= {
-        "xaxis": {
-            "tickvals": [*range(len(names))],
-            "ticktext": [*map(state.short_title_of, names)],
-            "tickangle": -TILT,
-            "ticklabeloverflow": "allow",
-            "side": "top",
-            "range": [-0.1, len(names) - 0.9],
-            "gridcolor": GRID,
-            "zeroline": False,
-            "fixedrange": True,
-        },
-        "yaxis": {"visible": False, "range": [-0.05, 1.05], "fixedrange": True},
-        "hovermode": False,
-        "selectdirection": "d",
-        "shapes": [
-            _box(
-                (k - BRUSH, k + BRUSH),
-                plotted.share_of(name, np.clip(ends, *plotted.ends[name])).tolist(),
-            )
-            for k, name in enumerate(names)
-            for ends in plotted.studies.ranges_of(name)
-        ],
-        **_selecting(revision),
-    }
-    return figure
-
-
-def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
-    """Return the plot of two measures with a point for each design; see `parallel`."""
-    front, inside = plotted.front[plotted.rows], plotted.inside[plotted.rows]
-    is_picked = np.isin(plotted.rows, plotted.picked)
-    colours = plotted.column(plotted.colour)[plotted.rows]
-    is_coloured = np.isfinite(colours)
-    low, high = _ends(colours[is_coloured])
-    gradient = {
-        "colorscale": [[k / 3, colour] for k, colour in enumerate(SCALE[dark])],
-        "cmin": low,
-        "cmax": high,
-        "colorbar": {
-            "title": {
-                "text": state.title_of(plotted.colour),
-                "side": "right",
-                "font": {"size": 11},
-            },
-            "thickness": 9,
-            "outlinewidth": 0,
-            "nticks": 5,
-        },
-    }
-    others = inside & ~front
-    coloured = {"size": 6, "color": pack(colours[others & is_coloured]), **gradient}
-    disc = {"size": 8, "color": FRONT, "line": {"width": 1, "color": PAPER[dark]}}
-    ring: Figure = {"size": 15, "symbol": "circle-open", "color": PICKED}
-    ring["line"] = {"width": 3, "color": PICKED}
-    traces = [
-        _points(plotted, ~inside & ~front, {"size": 5, "color": LEFT_OUT}),
-        _points(plotted, others & is_coloured, coloured),
-        _points(plotted, ~inside & front, {"size": 6, "color": FRONT, "opacity": 0.25}),
-    ]
-    if not is_coloured.all():
-        traces.append(_points(plotted, others & ~is_coloured, {"size": 6, "color": PLAIN}))
-    on_front = _points(plotted, inside & front, disc)
-    objectives = [objective.measure for objective in plotted.results.study.objectives]
-    if sorted(objectives) == sorted((plotted.across, plotted.up)):
-        # The front's points from left to right, in a line.
-        on_front |= {"mode": "lines+markers", "line": {"color": FRONT, "width": 1.5}}
-    traces += [on_front, _points(plotted, is_picked, ring)]
-    figure = _figure(plotted, "scatter", traces, {"l": 62, "r": 10, "t": 12, "b": 42}, dark=dark)
-    figure["layout"] |= {
-        "xaxis": _axis(plotted, plotted.across),
-        "yaxis": _axis(plotted, plotted.up),
-        "hovermode": "closest",
-        "shapes": _boxes(plotted),
-        **_selecting(revision),
-    }
-    return figure
-
-
-def _selecting(revision: int) -> Figure:
-    """Return the part of a layout by which a drag selects a box, forgotten at a new revision."""
-    return {"dragmode": "select", "selections": (), "selectionrevision": revision}
-
-
-def pack(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
-    """Return numbers as Plotly takes them in one piece: "f4" or "i4"."""
-    data = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
-    return {"dtype": kind, "bdata": base64.b64encode(data).decode()}
-
-
-def _points(plotted: PlotRows, which: BoolArray, marker: Mapping[str, Any]) -> Figure:
-    rows = plotted.rows[which]
-    rows = rows[np.argsort(plotted.column(plotted.across)[rows], kind="stable")]
-    x, y = (
-        f"{state.label_of(name)} %{{{axis}:,.5~r}} {state.unit_of(name)}".replace(" °", "°")
-        for axis, name in (("x", plotted.across), ("y", plotted.up))
-    )
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "x": pack(plotted.column(plotted.across)[rows]),
-        "y": pack(plotted.column(plotted.up)[rows]),
-        "customdata": pack(plotted.results.columns["index"][rows], "i4"),
-        "hovertemplate": f"<b>design %{{customdata}}</b><br>{x}<br>{y}<extra></extra>",
-        "marker": dict(marker),
-        # The server draws the points outside the brushes.
-        "unselected": {"marker": {"opacity": marker.get("opacity", 1.0)}},
-    }
-
-
-def _boxes(plotted: PlotRows) -> list[dict[str, Any]]:
-    """Return the brushes of the two axes as boxes, or as bands where one is free."""
-    across = plotted.studies.ranges_of(plotted.across)
-    up = plotted.studies.ranges_of(plotted.up)
-    if not across and not up:
-        return []
-    free: tuple[tuple[state.Range, str], ...] = (((0.0, 1.0), " domain"),)
-    columns = tuple((ends, "") for ends in across) or free
-    rows = tuple((ends, "") for ends in up) or free
     return [
-        {**_box(x, y), "xref": f"x{x_domain}", "yref": f"y{y_domain}"}
-        for x, x_domain in columns
-        for y, y_domain in rows
+        state.Brush(name, ((plotted.value_at(name, least), plotted.value_at(name, most)),))
+        for name, (least, most) in ends.items()
     ]
 
 
-def _box(x: state.Range, y: state.Range) -> Figure:
-    """Return a box over points and lines, from its ends on both axes."""
-    return {
-        "type": "rect",
-        "x0": x[0],
-        "x1": x[1],
-        "y0": y[0],
-        "y1": y[1],
-        "fillcolor": "rgba(34,104,212,0.12)",
-        "line": {"width": 1, "color": "rgba(34,104,212,0.55)"},
-    }
+def reading_of(plotted: PlotRows, plot: PlotName, row: int | None) -> tuple[str, str]:
+    """Return what is read at a row of a plot and its path, both "" for none."""
+    if row is None:
+        return "", ""
+    values = ", ".join(
+        f"{state.title_of(name)} {format_number(float(plotted.column(name)[row]), 5)}"
+        for name in plotted.axes_of(plot)
+    )
+    index = plotted.results.columns["index"][row]
+    return f"Design {index}: {values}", path_of(plotted.places(plot, np.array([row])))
 
 
-def _axis(plotted: PlotRows, name: str) -> dict[str, Any]:
-    return {
-        "type": "log" if plotted.is_logarithmic(name) else "linear",
-        "title": {"text": state.title_of(name), "standoff": 6, "font": {"size": 11}},
-        "gridcolor": GRID,
-        "zeroline": False,
-        "nticks": 7,
-        "separatethousands": True,
-        # A zoom stays as long as the axis is the same.
-        "uirevision": name,
-    }
+def path_of(places: FloatArray) -> str:
+    """Return lines or points, shape (n, k, 2), as the data of an SVG path."""
+    scaled = np.rint(places * (SIDE, -SIDE) + (0.0, SIDE)).astype(np.int64).tolist()
+    return "".join(f"M{' '.join(f'{x},{y}' for x, y in each)}h0" for each in scaled)
 
 
-def _figure(
-    plotted: PlotRows, plot: str, data: list[Figure], margin: Mapping[str, int], *, dark: bool
-) -> Figure:
-    layout = {
-        "showlegend": False,
-        "paper_bgcolor": PAPER[dark],
-        "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": TEXT if not dark else "#aeb6c0", "family": "inherit", "size": 11},
-        "margin": dict(margin),
-        "hoverlabel": {"font": {"size": 11}},
-        "separators": ".,",
-        "meta": {
-            "explorer": plot,
-            "study": plotted.studies.name,
-            "axes": [plotted.across, plotted.up],
-        },
-    }
-    config = {"displayModeBar": False, "doubleClick": "reset", "responsive": False}
-    return {"data": data, "layout": layout, "config": config}
+def ticks_of(plotted: PlotRows, name: str) -> FloatArray:
+    """Return the round values of an axis within its ends, ascending."""
+    low, high = plotted.ends[name]
+    if plotted.is_logarithmic(name) and high > 10.0 * low:
+        powers = np.arange(math.floor(math.log10(low)), math.ceil(math.log10(high)))
+        ticks = np.outer(np.power(10.0, powers), (1.0, 2.0, 5.0)).ravel()
+    else:
+        step = round_length(0.3 * (high - low))
+        ticks = step * np.arange(math.ceil(low / step), math.floor(high / step) + 1)
+    return np.array(ticks[(ticks >= low) & (ticks <= high)], dtype=np.float64)
+
+
+def lines_html(plotted: PlotRows) -> str:
+    """Return the plot with an axis for each variable and measure, and a line for each design."""
+    names, middles = plotted.axes, plotted.middles()
+    grid = [[(x, RIM), (x, 1.0 - RIM)] for x in middles]
+    half = 0.5 * BRUSH / len(names)
+    boxes = [
+        _box((x - half, x + half), ends)
+        for x, name in zip(middles.tolist(), names, strict=True)
+        for ends in _ranges(plotted, name)
+    ]
+    titles = "".join(f'<span class="title">{escape(state.title_of(name))}</span>' for name in names)
+    least, most = (
+        "".join(f"<span>{format_number(plotted.ends[name][end], 3)}</span>" for name in names)
+        for end in (0, 1)
+    )
+    drawing = _drawing(plotted, "lines", np.array(grid), boxes)
+    return (
+        f'<div class="ex-plot is-lines" style="--columns:{len(names)}">'
+        f"{titles}{most}{drawing}{least}</div>{reading(HINTS['lines'])}"
+    )
+
+
+def points_html(plotted: PlotRows) -> str:
+    """Return the plot of two variables or measures, with a point for each design."""
+    across, up = (ticks_of(plotted, name) for name in (plotted.across, plotted.up))
+    x, y = plotted.place_of(plotted.across, across), plotted.place_of(plotted.up, up)
+    grid = [[(at, 0.0), (at, 1.0)] for at in x] + [[(0.0, at), (1.0, at)] for at in y]
+    columns, rows = _ranges(plotted, plotted.across), _ranges(plotted, plotted.up)
+    free = [(0.0, 1.0)]
+    boxes = [_box(x, y) for x in columns or free for y in rows or free if columns or rows]
+    drawing = _drawing(plotted, "points", np.reshape(grid, (-1, 2, 2)), boxes)
+    return (
+        '<div class="ex-plot is-points">'
+        f'<span class="title">{escape(state.title_of(plotted.up))}</span>'
+        f"{_values('up', 'top', 1.0 - y, up)}{drawing}{_values('across', 'left', x, across)}"
+        f'<span class="title">{escape(state.title_of(plotted.across))}</span>'
+        f"</div>{reading(HINTS['points'])}"
+    )
+
+
+def _drawing(plotted: PlotRows, plot: PlotName, grid: FloatArray, boxes: list[str]) -> str:
+    """Return the designs of a plot as SVG, over lines and boxes."""
+    rows = plotted.rows[plot]
+    places, picked = plotted.places(plot, rows), np.isin(rows, plotted.picked)
+    inside, front = plotted.inside[rows], plotted.front[rows]
+    shares = plotted.place_of(plotted.colour, plotted.column(plotted.colour)[rows])
+    is_coloured, others = np.isfinite(shares), inside & ~front
+    level = (np.nan_to_num(shares) * len(SCALE)).astype(np.int64)
+    best = inside & front
+    pieces = [
+        _path("grid", grid),
+        *boxes,
+        _path("", places[~inside], LEFT_OUT),
+        _path("", places[others & ~is_coloured], PLAIN),
+        *(
+            _path("", places[others & is_coloured & (level == k)], colour)
+            for k, colour in enumerate(SCALE)
+        ),
+    ]
+    objectives = sorted(objective.measure for objective in plotted.results.study.objectives)
+    if plot == "points" and objectives == sorted((plotted.across, plotted.up)):
+        # The front from left to right, in a line.
+        order = np.argsort(places[best][:, 0, 0], kind="stable")
+        pieces.append(_path("step", places[best][order].reshape(1, -1, 2), FRONT))
+    pieces += [
+        _path("front", places[best], FRONT),
+        _path("picked", places[picked], PICKED),
+        _path("core", places[picked]),
+    ]
+    facts = msgspec.json.encode({"study": plotted.studies.name, "plot": plot}).decode()
+    words = f"Plot of {len(rows)} designs as {plot}"
+    return (
+        f'<svg viewBox="0 0 {SIDE} {SIDE}" preserveAspectRatio="none" role="img" '
+        f'aria-label="{words}" data-plot="{escape(facts)}">{"".join(pieces)}'
+        '<path class="near"/><rect class="drag"/></svg>'
+    )
+
+
+def _path(look: str, places: FloatArray, colour: str = "") -> str:
+    if not places.size:
+        return ""
+    stroke = f' style="stroke:{colour}"' if colour else ""
+    return f'<path class="{look}"{stroke} d="{path_of(places)}"/>'
+
+
+def _ranges(plotted: PlotRows, name: str) -> list[state.Range]:
+    """Return the places of the ends of the brushes of an axis."""
+    ranges = np.reshape(plotted.studies.ranges_of(name), (-1, 2))
+    low, high = plotted.place_of(name, np.clip(ranges, *plotted.ends[name])).T.tolist()
+    return list(zip(low, high, strict=True))
+
+
+def _box(x: state.Range, y: state.Range) -> str:
+    """Return the box of a brush, from its ends on both axes."""
+    left, right, top, bottom = (round(SIDE * each) for each in (*x, 1.0 - y[1], 1.0 - y[0]))
+    size = f'width="{right - left}" height="{bottom - top}"'
+    return f'<rect class="brush" x="{left}" y="{top}" {size}/>'
+
+
+def _values(look: str, side: str, places: FloatArray, values: FloatArray) -> str:
+    """Return values beside an axis, each at its place from one side."""
+    texts = "".join(
+        f'<span style="--{side}:{100.0 * place:.2f}%">{format_number(value, 5)}</span>'
+        for place, value in zip(places.tolist(), values.tolist(), strict=True)
+    )
+    return f'<span class="values is-{look}">{texts}</span>'
 
 
 def _ends(values: FloatArray) -> state.Range:

@@ -247,13 +247,6 @@ def title_of(name: str) -> str:
     return f"{label_of(name)} [{unit}]" if unit else label_of(name)
 
 
-def short_title_of(name: str) -> str:
-    """Return the title of an axis where there is little room, with its unit: u is one unit."""
-    unit = unit_of(name).replace("units", "u")
-    words = label_of(name).replace("inverse condition", "inv. cond.")
-    return f"{words} [{unit}]" if unit else words
-
-
 def _toggle(order: tuple[str, ...], chosen: tuple[str, ...], name: str) -> tuple[str, ...]:
     if name not in order:
         raise InputError(f"there is no {name!r}; there are {', '.join(order)}")

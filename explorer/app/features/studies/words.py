@@ -8,11 +8,11 @@ from html import escape
 import numpy as np
 
 from explorer.app.features.studies.feed import StudyDrawing
-from explorer.app.features.studies.figures import FRONT, MOST_LINES, PICKED, SCALE
+from explorer.app.features.studies.figures import FRONT, MOST_ROWS, PICKED, SCALE
 from explorer.app.features.studies.state import StudyPlan, choices_for, label_of, title_of
 from explorer.app.features.studies.work import StudyRun
 from explorer.app.widgets.buttons import extra_button, press_button
-from explorer.app.widgets.markup import box, by_theme, dim, meter
+from explorer.app.widgets.markup import box, dim, meter
 from explorer.files.extras import is_missing
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import Design
@@ -61,8 +61,8 @@ def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
         clear = press_button("studies.clear", "", "clear", hint=hint, class_name="ex-link")
         parts.append(f"<b>{format_number(inside)}</b> within the brushes {clear}")
     plotted = drawing.plotted
-    if plotted is not None and plotted.count > MOST_LINES:
-        points, lines = map(format_number, (len(plotted.rows), len(plotted.lines)))
+    if plotted is not None and plotted.count > MOST_ROWS["lines"]:
+        points, lines = (format_number(len(plotted.rows[plot])) for plot in ("points", "lines"))
         parts.append(f"{points} drawn as points and {lines} as lines, the front first")
     if plotted is not None and plotted.lacking[0]:
         lacking, names = plotted.lacking
@@ -180,18 +180,16 @@ def _button(name: str, *, is_main: bool = False) -> str:
 
 
 def legend(drawing: StudyDrawing) -> str:
-    """Return the legend of the plots and how to use them, as HTML."""
+    """Return the legend of the plots as HTML."""
     plotted = drawing.plotted
     if plotted is None:
         return ""
-    colours = ",".join(map(by_theme, SCALE[False], SCALE[True]))
-    bar = f'<span class="ex-legend is-inline" style="--colours:{colours}"></span>'
+    least, most = (format_number(end, 3) for end in plotted.ends[plotted.colour])
+    bar = f'<span class="ex-legend is-inline" style="--colours:{",".join(SCALE)}"></span>'
     return (
         f'<div class="ex-note ex-dim">{_dot(FRONT)}Pareto front &nbsp; '
-        f"{bar}other designs, by {escape(label_of(plotted.colour))} &nbsp; "
-        f'<span class="ex-ring" style="--colour:{PICKED}"></span>'
-        "picked<br>Drag along an axis, or a box over points, to brush; double-click frees it; "
-        "click a design to make it the live one.</div>"
+        f'<span class="ex-ring" style="--colour:{PICKED}"></span>picked &nbsp; '
+        f"others by {escape(title_of(plotted.colour))}: {least}{bar}{most}</div>"
     )
 
 
