@@ -25,7 +25,7 @@ T = TypeVar("T")
 LONGEST_LINE = 300
 # Longest part of a file in a message, in characters.
 _LONGEST_QUOTE = 60
-# Bytes of a file that are searched for the names of fields; a multiple of four.
+# Bytes of a file that are searched for the names of fields.
 _LONGEST_START = 1 << 17
 # Fields that are nested deeper than any of ours are not looked for.
 _DEEPEST = 16
@@ -92,11 +92,8 @@ def decode_text(data: bytes) -> str:
 
 def field_names(data: bytes) -> set[str | int | EllipsisType]:
     """Return the names of the outermost fields at the start of a text; none if it is no JSON."""
-    try:
-        places = _places(decode_text(data[:_LONGEST_START]))
-        return {path[0] for path, _ in places if len(path) == 1}
-    except InputError:
-        return set()
+    start = data[:_LONGEST_START].decode(json.detect_encoding(data), "ignore")
+    return {path[0] for path, _ in _places(start) if len(path) == 1}
 
 
 def check_unique_fields(text: str) -> None:

@@ -41,9 +41,7 @@ def decode_design(data: bytes, source: str) -> Design:
             repeated fields or unusable values.
     """
     if len(data) > LARGEST_FILE:
-        raise DesignError(
-            f"{source}: {len(data)} bytes is no design file; they stay below {LARGEST_FILE}"
-        )
+        raise DesignError(f"{source}: a design file has at most 1 MB")
     with located_errors(data, Design, source, DesignError) as text:
         schema = msgspec.json.decode(text, type=_Versioned).schema
         if schema not in READ_SCHEMAS:

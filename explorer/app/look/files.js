@@ -8,6 +8,7 @@ window.explorer.files ??= (() => {
   const root = document.documentElement;
   let button = null,
     waiting = [],
+    isSending = false,
     count = 0;
   const send = async (file) => {
     // A folder cannot be read.
@@ -35,14 +36,15 @@ window.explorer.files ??= (() => {
       sendMessage({ type: "FileTransferPart", ...ids, part_index, content: part });
     }
   };
-  // The server asks for the next one of several files once it has taken one.
+  // The server takes one file at a time, and asks for the next one.
   window.explorer.sendFile = () => {
     const file = waiting.shift();
+    isSending = Boolean(file);
     if (file) send(file);
   };
   const open = (files) => {
-    waiting = [...files];
-    window.explorer.sendFile();
+    waiting.push(...files);
+    if (!isSending) window.explorer.sendFile();
   };
   addEventListener(
     "change",
@@ -69,7 +71,10 @@ window.explorer.files ??= (() => {
     delete root.dataset.drop;
     open(event.dataTransfer.files);
   });
+  // Files of a lost connection are not sent to the next one.
   return (uuid) => {
     button = uuid;
+    waiting = [];
+    isSending = false;
   };
 })();

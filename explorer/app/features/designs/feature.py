@@ -32,6 +32,9 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 from explorer.numerics.number_text import format_number
 
+# Byte order marks, the zeros of UTF-16, and blanks.
+BEFORE_JSON = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
+
 _Request = tuple[Callable[[], object], Who]
 
 
@@ -118,6 +121,8 @@ class SavedDesigns:
         who = None if client is None else client.client_id
 
         def work() -> None:
+            if not data.lstrip(BEFORE_JSON).startswith(b"{"):
+                raise InputError(f"{name} is no design, study or session; these are JSON files")
             openers, fields = self._services.openers, field_names(data)
             opener = next((openers[each] for each in openers if each in fields), open_design)
             action, words = opener(self._services, data, name)

@@ -261,7 +261,8 @@ def reading_of(plotted: PlotRows, plot: PlotName, row: int | None) -> tuple[str,
     if row is None:
         return "", ""
     values = ", ".join(
-        f"{state.title_of(name)} {format_number(float(plotted.column(name)[row]), 5)}"
+        f"{state.label_of(name)} {format_number(float(plotted.column(name)[row]), 4)} "
+        f"{state.unit_of(name)}".rstrip()
         for name in plotted.axes_of(plot)
     )
     index = plotted.results.columns["index"][row]

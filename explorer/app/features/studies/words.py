@@ -87,7 +87,7 @@ def _summary(study: Study) -> str:
         (
             f"objectives: {objectives}" if objectives else "no objectives",
             f"varied: {', '.join(map(label_of, study.varied))}",
-            f"1 unit (u) = {format_number(study.base.unit_mm, 6)} mm",
+            f"1 unit = {format_number(study.base.unit_mm, 6)} mm",
         )
     )
 
