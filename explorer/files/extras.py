@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import sys
 from importlib.util import find_spec
 from typing import Any
 
@@ -20,13 +21,16 @@ EXTRAS = {
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs an extra, in a checkout of this project."""
-    return f'pip install ".[{extra}]"'
+    """Return the command that installs an extra, in a checkout of this project; "" for none."""
+    # OMPL has packages for Linux alone.
+    is_offered = extra != "planning" or sys.platform == "linux"
+    return f'pip install ".[{extra}]"' if is_offered else ""
 
 
 def need_of(extra: str) -> str:
     """Return what needs an extra, and how to install it, as the end of a sentence."""
-    return f"{EXTRAS[extra][0]} need the extra {extra}: {install_command(extra)}"
+    how = install_command(extra) or "it has packages for Linux alone"
+    return f"{EXTRAS[extra][0]} need the extra {extra}: {how}"
 
 
 @functools.cache

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Generator
 from contextlib import closing
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,8 @@ from explorer.app.state.actions import Open, Set, SetJoint, SetPosition
 from explorer.app.state.compared import SLOTS
 from explorer.app.widgets import assigning
 from explorer.app.widgets.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
-from explorer.app.widgets.buttons import Buttons, press_button
+from explorer.app.widgets.buttons import Buttons, extra_button, press_button
+from explorer.files.extras import EXTRAS, install_command
 from explorer.files.packaged import SOURCES
 from explorer.mechanism.design_file import PRESETS
 
@@ -67,6 +69,19 @@ def test_press_of_a_client_is_one_step(running: Running, tab: SocketTab) -> None
         session.do(UNDO)
     assert session.wait_until_idle()
     assert session.state.compared.is_empty
+
+
+@pytest.mark.parametrize("extra", EXTRAS)
+def test_button_of_a_missing_library_says_what_needs_it_and_copies_the_command(
+    extra: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    html = extra_button(extra)
+    assert f'data-value="{extra}"' in html
+    for words in (EXTRAS[extra][0][1:], escape(install_command(extra))):
+        assert words in html
+    # No button where there is nothing to install.
+    monkeypatch.setattr("sys.platform", "win32")
+    assert ("<button" in extra_button(extra)) == (extra != "planning")
 
 
 def test_press_that_nothing_offers_does_nothing(running: Running, tab: SocketTab) -> None:

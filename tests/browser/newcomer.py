@@ -150,6 +150,7 @@ class Newcomer:
 
     def drop(self, file: Path) -> None:
         """Drop a file on the scene."""
+        self.presses += 1
         transfer = self.page.evaluate_handle(DROPPED, [file.name, file.read_text()])
         self.page.dispatch_event("canvas", "drop", {"dataTransfer": transfer})
 

@@ -245,7 +245,12 @@ def test_study_is_started_brushed_and_a_design_of_it_picked(newcomer: Newcomer) 
     newcomer.press("Start study")
     newcomer.sees(re.compile("32 designs · .* on the Pareto front"))
     newcomer.button("New study").wait_for()
+    newcomer.sees(re.compile("^Pareto front: "))
+    # Two of them type the number, so that a first table takes the other two.
     assert newcomer.presses_for() == 4
+    table = newcomer.export("Study", "CSV").decode().splitlines()
+    assert [line.split(",")[0] for line in table[1:]] == [*map(str, range(32))]
+    assert newcomer.presses_for() == 2
     newcomer.wait()
     # The words of an axis stand above its middle.
     x, y = middle(newcomer.sees("volume [units³]"))
@@ -418,6 +423,13 @@ def test_mistakes_are_refused_with_a_reason_and_lose_nothing(
     )
     expect(newcomer.notices("broken.json")).to_have_count(1)
     expect(volume).to_contain_text(volume_of(OPTIMAL))
+    newcomer.presses_for()
+    good = tmp_path / "good.json"
+    good.write_bytes(encode_design(CHANGED))
+    newcomer.drop(good)
+    expect(newcomer.notices("good.json is open")).to_have_count(1)
+    expect(volume).to_contain_text(volume_of(CHANGED))
+    assert newcomer.presses_for() == 1
 
 
 def test_bar_tabs_and_main_buttons_are_in_view_in_a_larger_window(

@@ -26,6 +26,7 @@ from explorer import __version__
 from explorer.cli import COMMANDS, run
 from explorer.cli.parsing import load_command, parse
 from explorer.errors import InputError
+from explorer.files.extras import EXTRAS
 from explorer.files.packaged import list_pages, read_page
 from explorer.optimise.problem import OBJECTIVES
 
@@ -48,6 +49,15 @@ MEASURED = ("README.md", "claims.md")
 
 def read(name: str) -> str:
     return DOCUMENTS[name].read_text(encoding="utf-8")
+
+
+def test_first_command_of_the_readme_installs_what_the_page_offers() -> None:
+    assert '".[full]"' in read("README.md").partition("## The first minute")[0]
+    extras: dict[str, list[str]] = PROJECT["optional-dependencies"]
+    whole, *others = extras["full"]
+    included = set(re.findall(r"\w+", whole.partition("[")[2]))
+    for extra in EXTRAS.keys() - {"cluster"} - included:
+        assert all(any(each in other for other in others) for each in extras[extra])
 
 
 def test_manual_pages_are_all_listed_glossary_first() -> None:

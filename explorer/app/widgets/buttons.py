@@ -9,6 +9,7 @@ dropped.
 from __future__ import annotations
 
 import contextlib
+import sys
 from collections.abc import Callable, Container
 from concurrent.futures import ThreadPoolExecutor
 from html import escape
@@ -19,7 +20,7 @@ import viser
 from explorer.app.browser.browser_facts import decode_text
 from explorer.app.browser.viser_gaps import element_id, run_script, run_script_in
 from explorer.app.look import read_script
-from explorer.app.widgets.markup import meter
+from explorer.app.widgets.markup import meter, note
 from explorer.app.widgets.palette import STEP, Command, Key
 from explorer.files.extras import EXTRAS, install_command, need_of
 from explorer.measures.blocks.source import Source
@@ -177,15 +178,22 @@ COPY_INSTALL = "extra.copy"
 
 
 def extra_button(extra: str) -> str:
-    """Return a button as HTML that says which extra is missing for what, and copies the command."""
+    """Return a button as HTML that says which extra is missing for what, and copies the command.
+
+    On a system that has no such library, it is a note.
+    """
     words = need_of(extra)
     content = escape(words[:1].upper() + words[1:])
+    if not install_command(extra):
+        return note(content)
     hint = "Copy the command; run it in the checkout of the explorer, and start the explorer again."
-    return press_button(COPY_INSTALL, extra, content, hint=hint, class_name="ex-button")
+    return press_button(COPY_INSTALL, extra, content, hint=hint, class_name="ex-button is-extra")
 
 
 def _copy_install(extra: str, client: viser.ClientHandle) -> None:
-    run_script_in(client, read_script("copies", install_command(extra)))
+    # The pip of the Python that runs the page, which may not be the first one of a shell.
+    python = f'"{sys.executable}"' if " " in sys.executable else sys.executable
+    run_script_in(client, read_script("copies", f"{python} -m {install_command(extra)}"))
 
 
 def open_button(
