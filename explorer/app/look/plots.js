@@ -1,8 +1,10 @@
 // Sends what a pointer does to the plots of studies as presses of "studies.plot", and shows what the
 // server reads there. Places are shares of the width and height of a plot, from its lower left corner.
 window.explorer.plots ??= (() => {
-  // Pixels beyond which a press is a drag.
-  const LEAST = 4;
+  const { clock } = window.explorer;
+  // Pixels beyond which a press is a drag; milliseconds in which a click may become a double one.
+  const LEAST = 4,
+    AGAIN = 300;
   const plotAt = (target) => target?.closest?.("[data-plot]") ?? null;
   const within = (share) => Math.min(1, Math.max(0, share));
   const placeIn = (plot, { clientX, clientY }) => {
@@ -20,11 +22,13 @@ window.explorer.plots ??= (() => {
     reading.textContent = words || reading.dataset.hint;
     plot.querySelector(".near").setAttribute("d", path);
   };
-  // The press that goes on; the plot under the pointer and the place there; whether the server is
-  // asked about one. It is asked again once it has answered, if the pointer is elsewhere by then.
+  // The press that goes on; the plot under the pointer and the place there; the ones that the server
+  // is asked about, again once it has answered if the pointer is elsewhere by then; the pick that
+  // waits.
   let pressed = null,
     pointer = null,
-    asked = null;
+    asked = null,
+    picking = null;
   const ask = () => {
     asked = pointer;
     tell(pointer.plot, "read", pointer.place);
@@ -63,7 +67,9 @@ window.explorer.plots ??= (() => {
     if (!pressed) return;
     const { plot, start } = pressed,
       end = placeIn(plot, event);
-    tell(plot, isDrag(event) ? "brush" : "pick", end, start);
+    clock.cancel(picking);
+    if (isDrag(event)) tell(plot, "brush", end, start);
+    else picking = clock.after(AGAIN, () => tell(plot, "pick", end));
     draw(pressed, start);
     pressed = null;
   });
@@ -73,7 +79,9 @@ window.explorer.plots ??= (() => {
   });
   addEventListener("dblclick", (event) => {
     const plot = plotAt(event.target);
-    if (plot) tell(plot, "free", placeIn(plot, event));
+    if (!plot) return;
+    clock.cancel(picking);
+    tell(plot, "free", placeIn(plot, event));
   });
   return (name, words, path) => {
     if (!asked || JSON.parse(asked.plot.dataset.plot).plot !== name) return;
